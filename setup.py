@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Package description for pip and for colcon (ament_python)."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+PACKAGE = 'shipdrag_ros'
+
+ROS = [  # the edge: a node on a machine without ROS from apt
+    'ros-jazzy-rclpy',
+    'ros-jazzy-rmw-fastrtps-cpp',  # rclpy alone brings no middleware
+    'ros-jazzy-common-interfaces',
+]
+DEVELOPMENT = [
+    'pytest',
+    'pytest-timeout',  # a hung node must not hang the suite
+    'pytest-xdist',  # the suite in minutes on two cores
+    'hypothesis',  # property tests: cut invariance, bad input
+    'mypy',
+    'types-PyYAML',
+    'ruff',
+    'psutil',  # memory and CPU in the benchmarks
+    'mcap-ros2-support',  # an independent reader to check our bags against
+    'colcon-core',  # the same tree builds as an ament_python package
+    'colcon-ros',
+    'colcon-python-setup-py',
+    'setuptools',
+]
+
+setup(
+    name=PACKAGE,
+    version='0.1.0',
+    description='Hydrodynamic resistance of a ship from its coastdowns, live and from bags',
+    author='shipdrag_ros maintainers',
+    author_email='maintainers@shipdrag.example.org',
+    license='Apache-2.0',
+    python_requires='>=3.11',
+    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
+    package_data={
+        PACKAGE: ['py.typed', 'data/*'],
+        f'{PACKAGE}.report': ['*.html'],
+    },
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
+        (f'share/{PACKAGE}', ['package.xml']),
+        (f'share/{PACKAGE}/launch', glob('launch/*.launch.py')),
+        (f'share/{PACKAGE}/config', glob('config/*')),
+    ],
+    zip_safe=False,
+    install_requires=[
+        'numpy',
+        'scipy',  # PCHIP tables, ODE integration, statistical tests
+        'numba',  # compiled per-sample kernels: validation, onset
+        'PyYAML',  # ship and parameter files
+        'mcap',  # bags in and out
+        'rosbags',  # message definitions and CDR without ROS; rosbag2 directories
+        'rich',  # tables and progress bars in the terminal
+        'matplotlib',  # pictures of a report
+        'Jinja2',  # the report's page, with escaping
+    ],
+    extras_require={'ros': ROS, 'dev': DEVELOPMENT},
+    entry_points={
+        'console_scripts': [
+            f'shipdrag = {PACKAGE}.cli:main',
+            f'coastdown_node = {PACKAGE}.node.main:main',
+        ],
+    },
+)

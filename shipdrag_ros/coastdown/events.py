@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the monitor reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from shipdrag_ros.estimation.result import Estimate
+
+
+class State(Enum):
+    """Where the monitor stands."""
+
+    WAITING = 'waiting'  # not enough record to know what steady is
+    STEADY = 'steady'  # watching for an onset
+    CANDIDATE = 'candidate'  # decelerating, not yet confirmed
+    COASTDOWN = 'coastdown'  # confirmed, estimating
+
+
+class EndedBy(Enum):
+    """Why a coastdown ended."""
+
+    SPEED = 'speed'  # the minimum speed was reached
+    TURN = 'turn'
+    ENGINE = 'engine'  # re-engaged, or the speed settled or rose
+    DATA_STOP = 'data_stop'
+    RESET = 'reset'
+    RECORD_END = 'record_end'
+    GIVEN = 'given'  # the window was given by hand
+
+
+@dataclass(frozen=True)
+class Onset:
+    """A coastdown was confirmed; it began at `start_ns`."""
+
+    start_ns: int
+    detected_ns: int
+
+
+@dataclass(frozen=True)
+class Update:
+    """An estimate during a coastdown, of all samples from its start to `stamp_ns`."""
+
+    stamp_ns: int
+    estimate: Estimate
+
+
+@dataclass(frozen=True)
+class NoEstimate:
+    """No estimate was possible at `stamp_ns`."""
+
+    stamp_ns: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Coastdown:
+    """
+    A coastdown that has ended.
+
+    `estimate` is None where none was possible; `failure` then says why.
+    `onset_detected_ns` is None where the window was given; `heading_rad` (yaw, REP-103, at the
+    start) where there is no heading.
+    """
+
+    start_ns: int
+    end_ns: int
+    onset_detected_ns: int | None
+    ended_by: EndedBy
+    estimate: Estimate | None
+    failure: str | None = None
+    heading_rad: float | None = None
+
+
+@dataclass(frozen=True)
+class Reset:
+    """All memory was dropped, at arrival time `receive_ns`."""
+
+    receive_ns: int
+    reason: str
+
+
+Event = Onset | Update | NoEstimate | Coastdown | Reset

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Errors a user can mend.
+
+Each message says what is wrong, which value, and what to do. Anything else
+that is raised is a defect of this package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class ShipdragError(Exception):
+    """Base of all errors that a user can mend; the command line exits with 1."""
+
+
+class ProblemsError(ShipdragError):
+    """
+    Several findings reported together.
+
+    Parameters
+    ----------
+    subject
+        What was checked, a file name for instance.
+    problems
+        One line each: key, value and expectation.
+    """
+
+    def __init__(self, subject: str, problems: Sequence[str]) -> None:
+        self.subject = subject
+        self.problems = tuple(problems)
+        lines = '\n'.join(f'  - {problem}' for problem in self.problems)
+        super().__init__(f'{subject}: {len(self.problems)} problem(s)\n{lines}')
+
+
+class ShipFileError(ProblemsError):
+    """A ship file that cannot be used."""
+
+
+class ParameterError(ProblemsError):
+    """Parameters that are unknown, of the wrong type or out of range."""
+
+
+class BagError(ShipdragError):
+    """A bag that cannot be read or written."""
+
+
+class ImportDataError(ShipdragError):
+    """A CSV or NMEA source that cannot be turned into a bag."""
+
+
+class EstimationError(ShipdragError):
+    """A window from which no resistance can be estimated."""
+
+
+class SimulationError(ShipdragError):
+    """A simulation that was asked for something impossible."""

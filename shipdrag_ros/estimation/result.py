@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an estimator returns: the tuple (8) of S1, owning its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from shipdrag_ros.samples import Float64, Int64
+
+
+class FroudeMax(Enum):
+    """How the upper end of the valid range was found."""
+
+    INFLECTION = 'inflection'  # a maximum of dr/dFr whose fall is significant
+    BRANCH_TOP = 'branch_top'  # no such maximum: the top of the monotone branch
+
+
+@dataclass(frozen=True)
+class ResistanceCurve:
+    """
+    Specific resistance against speed, ascending in speed.
+
+    Attributes
+    ----------
+    speed_m_s : (m,)
+        Speed through water, strictly ascending [m/s].
+    resistance_m_s2 : (m,)
+        Specific resistance r, retarding positive [m/s^2 = N/kg].
+    sigma_m_s2 : (m,)
+        Standard deviation of r, S1 (13), the error of n_r included [m/s^2].
+    sigma_repeatable_m_s2 : (m,)
+        The same without the error of n_r, which repeats from run to run.
+    froude : (m,)
+        speed / sqrt(g L).
+    slope, slope_sigma : (m,)
+        dr/dFr and its standard deviation [m/s^2].
+    """
+
+    speed_m_s: Float64
+    resistance_m_s2: Float64
+    sigma_m_s2: Float64
+    sigma_repeatable_m_s2: Float64
+    froude: Float64
+    slope: Float64
+    slope_sigma: Float64
+
+    def __len__(self) -> int:
+        return len(self.speed_m_s)
+
+    def between(self, froude_min: float, froude_max: float) -> ResistanceCurve:
+        """
+        Return the part with froude_min <= Fr <= froude_max.
+        """
+        keep = (self.froude >= froude_min) & (self.froude <= froude_max)
+        return ResistanceCurve(
+            self.speed_m_s[keep],
+            self.resistance_m_s2[keep],
+            self.sigma_m_s2[keep],
+            self.sigma_repeatable_m_s2[keep],
+            self.froude[keep],
+            self.slope[keep],
+            self.slope_sigma[keep],
+        )
+
+
+@dataclass(frozen=True)
+class OrderTrial:
+    """One row of the order table: S1 (11) at one number of coefficients."""
+
+    order: int
+    variance: float  # s^2 of the problem solved
+    variance_speed: float  # of the speed channel, (m/s)^2; NaN if not used
+    variance_position: float  # of the position channel, m^2; NaN if not used
+    f: float  # F of the step from the order before; NaN at the first
+    p: float  # its probability by chance
+
+
+@dataclass(frozen=True)
+class Track:
+    """
+    One channel as measured and as fitted, for pictures and for residuals.
+
+    Attributes
+    ----------
+    time_ns : (n,) int64
+    measured, fitted : (n,)
+        [m/s], or [m] along the track.
+    """
+
+    time_ns: Int64
+    measured: Float64
+    fitted: Float64
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """
+    An estimate of r(v) from one window.
+
+    Attributes
+    ----------
+    estimator
+        Which problem was solved, `s1_joint` for instance.
+    start_ns, end_ns
+        First and last stamp used [ns].
+    order
+        Number of coefficients; None where orders are averaged.
+    orders
+        The order table.
+    samples
+        How many samples of each input were used.
+    noise_sd
+        Estimated standard deviation of each input, in its unit.
+    curve
+        r(v) on the whole monotone branch of v.
+    froude_valid
+        [Fr_min, Fr_max]: where r(v) may be used.
+    froude_max_by
+        Which rule gave Fr_max.
+    froude_max_argmax
+        argmax dr/dFr over the branch, as S1 has it.
+    w
+        max sigma_r / max r over the valid range, S1's figure of merit.
+    last_speed_m_s, last_speed_sigma_m_s, last_resistance_m_s2, last_sigma_m_s2
+        Estimates at `end_ns`.
+    tracks
+        Measured and fitted values of each input used.
+    current_m_s, current_sigma_m_s
+        Current along the track; None where it is not estimated.
+    reorthogonalised
+        How many basis columns needed a second orthogonalisation.
+    notes
+        What a reader must know to judge the figures, a sentence each.
+    """
+
+    estimator: str
+    start_ns: int
+    end_ns: int
+    order: int | None
+    orders: tuple[OrderTrial, ...]
+    samples: dict[str, int]
+    noise_sd: dict[str, float]
+    curve: ResistanceCurve
+    froude_valid: tuple[float, float]
+    froude_max_by: FroudeMax
+    froude_max_argmax: float
+    w: float
+    last_speed_m_s: float
+    last_speed_sigma_m_s: float
+    last_resistance_m_s2: float
+    last_sigma_m_s2: float
+    tracks: dict[str, Track]
+    current_m_s: float | None = None
+    current_sigma_m_s: float | None = None
+    reorthogonalised: int = 0
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def valid_curve(self) -> ResistanceCurve:
+        """r(v) inside the valid range."""
+        return self.curve.between(*self.froude_valid)
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the window [s]."""
+        return float(np.int64(self.end_ns) - np.int64(self.start_ns)) * 1e-9
