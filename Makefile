@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+# make demo, make test: each works alone on a fresh machine and installs what it needs into .venv.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/installed
+
+# all traffic of demo and tests stays on this machine
+export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+
+.PHONY: help env demo test lint types tests lock clean
+
+help:
+	@echo 'make demo   simulated ship -> ROS topics -> node -> bag -> replay -> report'
+	@echo 'make test   lint, types, tests'
+	@echo 'make env    only the environment, in $(VENV)'
+	@echo 'make lock   resolve the dependencies anew into requirements.lock (needs uv)'
+
+env: $(STAMP)
+
+$(STAMP): requirements.lock setup.py setup.cfg pyproject.toml
+	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(0 if (3, 11) <= v < (3, 14) else \
+	    f"ERROR: {sys.executable} is Python {v.major}.{v.minor}; 3.11 to 3.13 is needed: make PYTHON=python3.12 ...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+demo: env
+	$(BIN)/shipdrag demo --out demo
+
+test: lint types tests
+
+lint: env
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: env
+	$(BIN)/mypy
+
+tests: env
+	$(BIN)/python -m pytest -n 2
+
+lock:
+	uv pip compile --quiet --universal --python-version 3.11 --extra ros --extra dev --generate-hashes \
+	    --no-header setup.py -o requirements.lock
+
+clean:
+	rm -rf $(VENV) build install log demo *.egg-info
