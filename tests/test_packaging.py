@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The same tree as a pip package and as an ament_python package."""
+
+from __future__ import annotations
+
+import compileall
+import os
+import re
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+import shipdrag_ros
+
+ROOT = Path(__file__).resolve().parents[1]
+COLCON = Path(sys.executable).with_name('colcon')
+PARTS = ('package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'LICENSE', 'README.md')
+FOLDERS = ('resource', 'shipdrag_ros', 'launch', 'config')
+
+
+@pytest.fixture(scope='module')
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the package with colcon in a workspace of its own; return the install prefix."""
+    if not COLCON.exists():
+        pytest.skip('colcon is not installed')
+    workspace = tmp_path_factory.mktemp('workspace')
+    source = workspace / 'src' / 'shipdrag_ros'
+    source.mkdir(parents=True)
+    for name in PARTS:
+        if (ROOT / name).exists():
+            shutil.copy(ROOT / name, source)
+    for name in FOLDERS:
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns('__pycache__'))
+    environment = {**os.environ, 'PATH': f'{COLCON.parent}{os.pathsep}{os.environ["PATH"]}'}
+    done = subprocess.run(
+        [COLCON, 'build'],
+        cwd=workspace,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return workspace / 'install' / 'shipdrag_ros'
+
+
+def test_ament_index_finds_the_colcon_build(built: Path) -> None:
+    index = pytest.importorskip('ament_index_python.packages')
+    code = (
+        'from ament_index_python.packages import get_package_share_directory as s;'
+        'print(s("shipdrag_ros"))'
+    )
+    found = subprocess.run(
+        [sys.executable, '-c', code],
+        env={**os.environ, 'AMENT_PREFIX_PATH': str(built)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert index is not None
+    assert Path(found.stdout.strip()) == built / 'share' / 'shipdrag_ros'
+
+
+def test_colcon_build_has_all_that_ros2_run_and_launch_need(built: Path) -> None:
+    share = built / 'share' / 'shipdrag_ros'
+    assert (share / 'package.xml').exists()
+    # the hook that puts the package on AMENT_PREFIX_PATH; a bad maintainer e-mail drops it
+    assert (share / 'hook' / 'ament_prefix_path.sh').exists()
+    assert sorted(path.name for path in (built / 'lib' / 'shipdrag_ros').iterdir()) == [
+        'coastdown_node',
+        'shipdrag',
+    ]
+    for folder in ('launch', 'config'):
+        expected = {path.name for path in (ROOT / folder).iterdir() if path.is_file()}
+        assert {path.name for path in (share / folder).iterdir()} == expected != set()
+
+
+def test_launch_files_compile() -> None:
+    assert compileall.compile_dir(ROOT / 'launch', quiet=1, force=True)
+
+
+def test_package_xml_and_setup_agree() -> None:
+    xml = ElementTree.parse(ROOT / 'package.xml').getroot()
+    setup = (ROOT / 'setup.py').read_text()
+    assert xml.findtext('name') == 'shipdrag_ros'
+    assert xml.findtext('license') == 'Apache-2.0'
+    assert xml.findtext('version') == shipdrag_ros.__version__
+    assert f"version='{shipdrag_ros.__version__}'" in setup
+    maintainer = xml.find('maintainer')
+    assert maintainer is not None
+    email = maintainer.get('email', '')
+    assert re.fullmatch(r'[\w.+-]+@[\w-]+(\.[\w-]+)+', email)
+    assert f"author_email='{email}'" in setup
+
+
+def test_every_direct_dependency_is_pinned_with_a_hash() -> None:
+    setup = (ROOT / 'setup.py').read_text()
+    lock = (ROOT / 'requirements.lock').read_text().lower()
+    names = re.findall(r"^ {4,8}'([A-Za-z][\w-]*)',", setup, flags=re.MULTILINE)
+    assert 'numpy' in names
+    assert 'ros-jazzy-rclpy' in names
+    for name in names:
+        assert re.search(rf'^{re.escape(name.lower())}==\S+', lock, flags=re.MULTILINE), name
+    assert lock.count('--hash=sha256:') > 100
+
+
+def test_console_scripts_are_installed() -> None:
+    scripts = {item.name: item for item in entry_points(group='console_scripts')}
+    assert callable(scripts['shipdrag'].load())
+    pytest.importorskip('rclpy')
+    assert callable(scripts['coastdown_node'].load())
