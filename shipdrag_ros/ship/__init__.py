@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ship file: particulars, added mass, baseline resistance."""
+
+from shipdrag_ros.ship.added_mass import (
+    AddedMass,
+    ConstantAddedMass,
+    MerchantAddedMass,
+    TableAddedMass,
+)
+from shipdrag_ros.ship.baseline import Baseline, CoefficientBaseline, CoefficientSd, TableBaseline
+from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3, GRAVITY_M_S2, Ship
+from shipdrag_ros.ship.sections import Air, Effect, Propeller, Propulsion, Uncertain, Water
+
+__all__ = [
+    'AIR_DENSITY_KG_M3',
+    'GRAVITY_M_S2',
+    'AddedMass',
+    'Air',
+    'Baseline',
+    'CoefficientBaseline',
+    'CoefficientSd',
+    'ConstantAddedMass',
+    'Effect',
+    'MerchantAddedMass',
+    'Propeller',
+    'Propulsion',
+    'Ship',
+    'TableAddedMass',
+    'TableBaseline',
+    'Uncertain',
+    'Water',
+]

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The ship: what the ship file says, and what follows from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import MISSING, dataclass, fields
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shipdrag_ros.errors import ShipdragError, ShipFileError
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import strict_yaml
+from shipdrag_ros.ship.added_mass import AddedMass, MerchantAddedMass, added_mass, n_r
+from shipdrag_ros.ship.baseline import Baseline, TableBaseline, baseline
+from shipdrag_ros.ship.consistency import (
+    SLENDERNESS_MERCHANT_TRUSTED,
+    inconsistencies,
+    slenderness,
+)
+from shipdrag_ros.ship.fields import declare, list_of, number, plain, read_keys, section, text
+from shipdrag_ros.ship.sections import Air, Effect, Propeller, Propulsion, Water
+
+GRAVITY_M_S2 = 9.81
+AIR_DENSITY_KG_M3 = 1.225
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ship:
+    """
+    A ship as its file states it.
+
+    `load` and `from_yaml` check every value; constructing one directly does
+    not. Only the length and the volume are needed to estimate r(v); the
+    baseline is needed to simulate.
+    """
+
+    name: str = declare(text(), 'name of the ship', default='')
+    length_m: float = declare(number(0.5, 500.0, 'm'), 'waterline length')
+    displaced_volume_m3: float = declare(number(1e-4, 1e6, 'm^3'), 'displaced volume')
+    breadth_m: float | None = declare(number(0.05, 100.0, 'm'), 'waterline breadth', default=None)
+    draught_m: float | None = declare(number(0.01, 40.0, 'm'), 'draught', default=None)
+    wetted_surface_m2: float | None = declare(
+        number(0.01, 1e5, 'm^2'), 'wetted surface', default=None
+    )
+    water: Water = declare(section(Water), 'the water', default=Water())
+    added_mass: AddedMass = declare(
+        added_mass(), 'surge added mass over mass', default=MerchantAddedMass()
+    )
+    air: Air | None = declare(section(Air), 'above-water ship', default=None)
+    propeller: Propeller | None = declare(section(Propeller), 'propeller', default=None)
+    propulsion: Propulsion | None = declare(
+        section(Propulsion), 'run-down after the stop', default=None
+    )
+    baseline: Baseline | None = declare(baseline(), 'expected resistance', default=None)
+    effects: tuple[Effect, ...] = declare(
+        list_of(section(Effect)), 'effects on top of the baseline', default=()
+    )
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Ship:
+        """
+        Read a ship file.
+
+        Raises
+        ------
+        ShipFileError
+            Naming every problem of the file at once.
+        """
+        try:
+            content = Path(path).read_text(encoding='utf-8-sig')
+        except OSError as error:
+            problem = f'cannot be read: {error.strerror or error}'
+            raise ShipFileError(str(path), [problem]) from error
+        except ValueError as error:
+            raise ShipFileError(str(path), [f'is not a text file: {error}']) from error
+        return cls.from_yaml(content, subject=str(path))
+
+    @classmethod
+    def from_yaml(cls, content: str, *, subject: str) -> Ship:
+        """
+        Read the text of a ship file; `subject` names it in errors.
+
+        Raises
+        ------
+        ShipFileError
+            Naming every problem of the text at once.
+        """
+        try:
+            data, problems = strict_yaml.load(content)
+        except ValueError as error:
+            raise ShipFileError(subject, [f'not YAML: {error}']) from error
+        accepted = read_keys(cls, data, '', problems)
+        # a section that was refused is not checked as if it were the default
+        given = data if isinstance(data, dict) else {}
+        defaults = {
+            item.name: item.default
+            for item in fields(cls)
+            if item.name not in given and item.default is not MISSING
+        }
+        problems.extend(inconsistencies({**defaults, **accepted}))
+        if problems:
+            raise ShipFileError(subject, problems)
+        return cls(**accepted)
+
+    def to_yaml(self) -> str:
+        """
+        Return the text that `from_yaml` reads back as this ship.
+        """
+        return strict_yaml.dump(plain(self))
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of the displaced water."""
+        return self.water.density_kg_m3 * self.displaced_volume_m3
+
+    @property
+    def slenderness(self) -> float:
+        """L / V^(1/3)."""
+        return slenderness(self.length_m, self.displaced_volume_m3)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader of the results must know, a sentence each."""
+        low, high = SLENDERNESS_MERCHANT_TRUSTED
+        if isinstance(self.added_mass, MerchantAddedMass) and not low <= self.slenderness <= high:
+            return (
+                f'added_mass: merchant n_r at L/V^(1/3) = {self.slenderness:.3g}, outside the '
+                f'{low:g}..{high:g} it is trusted for',
+            )
+        return ()
+
+    @property
+    def _froude_one(self) -> float:
+        return math.sqrt(GRAVITY_M_S2 * self.length_m)
+
+    def froude(self, speed_m_s: ArrayLike) -> Float64:
+        """
+        Return the Froude number v / sqrt(g L).
+        """
+        return np.asarray(speed_m_s, np.float64) / self._froude_one
+
+    def speed(self, froude: ArrayLike) -> Float64:
+        """
+        Return the speed [m/s] at a Froude number.
+        """
+        return np.asarray(froude, np.float64) * self._froude_one
+
+    def n_r(self, speed_m_s: ArrayLike) -> Float64:
+        """
+        Return the unsteady-motion correction n_r at |v|.
+
+        Notes
+        -----
+        S1 (2).
+        """
+        return n_r(self.added_mass, np.abs(self.froude(speed_m_s)), self.slenderness)
+
+    def resistance_n(self, speed_m_s: ArrayLike) -> Float64:
+        """
+        Return the baseline resistance [N], odd in the speed.
+
+        Raises
+        ------
+        ShipdragError
+            Without a baseline, or outside its table.
+        """
+        if self.baseline is None:
+            raise ShipdragError(
+                f'ship {self.name!r} has no baseline resistance; add `baseline` to its ship file'
+            )
+        v = np.asarray(speed_m_s, np.float64)
+        magnitude = np.abs(v)
+        if isinstance(self.baseline, TableBaseline):
+            table: Float64 = np.sign(v) * self.baseline.resistance(magnitude)
+            return table
+        assert self.wetted_surface_m2 is not None  # the ship file was checked
+        reynolds = magnitude * self.length_m / self.water.kinematic_viscosity_m2_s
+        coefficient = self.baseline.viscous(reynolds) + self.baseline.wave(self.froude(magnitude))
+        pressure = 0.5 * self.water.density_kg_m3 * v * magnitude
+        return pressure * self.wetted_surface_m2 * coefficient + self.air_drag_n(v)
+
+    def air_drag_n(self, relative_wind_m_s: ArrayLike) -> Float64:
+        """
+        Return the air drag along the ship [N], retarding positive.
+
+        Parameters
+        ----------
+        relative_wind_m_s
+            Wind along the ship as felt on board, from ahead positive. In
+            still air: the speed over ground.
+        """
+        wind = np.asarray(relative_wind_m_s, np.float64)
+        if self.air is None:
+            return np.zeros_like(wind)
+        area = self.air.frontal_area_m2 * self.air.drag_coefficient
+        return 0.5 * AIR_DENSITY_KG_M3 * area * wind * np.abs(wind)

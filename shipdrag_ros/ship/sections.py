@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Small sections of the ship file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from shipdrag_ros.ship.fields import choice, declare, named, number, section, text
+
+
+@dataclass(frozen=True)
+class Water:
+    """
+    Water that the ship sails in; sea water at 15 degrees by default.
+    """
+
+    density_kg_m3: float = declare(number(900.0, 1100.0, 'kg/m^3'), 'density', default=1025.0)
+    kinematic_viscosity_m2_s: float = declare(
+        number(5e-7, 3e-6, 'm^2/s'), 'kinematic viscosity', default=1.19e-6
+    )
+
+
+@dataclass(frozen=True)
+class Air:
+    """
+    Above-water ship, for the air drag along it.
+    """
+
+    frontal_area_m2: float = declare(number(1e-3, 1e4, 'm^2'), 'frontal area above water')
+    drag_coefficient: float = declare(number(0.05, 2.0), 'drag coefficient on that area')
+
+
+@dataclass(frozen=True)
+class Propeller:
+    """
+    Propeller, and how it is while coasting.
+    """
+
+    diameter_m: float = declare(number(0.01, 15.0, 'm'), 'diameter')
+    state_in_baseline: str = declare(
+        choice('free', 'locked', 'none'), 'what the baseline contains'
+    )
+
+
+@dataclass(frozen=True)
+class Propulsion:
+    """
+    How thrust and shaft speed decay after the stop: exp(-t / run_down_s).
+    """
+
+    run_down_s: float = declare(number(0.0, 600.0, 's'), 'time constant; 0: at once')
+    sd: float = declare(number(0.0, 600.0, 's'), 'standard deviation of it', default=0.0)
+
+
+@dataclass(frozen=True)
+class Uncertain:
+    """
+    A value with its standard deviation.
+    """
+
+    value: float = declare(number(-1e12, 1e12), 'value')
+    sd: float = declare(number(0.0, 1e12), 'standard deviation')
+
+
+@dataclass(frozen=True)
+class Effect:
+    """
+    An effect added to the baseline, as a diagnosis writes it.
+    """
+
+    name: str = declare(text(), 'which effect')
+    parameters: Mapping[str, Uncertain] = declare(
+        named(section(Uncertain)), 'its parameters', hashed=False
+    )
