@@ -69,7 +69,7 @@ class TableAddedMass:
 
     model: str = declare(choice('table'), 'how n_r is found', default='table')
     coefficients: tuple[tuple[float, ...], ...] = declare(
-        list_of(numbers(-1e4, 1e4), minimum=1),
+        list_of(numbers(-1e4, 1e4, minimum=1), minimum=1),
         'rows: powers of Fr; columns: powers of L / V^(1/3)',
     )
     sd: float = _SD

@@ -19,6 +19,7 @@ Reader = Callable[[object, str, Problems], Any]
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
+_SHORT.maxlevel = 2  # lists that hold themselves would fill pages
 
 
 class _Invalid:
@@ -64,16 +65,18 @@ def number(low: float, high: float, unit: str = '') -> Kind:
     return Kind(read, expectation)
 
 
-def numbers(low: float, high: float, unit: str = '', *, ascending: bool = False) -> Kind:
+def numbers(
+    low: float, high: float, unit: str = '', *, ascending: bool = False, minimum: int = 2
+) -> Kind:
     """
-    Expect at least two finite numbers in low..high.
+    Expect a list of finite numbers in low..high.
     """
     one = number(low, high, unit)
     order = 'ascending ' if ascending else ''
-    expectation = f'a list of two or more {order}numbers, {one.expectation}'
+    expectation = f'a list of {minimum} or more {order}numbers, {one.expectation}'
 
     def read(value: object, path: str, problems: Problems) -> tuple[float, ...] | _Invalid:
-        if not isinstance(value, list) or len(value) < 2:
+        if not isinstance(value, list) or len(value) < minimum:
             problems.append(f'{path}: {show(value)}, expected {expectation}')
             return INVALID
         row = [one.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]
