@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of a result as text, the same in the terminal and on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
+from shipdrag_ros.report import words
+from shipdrag_ros.report.hulls import Ranking
+from shipdrag_ros.report.run import InputCounts
+from shipdrag_ros.report.truth import TrueCurve
+
+_UNITS = {'speed_through_water': 'm/s', 'speed_over_ground': 'm/s', 'position': 'm'}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Column heads and rows, ready to be shown."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def curve_table(
+    curve: ResistanceCurve, *, count: int = 10, truth: TrueCurve | None = None
+) -> Table:
+    """
+    Show about `count` points of a curve, evenly over its speeds.
+
+    The points are the estimated ones; only the truth is interpolated, and its
+    two columns are there only if it is known.
+    """
+    columns: tuple[str, ...] = ('speed [m/s]', '[knots]', 'Fr', 'r [m/s²]', 'sigma [m/s²]')
+    if truth is not None:
+        columns = (*columns, 'true r [m/s²]', 'error [%]')
+    if not len(curve):
+        return Table(columns, ())
+    wanted = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], count)
+    chosen = np.unique(np.abs(curve.speed_m_s[:, None] - wanted).argmin(axis=0))
+    rows = []
+    for i in chosen:
+        speed, r = float(curve.speed_m_s[i]), float(curve.resistance_m_s2[i])
+        cells: tuple[str, ...] = (
+            f'{speed:.2f}',
+            f'{speed / words.M_S_PER_KNOT:.1f}',
+            f'{curve.froude[i]:.3f}',
+            f'{r:.4g}',
+            f'{curve.sigma_m_s2[i]:.2g}',
+        )
+        if truth is not None:
+            true = float(truth.at(curve.speed_m_s[i]))
+            cells = (*cells, f'{true:.4g}', f'{100.0 * (r / true - 1.0):+.1f}')
+        rows.append(cells)
+    return Table(columns, tuple(rows))
+
+
+def facts(coastdown: Coastdown) -> Table:
+    """
+    Show how a coastdown was found and what its estimate rests on.
+    """
+    seconds = (coastdown.end_ns - coastdown.start_ns) * 1e-9
+    rows = [
+        ('start', words.utc(coastdown.start_ns)),
+        ('duration', words.duration(seconds)),
+        ('ended because', words.ENDED_BY[coastdown.ended_by]),
+    ]
+    if coastdown.onset_detected_ns is not None:
+        delay = (coastdown.onset_detected_ns - coastdown.start_ns) * 1e-9
+        rows.append(('confirmed after', words.duration(delay)))
+    if coastdown.estimate is not None:
+        rows.extend(_estimate_facts(coastdown.estimate))
+    return Table(('', ''), tuple(rows))
+
+
+def _estimate_facts(estimate: Estimate) -> list[tuple[str, str]]:
+    low, high = estimate.froude_valid
+    rows = [
+        ('estimator', words.estimator(estimate.estimator)),
+        (
+            'coefficients',
+            'averaged over orders' if estimate.order is None else f'{estimate.order}',
+        ),
+        ('samples used', ', '.join(f'{n} {name}' for name, n in estimate.samples.items())),
+        (
+            'noise found',
+            ', '.join(
+                f'{sd:.3g} {_UNITS.get(name, "")} {name}' for name, sd in estimate.noise_sd.items()
+            ),
+        ),
+        ('valid range', f'Fr {low:.3f} to {high:.3f}'),
+        ('upper end is', words.FROUDE_MAX_BY[estimate.froude_max_by]),
+        ('largest sigma / largest r', f'{100.0 * estimate.w:.2g} %'),
+    ]
+    if estimate.current_m_s is not None:
+        sd = float('nan') if estimate.current_sigma_m_s is None else estimate.current_sigma_m_s
+        current = words.plus_minus(estimate.current_m_s, 2.0 * sd)
+        rows.append(('current along the track', f'{current} m/s (two standard deviations)'))
+    return rows
+
+
+def inputs_table(inputs: Mapping[str, InputCounts]) -> Table:
+    """
+    Show the messages of each input and why some were not used.
+    """
+    return Table(
+        ('input', 'messages', 'used', 'rejected'),
+        tuple(
+            (
+                name,
+                f'{counts.messages}',
+                f'{counts.used}',
+                ', '.join(f'{n} {reason}' for reason, n in counts.rejected.items() if n) or '-',
+            )
+            for name, counts in inputs.items()
+        ),
+    )
+
+
+def ranking_table(ranking: Ranking) -> Table:
+    """
+    Show hulls by Fr_max, the best first.
+    """
+    rows = []
+    for place, hull in enumerate(ranking.hulls, start=1):
+        bound = hull.found_by is FroudeMax.BRANCH_TOP
+        rows.append(
+            (
+                f'{place}. {hull.label}',
+                f'{"at least " if bound else ""}{hull.froude_max:.3f}',
+                ', '.join(f'{other:.3f}' for other in hull.others) or '-',
+                words.FROUDE_MAX_BY[hull.found_by],
+            )
+        )
+    return Table(('hull', 'Fr_max', 'other coastdowns', 'found as'), tuple(rows))

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One page for one result: a file that carries its pictures and needs no network."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from shipdrag_ros import __version__
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.report import cells, pictures, words
+from shipdrag_ros.report.cells import Table
+from shipdrag_ros.report.hulls import Ranking
+from shipdrag_ros.report.run import RunResult
+
+
+@dataclass(frozen=True)
+class _Picture:
+    uri: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class _Coastdown:
+    heading: str
+    sentence: str
+    facts: Table
+    pictures: tuple[_Picture, ...]
+    curve: Table | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Run:
+    heading: str
+    ship: str
+    warnings: tuple[str, ...]
+    coastdowns: tuple[_Coastdown, ...]
+    inputs: Table
+    recorded: str
+
+
+@dataclass(frozen=True)
+class _Hulls:
+    table: Table
+    picture: _Picture
+    notes: tuple[str, ...]
+
+
+def write_report(path: Path, runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> None:
+    """
+    Write the result of one or several bags as one HTML file.
+
+    Parameters
+    ----------
+    path
+        The file; an existing one is replaced.
+    runs
+        What each bag gave.
+    ranking
+        The hulls compared, where that was asked for.
+    """
+    environment = Environment(
+        loader=PackageLoader('shipdrag_ros.report', '.'),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    names = list(dict.fromkeys(run.ship.name for run in runs))
+    text = environment.get_template('page.html').render(
+        title='Resistance from coastdowns: ' + ', '.join(names),
+        version=__version__,
+        runs=[_run(run) for run in runs],
+        hulls=None if ranking is None else _hulls(ranking),
+    )
+    path.write_text(text.lstrip(), encoding='utf-8')
+
+
+def _run(run: RunResult) -> _Run:
+    return _Run(
+        heading=run.bag,
+        ship=words.ship_line(run.ship),
+        warnings=run.ship.warnings,
+        coastdowns=tuple(
+            _coastdown(number, coastdown, run)
+            for number, coastdown in enumerate(run.coastdowns, start=1)
+        ),
+        inputs=cells.inputs_table(run.inputs),
+        recorded=words.recorded_sentence(run.recorded),
+    )
+
+
+def _coastdown(number: int, coastdown: Coastdown, run: RunResult) -> _Coastdown:
+    estimate = coastdown.estimate
+    drawn: tuple[_Picture, ...] = ()
+    curve: Table | None = None
+    if estimate is not None:
+        drawn = (
+            _Picture(
+                pictures.data_uri(
+                    pictures.resistance_picture(
+                        estimate, mass_kg=run.ship.mass_kg, truth=run.truth
+                    )
+                ),
+                'Specific resistance against speed, with its band of two standard deviations; '
+                'shaded: where it may be used.',
+            ),
+            _Picture(
+                pictures.data_uri(pictures.track_picture(estimate)),
+                'What was measured, the fit, and what is left between them. Left-overs that '
+                'wave slowly, instead of scattering, are not in the band.',
+            ),
+            _Picture(
+                pictures.data_uri(pictures.order_picture(estimate)),
+                'Residual variance against the number of coefficients; the smallest number on '
+                'the plateau is chosen.',
+            ),
+        )
+        curve = cells.curve_table(estimate.valid_curve, truth=run.truth)
+    return _Coastdown(
+        heading=f'Coastdown {number}: {words.utc(coastdown.start_ns)}',
+        sentence=words.result_sentence(coastdown, mass_kg=run.ship.mass_kg),
+        facts=cells.facts(coastdown),
+        pictures=drawn,
+        curve=curve,
+        notes=words.notes(coastdown),
+    )
+
+
+def _hulls(ranking: Ranking) -> _Hulls:
+    return _Hulls(
+        table=cells.ranking_table(ranking),
+        picture=_Picture(
+            pictures.data_uri(
+                pictures.comparison_picture([(hull.label, hull.curve) for hull in ranking.hulls])
+            ),
+            'Specific resistance against Froude number, each hull inside its valid range.',
+        ),
+        notes=ranking.notes,
+    )

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Results in sentences, the same in the terminal and on the page.
+
+Written for a chief engineer: what was found, what it can be used for, what
+this record cannot show.
+"""
+
+from __future__ import annotations
+
+import math
+from datetime import UTC, datetime
+
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.estimation.result import Estimate, FroudeMax
+from shipdrag_ros.report.run import Recorded
+from shipdrag_ros.ship import Ship
+
+M_S_PER_KNOT = 1852.0 / 3600.0
+
+ENDED_BY = {
+    EndedBy.SPEED: 'the minimum speed was reached',
+    EndedBy.TURN: 'the ship turned',
+    EndedBy.ENGINE: 'the engine drove the ship again',
+    EndedBy.DATA_STOP: 'the data stopped',
+    EndedBy.RESET: 'the memory was reset',
+    EndedBy.RECORD_END: 'the record ended',
+    EndedBy.GIVEN: 'the window was given by hand',
+}
+FROUDE_MAX_BY = {
+    FroudeMax.INFLECTION: 'the steepest rise of r, beyond which it falls significantly',
+    FroudeMax.BRANCH_TOP: 'the highest speed of the record; no steepest rise was found',
+}
+_ESTIMATORS = {
+    's1_joint': 'orthogonal polynomial, speed and position jointly',
+    's1_position': 'orthogonal polynomial, position alone',
+    's1_speed': 'orthogonal polynomial, speed alone',
+}
+
+
+def utc(time_ns: int) -> str:
+    """
+    Return a time in a form to read, in whole seconds of UTC.
+    """
+    seconds = time_ns // 1_000_000_000
+    try:
+        moment = datetime.fromtimestamp(seconds, UTC)
+    except (ValueError, OverflowError, OSError):
+        return f'{seconds} s'
+    # clocks that start at zero (simulation, import) have no date worth reading
+    if moment.year < 1980:
+        return f'{seconds} s'
+    return moment.strftime('%Y-%m-%d %H:%M:%S UTC')
+
+
+def duration(seconds: float) -> str:
+    """
+    Return a length of time in s, and in min where that reads better.
+    """
+    if seconds < 600.0:
+        return f'{seconds:.4g} s'
+    return f'{seconds:.0f} s ({seconds / 60.0:.0f} min)'
+
+
+def plus_minus(value: float, spread: float) -> str:
+    """
+    Return a value and its spread, both to the digits that the spread allows.
+    """
+    if not (math.isfinite(value) and math.isfinite(spread) and spread > 0.0):
+        return f'{value:.4g} ± {spread:.2g}'
+    decimals = 1 - math.floor(math.log10(spread))
+    if decimals < 0:
+        value, spread, decimals = round(value, decimals), round(spread, decimals), 0
+    return f'{value:.{decimals}f} ± {spread:.{decimals}f}'
+
+
+def estimator(name: str) -> str:
+    """
+    Name an estimator, with what it is.
+    """
+    return f'{name}: {_ESTIMATORS[name]}' if name in _ESTIMATORS else name
+
+
+def ship_line(ship: Ship) -> str:
+    """
+    Return the ship in one line.
+    """
+    name = ship.name or 'a ship without a name'
+    mass = f'{ship.mass_kg:.4g} kg' if ship.mass_kg < 1e4 else f'{ship.mass_kg * 1e-3:,.0f} t'
+    return (
+        f'{name}: length {ship.length_m:g} m, displacement {ship.displaced_volume_m3:g} m³ '
+        f'({mass})'
+    )
+
+
+def recorded_sentence(recorded: Recorded) -> str:
+    """
+    Say whether the replayed outputs are those in the bag.
+    """
+    if not recorded.compared:
+        return 'The bag holds no outputs of its own to compare with.'
+    if recorded.identical == recorded.compared:
+        return f'All {recorded.compared} outputs in the bag are identical to the replayed ones.'
+    return (
+        f'{recorded.identical} of {recorded.compared} outputs in the bag are identical to the '
+        f'replayed ones; first difference: {recorded.first_difference}.'
+    )
+
+
+def result_sentence(coastdown: Coastdown, *, mass_kg: float | None = None) -> str:
+    """
+    Say in one sentence what a coastdown gave.
+    """
+    if coastdown.estimate is None:
+        return f'No resistance could be estimated: {coastdown.failure or "no reason given"}.'
+    curve = coastdown.estimate.valid_curve
+    if not len(curve):
+        return 'No speed of this record lies inside the range where r(v) may be used.'
+    low, high = float(curve.speed_m_s[0]), float(curve.speed_m_s[-1])
+    r, sigma = float(curve.resistance_m_s2[-1]), float(curve.sigma_m_s2[-1])
+    force = ''
+    if mass_kg is not None:
+        force = f', that is {plus_minus(r * mass_kg * 1e-3, 2e-3 * sigma * mass_kg)} kN'
+    return (
+        f'The resistance is known from {low:.2f} to {high:.2f} m/s '
+        f'({low / M_S_PER_KNOT:.1f} to {high / M_S_PER_KNOT:.1f} knots); at {high:.2f} m/s the '
+        f'specific resistance is {plus_minus(r, 2.0 * sigma)} m/s² (two standard deviations)'
+        f'{force}.'
+    )
+
+
+def notes(coastdown: Coastdown) -> tuple[str, ...]:
+    """
+    Say what this record can and cannot show, a sentence each.
+
+    The estimator's own notes come first.
+    """
+    estimate = coastdown.estimate
+    if estimate is None:
+        return ()
+    return (*estimate.notes, *_range_notes(estimate), *_method_notes(estimate))
+
+
+def _range_notes(estimate: Estimate) -> list[str]:
+    curve = estimate.valid_curve
+    found = []
+    if len(curve):
+        fastest = float(estimate.curve.speed_m_s[-1])
+        found.append(
+            f'Nothing is said outside {curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f} m/s; '
+            f'the record itself reaches {fastest:.2f} m/s.'
+        )
+    found.append(
+        f'The upper end, Fr {estimate.froude_valid[1]:.3f}, is '
+        f'{FROUDE_MAX_BY[estimate.froude_max_by]}.'
+    )
+    if estimate.froude_max_by is FroudeMax.BRANCH_TOP:
+        found.append(
+            'So it depends on the starting speed; hulls compared, it is only a lower bound.'
+        )
+    return found
+
+
+def _method_notes(estimate: Estimate) -> list[str]:
+    found = []
+    if 'speed_through_water' not in estimate.samples and estimate.current_m_s is None:
+        found.append(
+            'Only the motion over ground was measured, on one run: a current along the track is '
+            'not separated and shifts the speed scale; a run on the opposite heading would tell.'
+        )
+    elif 'position' in estimate.samples and estimate.current_m_s is None:
+        found.append(
+            'The joint fit takes log and position to show the same speed: a current, or a log '
+            'that reads wrong by a factor, bends r(v).'
+        )
+    if estimate.estimator.startswith('s1_'):
+        found.append(
+            'The band holds the noise of the sensors and the uncertainty of the added mass, not '
+            'the error of the polynomial itself: towards the highest speeds, where the run-down '
+            'of the engine lies, the true error can be several times larger.'
+        )
+    return found

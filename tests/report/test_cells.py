@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables show the estimated figures, not others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.report import cells
+from shipdrag_ros.report.hulls import rank
+from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.report.truth import TrueCurve
+
+
+def test_a_curve_is_shown_at_its_own_points_from_end_to_end(estimate: Estimate) -> None:
+    table = cells.curve_table(estimate.valid_curve)
+    speeds = [row[0] for row in table.rows]
+    assert len(speeds) == 10
+    assert speeds[0] == f'{estimate.valid_curve.speed_m_s[0]:.2f}'
+    assert speeds[-1] == f'{estimate.valid_curve.speed_m_s[-1]:.2f}'
+    assert set(speeds) <= {f'{speed:.2f}' for speed in estimate.valid_curve.speed_m_s}
+    assert len(cells.curve_table(estimate.valid_curve, count=4).rows) == 4
+
+
+def test_a_short_curve_repeats_no_point(estimate: Estimate) -> None:
+    low = float(estimate.curve.froude[40])
+    assert len(cells.curve_table(estimate.curve.between(low, low)).rows) == 1
+    assert cells.curve_table(estimate.curve.between(0.5, 0.6)).rows == ()
+
+
+def test_the_truth_adds_its_error(estimate: Estimate, truth: TrueCurve) -> None:
+    table = cells.curve_table(estimate.valid_curve, truth=truth)
+    assert table.columns[-1] == 'error [%]'
+    # r = v^2 / 3000 against v^2 / 3100
+    np.testing.assert_allclose([float(row[-1]) for row in table.rows], 3.3, atol=0.11)
+
+
+def test_facts_leave_out_what_is_not_known(coastdown: Coastdown) -> None:
+    names = [row[0] for row in cells.facts(coastdown).rows]
+    assert {'confirmed after', 'estimator', 'coefficients'} <= set(names)
+    given = replace(coastdown, onset_detected_ns=None, estimate=None)
+    assert [row[0] for row in cells.facts(given).rows] == ['start', 'duration', 'ended because']
+
+
+def test_facts_show_a_current_and_an_average(coastdown: Coastdown) -> None:
+    assert coastdown.estimate is not None
+    other = replace(coastdown.estimate, order=None, current_m_s=0.25, current_sigma_m_s=0.02)
+    facts = dict(cells.facts(replace(coastdown, estimate=other)).rows)
+    assert facts['coefficients'] == 'averaged over orders'
+    assert facts['current along the track'] == '0.250 ± 0.040 m/s (two standard deviations)'
+
+
+def test_rejections_are_shown_with_their_reason_and_zeros_are_not(run: RunResult) -> None:
+    assert cells.inputs_table(run.inputs).rows == (
+        ('speed_through_water', '1503', '1500', '2 nan, 1 late'),
+        ('position', '1500', '1500', '-'),
+    )
+
+
+def test_a_ranking_starts_with_the_best(run: RunResult) -> None:
+    other = replace(run, bag='b.mcap')
+    assert [row[0] for row in cells.ranking_table(rank([run, other])).rows] == [
+        '1. Vitus Bering sea trial.mcap',
+        '2. Vitus Bering b.mcap',
+    ]

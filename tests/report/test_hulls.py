@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hulls are ranked by Fr_max, and a bound is not sold as a find."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.result import FroudeMax
+from shipdrag_ros.report.hulls import rank
+from shipdrag_ros.report.run import RunResult
+
+
+def hull(run: RunResult, name: str, *found: tuple[float, FroudeMax]) -> RunResult:
+    part = run.coastdowns[0]
+    assert part.estimate is not None
+    return replace(
+        run,
+        bag=f'{name}.mcap',
+        ship=replace(run.ship, name=name),
+        coastdowns=tuple(
+            replace(
+                part,
+                estimate=replace(part.estimate, froude_valid=(0.05, top), froude_max_by=rule),
+            )
+            for top, rule in found
+        ),
+    )
+
+
+def test_the_higher_stands_first(run: RunResult) -> None:
+    low = hull(run, 'low', (0.15, FroudeMax.INFLECTION))
+    high = hull(run, 'high', (0.19, FroudeMax.INFLECTION))
+    for runs in ([low, high], [high, low]):
+        ranking = rank(runs)
+        assert [item.label for item in ranking.hulls] == ['high', 'low']
+        assert not any('lower bound' in note for note in ranking.notes)
+
+
+def test_a_find_goes_before_a_bound_and_the_middle_find_is_shown(run: RunResult) -> None:
+    several = hull(
+        run,
+        'several',
+        (0.16, FroudeMax.INFLECTION),
+        (0.20, FroudeMax.BRANCH_TOP),
+        (0.15, FroudeMax.INFLECTION),
+        (0.17, FroudeMax.INFLECTION),
+    )
+    bound = hull(run, 'bound', (0.12, FroudeMax.BRANCH_TOP), (0.14, FroudeMax.BRANCH_TOP))
+    first, second = rank([bound, several]).hulls
+    assert (first.froude_max, first.others) == (0.16, (0.15, 0.17))
+    assert (second.froude_max, second.found_by) == (0.14, FroudeMax.BRANCH_TOP)
+
+
+def test_a_bound_is_called_one(run: RunResult) -> None:
+    ranking = rank(
+        [
+            hull(run, 'a', (0.15, FroudeMax.BRANCH_TOP)),
+            hull(run, 'b', (0.19, FroudeMax.INFLECTION)),
+        ]
+    )
+    assert any('No steepest rise of r was found for a:' in note for note in ranking.notes)
+
+
+def test_one_hull_is_not_a_comparison(run: RunResult) -> None:
+    nothing = replace(run, bag='nothing.mcap', coastdowns=())
+    with pytest.raises(EstimationError, match=r"1 of 2 .*'nothing\.mcap'"):
+        rank([run, nothing])
+
+
+def test_a_bag_without_an_estimate_is_named(run: RunResult) -> None:
+    nothing = replace(run, bag='nothing.mcap', coastdowns=())
+    ranking = rank([run, replace(run, bag='b.mcap'), nothing])
+    assert any('nothing.mcap' in note for note in ranking.notes)

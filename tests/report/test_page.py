@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page stands alone, says everything and lets nothing in."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.report.hulls import rank
+from shipdrag_ros.report.page import write_report
+from shipdrag_ros.report.run import RunResult
+
+
+class Page(HTMLParser):
+    """Text, pictures and links of a page; every tag that is opened is closed."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.words: list[str] = []
+        self.images: list[str] = []
+        self.links: list[str] = []
+        self.open: list[str] = []
+        self.feed(path.read_text(encoding='utf-8'))
+        assert self.open == []
+        self.text = re.sub(r'\s+', ' ', ' '.join(self.words))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        if tag == 'img':
+            self.images.append(values['src'] or '')
+            assert values['alt']
+        if 'href' in values or (tag != 'img' and 'src' in values):
+            self.links.append(tag)
+        if tag not in ('img', 'meta', 'br'):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != 'style':
+            self.words.append(data)
+
+
+@pytest.fixture
+def page(simulated: RunResult, tmp_path: Path) -> Page:
+    write_report(tmp_path / 'report.html', [simulated])
+    return Page(tmp_path / 'report.html')
+
+
+def test_the_page_needs_no_network(page: Page) -> None:
+    assert page.links == []
+    assert len(page.images) == 3
+    assert all(image.startswith('data:image/svg+xml;base64,') for image in page.images)
+
+
+@pytest.mark.parametrize(
+    'words',
+    [
+        'Resistance from coastdowns: Vitus Bering',
+        'sea trial.mcap',
+        'the specific resistance is 0.01587 ± 0.00083 m/s²',
+        'the minimum speed was reached',
+        's1_joint: orthogonal polynomial',
+        'true r [m/s²]',
+        '2 nan, 1 late',
+        'All 100 outputs in the bag are identical',
+        'A note of the estimator <b>itself</b>.',
+        'How to read the band',
+    ],
+)
+def test_the_page_says(page: Page, words: str) -> None:
+    assert words in page.text
+
+
+def test_names_from_outside_are_text_and_nothing_else(run: RunResult, tmp_path: Path) -> None:
+    evil = '<script>alert(1)</script>'
+    write_report(
+        tmp_path / 'report.html',
+        [replace(run, bag=evil, ship=replace(run.ship, name=evil))],
+    )
+    assert '<script' not in (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert evil in Page(tmp_path / 'report.html').text
+
+
+def test_a_record_without_coastdown_is_a_result(run: RunResult, tmp_path: Path) -> None:
+    write_report(tmp_path / 'report.html', [replace(run, coastdowns=())])
+    page = Page(tmp_path / 'report.html')
+    assert 'No coastdown was found in this record.' in page.text
+    assert page.images == []
+
+
+def test_a_coastdown_without_estimate_says_why(run: RunResult, tmp_path: Path) -> None:
+    failed = replace(run.coastdowns[0], estimate=None, failure='only 3 samples')
+    write_report(tmp_path / 'report.html', [replace(run, coastdowns=(failed,))])
+    assert 'only 3 samples' in Page(tmp_path / 'report.html').text
+
+
+def test_hulls_compared_come_first(run: RunResult, tmp_path: Path) -> None:
+    other = replace(run, ship=replace(run.ship, name='Rowdy'))
+    write_report(tmp_path / 'report.html', [run, other], ranking=rank([run, other]))
+    page = Page(tmp_path / 'report.html')
+    assert page.text.index('Hulls compared') < page.text.index('sea trial.mcap')
+    assert len(page.images) == 7
+
+
+def test_a_doubt_about_the_ship_is_shown(run: RunResult, tmp_path: Path) -> None:
+    slender = replace(run.ship, displaced_volume_m3=8000.0)
+    assert slender.warnings
+    write_report(tmp_path / 'report.html', [replace(run, ship=slender)])
+    assert slender.warnings[0] in Page(tmp_path / 'report.html').text

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sentences say what the figures say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.estimation.result import FroudeMax
+from shipdrag_ros.report import words
+from shipdrag_ros.report.run import Recorded
+from shipdrag_ros.ship import Ship
+
+
+def test_every_end_and_every_rule_has_words() -> None:
+    assert set(words.ENDED_BY) == set(EndedBy)
+    assert set(words.FROUDE_MAX_BY) == set(FroudeMax)
+
+
+@pytest.mark.parametrize(
+    ('value', 'spread', 'text'),
+    [
+        (0.0158734, 0.00083, '0.01587 ± 0.00083'),
+        (328.64, 17.3, '329 ± 17'),
+        (32864.0, 1730.0, '32900 ± 1700'),
+        (-0.4, 0.031, '-0.400 ± 0.031'),
+        (1.5, 0.0, '1.5 ± 0'),
+        (1.5, float('nan'), '1.5 ± nan'),
+    ],
+)
+def test_a_spread_sets_the_digits(value: float, spread: float, text: str) -> None:
+    assert words.plus_minus(value, spread) == text
+
+
+def test_times_of_a_real_clock_are_dates_and_others_are_seconds() -> None:
+    assert words.utc(1_700_000_000_000_000_000) == '2023-11-14 22:13:20 UTC'
+    assert words.utc(153_200_000_000) == '153 s'
+    assert words.utc(2**62) == '2116-02-20 23:53:38 UTC'
+
+
+def test_a_long_time_is_also_given_in_minutes() -> None:
+    assert words.duration(40.0) == '40 s'
+    assert words.duration(1500.0) == '1500 s (25 min)'
+
+
+def test_the_sentence_gives_range_figure_and_force(coastdown: Coastdown, ship: Ship) -> None:
+    sentence = words.result_sentence(coastdown, mass_kg=ship.mass_kg)
+    assert '1.95 to 6.90 m/s (3.8 to 13.4 knots)' in sentence
+    assert '0.01587 ± 0.00083 m/s²' in sentence
+    assert '329 ± 17 kN' in sentence
+    assert 'kN' not in words.result_sentence(coastdown)
+
+
+def test_the_sentence_of_a_failure_gives_its_reason(coastdown: Coastdown) -> None:
+    failed = replace(coastdown, estimate=None, failure='too few samples')
+    assert 'too few samples' in words.result_sentence(failed)
+    assert words.notes(failed) == ()
+
+
+def test_the_sentence_of_an_empty_range_promises_nothing(coastdown: Coastdown) -> None:
+    assert coastdown.estimate is not None
+    empty = replace(coastdown, estimate=replace(coastdown.estimate, froude_valid=(0.3, 0.3)))
+    assert 'No speed' in words.result_sentence(empty)
+
+
+def test_notes_say_what_the_record_cannot_show(coastdown: Coastdown) -> None:
+    assert coastdown.estimate is not None
+    notes = ' '.join(words.notes(coastdown))
+    assert 'A note of the estimator' in notes
+    assert 'Nothing is said outside 1.95 to 6.90 m/s' in notes
+    assert 'not the error of the polynomial' in notes
+    assert 'a current, or a log that reads wrong' in notes
+
+    ground = replace(
+        coastdown,
+        estimate=replace(
+            coastdown.estimate,
+            estimator='s1_position',
+            samples={'position': 1500},
+            froude_max_by=FroudeMax.BRANCH_TOP,
+        ),
+    )
+    notes = ' '.join(words.notes(ground))
+    assert 'a run on the opposite heading would tell' in notes
+    assert 'only a lower bound' in notes
+
+
+def test_a_ship_is_one_line(ship: Ship) -> None:
+    assert words.ship_line(ship) == (
+        'Vitus Bering: length 150 m, displacement 20200 m³ (20,705 t)'
+    )
+    model = replace(ship, name='', length_m=1.1, displaced_volume_m3=0.0142)
+    assert words.ship_line(model).endswith('displacement 0.0142 m³ (14.56 kg)')
+
+
+def test_the_comparison_with_the_bag_is_said() -> None:
+    assert 'no outputs' in words.recorded_sentence(Recorded(0, 0, None))
+    assert 'All 7 outputs' in words.recorded_sentence(Recorded(7, 7, None))
+    differs = words.recorded_sentence(Recorded(7, 6, '/coastdown_node/speed at 12 ns'))
+    assert '6 of 7' in differs
+    assert 'first difference: /coastdown_node/speed at 12 ns' in differs
+
+
+def test_an_estimator_is_named_and_explained() -> None:
+    assert words.estimator('s1_speed') == 's1_speed: orthogonal polynomial, speed alone'
+    assert words.estimator('another') == 'another'
