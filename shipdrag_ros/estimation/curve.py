@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+From a fitted motion to r(v), and to the range in which it may be used.
+
+r and v are evaluated at the same times and never interpolated. Where the speed
+does not fall r(v) has two values: only the branch on which it falls is kept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.motion import Motion, sigma
+from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+SIGNIFICANT_FALL = 2.0  # in standard deviations of dr/dFr
+_MIN_POINTS = 3  # fewer are no curve
+
+
+def specific_resistance(motion: Motion, ship: Ship) -> tuple[Float64, Float64, Float64]:
+    """
+    Return r, its sigma, and its sigma without the error of n_r.
+
+    Notes
+    -----
+    S1 (12, 13); the error of n_r is independent of that of the motion.
+    """
+    inertia = 1.0 + ship.n_r(motion.speed)
+    repeatable = inertia * sigma(motion.acceleration_error)
+    of_n_r = np.abs(motion.acceleration) * ship.added_mass.sd
+    # + 0.0: no negative zero
+    return (
+        0.0 - inertia * motion.acceleration,
+        np.sqrt(repeatable**2 + of_n_r**2),
+        repeatable,
+    )
+
+
+def resistance_curve(motion: Motion, ship: Ship, *, froude_min: float) -> ResistanceCurve:
+    """
+    Return r(v) on the monotone branch of the speed.
+
+    The branch is the longest fall of the speed, in m/s, through consecutive
+    times with dv/dt < 0 and Fr >= froude_min.
+
+    Parameters
+    ----------
+    motion
+        At times that ascend, dense enough to show the shape.
+
+    Raises
+    ------
+    EstimationError
+        If there is no such branch.
+    """
+    branch = motion[_falling(motion, ship, froude_min)][::-1]
+    if len(branch.speed) < _MIN_POINTS:
+        low, high = float(motion.speed.min()), float(motion.speed.max())
+        raise EstimationError(
+            f'the fitted speed, {low:.4g}..{high:.4g} m/s (Fr {ship.froude(low):.3g}..'
+            f'{ship.froude(high):.3g}), does not fall steadily above froude_min {froude_min:g}: '
+            'give a window that lies in a coastdown, or a smaller froude_min'
+        )
+    resistance, total, repeatable = specific_resistance(branch, ship)
+    slope, slope_error = _slope(branch, ship)
+    return ResistanceCurve(
+        np.ascontiguousarray(branch.speed),
+        resistance,
+        total,
+        repeatable,
+        ship.froude(branch.speed),
+        slope,
+        sigma(slope_error),
+    )
+
+
+def _falling(motion: Motion, ship: Ship, froude_min: float) -> slice:
+    """Find the times of the longest fall."""
+    speed = motion.speed
+    usable = (motion.acceleration < 0.0) & (ship.froude(speed) >= froude_min)
+    # time i belongs with i + 1: both usable, the speed strictly lower
+    linked = usable[:-1] & usable[1:] & (speed[1:] < speed[:-1])
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], linked, [False]])))
+    starts, ends = edges[::2], edges[1::2]
+    if len(starts) == 0:
+        return slice(0, 0)
+    best = int(np.argmax(speed[starts] - speed[ends]))
+    return slice(int(starts[best]), int(ends[best]) + 1)
+
+
+def _slope(motion: Motion, ship: Ship) -> tuple[Float64, Float64]:
+    """
+    Return dr/dFr and its error, of the motion alone.
+
+    With a = dv/dt: dr/dv = -((1 + n_r) da/dt / a + dn_r/dv a).
+    """
+    per_froude = float(ship.speed(1.0))
+    # exact for the quadratic n_r up to rounding
+    step = 1e-3 * per_froude
+    n_r_slope = (ship.n_r(motion.speed + step) - ship.n_r(motion.speed - step)) / (2.0 * step)
+    inertia = 1.0 + ship.n_r(motion.speed)
+    a, jerk = motion.acceleration, motion.jerk
+    slope = -per_froude * (inertia * jerk / a + n_r_slope * a)
+    by_a = n_r_slope - inertia * jerk / a**2
+    error = per_froude * (
+        (inertia / a)[:, None] * motion.jerk_error + by_a[:, None] * motion.acceleration_error
+    )
+    return slope, error
+
+
+def froude_max(curve: ResistanceCurve) -> tuple[float, FroudeMax]:
+    """
+    Return the upper end of the valid range, and what gave it.
+
+    Notes
+    -----
+    S1 takes argmax dr/dFr: above that inflection the curve still carries the
+    transient of the start. Over everything that is the transient itself, and
+    the first maximum is a wiggle. So: the first maximum from which dr/dFr falls,
+    before it rises above it again, by more than `SIGNIFICANT_FALL` of its
+    standard deviations (of the larger one of top and bottom). Many hulls have
+    none: then the top of the branch.
+    """
+    slope, slope_sigma = curve.slope, curve.slope_sigma
+    rises = slope[1:-1] > slope[:-2]
+    falls = slope[1:-1] >= slope[2:]
+    for top in np.flatnonzero(rises & falls) + 1:
+        after = slope[top + 1 :]
+        higher = np.flatnonzero(after > slope[top])
+        stop = higher[0] if len(higher) else len(after)
+        doubt = np.maximum(slope_sigma[top], slope_sigma[top + 1 :][:stop])
+        if np.any(slope[top] - after[:stop] > SIGNIFICANT_FALL * doubt):
+            return float(curve.froude[top]), FroudeMax.INFLECTION
+    return float(curve.froude[-1]), FroudeMax.BRANCH_TOP

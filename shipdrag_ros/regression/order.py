@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+How many coefficients a fit should have: the table and the one rule.
+
+The rule is a stated test in place of a glance at a plot. It serves the order
+of a polynomial in time as well as the degree of a polynomial surface: nested
+fits of growing size, whatever the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc, fdtrc
+
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis
+from shipdrag_ros.samples import Float64
+
+SIGNIFICANCE = 0.01  # probability at which a step by chance counts as a fall of s^2
+NEIGHBOURS = 2  # even and odd terms alternate: one idle step is not yet a plateau
+
+
+@dataclass(frozen=True)
+class OrderTable:
+    """
+    Nested least-squares fits of growing size to the same data.
+
+    Attributes
+    ----------
+    coefficients : (m,) int
+        How many coefficients each fit has, ascending, all below `rows`.
+    sse : (m,)
+        Sum of squared residuals of each, not ascending.
+    rows
+        How many data.
+    """
+
+    coefficients: NDArray[np.intp]
+    sse: Float64
+    rows: int
+
+    @classmethod
+    def of(
+        cls,
+        coefficients: Sequence[int] | NDArray[np.intp],
+        sse: Sequence[float] | Float64,
+        *,
+        rows: int,
+        rounding: float = 0.0,
+    ) -> OrderTable:
+        """
+        Build a table from plain numbers.
+
+        Parameters
+        ----------
+        coefficients, sse, rows
+            See the attributes.
+        rounding
+            A sum of squares this small is rounding alone and counts as 0.
+
+        Raises
+        ------
+        ValueError
+            If a fit has as many coefficients as data, or the sizes do not
+            ascend.
+        """
+        sizes = np.asarray(coefficients, np.intp)
+        sums = np.asarray(sse, np.float64)
+        if np.any(np.diff(sizes) <= 0) or sizes[-1] >= rows:
+            raise ValueError(f'coefficients are {sizes}, expected ascending and below {rows}')
+        return cls(sizes, np.where(sums <= rounding, 0.0, sums), rows)
+
+    @cached_property
+    def freedom(self) -> Float64:
+        """(m,) Degrees of freedom of the residuals."""
+        return (self.rows - self.coefficients).astype(np.float64)
+
+    @cached_property
+    def variance(self) -> Float64:
+        """(m,) s^2 of S1 (11)."""
+        return self.sse / self.freedom
+
+    @cached_property
+    def f(self) -> Float64:
+        """(m,) F of the step from the fit before; NaN at the first."""
+        fall = np.maximum(-np.diff(self.sse), 0.0) / np.diff(self.coefficients)
+        after = self.variance[1:]
+        exact = after == 0.0
+        ratio = fall / np.where(exact, 1.0, after)
+        return np.concatenate([[np.nan], np.where(exact & (fall > 0.0), np.inf, ratio)])
+
+    @cached_property
+    def p(self) -> Float64:
+        """(m,) Probability of such an F by chance; NaN at the first."""
+        chance = fdtrc(np.diff(self.coefficients), self.freedom[1:], self.f[1:])
+        # the library answers NaN at infinity
+        chance[np.isinf(self.f[1:])] = 0.0
+        return np.concatenate([[np.nan], chance])
+
+    def plateau(self) -> int:
+        """
+        Return the row of the smallest fit in the plateau of s^2.
+
+        Notes
+        -----
+        S1 compares neighbours of s^2, S5 raises the degree while the fall is
+        substantial. As a test: the smallest fit of which neither of the next
+        `NEIGHBOURS` steps has p < `SIGNIFICANCE`. s^2 falls where F > 1; the
+        test asks for more than chance gives.
+        """
+        step = self.p[1:] < SIGNIFICANCE
+        for row in range(len(self.sse)):
+            if not step[row : row + NEIGHBOURS].any():
+                return row
+        raise AssertionError('the last row has no step after it')
+
+    @property
+    def plateau_order(self) -> int:
+        """How many coefficients the smallest fit in the plateau has."""
+        return int(self.coefficients[self.plateau()])
+
+    def consistent(self, variance: float) -> int | None:
+        """
+        Return the row of the smallest fit that a known variance allows.
+
+        Parameters
+        ----------
+        variance
+            A-priori variance of one datum.
+
+        Returns
+        -------
+        int or None
+            None where the residuals of every fit are too large for it.
+
+        Notes
+        -----
+        S1's other comparison: the smallest fit whose sum of squares over
+        `variance` does not exceed chi^2 with probability < `SIGNIFICANCE`.
+        """
+        allowed = chdtrc(self.freedom, self.sse / variance) >= SIGNIFICANCE
+        return int(np.argmax(allowed)) if allowed.any() else None
+
+
+def fit_orders(basis: OrthogonalBasis, values: Float64) -> tuple[Float64, OrderTable]:
+    """
+    Fit at every order that leaves a degree of freedom.
+
+    Parameters
+    ----------
+    basis
+        Polynomials on n times with equal weights.
+    values : (n,)
+        Measured at these times; n >= 2.
+
+    Returns
+    -------
+    coefficients : (order,)
+        The first k of them are the fit of order k.
+    table
+        Of orders 1, 2, ..
+    """
+    coefficients, sse = basis.fit(values)
+    orders = np.arange(1, min(basis.order, len(values) - 1) + 1)
+    table = OrderTable.of(
+        orders, sse[: len(orders)], rows=len(values), rounding=rounding((values * values).sum())
+    )
+    return coefficients, table
+
+
+def rounding(sum_of_squares: float) -> float:
+    """
+    Return the sum of squares that rounding alone leaves of data.
+    """
+    return (8.0 * float(np.finfo(np.float64).eps)) ** 2 * float(sum_of_squares)

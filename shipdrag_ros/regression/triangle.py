@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A tall matrix condensed to its triangular factor.
+
+The factor of [A | z] holds all that least squares needs of A and z: any
+weighting against other data, any number of leading columns and the residual
+sums follow from it, at a cost that no longer depends on the number of rows.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shipdrag_ros.samples import Float64
+
+# Small enough that BLAS never splits the work between threads, so that the last
+# bit does not depend on how many there are; at least twice the columns.
+_BLOCK = 128
+
+
+def triangle(rows: Float64) -> Float64:
+    """
+    Return the triangular factor R of rows = Q R, without Q.
+
+    Parameters
+    ----------
+    rows : (n, k)
+        At most 64 columns.
+
+    Returns
+    -------
+    (k, k)
+        Upper triangular; rows of zeros at the end where n < k.
+
+    Notes
+    -----
+    Householder on blocks of rows, then on the stacked factors.
+    """
+    k = rows.shape[1]
+    if 2 * k > _BLOCK:
+        raise ValueError(f'{k} columns, expected at most {_BLOCK // 2}')
+    householder: Any = np.linalg.qr  # numpy's types do not know that mode 'r' gives one array
+    while len(rows) > _BLOCK:
+        blocks = -(-len(rows) // _BLOCK)
+        padded = np.zeros((blocks * _BLOCK, k))
+        padded[: len(rows)] = rows
+        rows = householder(padded.reshape(blocks, _BLOCK, k), mode='r').reshape(-1, k)
+    if len(rows) < k:
+        rows = np.concatenate([rows, np.zeros((k - len(rows), k))])
+    factor: Float64 = householder(rows, mode='r')
+    return factor
