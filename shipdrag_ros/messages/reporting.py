@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Events of the monitor to the messages that the node publishes.
+
+The node and replay both encode here, so that what was published and what is
+replayed can be compared byte by byte.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from shipdrag_ros.coastdown.events import Coastdown, Event, NoEstimate, Onset, Reset, Update
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.messages import types
+from shipdrag_ros.messages.encoding import covariance6, vector3
+from shipdrag_ros.messages.topics import (
+    DEFAULT_NODE,
+    EVENTS,
+    RESISTANCE,
+    RESISTANCE_CURVE,
+    SPEED,
+    OutputTopic,
+)
+
+FRAME = 'base_link'
+CURVE_FIELDS = ('speed', 'resistance', 'sigma', 'froude')
+_FLOAT64_BYTES = 8
+
+
+@dataclass(frozen=True)
+class OutputMessage:
+    """A message of the node, ready to be published and recorded."""
+
+    topic: str
+    type: str
+    payload: bytes
+    stamp_ns: int
+
+
+class EventKind(Enum):
+    """What a message on `~/events` reports."""
+
+    ONSET = 'onset'
+    COASTDOWN = 'coastdown'
+    NO_ESTIMATE = 'no_estimate'
+    RESET = 'reset'  # done, whatever the cause
+    RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
+    LIFECYCLE = 'lifecycle'
+    CLOCK_JUMP = 'clock_jump'
+
+    @property
+    def is_warning(self) -> bool:
+        """Whether an operator should look at it."""
+        return self in (EventKind.NO_ESTIMATE, EventKind.RESET, EventKind.CLOCK_JUMP)
+
+
+@dataclass(frozen=True)
+class EventNote:
+    """
+    The content of a message on `~/events`.
+
+    `values` are texts by name, the unit at the end of the name.
+    """
+
+    kind: EventKind
+    stamp_ns: int
+    text: str
+    values: Mapping[str, str]
+
+
+def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
+    """
+    Encode an event of the monitor, in the order to publish.
+
+    Parameters
+    ----------
+    event
+        What the monitor reported.
+    node
+        Full name of the node, the `~` of its topics.
+    """
+    match event:
+        case Update(stamp_ns, estimate):
+            return _figures(stamp_ns, estimate, node)
+        case Coastdown():
+            curve = [] if event.estimate is None else [_curve(event.end_ns, event.estimate, node)]
+            return [*curve, event_message(_coastdown_note(event), node=node)]
+        case Onset(start_ns, detected_ns):
+            note = EventNote(
+                EventKind.ONSET,
+                detected_ns,
+                'a coastdown has begun',
+                {'start_ns': str(start_ns)},
+            )
+        case NoEstimate(stamp_ns, reason):
+            note = EventNote(EventKind.NO_ESTIMATE, stamp_ns, reason, {})
+        case Reset(receive_ns, reason):
+            note = EventNote(EventKind.RESET, receive_ns, reason, {})
+    return [event_message(note, node=node)]
+
+
+def reset_request(receive_ns: int, reason: str, *, node: str = DEFAULT_NODE) -> OutputMessage:
+    """
+    Encode that a reset was asked for, so that replay resets there too.
+
+    To be recorded before the reset is done, at log time `receive_ns`. Resets
+    that the monitor decides by itself need none: the samples bring them about.
+    """
+    return event_message(EventNote(EventKind.RESET_REQUEST, receive_ns, reason, {}), node=node)
+
+
+def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage:
+    """
+    Encode a note for `~/events`.
+    """
+    status = types.class_of('diagnostic_msgs/msg/DiagnosticStatus')
+    message = types.make(
+        EVENTS.type,
+        header=types.header(note.stamp_ns, ''),
+        status=[
+            status(
+                level=status.WARN if note.kind.is_warning else status.OK,
+                name=note.kind.value,
+                message=note.text,
+                hardware_id='',
+                values=[
+                    types.make('diagnostic_msgs/msg/KeyValue', key=key, value=value)
+                    for key, value in note.values.items()
+                ],
+            )
+        ],
+    )
+    return _message(EVENTS, message, note.stamp_ns, node)
+
+
+def read_event(payload: bytes) -> EventNote:
+    """
+    Decode a message of `~/events`.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none of this package's.
+    """
+    message = types.deserialize(EVENTS.type, payload)
+    try:
+        (status,) = message.status
+        kind = EventKind(status.name)
+    except ValueError as error:
+        raise types.MalformedMessage(f'not an event of the node: {error}') from error
+    values = {item.key: item.value for item in status.values}
+    return EventNote(kind, types.stamp_ns(message), status.message, values)
+
+
+def _figures(stamp_ns: int, estimate: Estimate, node: str) -> list[OutputMessage]:
+    """Speed, resistance and the curve of one estimate."""
+    still = vector3(0.0, 0.0)
+    speed = types.make(
+        SPEED.type,
+        header=types.header(stamp_ns, FRAME),
+        twist=types.make(
+            'geometry_msgs/msg/TwistWithCovariance',
+            twist=types.make(
+                'geometry_msgs/msg/Twist',
+                linear=vector3(float(estimate.last_speed_m_s), 0.0),
+                angular=still,
+            ),
+            covariance=covariance6(float(estimate.last_speed_sigma_m_s) ** 2),
+        ),
+    )
+    resistance = types.make(
+        RESISTANCE.type,
+        header=types.header(stamp_ns, FRAME),
+        accel=types.make(
+            'geometry_msgs/msg/AccelWithCovariance',
+            accel=types.make(
+                'geometry_msgs/msg/Accel',
+                linear=vector3(float(estimate.last_resistance_m_s2), 0.0),
+                angular=still,
+            ),
+            covariance=covariance6(float(estimate.last_sigma_m_s2) ** 2),
+        ),
+    )
+    return [
+        _message(SPEED, speed, stamp_ns, node),
+        _message(RESISTANCE, resistance, stamp_ns, node),
+        _curve(stamp_ns, estimate, node),
+    ]
+
+
+def _curve(stamp_ns: int, estimate: Estimate, node: str) -> OutputMessage:
+    """Return r(v) inside the valid range, one point a speed."""
+    curve = estimate.valid_curve
+    points = np.column_stack(
+        [curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, curve.froude]
+    ).astype('<f8')
+    field = types.class_of('sensor_msgs/msg/PointField')
+    point_step = _FLOAT64_BYTES * len(CURVE_FIELDS)
+    cloud = types.make(
+        RESISTANCE_CURVE.type,
+        header=types.header(stamp_ns, FRAME),
+        height=1,
+        width=len(points),
+        fields=[
+            field(name=name, offset=_FLOAT64_BYTES * index, datatype=field.FLOAT64, count=1)
+            for index, name in enumerate(CURVE_FIELDS)
+        ],
+        is_bigendian=False,
+        point_step=point_step,
+        row_step=point_step * len(points),
+        data=np.frombuffer(points.tobytes(), np.uint8),
+        is_dense=True,
+    )
+    return _message(RESISTANCE_CURVE, cloud, stamp_ns, node)
+
+
+def _coastdown_note(event: Coastdown) -> EventNote:
+    values = {
+        'start_ns': str(event.start_ns),
+        'end_ns': str(event.end_ns),
+        'ended_by': event.ended_by.value,
+    }
+    if event.onset_detected_ns is not None:
+        values['onset_detected_ns'] = str(event.onset_detected_ns)
+    if event.heading_rad is not None:
+        values['heading_rad'] = repr(float(event.heading_rad))
+    text = f'a coastdown has ended: {event.ended_by.value}'
+    if event.estimate is None:
+        text += f'; no estimate: {event.failure}'
+    else:
+        values['estimator'] = event.estimate.estimator
+        low, high = event.estimate.froude_valid
+        values['froude_min'] = repr(float(low))
+        values['froude_max'] = repr(float(high))
+    return EventNote(EventKind.COASTDOWN, event.end_ns, text, values)
+
+
+def _message(topic: OutputTopic, message: object, stamp_ns: int, node: str) -> OutputMessage:
+    return OutputMessage(
+        topic.under(node), topic.type, types.serialize(topic.type, message), stamp_ns
+    )

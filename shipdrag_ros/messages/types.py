@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Message types: their names, and the one store that knows their layout.
+
+The store is that of ROS 2 Jazzy and needs no ROS. It also holds the layout of
+`sensor_msgs/Range` before Iron, which lacks the variance at its end, so that
+older bags are read.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+ACCEL_WITH_COVARIANCE = 'geometry_msgs/msg/AccelWithCovarianceStamped'
+DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
+IMU = 'sensor_msgs/msg/Imu'
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+NAV_SAT_FIX = 'sensor_msgs/msg/NavSatFix'
+ODOMETRY = 'nav_msgs/msg/Odometry'
+POINT = 'geometry_msgs/msg/PointStamped'
+POINT_CLOUD = 'sensor_msgs/msg/PointCloud2'
+POSE = 'geometry_msgs/msg/PoseStamped'
+POSE_WITH_COVARIANCE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
+QUATERNION = 'geometry_msgs/msg/QuaternionStamped'
+RANGE = 'sensor_msgs/msg/Range'
+TWIST = 'geometry_msgs/msg/TwistStamped'
+TWIST_WITH_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+
+_RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
+
+_store = get_typestore(Stores.ROS2_JAZZY)
+_store.register(
+    get_types_from_msg(
+        'std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n'
+        'float32 min_range\nfloat32 max_range\nfloat32 range\n',
+        _RANGE_BEFORE_IRON,
+    )
+)
+
+
+class MalformedMessage(Exception):
+    """Bytes that are not a message of the type they claim to be."""
+
+
+def class_of(type_name: str) -> Any:
+    """
+    Return the class of a message type, for its constants.
+    """
+    return _store.types[type_name]
+
+
+def make(type_name: str, /, **fields: Any) -> Any:
+    """
+    Build a message; every field must be given.
+    """
+    return class_of(type_name)(**fields)
+
+
+def header(stamp_ns: int, frame_id: str) -> Any:
+    """
+    Build a std_msgs/Header.
+    """
+    seconds, nanoseconds = divmod(int(stamp_ns), 1_000_000_000)
+    stamp = make('builtin_interfaces/msg/Time', sec=seconds, nanosec=nanoseconds)
+    return make('std_msgs/msg/Header', stamp=stamp, frame_id=frame_id)
+
+
+def stamp_ns(message: Any) -> int:
+    """
+    Return the time in the header of a message [ns].
+    """
+    stamp = message.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def serialize(type_name: str, message: Any) -> bytes:
+    """
+    Return the CDR bytes of a message, little endian.
+    """
+    return bytes(_store.serialize_cdr(message, type_name, little_endian=True))
+
+
+def deserialize(type_name: str, payload: bytes) -> Any:
+    """
+    Return the message in CDR bytes of either byte order.
+
+    Raises
+    ------
+    MalformedMessage
+        If the bytes are not such a message.
+    """
+    try:
+        return _store.deserialize_cdr(payload, type_name)
+    except SerdeError as error:
+        if type_name == RANGE:
+            return deserialize(_RANGE_BEFORE_IRON, payload)
+        raise MalformedMessage(str(error)) from error
+
+
+def definition(type_name: str) -> str:
+    """
+    Return the full `ros2msg` text of a type, dependencies included.
+    """
+    text: str = _store.generate_msgdef(type_name, ros_version=2)[0]
+    return text
+
+
+def type_hash(type_name: str) -> str:
+    """
+    Return the RIHS01 hash by which ROS 2 tells definitions apart.
+    """
+    digest: str = _store.hash_rihs01(type_name)
+    return digest
+
+
+def is_known(type_name: str) -> bool:
+    """
+    Say whether the store has a definition of this type.
+    """
+    return type_name in _store.fielddefs

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages of every accepted type, built by the reference library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+class Reference:
+    """Builds and serializes messages through rosbags, independently of the package."""
+
+    def make(self, type_name: str, /, **fields: Any) -> Any:
+        return STORE.types[type_name](**fields)
+
+    def header(self, stamp_ns: int, frame_id: str = '') -> Any:
+        time = self.make(
+            'builtin_interfaces/msg/Time', sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9
+        )
+        return self.make('std_msgs/msg/Header', stamp=time, frame_id=frame_id)
+
+    def vector(self, x: float, y: float) -> Any:
+        return self.make('geometry_msgs/msg/Vector3', x=x, y=y, z=3.0)
+
+    def message(self, type_name: str, stamp_ns: int, frame_id: str, numbers: list[float]) -> Any:
+        """Fill a message of an accepted type with eight numbers."""
+        a, b, c, d, e, f, g, h = numbers
+        covariance = np.arange(36.0)
+        covariance[[0, 1, 6, 7]] = c, d, d, e
+        twist = self.make(
+            'geometry_msgs/msg/Twist', linear=self.vector(a, b), angular=self.vector(f, g)
+        )
+        quaternion = self.make('geometry_msgs/msg/Quaternion', x=a, y=b, z=c, w=d)
+        point = self.make('geometry_msgs/msg/Point', x=a, y=b, z=h)
+        pose = self.make('geometry_msgs/msg/Pose', position=point, orientation=quaternion)
+        pose_with_covariance = self.make(
+            'geometry_msgs/msg/PoseWithCovariance', pose=pose, covariance=covariance
+        )
+        twist_with_covariance = self.make(
+            'geometry_msgs/msg/TwistWithCovariance', twist=twist, covariance=covariance
+        )
+        nine = np.array([e, 0, 0, 0, f, 0, 0, 0, g])
+        bodies: dict[str, dict[str, Any]] = {
+            'geometry_msgs/msg/TwistStamped': {'twist': twist},
+            'geometry_msgs/msg/TwistWithCovarianceStamped': {'twist': twist_with_covariance},
+            'geometry_msgs/msg/PoseStamped': {'pose': pose},
+            'geometry_msgs/msg/PoseWithCovarianceStamped': {'pose': pose_with_covariance},
+            'geometry_msgs/msg/PointStamped': {'point': point},
+            'geometry_msgs/msg/QuaternionStamped': {'quaternion': quaternion},
+            'nav_msgs/msg/Odometry': {
+                'child_frame_id': frame_id[::-1],
+                'pose': pose_with_covariance,
+                'twist': twist_with_covariance,
+            },
+            'sensor_msgs/msg/NavSatFix': {
+                'status': self.make('sensor_msgs/msg/NavSatStatus', status=0, service=1),
+                'latitude': a,
+                'longitude': b,
+                'altitude': c,
+                'position_covariance': nine,
+                'position_covariance_type': 2,
+            },
+            'sensor_msgs/msg/Imu': {
+                'orientation': quaternion,
+                'orientation_covariance': nine,
+                'angular_velocity': self.vector(a, b),
+                'angular_velocity_covariance': nine,
+                'linear_acceleration': self.vector(a, b),
+                'linear_acceleration_covariance': nine,
+            },
+            'sensor_msgs/msg/JointState': {
+                'name': ['other', 'shaft', 'rudder'],
+                'position': np.array([0.0, a, b]),
+                'velocity': np.array([0.0, c, d]),
+                'effort': np.empty(0),
+            },
+            'sensor_msgs/msg/Range': {
+                'radiation_type': 0,
+                'field_of_view': 0.1,
+                'min_range': 0.0,
+                'max_range': 100.0,
+                'range': float(np.float32(a)),
+                'variance': float(np.float32(c)),
+            },
+        }
+        return self.make(type_name, header=self.header(stamp_ns, frame_id), **bodies[type_name])
+
+    def serialize(self, type_name: str, message: Any, *, little_endian: bool = True) -> bytes:
+        return bytes(STORE.serialize_cdr(message, type_name, little_endian=little_endian))
+
+    def deserialize(self, type_name: str, payload: bytes) -> Any:
+        return STORE.deserialize_cdr(payload, type_name)
+
+
+@pytest.fixture(scope='session')
+def reference() -> Reference:
+    return Reference()

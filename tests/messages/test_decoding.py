@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every accepted type, both byte orders, alone and in batches, whole and broken."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.messages import TOPICS, Source, Unreadable, decode
+from shipdrag_ros.samples import Block, Channel, concatenate
+
+SOURCES = [Source(name, type_name) for name, accepted in TOPICS.items() for type_name in accepted]
+STAMP_NS = 1_700_000_000_123_456_789
+
+finite = st.floats(allow_nan=False, allow_infinity=False, width=32)
+any_float = st.floats(width=32)
+stamps = st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9 + 999_999_999)
+eight = st.lists(any_float, min_size=8, max_size=8)
+frames = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=20)
+
+
+def same_bits(one: Block, other: Block) -> bool:
+    return all(
+        np.array_equal(
+            np.ascontiguousarray(getattr(one, name)).view(np.uint8),
+            np.ascontiguousarray(getattr(other, name)).view(np.uint8),
+        )
+        for name in ('channel', 'stamp_ns', 'receive_ns', 'value', 'variance')
+    )
+
+
+def expected(source: Source, numbers: list[float]) -> tuple[Channel, list[float], list[float]]:
+    """Say what each source gives, by scalar arithmetic."""
+    a, b, c, d, e, f, g, _ = numbers
+    nan = math.nan
+    with_covariance = 'WithCovariance' in source.type or 'Odometry' in source.type
+    match source.input:
+        case 'speed_through_water':
+            return Channel.SPEED_THROUGH_WATER, [a, 0], [c if with_covariance else nan, nan]
+        case 'speed_over_ground':
+            return Channel.SPEED_OVER_GROUND, [math.hypot(a, b), 0], [nan, nan]
+        case 'position' if 'NavSatFix' in source.type:
+            return Channel.POSITION_GEODETIC, [a, b], [f, e]
+        case 'position':
+            return Channel.POSITION, [a, b], [c, e] if with_covariance else [nan, nan]
+        case 'heading':
+            yaw = math.atan2(2 * (d * c + a * b), d * d + a * a - b * b - c * c)
+            variance = g if 'Imu' in source.type else nan
+            return Channel.HEADING, [yaw, 0], [variance, nan]
+        case 'shaft':
+            return Channel.SHAFT, [c, 0], [nan, nan]
+        case 'rudder':
+            return Channel.RUDDER, [b, 0], [nan, nan]
+        case 'wind_apparent':
+            return Channel.WIND_APPARENT, [a, b], [nan, nan]
+        case 'depth':
+            return Channel.DEPTH, [a, 0], [c, nan]
+    raise AssertionError(source)
+
+
+@pytest.mark.parametrize('source', SOURCES, ids=lambda s: f'{s.input}-{s.type.split("/")[2]}')
+@pytest.mark.parametrize('little_endian', [True, False])
+def test_every_accepted_type(reference: Any, source: Source, little_endian: bool) -> None:
+    numbers = [0.1, 0.2, 0.3, math.sqrt(1 - 0.14), 0.5, 0.6, 0.7, 0.8]
+    numbers = [float(np.float32(x)) for x in numbers]
+    message = reference.message(source.type, STAMP_NS, 'a frame', numbers)
+    payload = reference.serialize(source.type, message, little_endian=little_endian)
+    channel, value, variance = expected(source, numbers)
+    decoded = decode(source, [payload], [STAMP_NS + 7])
+    assert decoded.block.channel.tolist() == [channel]
+    assert channel.input == source.input
+    assert decoded.block.stamp_ns.tolist() == [STAMP_NS]
+    assert decoded.block.receive_ns.tolist() == [STAMP_NS + 7]
+    np.testing.assert_allclose(decoded.block.value[0], value, rtol=1e-15, atol=0)
+    if source.input != 'speed_over_ground':
+        np.testing.assert_array_equal(decoded.block.variance[0], variance)
+    assert not decoded.unreadable
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    source=st.sampled_from(SOURCES),
+    rows=st.lists(st.tuples(stamps, frames, eight, st.booleans()), min_size=1, max_size=40),
+)
+def test_a_batch_gives_the_bits_of_single_messages(
+    reference: Any, source: Source, rows: list[tuple[int, str, list[float], bool]]
+) -> None:
+    payloads = [
+        reference.serialize(
+            source.type, reference.message(source.type, s, frame, numbers), little_endian=little
+        )
+        for s, frame, numbers, little in rows
+    ]
+    received = list(range(len(rows)))
+    batch = decode(source, payloads, received).block
+    singles = [decode(source, [p], [t]).block for p, t in zip(payloads, received, strict=True)]
+    assert same_bits(batch, concatenate(singles))
+    assert batch.stamp_ns.tolist() == [s for s, *_ in rows]
+
+
+def test_magnitudes_and_yaws_do_not_depend_on_the_batch(reference: Any) -> None:
+    rng = np.random.default_rng(5)
+    for source in (
+        Source('speed_over_ground', 'geometry_msgs/msg/TwistStamped'),
+        Source('heading', 'geometry_msgs/msg/QuaternionStamped'),
+    ):
+        numbers = rng.normal(size=(1000, 8))
+        numbers[:, :4] /= np.linalg.norm(numbers[:, :4], axis=1, keepdims=True)
+        payloads = [
+            reference.serialize(source.type, reference.message(source.type, 0, '', row.tolist()))
+            for row in numbers
+        ]
+        batch = decode(source, payloads, np.zeros(1000, np.int64)).block
+        singles = [decode(source, [payload], [0]).block for payload in payloads]
+        assert same_bits(batch, concatenate(singles))
+        assert np.isfinite(batch.value).all()
+
+
+@settings(max_examples=80, deadline=None)
+@given(source=st.sampled_from(SOURCES), data=st.data())
+def test_broken_bytes_are_counted_and_spoil_no_neighbour(
+    reference: Any, source: Source, data: st.DataObject
+) -> None:
+    good = reference.serialize(
+        source.type, reference.message(source.type, STAMP_NS, 'map', [0.5] * 8)
+    )
+    cut = data.draw(st.integers(0, len(good) - 5))
+    flips = data.draw(st.lists(st.tuples(st.integers(0, 39), st.integers(0, 255)), max_size=6))
+    flipped = bytearray(good)
+    for place, byte in flips:
+        flipped[place] = byte
+    junk = data.draw(st.binary(max_size=80))
+    payloads = [good, good[:cut], bytes(flipped), junk, good]
+    decoded = decode(source, payloads, [1, 2, 3, 4, 5])
+    assert len(decoded.block) + sum(decoded.unreadable.values()) == 5
+    assert {0, 4} <= set(decoded.kept.tolist())
+    np.testing.assert_array_equal(decoded.block.receive_ns, decoded.kept + 1)
+    assert decoded.block.value[0].tolist() == decoded.block.value[-1].tolist()
+
+
+def test_short_and_wrongly_encapsulated_messages_are_malformed(reference: Any) -> None:
+    source = Source('speed_through_water', 'geometry_msgs/msg/TwistStamped')
+    good = reference.serialize(source.type, reference.message(source.type, 1, '', [1.0] * 8))
+    parameter_list = b'\x00\x03' + good[2:]
+    unreadable = decode(
+        source, [good[:-8], parameter_list, b'', good + bytes(8)], [0, 0, 0, 0]
+    ).unreadable
+    assert unreadable == {Unreadable.MALFORMED: 4}
+
+
+@pytest.mark.parametrize(
+    ('names', 'velocities'), [([], []), (['rudder'], [1.0]), (['a', 'shaft'], [1.0])]
+)
+def test_a_joint_that_is_not_there_is_counted(
+    reference: Any, names: list[str], velocities: list[float]
+) -> None:
+    message = reference.make(
+        'sensor_msgs/msg/JointState',
+        header=reference.header(1),
+        name=names,
+        position=np.empty(0),
+        velocity=np.array(velocities, np.float64),
+        effort=np.empty(0),
+    )
+    source = Source('shaft', 'sensor_msgs/msg/JointState')
+    decoded = decode(source, [reference.serialize(source.type, message)], [0])
+    assert decoded.unreadable == {Unreadable.NO_JOINT: 1}
+    assert len(decoded.block) == 0
+
+
+@pytest.mark.parametrize('variance', [0.0, -1.0, math.nan, math.inf])
+def test_a_variance_that_says_nothing_is_unknown(reference: Any, variance: float) -> None:
+    source = Source('speed_through_water', 'geometry_msgs/msg/TwistWithCovarianceStamped')
+    message = reference.message(source.type, 1, '', [1.0, 0.0, variance, 0, 0, 0, 0, 0])
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert np.isnan(block.variance).all()
+
+
+def test_variance_of_the_speed_over_ground_is_that_along_the_track(reference: Any) -> None:
+    source = Source('speed_over_ground', 'geometry_msgs/msg/TwistWithCovarianceStamped')
+
+    def variance(x: float, y: float, xx: float, xy: float, yy: float) -> float:
+        message = reference.message(source.type, 1, '', [x, y, xx, xy, yy, 0, 0, 0])
+        block = decode(source, [reference.serialize(source.type, message)], [0]).block
+        return float(block.variance[0, 0])
+
+    assert variance(3.0, 0.0, 0.04, 0.5, 9.0) == 0.04
+    assert variance(3.0, 4.0, 1.0, 0.25, 4.0) == pytest.approx(
+        (9 * 1.0 + 16 * 4.0 + 2 * 12 * 0.25) / 25, rel=1e-15
+    )
+    assert variance(0.0, 0.0, 1.0, 0.0, 3.0) == 3.0
+    assert math.isnan(variance(3.0, 4.0, 1.0, 0.0, -1.0))
+    # Monte Carlo of the first-order formula, N = 200 000, seed 3
+    rng = np.random.default_rng(3)
+    covariance = np.array([[0.01, 0.004], [0.004, 0.02]])
+    drawn = rng.multivariate_normal([3.0, 4.0], covariance, 200_000)
+    assert variance(3.0, 4.0, 0.01, 0.004, 0.02) == pytest.approx(
+        np.hypot(*drawn.T).var(), rel=0.02
+    )
+
+
+@pytest.mark.parametrize(
+    'quaternion', [(0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 2.0, 0.0), (math.nan, 0.0, 0.0, 1.0)]
+)
+def test_what_is_no_rotation_has_no_yaw(
+    reference: Any, quaternion: tuple[float, float, float, float]
+) -> None:
+    source = Source('heading', 'geometry_msgs/msg/QuaternionStamped')
+    message = reference.message(source.type, 1, '', [*quaternion, 0, 0, 0, 0])
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert math.isnan(block.value[0, 0])
+    assert block.value[0, 1] == 0.0
+
+
+@pytest.mark.parametrize('tilt', [(0.0, 0.0), (0.2, -0.1)])
+def test_yaw_is_the_yaw_of_a_rolling_ship(reference: Any, tilt: tuple[float, float]) -> None:
+    from scipy.spatial.transform import Rotation
+
+    rotation = Rotation.from_euler('ZYX', [-2.5, *tilt])
+    source = Source('heading', 'geometry_msgs/msg/QuaternionStamped')
+    message = reference.message(source.type, 1, '', [*rotation.as_quat().tolist(), 0, 0, 0, 0])
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert block.value[0, 0] == pytest.approx(-2.5, abs=1e-14)
+
+
+def test_an_imu_without_orientation_has_no_yaw(reference: Any) -> None:
+    source = Source('heading', 'sensor_msgs/msg/Imu')
+    message = reference.message(source.type, 1, '', [0.0, 0.0, 0.0, 1.0, -1.0, 0, 0.5, 0])
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert math.isnan(block.value[0, 0])
+
+
+def test_a_fix_that_is_none_has_no_position(reference: Any) -> None:
+    source = Source('position', 'sensor_msgs/msg/NavSatFix')
+    message = reference.message(source.type, 1, '', [60.0, 5.0, 0, 0, 4.0, 9.0, 1.0, 0])
+    message.status.status = -1
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert np.isnan(block.value).all()
+    message.status.status = 0
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert block.variance.tolist() == [[9.0, 4.0]]  # north, east
+    message.position_covariance_type = 0
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert np.isnan(block.variance).all()
+
+
+def test_a_range_of_before_iron_is_read() -> None:
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    time = store.types['builtin_interfaces/msg/Time'](sec=1, nanosec=2)
+    message = store.types['sensor_msgs/msg/Range'](
+        header=store.types['std_msgs/msg/Header'](stamp=time, frame_id='x'),
+        radiation_type=0,
+        field_of_view=0.0,
+        min_range=0.0,
+        max_range=9.0,
+        range=4.5,
+    )
+    payload = bytes(store.serialize_cdr(message, 'sensor_msgs/msg/Range'))
+    block = decode(Source('depth', 'sensor_msgs/msg/Range'), [payload], [0]).block
+    assert block.value[0, 0] == 4.5
+    assert block.stamp_ns.tolist() == [1_000_000_002]
+    assert np.isnan(block.variance).all()
+
+
+def test_no_messages_give_no_samples() -> None:
+    decoded = decode(SOURCES[0], [], [])
+    assert len(decoded.block) == 0

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the node publishes, read back by the reference library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, NoEstimate, Onset, Reset, Update
+from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
+from shipdrag_ros.messages import (
+    EventKind,
+    EventNote,
+    MalformedMessage,
+    event_message,
+    outputs,
+    read_event,
+    reset_request,
+)
+
+STAMP_NS = 1_700_000_000_000_000_001
+
+
+@pytest.fixture
+def estimate() -> Estimate:
+    speed = np.linspace(1.0, 8.0, 15)
+    curve = ResistanceCurve(
+        speed,
+        1e-3 * speed**2,
+        1e-4 * speed,
+        5e-5 * speed,
+        speed / 38.0,
+        2e-3 * speed,
+        1e-4 * speed,
+    )
+    return Estimate(
+        estimator='s1_joint',
+        start_ns=STAMP_NS - 10**12,
+        end_ns=STAMP_NS,
+        order=6,
+        orders=(),
+        samples={},
+        noise_sd={},
+        curve=curve,
+        froude_valid=(0.05, 0.15),
+        froude_max_by=FroudeMax.BRANCH_TOP,
+        froude_max_argmax=0.2,
+        w=0.01,
+        last_speed_m_s=1.25,
+        last_speed_sigma_m_s=0.5,
+        last_resistance_m_s2=2e-3,
+        last_sigma_m_s2=1e-4,
+        tracks={},
+    )
+
+
+def test_an_update_is_speed_resistance_and_curve(reference: Any, estimate: Estimate) -> None:
+    speed, resistance, curve = outputs(Update(STAMP_NS, estimate))
+    assert [m.topic for m in (speed, resistance, curve)] == [
+        '/coastdown_node/speed',
+        '/coastdown_node/resistance',
+        '/coastdown_node/resistance_curve',
+    ]
+    assert {m.stamp_ns for m in (speed, resistance, curve)} == {STAMP_NS}
+    twist = reference.deserialize(speed.type, speed.payload)
+    assert twist.header.frame_id == 'base_link'
+    assert twist.twist.twist.linear.x == 1.25
+    assert twist.twist.covariance[0] == 0.25
+    accel = reference.deserialize(resistance.type, resistance.payload)
+    assert (accel.header.stamp.sec, accel.header.stamp.nanosec) == (1_700_000_000, 1)
+    assert accel.accel.accel.linear.x == 2e-3
+    assert accel.accel.covariance[0] == pytest.approx(1e-8, rel=1e-15)
+    cloud = reference.deserialize(curve.type, curve.payload)
+    valid = estimate.valid_curve
+    assert 0 < len(valid) < len(estimate.curve)
+    assert (cloud.height, cloud.width) == (1, len(valid))
+    assert (cloud.point_step, cloud.row_step) == (32, 32 * len(valid))
+    assert (cloud.is_dense, cloud.is_bigendian) == (True, False)
+    assert [(f.name, f.offset, f.datatype, f.count) for f in cloud.fields] == [
+        ('speed', 0, 8, 1),
+        ('resistance', 8, 8, 1),
+        ('sigma', 16, 8, 1),
+        ('froude', 24, 8, 1),
+    ]
+    points = cloud.data.view('<f8').reshape(-1, 4)
+    np.testing.assert_array_equal(points[:, 0], valid.speed_m_s)
+    np.testing.assert_array_equal(points[:, 1], valid.resistance_m_s2)
+    np.testing.assert_array_equal(points[:, 2], valid.sigma_m_s2)
+    np.testing.assert_array_equal(points[:, 3], valid.froude)
+
+
+def test_the_node_name_is_that_given(estimate: Estimate) -> None:
+    topics = {m.topic for m in outputs(Update(STAMP_NS, estimate), node='/mv/drag')}
+    assert topics == {'/mv/drag/speed', '/mv/drag/resistance', '/mv/drag/resistance_curve'}
+
+
+def test_a_coastdown_gives_its_curve_and_an_event(estimate: Estimate) -> None:
+    event = Coastdown(1, STAMP_NS, 3, EndedBy.TURN, estimate, heading_rad=0.5)
+    curve, note = outputs(event)
+    assert curve.topic.endswith('/resistance_curve')
+    assert curve.stamp_ns == STAMP_NS
+    read = read_event(note.payload)
+    assert read.kind is EventKind.COASTDOWN
+    assert read.values == {
+        'start_ns': '1',
+        'end_ns': str(STAMP_NS),
+        'ended_by': 'turn',
+        'onset_detected_ns': '3',
+        'heading_rad': '0.5',
+        'estimator': 's1_joint',
+        'froude_min': '0.05',
+        'froude_max': '0.15',
+    }
+
+
+def test_a_coastdown_without_estimate_says_why() -> None:
+    (note,) = outputs(Coastdown(1, 2, None, EndedBy.GIVEN, None, failure='too short'))
+    assert 'too short' in read_event(note.payload).text
+
+
+@pytest.mark.parametrize(
+    ('event', 'kind', 'stamp_ns'),
+    [
+        (Onset(5, 9), EventKind.ONSET, 9),
+        (NoEstimate(7, 'why'), EventKind.NO_ESTIMATE, 7),
+        (Reset(8, 'why'), EventKind.RESET, 8),
+    ],
+)
+def test_events_read_back(event: Any, kind: EventKind, stamp_ns: int) -> None:
+    (message,) = outputs(event)
+    assert message.topic == '/coastdown_node/events'
+    note = read_event(message.payload)
+    assert (note.kind, note.stamp_ns) == (kind, stamp_ns)
+
+
+def test_a_reset_asked_for_is_not_taken_for_one_done() -> None:
+    asked = read_event(reset_request(11, 'service').payload)
+    (done,) = (read_event(m.payload) for m in outputs(Reset(11, 'service')))
+    assert asked.kind is EventKind.RESET_REQUEST
+    assert done.kind is EventKind.RESET
+    assert (asked.stamp_ns, asked.text) == (11, 'service')
+
+
+def test_notes_round_trip() -> None:
+    note = EventNote(EventKind.LIFECYCLE, STAMP_NS, 'active', {'from': 'inactive'})
+    assert read_event(event_message(note).payload) == note
+
+
+def test_an_array_of_another_kind_is_malformed(reference: Any) -> None:
+    name = 'diagnostic_msgs/msg/DiagnosticArray'
+    empty = reference.make(name, header=reference.header(1), status=[])
+    with pytest.raises(MalformedMessage):
+        read_event(reference.serialize(name, empty))
