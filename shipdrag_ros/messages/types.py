@@ -9,6 +9,7 @@ older bags are read.
 
 from __future__ import annotations
 
+import struct
 from typing import Any
 
 from rosbags.serde import SerdeError
@@ -28,6 +29,13 @@ QUATERNION = 'geometry_msgs/msg/QuaternionStamped'
 RANGE = 'sensor_msgs/msg/Range'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 TWIST_WITH_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+
+_ENCAPSULATION_BYTES = 4
+_BIG_ENDIAN = b'\x00\x00'
+_LITTLE_ENDIAN = b'\x00\x01'
+# Fast DDS aligns to 8 after an empty sequence of doubles (JointState.effort), and then to 4;
+# rosbags' own check allows 3 and would refuse what rclpy sends
+_PADDING_BYTES = 7
 
 _RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
 
@@ -93,11 +101,27 @@ def deserialize(type_name: str, payload: bytes) -> Any:
         If the bytes are not such a message.
     """
     try:
-        return _store.deserialize_cdr(payload, type_name)
-    except SerdeError as error:
-        if type_name == RANGE:
-            return deserialize(_RANGE_BEFORE_IRON, payload)
-        raise MalformedMessage(str(error)) from error
+        return _deserialize(type_name, payload)
+    except MalformedMessage:
+        if type_name != RANGE:
+            raise
+        return _deserialize(_RANGE_BEFORE_IRON, payload)
+
+
+def _deserialize(type_name: str, payload: bytes) -> Any:
+    if payload[:2] not in (_BIG_ENDIAN, _LITTLE_ENDIAN) or len(payload) < _ENCAPSULATION_BYTES:
+        raise MalformedMessage(f'unknown encapsulation {payload[:2]!r}')
+    definition = _store.get_msgdef(type_name)
+    little = payload[:2] == _LITTLE_ENDIAN
+    read = definition.deserialize_cdr_le if little else definition.deserialize_cdr_be
+    body = payload[_ENCAPSULATION_BYTES:]
+    try:
+        message, end = read(body, 0, definition.cls, _store)
+    except (SerdeError, struct.error, ValueError) as error:
+        raise MalformedMessage(f'not a {type_name}: {error}') from error
+    if len(body) - end > _PADDING_BYTES:
+        raise MalformedMessage(f'not a {type_name}: {len(body) - end} bytes too long')
+    return message
 
 
 def definition(type_name: str) -> str:
