@@ -1,1 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+"""MCAP in and out."""
+
+from shipdrag_ros.bags.writer import BagWriter, Compression
+
+__all__ = ['BagWriter', 'Compression']

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Writing MCAP files that any tool for ROS 2 reads.
+
+Profile `ros2`, full message definitions, log time = time of arrival,
+publish time = stamp.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from enum import Enum
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+from uuid import uuid4
+
+from mcap.writer import CompressionType, Writer
+
+from shipdrag_ros import __version__
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import OUTPUT_TOPICS, types
+
+METADATA = 'shipdrag_ros'
+"""Name of the metadata record that tells which recording a file is part of."""
+
+# as rosbag2 writes it; a player needs it to latch the topic again
+_LATCHED_QOS = """\
+- history: keep_last
+  depth: 1
+  reliability: reliable
+  durability: transient_local
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
+_LATCHED = {(topic.name, topic.type) for topic in OUTPUT_TOPICS if topic.latched}
+
+
+class Compression(Enum):
+    """How the chunks of a file are compressed."""
+
+    NONE = 'none'
+    LZ4 = 'lz4'
+    ZSTD = 'zstd'
+
+
+_MCAP_COMPRESSION = {
+    Compression.NONE: CompressionType.NONE,
+    Compression.LZ4: CompressionType.LZ4,
+    Compression.ZSTD: CompressionType.ZSTD,
+}
+
+
+class BagWriter:
+    """
+    Writes one MCAP file; a context manager.
+
+    Parameters
+    ----------
+    path
+        File to make; one that exists is never overwritten.
+    compression
+        Of the chunks.
+    chunk_bytes
+        Messages are written in chunks of this size [bytes], not before they are full.
+    recording_id, part
+        Files of one recording carry the same id and are numbered from 0; by
+        default the file is a recording of its own.
+
+    Raises
+    ------
+    BagError
+        If the file exists or cannot be made.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        compression: Compression = Compression.ZSTD,
+        chunk_bytes: int = 1 << 20,
+        recording_id: str | None = None,
+        part: int = 0,
+    ) -> None:
+        self.path = Path(path)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[tuple[str, str], int] = {}
+        try:
+            self._file = self.path.open('xb')
+        except FileExistsError:
+            raise BagError(f'{str(path)!r} exists; choose another name or remove it') from None
+        except OSError as error:
+            raise BagError(f'{str(path)!r} cannot be made: {error.strerror}') from error
+        self._writer = Writer(
+            self._file, chunk_size=chunk_bytes, compression=_MCAP_COMPRESSION[compression]
+        )
+        self._writer.start(profile='ros2', library=f'shipdrag_ros {__version__}')
+        self._writer.add_metadata(
+            METADATA,
+            {
+                'version': __version__,
+                'recording_id': recording_id or uuid4().hex,
+                'part': str(part),
+            },
+        )
+
+    def attach(self, name: str, text: str) -> None:
+        """
+        Write a text file into the bag, before the first message if it is to survive a crash.
+        """
+        self._writer.add_attachment(
+            create_time=0,
+            log_time=0,
+            name=name,
+            media_type='application/yaml' if name.endswith('.yaml') else 'text/plain',
+            data=text.encode(),
+        )
+
+    def register(self, topic: str, type_name: str) -> None:
+        """
+        Make a topic known before its first message, or without any.
+
+        Raises
+        ------
+        BagError
+            If the definition of the type is not known.
+        """
+        self._channel(topic, type_name)
+
+    def write(
+        self, topic: str, type_name: str, payload: bytes, *, log_ns: int, publish_ns: int
+    ) -> None:
+        """
+        Write one message.
+
+        Parameters
+        ----------
+        topic, type_name
+            Full names, `/shaft` and `sensor_msgs/msg/JointState` for instance.
+        payload
+            CDR bytes.
+        log_ns
+            Time of arrival [ns since the epoch].
+        publish_ns
+            Time of measurement [ns since the epoch].
+
+        Raises
+        ------
+        BagError
+            If the type is not known or the file cannot be written.
+        """
+        try:
+            self._writer.add_message(
+                self._channel(topic, type_name),
+                log_time=log_ns,
+                data=payload,
+                # a stamp before 1970 has no place here; the message itself keeps it
+                publish_time=max(publish_ns, 0),
+            )
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
+
+    def close(self) -> None:
+        """
+        Write the index and bring everything to the disk; again is harmless.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        if self._file.closed:
+            return
+        try:
+            self._writer.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r} cannot be closed: {error.strerror}') from error
+        finally:
+            with suppress(OSError):
+                self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _channel(self, topic: str, type_name: str) -> int:
+        key = (topic, type_name)
+        if key not in self._channels:
+            schema = self._schema(type_name)
+            latched = (topic.rpartition('/')[2], type_name) in _LATCHED
+            self._channels[key] = self._writer.register_channel(
+                topic,
+                'cdr',
+                schema,
+                {
+                    'offered_qos_profiles': _LATCHED_QOS if latched else '',
+                    'topic_type_hash': types.type_hash(type_name),
+                },
+            )
+        return self._channels[key]
+
+    def _schema(self, type_name: str) -> int:
+        if type_name not in self._schemas:
+            if not types.is_known(type_name):
+                raise BagError(f'{type_name!r} is no message type of ROS 2 Jazzy that is known')
+            self._schemas[type_name] = self._writer.register_schema(
+                type_name, 'ros2msg', types.definition(type_name).encode()
+            )
+        return self._schemas[type_name]
