@@ -37,12 +37,16 @@ class Measured:
         Speed [m/s], or distance along the track [m].
     known_sigma
         A-priori standard deviation, 0 where unknown.
+    scale, basis
+        Polynomials on these times.
     """
 
     name: str
     time_ns: Int64
     value: Float64
     known_sigma: float
+    scale: TimeScale
+    basis: OrthogonalBasis
 
 
 @dataclass(frozen=True)
@@ -74,7 +78,7 @@ class Solution:
     notes: tuple[str, ...]
 
 
-def solve_speed(speed: Measured, *, order_max: int) -> Solution:
+def solve_speed(speed: Measured) -> Solution:
     """
     Fit the speed alone.
 
@@ -82,10 +86,10 @@ def solve_speed(speed: Measured, *, order_max: int) -> Solution:
     -----
     S1 (6, 9, 11).
     """
-    return _solve_one(speed, order_max=order_max, speed_at=0)
+    return _solve_one(speed, speed_at=0)
 
 
-def solve_position(position: Measured, *, order_max: int) -> Solution:
+def solve_position(position: Measured) -> Solution:
     """
     Fit the position alone; the speed is its derivative.
 
@@ -93,12 +97,11 @@ def solve_position(position: Measured, *, order_max: int) -> Solution:
     -----
     S1 (5, 9, 11).
     """
-    return _solve_one(position, order_max=order_max, speed_at=1)
+    return _solve_one(position, speed_at=1)
 
 
-def _solve_one(data: Measured, *, order_max: int, speed_at: int) -> Solution:
-    scale = TimeScale.of(data.time_ns)
-    basis = OrthogonalBasis.on(scale.normalise(data.time_ns), order_max)
+def _solve_one(data: Measured, *, speed_at: int) -> Solution:
+    basis = data.basis
     coefficients, table = fit_orders(basis, data.value)
     known = data.known_sigma**2
     row, trusted, notes = _choose(table, known)
@@ -108,7 +111,7 @@ def _solve_one(data: Measured, *, order_max: int, speed_at: int) -> Solution:
     unused = np.full(len(table.sse), np.nan)
     speed, position = (unused, table.variance) if speed_at else (table.variance, unused)
     return Solution(
-        PolynomialMotion(scale, basis, coefficients[:order], root, speed_at),
+        PolynomialMotion(data.scale, basis, coefficients[:order], root, speed_at),
         order,
         _trials(table, speed, position),
         {data.name: math.sqrt(table.variance[row])},
@@ -117,7 +120,7 @@ def _solve_one(data: Measured, *, order_max: int, speed_at: int) -> Solution:
     )
 
 
-def solve_joint(speed: Measured, position: Measured, *, order_max: int) -> Solution:
+def solve_joint(speed: Measured, position: Measured) -> Solution:
     """
     Fit one polynomial to the position and its derivative to the speed.
 
@@ -131,10 +134,7 @@ def solve_joint(speed: Measured, position: Measured, *, order_max: int) -> Solut
     input is its sum of squares over n_i less the trace of its part of the hat
     matrix.
     """
-    alone = (
-        solve_position(position, order_max=order_max),
-        solve_speed(speed, order_max=order_max),
-    )
+    alone = solve_position(position), solve_speed(speed)
     inputs = (position, speed)
     sigmas = np.array(
         [
@@ -145,10 +145,8 @@ def solve_joint(speed: Measured, position: Measured, *, order_max: int) -> Solut
     scale = TimeScale.of(position.time_ns, speed.time_ns)
     counts = np.array([len(position.value), len(speed.value)])
     times = scale.normalise(np.concatenate([position.time_ns, speed.time_ns]))
-    # of full rank: fewer columns than positions, or a constant more than speeds
-    order_max = min(order_max, int(counts.max()))
-    basis = OrthogonalBasis.on(times, order_max)
-    order_max = basis.order
+    # of full rank: no more columns than either input carries by itself
+    basis = OrthogonalBasis.on(times, max(position.basis.order, speed.basis.order))
     rates = basis.evaluate(times[counts[0] :], derivatives=1)[1] / scale.half_s
     # each input condensed once; weights and orders are then a matter of small matrices
     factors = np.concatenate(
@@ -159,7 +157,7 @@ def solve_joint(speed: Measured, position: Measured, *, order_max: int) -> Solut
     )
     q, r = np.linalg.qr(factors)
     projected = r[:, -1]
-    parts = np.stack([q[: order_max + 1], q[order_max + 1 :]])
+    parts = np.stack([q[: len(r)], q[len(r) :]])
     # residual of each order: what the columns from that order on take of the data
     residual = np.cumsum((parts * projected)[:, :, ::-1], axis=2)[:, :, ::-1]
     sse = np.einsum('ijk,ijk->ik', residual, residual)[:, 1:]
@@ -172,7 +170,7 @@ def solve_joint(speed: Measured, position: Measured, *, order_max: int) -> Solut
     )
     tail = np.cumsum((projected**2)[::-1])[::-1]
     table = OrderTable.of(
-        np.arange(1, order_max + 1),
+        np.arange(1, basis.order + 1),
         tail[1:],
         rows=int(counts.sum()),
         rounding=rounding(squares),

@@ -29,11 +29,25 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
 from shipdrag_ros.ship import Ship
 
-MIN_STAMPS = 4  # of an input, for a curve with a degree of freedom left
-MIN_STAMPS_JOINT = 12  # of each input: fewer do not tell their noise, hence no weight
 _GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is evaluated
-# coefficients without which there is no deceleration
-_ORDER_MIN = {'s1_speed': 2, 's1_position': 3, 's1_joint': 3}
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What a problem needs."""
+
+    speed: bool
+    position: bool
+    stamps: int  # of each input, at least
+    order: int  # coefficients without which there is no deceleration
+
+
+# joint: fewer stamps of an input do not tell its noise, hence not its weight
+_PROBLEMS = {
+    's1_speed': _Problem(speed=True, position=False, stamps=4, order=2),
+    's1_position': _Problem(speed=False, position=True, stamps=4, order=3),
+    's1_joint': _Problem(speed=True, position=True, stamps=12, order=3),
+}
 
 
 @dataclass(frozen=True)
@@ -75,7 +89,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     repeatable sigma, which is S1's.
     """
     inputs = _inputs(window, parameters)
-    solution = _solve(inputs, parameters.order_max)
+    solution = _solve(inputs)
     _check_deceleration(inputs, solution)
     motion = solution.fit.motion(_GRID)
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
@@ -109,78 +123,88 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
 
 def _inputs(window: Window, parameters: Parameters) -> _Inputs:
     """Decide which inputs are used, and for which problem."""
-    wanted = parameters.estimator
-    notes: list[str] = []
     name, speed = 'speed_through_water', window.speed_through_water
-    if len(speed) < MIN_STAMPS <= len(window.speed_over_ground):
+    notes: list[str] = []
+    if len(speed) < _PROBLEMS['s1_speed'].stamps <= len(window.speed_over_ground):
         name, speed = 'speed_over_ground', window.speed_over_ground
-    enough = MIN_STAMPS
-    if wanted == 'auto':
-        wanted = _offered(len(speed), len(window.position))
-        for left_out, count in ((name, len(speed)), ('position', len(window.position))):
-            if count and wanted != 's1_joint' and not left_out.startswith(wanted[3:]):
-                notes.append(
-                    f'{left_out}: {count} sample(s), fewer than the {MIN_STAMPS_JOINT} of each '
-                    'input that a joint fit needs; left out'
-                )
-    elif wanted == 's1_joint':
-        enough = MIN_STAMPS_JOINT
-    for needed, series in ((name, speed), ('position', window.position)):
-        if wanted == 's1_joint' or needed.startswith(wanted[3:]):
-            _check(needed, series, enough, wanted)
-    if name == 'speed_over_ground' and wanted != 's1_position':
+    position = window.position
+    estimator = parameters.estimator
+    if estimator == 'auto':
+        estimator = _offered(len(speed), len(position))
+    problem = _PROBLEMS[estimator]
+    for series_name, series, used in (
+        (name, speed, problem.speed),
+        ('position', position, problem.position),
+    ):
+        if used:
+            _check(series_name, series, problem.stamps, estimator)
+        elif len(series) and parameters.estimator == 'auto':
+            notes.append(
+                f'{series_name}: {len(series)} sample(s) left out, a joint fit needs '
+                f'{_PROBLEMS["s1_joint"].stamps} of each input'
+            )
+    if problem.speed and name == 'speed_over_ground':
         notes.append(
             'speed over ground was used as the speed, there is none through water: '
             'a current is part of it'
         )
     return _Inputs(
-        wanted,
-        None
-        if wanted == 's1_position'
-        else Measured(name, speed.time_ns, speed.value, parameters.speed_sigma_m_s),
-        None if wanted == 's1_speed' else _distance(window.position, parameters),
+        estimator,
+        _speed(name, speed, parameters) if problem.speed else None,
+        _distance(position, parameters) if problem.position else None,
         tuple(notes),
     )
 
 
 def _offered(speeds: int, positions: int) -> str:
     """Name the problem that `auto` stands for."""
-    if min(speeds, positions) >= MIN_STAMPS_JOINT:
+    enough = _PROBLEMS['s1_joint'].stamps
+    if min(speeds, positions) >= enough:
         return 's1_joint'
-    return 's1_speed' if speeds >= min(positions, MIN_STAMPS_JOINT) else 's1_position'
+    return 's1_speed' if speeds >= min(positions, enough) else 's1_position'
 
 
 def _check(name: str, series: Series, enough: int, estimator: str) -> None:
-    if len(series) < enough:
+    stamps = len(np.unique(series.time_ns))
+    if stamps < enough:
         raise EstimationError(
-            f'{name}: {len(series)} sample(s) in the window, {estimator} needs {enough} or more: '
-            'give a longer window, or another `estimator`'
+            f'{name}: {stamps} distinct stamp(s) in the window, {estimator} needs {enough} or '
+            'more: give a longer window, or another `estimator`'
         )
-    if not np.isfinite(series.value).all():
-        raise EstimationError(
-            f'{name}: {int((~np.isfinite(series.value)).sum())} value(s) are not finite: '
-            'give accepted samples only'
-        )
+    bad = int((~np.isfinite(series.value)).sum())
+    if bad:
+        raise EstimationError(f'{name}: {bad} value(s) are not finite: give accepted samples only')
 
 
-def _distance(position: Series, parameters: Parameters) -> Measured:
-    time = TimeScale.of(position.time_ns).normalise(position.time_ns)
-    basis = OrthogonalBasis.on(time, parameters.order_max)
-    distance = along_track(time, position.value, basis)
-    return Measured('position', position.time_ns, distance, parameters.position_sigma_m)
+def _speed(name: str, series: Series, parameters: Parameters) -> Measured:
+    scale, basis = _polynomials(series, parameters)
+    sigma_m_s = parameters.speed_sigma_m_s
+    return Measured(name, series.time_ns, series.value, sigma_m_s, scale, basis)
 
 
-def _solve(inputs: _Inputs, order_max: int) -> Solution:
+def _distance(series: Series, parameters: Parameters) -> Measured:
+    scale, basis = _polynomials(series, parameters)
+    distance = along_track(scale.normalise(series.time_ns), series.value, basis)
+    sigma_m = parameters.position_sigma_m
+    return Measured('position', series.time_ns, distance, sigma_m, scale, basis)
+
+
+def _polynomials(series: Series, parameters: Parameters) -> tuple[TimeScale, OrthogonalBasis]:
+    scale = TimeScale.of(series.time_ns)
+    return scale, OrthogonalBasis.on(scale.normalise(series.time_ns), parameters.order_max)
+
+
+def _solve(inputs: _Inputs) -> Solution:
     if inputs.speed is None:
         assert inputs.position is not None
-        return solve_position(inputs.position, order_max=order_max)
+        return solve_position(inputs.position)
     if inputs.position is None:
-        return solve_speed(inputs.speed, order_max=order_max)
-    return solve_joint(inputs.speed, inputs.position, order_max=order_max)
+        return solve_speed(inputs.speed)
+    return solve_joint(inputs.speed, inputs.position)
 
 
 def _check_deceleration(inputs: _Inputs, solution: Solution) -> None:
-    needed = _ORDER_MIN[inputs.estimator]
+    needed = _PROBLEMS[inputs.estimator].order
     if solution.order < needed:
         noise = ', '.join(f'{name} {value:.3g}' for name, value in solution.noise_sd.items())
         raise EstimationError(

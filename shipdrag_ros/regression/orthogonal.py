@@ -136,27 +136,30 @@ class OrthogonalBasis:
         correction = np.zeros((order, order))
         reorthogonalised = 0
         columns[0] = 1.0
+        weighted_square = w  # w h_j^2
         squared_norm[0] = w.sum()
         done = 1
         while done < order:
             j = done - 1
-            h = columns[j]
-            alpha[j] = (w * h * h * time).sum() / squared_norm[j]
-            grown = (time - alpha[j]) * h
-            new = grown.copy()
+            h, before, norms = columns[j], columns[:done], squared_norm[:done]
+            alpha[j] = (weighted_square * time).sum() / norms[j]
+            new = (time - alpha[j]) * h
             if j > 0:
-                beta[j] = squared_norm[j] / squared_norm[j - 1]
+                beta[j] = norms[j] / norms[j - 1]
                 new -= beta[j] * columns[j - 1]
-            before, norms = columns[:done], squared_norm[:done]
-            overlap = np.einsum('ij,j->i', before, w * new) / norms
-            new_norm = (w * new * new).sum()
+            weighted = w * new
+            overlap = np.einsum('ij,j->i', before, weighted) / norms
+            weighted_square = weighted * new
+            new_norm = weighted_square.sum()
             # cosines, written without a division by a norm that may be 0
-            if np.any(overlap * overlap * norms > ORTHOGONALITY_LOST**2 * new_norm):
+            if (overlap * overlap * norms).max() > ORTHOGONALITY_LOST**2 * new_norm:
                 new -= np.einsum('i,ij->j', overlap, before)
-                new_norm = (w * new * new).sum()
+                weighted_square = w * new * new
+                new_norm = weighted_square.sum()
                 correction[done, :done] = overlap
                 reorthogonalised += 1
-            if new_norm <= _VANISHED**2 * (w * grown * grown).sum():
+            # |(t - alpha) h_j|^2 = |h_{j+1}|^2 + beta |h_j|^2
+            if new_norm <= _VANISHED**2 * (new_norm + beta[j] * norms[j]):
                 break
             columns[done] = new
             squared_norm[done] = new_norm
