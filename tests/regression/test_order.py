@@ -51,7 +51,7 @@ def test_polynomials_of_known_degree_without_noise() -> None:
     time = np.linspace(-1.0, 1.0, 50)
     basis = OrthogonalBasis.on(time, 20)
     for degree in (1, 3, 6):
-        values = 1e3 + np.polynomial.Chebyshev(np.ones(degree + 1))(time)
+        values = 1e3 + np.polynomial.Chebyshev(0.2 ** np.arange(degree + 1))(time)
         assert fit_orders(basis, values)[1].plateau_order == degree + 1
 
 
