@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Write the README's tables from the code.
+
+`python docs/tables.py` rewrites what stands between the markers in README.md;
+a test fails while the two differ.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from pathlib import Path
+
+from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
+from shipdrag_ros.parameters import Parameters
+
+README = Path(__file__).resolve().parents[1] / 'README.md'
+_INPUT_MEANING = {
+    'speed_through_water': 'speed log, `linear.x` forward [m/s]',
+    'speed_over_ground': 'radar or GNSS, `hypot(linear.x, linear.y)` [m/s], frame not trusted',
+    'position': 'radar-derived from a fixed mark, or GNSS: metres in a fixed frame, or latitude '
+    'and longitude',
+    'heading': 'yaw',
+    'shaft': 'joint `shaft`, `velocity` [rad/s]',
+    'rudder': 'joint `rudder`, `position` [rad]',
+    'wind_apparent': 'air relative to the ship in base_link [m/s]; head wind: `linear.x` < 0',
+    'depth': 'water depth from the surface [m]',
+}
+_OUTPUT_MEANING = {
+    'speed': 'estimated speed through water, variance at [0]',
+    'resistance': 'specific resistance r as `linear.x` [m/s² = N/kg], retarding positive, '
+    'variance at [0]',
+    'resistance_curve': 'fields `speed, resistance, sigma, froude`, one point a speed; latched',
+    'events': 'onsets, ends, resets, life cycle, clock jumps',
+}
+
+
+def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    head = list(head)
+    lines = [head, ['---'] * len(head), *rows]
+    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
+
+
+def _short(type_name: str) -> str:
+    return type_name.replace('/msg/', '/')
+
+
+def inputs() -> str:
+    """
+    Return the table of the topics that are heard.
+    """
+    rows = (
+        [f'`{name}`', ', '.join(_short(kind) for kind in kinds), _INPUT_MEANING[name]]
+        for name, kinds in TOPICS.items()
+    )
+    return _table(['topic', 'types accepted', 'meaning'], rows)
+
+
+def outputs() -> str:
+    """
+    Return the table of the topics that are published.
+    """
+    rows = [
+        [f'`~/{topic.name}`', _short(topic.type), _OUTPUT_MEANING[topic.name]]
+        for topic in OUTPUT_TOPICS
+    ]
+    diagnostics = 'state, health of each input, the latest figures; 1 Hz on steady time'
+    rows.append(['`/diagnostics`', 'diagnostic_msgs/DiagnosticArray', diagnostics])
+    return _table(['topic', 'type', 'meaning'], rows)
+
+
+def parameters() -> str:
+    """
+    Return the table of the parameters that change a result.
+    """
+    rows = []
+    for item in fields(Parameters):
+        about = item.metadata
+        if about['choices']:
+            allowed = ', '.join(f'`{choice}`' for choice in about['choices'])
+        else:
+            allowed = f'{about["low"]:g} .. {about["high"]:g}'
+        default = f'`{item.default}` {about["unit"]}'.strip()
+        rows.append([f'`{item.name}`', default, allowed, about['text']])
+    return _table(['parameter', 'default', 'allowed', 'meaning'], rows)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    'inputs': inputs,
+    'outputs': outputs,
+    'parameters': parameters,
+}
+
+
+def updated(text: str) -> str:
+    """
+    Return a page with every marked table made anew.
+
+    Raises
+    ------
+    ValueError
+        If the page lacks the markers of a table.
+    """
+    for name, table in TABLES.items():
+        begin, end = f'<!-- {name} -->', f'<!-- end {name} -->'
+        if begin not in text or end not in text:
+            raise ValueError(f'no {begin} .. {end} in the page')
+        made = f'{begin}\n{table()}\n{end}'
+        text = re.sub(f'{begin}.*?{end}', lambda _, made=made: made, text, flags=re.DOTALL)
+    return text
+
+
+if __name__ == '__main__':
+    README.write_text(updated(README.read_text(encoding='utf-8')), encoding='utf-8')

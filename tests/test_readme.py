@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The README says what the code does, and its commands exist."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+TEXT = (ROOT / 'README.md').read_text(encoding='utf-8')
+
+
+def test_tables_are_made_from_the_code() -> None:
+    spec = importlib.util.spec_from_file_location('tables', ROOT / 'docs' / 'tables.py')
+    assert spec is not None
+    assert spec.loader is not None
+    tables = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tables)
+    assert tables.updated(TEXT) == TEXT, 'run: python docs/tables.py'
+
+
+def test_opens_with_the_two_commands() -> None:
+    opening = TEXT[: TEXT.index('## ')]
+    makefile = (ROOT / 'Makefile').read_text()
+    for target in ('demo', 'test'):
+        assert f'make {target}' in opening
+        assert re.search(rf'^{target}:', makefile, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    'path', sorted(set(re.findall(r'(?:benchmarks|docs|config)/[\w./-]+\w', TEXT)))
+)
+def test_every_file_it_names_exists(path: str) -> None:
+    assert (ROOT / path).exists()
+
+
+@pytest.mark.parametrize('verb', sorted(set(re.findall(r'shipdrag (\w+) [-\w]', TEXT))))
+def test_every_verb_it_uses_exists(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    from shipdrag_ros.cli import main
+
+    with pytest.raises(SystemExit) as stopped:
+        main([verb, '--help'])
+    assert stopped.value.code == 0
+    assert 'usage' in capsys.readouterr().out
