@@ -96,16 +96,15 @@ def added_mass() -> Kind:
     return Kind(read, f'a model: {expectation}')
 
 
-def n_r(model: AddedMass, froude: Float64, slenderness: float) -> Float64:
+def n_r_polynomial(model: AddedMass, slenderness: float) -> Float64:
     """
-    Return n_r at Froude numbers >= 0.
+    Return the coefficients of n_r in the Froude number, lowest power first.
 
     Notes
     -----
     S1 (2). Written with the Froude number, sqrt(g L) drops out of its b.
     """
-    result = np.zeros_like(froude)
-    for row in reversed(model.coefficients):
-        b = sum(c * slenderness**power for power, c in enumerate(row))
-        result = result * froude + b
-    return result
+    return np.array(
+        [sum(c * slenderness**power for power, c in enumerate(row)) for row in model.coefficients],
+        np.float64,
+    )

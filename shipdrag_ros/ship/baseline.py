@@ -56,7 +56,7 @@ class CoefficientBaseline:
 
     @cached_property
     def _wave(self) -> Any:
-        return PchipInterpolator(self.wave_froude, self.wave_coefficient, extrapolate=False)
+        return PchipInterpolator(self.wave_froude, self.wave_coefficient)
 
     def wave(self, froude: Float64) -> Float64:
         """
@@ -93,7 +93,7 @@ class TableBaseline:
 
     @cached_property
     def _resistance(self) -> Any:
-        return PchipInterpolator(self.speed_m_s, self.resistance_n, extrapolate=False)
+        return PchipInterpolator(self.speed_m_s, self.resistance_n)
 
     def resistance(self, speed: Float64) -> Float64:
         """
@@ -137,8 +137,10 @@ def ittc57(reynolds: Float64) -> Float64:
 
 
 def _inside(table: Any, at: Float64, key: str, points: tuple[float, ...], unit: str) -> Float64:
-    result: Float64 = table(at)
-    outside = np.isnan(result)
+    # the last digit of a Froude number made from a speed may lie outside
+    near = np.clip(at, points[0], points[-1])
+    outside = ~(np.abs(at - near) <= 1e-12 * points[-1])
+    result: Float64 = table(near)
     if np.any(outside):
         worst = float(np.asarray(at)[outside].flat[0])
         raise ShipdragError(

@@ -12,8 +12,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
-from shipdrag_ros.ship.added_mass import MerchantAddedMass, n_r
+from shipdrag_ros.ship.added_mass import MerchantAddedMass, n_r_polynomial
 from shipdrag_ros.ship.baseline import CoefficientBaseline, TableBaseline
 
 SLENDERNESS = (2.0, 15.0)  # L / V^(1/3): car to racing shell
@@ -60,7 +61,7 @@ def _added_mass(values: Mapping[str, Any], psi: float) -> Iterator[str]:
             f'added_mass.model: merchant with L/V^(1/3) = {psi:.3g}, expected {low:g}..{high:g}; '
             'use {model: constant, value: ..., sd: ...}'
         )
-    elif np.min(smallest := n_r(model, _FROUDE, psi)) <= 0.0:
+    elif np.min(smallest := polyval(_FROUDE, n_r_polynomial(model, psi))) <= 0.0:
         yield (
             f'added_mass: n_r = {np.min(smallest):.3g} at Fr = '
             f'{_FROUDE[np.argmin(smallest)]:.2g}, expected n_r > 0 for Fr 0..0.4'

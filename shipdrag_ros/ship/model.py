@@ -9,12 +9,13 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import strict_yaml
-from shipdrag_ros.ship.added_mass import AddedMass, MerchantAddedMass, added_mass, n_r
+from shipdrag_ros.ship.added_mass import AddedMass, MerchantAddedMass, added_mass, n_r_polynomial
 from shipdrag_ros.ship.baseline import Baseline, TableBaseline, baseline
 from shipdrag_ros.ship.consistency import (
     SLENDERNESS_MERCHANT_TRUSTED,
@@ -157,7 +158,35 @@ class Ship:
         -----
         S1 (2).
         """
-        return n_r(self.added_mass, np.abs(self.froude(speed_m_s)), self.slenderness)
+        magnitude = np.abs(np.asarray(speed_m_s, np.float64))
+        return np.asarray(polyval(magnitude, self.n_r_polynomial()), np.float64)
+
+    def n_r_polynomial(self) -> Float64:
+        """
+        Return the coefficients of n_r in |v| [m/s], lowest power first.
+
+        Notes
+        -----
+        The b0, b1, b2 of S1 (2).
+        """
+        in_froude = n_r_polynomial(self.added_mass, self.slenderness)
+        return in_froude / self._froude_one ** np.arange(len(in_froude))
+
+    @property
+    def baseline_range_m_s(self) -> tuple[float, float]:
+        """
+        Speeds at which the baseline is stated, lowest and highest.
+
+        Raises
+        ------
+        ShipdragError
+            Without a baseline.
+        """
+        base = self._stated_baseline()
+        if isinstance(base, TableBaseline):
+            return base.speed_m_s[0], base.speed_m_s[-1]
+        low, high = self.speed((base.wave_froude[0], base.wave_froude[-1]))
+        return float(low), float(high)
 
     def resistance_n(self, speed_m_s: ArrayLike) -> Float64:
         """
@@ -168,20 +197,24 @@ class Ship:
         ShipdragError
             Without a baseline, or outside its table.
         """
+        base = self._stated_baseline()
+        v = np.asarray(speed_m_s, np.float64)
+        magnitude = np.abs(v)
+        if isinstance(base, TableBaseline):
+            table: Float64 = np.sign(v) * base.resistance(magnitude)
+            return table
+        assert self.wetted_surface_m2 is not None  # the ship file was checked
+        reynolds = magnitude * self.length_m / self.water.kinematic_viscosity_m2_s
+        coefficient = base.viscous(reynolds) + base.wave(self.froude(magnitude))
+        pressure = 0.5 * self.water.density_kg_m3 * v * magnitude
+        return pressure * self.wetted_surface_m2 * coefficient + self.air_drag_n(v)
+
+    def _stated_baseline(self) -> Baseline:
         if self.baseline is None:
             raise ShipdragError(
                 f'ship {self.name!r} has no baseline resistance; add `baseline` to its ship file'
             )
-        v = np.asarray(speed_m_s, np.float64)
-        magnitude = np.abs(v)
-        if isinstance(self.baseline, TableBaseline):
-            table: Float64 = np.sign(v) * self.baseline.resistance(magnitude)
-            return table
-        assert self.wetted_surface_m2 is not None  # the ship file was checked
-        reynolds = magnitude * self.length_m / self.water.kinematic_viscosity_m2_s
-        coefficient = self.baseline.viscous(reynolds) + self.baseline.wave(self.froude(magnitude))
-        pressure = 0.5 * self.water.density_kg_m3 * v * magnitude
-        return pressure * self.wetted_surface_m2 * coefficient + self.air_drag_n(v)
+        return self.baseline
 
     def air_drag_n(self, relative_wind_m_s: ArrayLike) -> Float64:
         """

@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What happens in a simulation: speeds, engine orders, turns, disturbances.
+
+The time of the record starts at 0; orders and turns are timed from the end of
+the lead-in, where the engine is stopped by default.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.simulation.noise import GaussMarkov
+
+
+@dataclass(frozen=True)
+class EngineOrder:
+    """
+    A change of engine power; thrust and shaft approach it as exp(-t/run_down).
+
+    Attributes
+    ----------
+    time_s
+        After the lead-in.
+    shaft
+        Shaft speed, as a fraction of the steady one.
+    thrust
+        Thrust, as a fraction of the steady one.
+    """
+
+    time_s: float
+    shaft: float
+    thrust: float
+
+
+STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """
+    A turn at a constant rate.
+
+    Attributes
+    ----------
+    start_s
+        After the lead-in.
+    duration_s
+    rate_rad_s
+        Yaw rate, anticlockwise positive.
+    drag_area_m2
+        Resistance while turning is 0.5 rho drag_area u |u| larger.
+    rudder_rad
+        Rudder angle while turning.
+    """
+
+    start_s: float
+    duration_s: float
+    rate_rad_s: float
+    drag_area_m2: float = 0.0
+    rudder_rad: float = 0.0
+
+    @property
+    def end_s(self) -> float:
+        """After the lead-in."""
+        return self.start_s + self.duration_s
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """
+    One simulated record.
+
+    Attributes
+    ----------
+    speed_m_s
+        Steady speed through water in the lead-in.
+    lead_in_s, duration_s
+        Length of the steady sailing and of what follows.
+    heading_rad
+        Yaw at the start, REP-103: from east, anticlockwise.
+    shaft_rad_s
+        Shaft speed in the lead-in.
+    current_m_s
+        Velocity of the water over ground, to the east and to the north.
+    depth_m
+        Water depth.
+    orders
+        Engine orders in the order of time; none: steady sailing throughout.
+    turns
+        Turns in the order of time, not overlapping.
+    water_speed
+        Slow disturbance of the water's velocity along the ship [m/s].
+    gust_force
+        Slow disturbance of the force along the ship [N], driving positive.
+    seed
+        Of the disturbances.
+
+    Raises
+    ------
+    SimulationError
+        Naming every value that is impossible.
+    """
+
+    speed_m_s: float
+    lead_in_s: float = 600.0
+    duration_s: float = 1500.0
+    heading_rad: float = 0.0
+    shaft_rad_s: float = 11.5
+    current_m_s: tuple[float, float] = (0.0, 0.0)
+    depth_m: float = 200.0
+    orders: tuple[EngineOrder, ...] = (STOP,)
+    turns: tuple[Turn, ...] = ()
+    water_speed: GaussMarkov | None = None
+    gust_force: GaussMarkov | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        problems = list(self._problems())
+        if problems:
+            raise SimulationError('scenario: ' + '; '.join(problems))
+
+    def _problems(self) -> Iterator[str]:
+        for name in ('speed_m_s', 'lead_in_s', 'duration_s', 'shaft_rad_s', 'depth_m'):
+            value = getattr(self, name)
+            if not (isfinite(value) and value >= 0.0):
+                yield f'{name} is {value!r}, expected 0 or more'
+        for name in ('heading_rad', 'current_m_s'):
+            if not np.all(np.isfinite(getattr(self, name))):
+                yield f'{name} is {getattr(self, name)!r}, expected finite'
+        if self.speed_m_s == 0.0 or self.lead_in_s + self.duration_s == 0.0:
+            yield 'speed and length of the record must not be 0'
+        times = [order.time_s for order in self.orders]
+        ascending = all(early < late for early, late in zip([-np.inf, *times], times))
+        if not ascending or any(time < -self.lead_in_s for time in times):
+            yield f'orders are at {times}, expected ascending and within the record'
+        edges = [time for turn in self.turns for time in (turn.start_s, turn.end_s)]
+        if not all(early <= late for early, late in zip([-self.lead_in_s, *edges], edges)):
+            yield f'turns are at {edges}, expected one after the other and within the record'
+        fractions = [value for order in self.orders for value in (order.shaft, order.thrust)]
+        if not np.all(np.isfinite(fractions)):
+            yield f'orders are {self.orders!r}, expected finite fractions'
+        rates = [
+            value
+            for turn in self.turns
+            for value in (turn.rate_rad_s, turn.drag_area_m2, turn.rudder_rad)
+        ]
+        if not np.all(np.isfinite(rates)):
+            yield f'turns are {self.turns!r}, expected finite values'
+        for name in ('water_speed', 'gust_force'):
+            noise = getattr(self, name)
+            if noise is not None:
+                yield from (f'{name}: {problem}' for problem in noise.problems())
+
+    @property
+    def length_s(self) -> float:
+        """Length of the record."""
+        return self.lead_in_s + self.duration_s
+
+    def events_s(self) -> list[float]:
+        """
+        Return the record times at which an order or a turn begins or ends.
+        """
+        moments = {self.moment_s(order.time_s) for order in self.orders}
+        for turn in self.turns:
+            moments |= {self.moment_s(turn.start_s), self.moment_s(turn.end_s)}
+        return sorted(moments)
+
+    def moment_s(self, after_lead_in_s: float) -> float:
+        """
+        Return the record time; the same digits wherever it is compared.
+        """
+        return self.lead_in_s + after_lead_in_s
+
+    def shaft_fraction(self, time_s: ArrayLike, *, run_down_s: float) -> Float64:
+        """
+        Return shaft speed over the steady one, at record times.
+        """
+        return self._approach([order.shaft for order in self.orders], time_s, run_down_s)
+
+    def thrust_fraction(self, time_s: ArrayLike, *, run_down_s: float) -> Float64:
+        """
+        Return thrust over the steady one, at record times.
+        """
+        return self._approach([order.thrust for order in self.orders], time_s, run_down_s)
+
+    def thrust_ordered(self, time_s: float) -> float:
+        """
+        Return the thrust that is approached at a record time, over the steady one.
+        """
+        given = [order for order in self.orders if self.moment_s(order.time_s) <= time_s]
+        return given[-1].thrust if given else 1.0
+
+    def heading(self, time_s: ArrayLike) -> Float64:
+        """
+        Return the yaw [rad], unwrapped, at record times.
+        """
+        time = np.asarray(time_s, np.float64)
+        yaw = np.full_like(time, self.heading_rad)
+        for turn in self.turns:
+            elapsed = np.clip(time - self.moment_s(turn.start_s), 0.0, turn.duration_s)
+            yaw += turn.rate_rad_s * elapsed
+        return yaw
+
+    def rudder(self, time_s: ArrayLike) -> Float64:
+        """
+        Return the rudder angle [rad] at record times.
+        """
+        time = np.asarray(time_s, np.float64)
+        angle = np.zeros_like(time)
+        for turn in self.turns:
+            start, end = self.moment_s(turn.start_s), self.moment_s(turn.end_s)
+            angle[(time >= start) & (time < end)] = turn.rudder_rad
+        return angle
+
+    def turn_at(self, time_s: float) -> Turn | None:
+        """
+        Return the turn that goes on at a record time.
+        """
+        for turn in self.turns:
+            if self.moment_s(turn.start_s) <= time_s < self.moment_s(turn.end_s):
+                return turn
+        return None
+
+    def _approach(self, targets: list[float], time_s: ArrayLike, run_down_s: float) -> Float64:
+        """Follow the orders with a first-order lag, from 1 in the lead-in."""
+        time = np.asarray(time_s, np.float64)
+        result = np.ones_like(time)
+
+        def decay(elapsed: Float64) -> Float64:
+            # before an order the value is not used, and must not overflow
+            late = np.maximum(elapsed, 0.0)
+            return np.exp(-late / run_down_s) if run_down_s > 0.0 else np.zeros_like(late)
+
+        level, target, since = 1.0, 1.0, -np.inf
+        for order, new_target in zip(self.orders, targets):
+            moment = self.moment_s(order.time_s)
+            level = target + (level - target) * float(decay(np.asarray(moment - since)))
+            target, since = new_target, moment
+            value = target + (level - target) * decay(time - since)
+            result = np.where(time >= since, value, result)
+        return result

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Sensors that read a simulated motion, with the faults of real ones.
+
+A reading is the truth at its time of measurement plus noise; what the stamp
+says and when the reading arrives are faults of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+from shipdrag_ros.simulation.noise import GaussMarkov
+from shipdrag_ros.simulation.surge import Truth
+
+START_NS = 1_780_300_800_000_000_000  # 2026-06-01 08:00 UTC
+
+_TWO_COLUMNS = (Channel.POSITION, Channel.WIND_APPARENT)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensor:
+    """
+    One sensor; values are in the unit of its channel.
+
+    Attributes
+    ----------
+    channel
+        What it measures; geodetic positions are not simulated.
+    rate_hz
+        Readings per second.
+    sd
+        Standard deviation of white noise, of each column.
+    coloured
+        Slow noise on top, of each column.
+    outlier_fraction, outlier_size
+        Share of readings that jump, either way, by 0.5 to 1.5 times the size.
+    gaps_s
+        Times of the record, (from, to), without readings.
+    quantum
+        Readings are multiples of it; 0: not rounded.
+    delay_s
+        Time from the measurement to its arrival.
+    stamp_jitter_s
+        Standard deviation of the stamp around the time of measurement.
+    stated_sd
+        Standard deviation that the sensor claims; NaN: it does not say.
+    """
+
+    channel: Channel
+    rate_hz: float = 1.0
+    sd: float = 0.0
+    coloured: GaussMarkov | None = None
+    outlier_fraction: float = 0.0
+    outlier_size: float = 0.0
+    gaps_s: tuple[tuple[float, float], ...] = ()
+    quantum: float = 0.0
+    delay_s: float = 0.0
+    stamp_jitter_s: float = 0.0
+    stated_sd: float = np.nan
+
+
+def standard_sensors(*, rate_hz: float = 1.0, noise: float = 1.0) -> tuple[Sensor, ...]:
+    """
+    Return log, position, heading and shaft of a well-kept ship.
+
+    Parameters
+    ----------
+    rate_hz
+        Readings per second of each.
+    noise
+        Multiplies the standard deviations 0.05 m/s, 10 m, 0.5 deg and
+        0.02 rad/s; 0 for exact readings.
+    """
+    white = (
+        (Channel.SPEED_THROUGH_WATER, 0.05),
+        (Channel.POSITION, 10.0),
+        (Channel.HEADING, np.radians(0.5)),
+        (Channel.SHAFT, 0.02),
+    )
+    return tuple(
+        Sensor(channel=channel, rate_hz=rate_hz, sd=noise * float(sd)) for channel, sd in white
+    )
+
+
+def sense(
+    truth: Truth, sensors: Sequence[Sensor], *, seed: int, start_ns: int = START_NS
+) -> Block:
+    """
+    Read a motion with sensors; return their samples in arrival order.
+
+    Parameters
+    ----------
+    truth
+        The motion.
+    sensors
+        At most one of a channel.
+    seed
+        Of all noise; the noise of one sensor does not depend on the others.
+    start_ns
+        Time of the start of the record [ns since the epoch].
+
+    Raises
+    ------
+    SimulationError
+        If a sensor is impossible.
+    """
+    problems = [problem for sensor in sensors for problem in _problems(sensor)]
+    if len({sensor.channel for sensor in sensors}) < len(sensors):
+        problems.append('two sensors of one channel, expected one')
+    if problems:
+        raise SimulationError('sensors: ' + '; '.join(problems))
+    return in_arrival_order(
+        [
+            _read(truth, sensor, np.random.default_rng([seed, sensor.channel]), start_ns)
+            for sensor in sensors
+        ]
+    )
+
+
+def _read(truth: Truth, sensor: Sensor, rng: np.random.Generator, start_ns: int) -> Block:
+    end_s = truth.time_s[-1]
+    time = np.arange(int(end_s * sensor.rate_hz) + 1) / sensor.rate_hz
+    time = time[time <= end_s]
+    n = len(time)
+    columns = 2 if sensor.channel in _TWO_COLUMNS else 1
+    value = _true_values(truth.at(time), sensor.channel)
+    value += sensor.sd * rng.standard_normal((n, columns))
+    if sensor.coloured:
+        for column in range(columns):
+            value[:, column] += sensor.coloured.sample(time, rng)
+    is_outlier = rng.random(n) < sensor.outlier_fraction
+    jump = sensor.outlier_size * rng.uniform(0.5, 1.5, (n, columns))
+    value += is_outlier[:, None] * jump * rng.choice([-1.0, 1.0], (n, columns))
+    if sensor.quantum:
+        value = np.round(value / sensor.quantum) * sensor.quantum
+    value = _as_sent(value, sensor.channel)
+
+    jitter = sensor.stamp_jitter_s * rng.standard_normal(n)
+    keep = np.ones(n, np.bool_)
+    for start, end in sensor.gaps_s:
+        keep &= (time < start) | (time > end)
+    variance = np.full((n, 2), np.nan)
+    variance[:, :columns] = sensor.stated_sd**2
+    return Block.of(
+        sensor.channel,
+        start_ns + _nanoseconds(time + jitter)[keep],
+        (value if columns == 2 else value[:, 0])[keep],
+        receive_ns=start_ns + _nanoseconds(time + sensor.delay_s)[keep],
+        variance=variance[keep],
+    )
+
+
+def _true_values(truth: Truth, channel: Channel) -> Float64:
+    """Return what a perfect sensor reads, a new array of one or two columns."""
+    match channel:
+        case Channel.SPEED_THROUGH_WATER:
+            return truth.speed_through_water_m_s[:, None].copy()
+        case Channel.SPEED_OVER_GROUND:
+            return np.linalg.norm(truth.velocity_over_ground_m_s, axis=1, keepdims=True)
+        case Channel.POSITION:
+            return truth.position_m.copy()
+        case Channel.HEADING:
+            return truth.heading_rad[:, None].copy()
+        case Channel.SHAFT:
+            return truth.shaft_rad_s[:, None].copy()
+        case Channel.RUDDER:
+            return truth.scenario.rudder(truth.time_s)[:, None]
+        case Channel.DEPTH:
+            return np.full((len(truth), 1), truth.scenario.depth_m)
+        case Channel.WIND_APPARENT:
+            # still air, seen from the ship: forward and to port
+            east, north = -truth.velocity_over_ground_m_s.T
+            cos, sin = np.cos(truth.heading_rad), np.sin(truth.heading_rad)
+            return np.column_stack([east * cos + north * sin, north * cos - east * sin])
+        case _:
+            raise SimulationError(f'{channel.name.lower()} is not simulated')
+
+
+def _as_sent(value: Float64, channel: Channel) -> Float64:
+    """Bring noisy readings to the range in which they are sent."""
+    if channel is Channel.HEADING:
+        return np.angle(np.exp(1j * value))
+    if channel is Channel.SPEED_OVER_GROUND:
+        return np.abs(value)
+    return value
+
+
+def _nanoseconds(time_s: Float64) -> NDArray[np.int64]:
+    return np.round(time_s * 1e9).astype(np.int64)
+
+
+def _problems(sensor: Sensor) -> list[str]:
+    name = sensor.channel.name.lower()
+    problems = []
+    if sensor.channel is Channel.POSITION_GEODETIC:
+        problems.append(f'{name} is not simulated, expected position')
+    if not 0.0 < sensor.rate_hz <= 1e4:
+        problems.append(f'{name}: rate_hz is {sensor.rate_hz!r}, expected 0..10000 Hz')
+    if not 0.0 <= sensor.outlier_fraction <= 1.0:
+        problems.append(f'{name}: outlier_fraction is {sensor.outlier_fraction!r}, expected 0..1')
+    for field in ('sd', 'outlier_size', 'quantum', 'delay_s', 'stamp_jitter_s'):
+        value = getattr(sensor, field)
+        if not 0.0 <= value < np.inf:
+            problems.append(f'{name}: {field} is {value!r}, expected 0 or more')
+    if sensor.coloured:
+        problems.extend(f'{name}: coloured {problem}' for problem in sensor.coloured.problems())
+    return problems
