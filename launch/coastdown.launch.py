@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Start the onboard node.
+
+    ros2 launch shipdrag_ros coastdown.launch.py ship_file:=ship.yaml output_directory:=bags
+
+The topics of other drivers are connected from a launch file of yours that includes
+this one after `SetRemap('speed_through_water', '/log/velocity')`.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import LifecycleNode
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+ARGUMENTS = (
+    ('ship_file', None, 'path of the ship file (YAML)'),
+    ('output_directory', '.', 'where recordings are written'),
+    (
+        'params_file',
+        PathJoinSubstitution([FindPackageShare('shipdrag_ros'), 'config', 'parameters.yaml']),
+        'parameters of the node; the arguments here override it',
+    ),
+    ('use_sim_time', 'false', 'take the time from /clock'),
+    ('namespace', '', 'namespace of the node and of its inputs'),
+)
+
+
+def generate_launch_description():
+    """
+    Describe the one node and its arguments.
+    """
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=text)
+        for name, default, text in ARGUMENTS
+    ]
+    node = LifecycleNode(
+        package='shipdrag_ros',
+        executable='coastdown_node',
+        name='coastdown_node',
+        namespace=LaunchConfiguration('namespace'),
+        output='screen',
+        parameters=[
+            LaunchConfiguration('params_file'),
+            {
+                'ship_file': ParameterValue(LaunchConfiguration('ship_file'), value_type=str),
+                'output_directory': ParameterValue(
+                    LaunchConfiguration('output_directory'), value_type=str
+                ),
+                'use_sim_time': ParameterValue(
+                    LaunchConfiguration('use_sim_time'), value_type=bool
+                ),
+            },
+        ],
+    )
+    return LaunchDescription([*declared, node])

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What /diagnostics says: where the node stands and why it may be silent.
+
+Each function turns one part of the node into one DiagnosticStatus. A figure has
+its unit in its key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.node.inputs import InputTopic
+from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
+from shipdrag_ros.samples import MOTION_INPUTS
+
+OK = DiagnosticStatus.OK
+WARN = DiagnosticStatus.WARN
+ERROR = DiagnosticStatus.ERROR
+STALE = DiagnosticStatus.STALE
+
+SILENT_S = 10.0  # an input heard before and silent for longer is stale
+
+
+def state_status(
+    lifecycle: str,
+    monitor: str | None,
+    inputs: Sequence[InputTopic],
+    *,
+    clock_ns: int,
+    sim_time: bool,
+) -> DiagnosticStatus:
+    """
+    Say where the node stands, and what keeps it from estimating.
+
+    Parameters
+    ----------
+    lifecycle
+        State of the managed node.
+    monitor
+        State of the monitor, None while not active.
+    clock_ns
+        The node's clock; 0 under sim time before the first /clock.
+    """
+    values = {
+        'lifecycle': lifecycle,
+        'monitor': monitor or 'none',
+        'clock': 'simulated' if sim_time else 'system',
+    }
+    motion = [topic for topic in inputs if topic.name in MOTION_INPUTS]
+    if sim_time and clock_ns == 0:
+        return _status(
+            'state', ERROR, 'use_sim_time is true but no /clock: messages are not used', values
+        )
+    if monitor is None:
+        return _status('state', WARN, f'{lifecycle}: not estimating', values)
+    if not any(topic.age_s is not None and topic.age_s < SILENT_S for topic in motion):
+        names = ', '.join(topic.name for topic in motion)
+        return _status('state', ERROR, f'no data: nothing on any of {names}', values)
+    return _status('state', OK, monitor, values)
+
+
+def input_status(topic: InputTopic, rejected: Mapping[str, int]) -> DiagnosticStatus:
+    """
+    Say how one input is doing; `rejected` counts samples by reason.
+    """
+    level, message = _input_health(topic)
+    values: dict[str, object] = {
+        'topic': topic.topic,
+        'type': topic.type or 'not yet known',
+        'publishers': sum(topic.publishers.values()),
+        'messages': topic.received,
+        'rate [Hz]': topic.rate_hz,
+        'age [s]': topic.age_s,
+        'clock offset [s]': (
+            None if topic.clock_offset_ns is None else topic.clock_offset_ns * 1e-9
+        ),
+        'not used, node inactive or without clock': topic.unused,
+        **{f'unreadable {reason}': times for reason, times in topic.unreadable.items()},
+        **{f'rejected {reason}': times for reason, times in rejected.items()},
+    }
+    return _status(f'input {topic.name}', level, message, values)
+
+
+def _input_health(topic: InputTopic) -> tuple[bytes, str]:
+    others = ', '.join(topic.other_types)
+    if topic.type is None and others:
+        accepted = ', '.join(topic.accepted)
+        return ERROR, f'wrong type: {others} is published, accepted are {accepted}'
+    if topic.type is None:
+        return OK, 'no publisher'
+    if others:
+        return WARN, f'wrong type: also published as {others}, heard is only {topic.type}'
+    if topic.incompatible_qos is not None:
+        return WARN, f'a publisher is not heard: its {topic.incompatible_qos} QoS does not fit'
+    if topic.age_s is None:
+        return WARN, 'no data'
+    if topic.age_s > SILENT_S:
+        return STALE, f'no data for {topic.age_s:.0f} s'
+    return OK, 'receiving'
+
+
+def recording_status(status: RecordingStatus) -> DiagnosticStatus:
+    """
+    Say how the recording stands.
+    """
+    return _status(
+        'recording',
+        ERROR if status.state is RecordingState.FAILED else OK,
+        status.text,
+        {
+            'state': status.state.value,
+            'file': status.path or 'none',
+            'size [B]': status.size_bytes,
+            'messages': status.messages,
+            'messages not written': status.lost,
+            'memory for a later start': 'too small' if status.ring_cut else 'sufficient',
+        },
+    )
+
+
+def estimate_status(estimate: Estimate | None) -> DiagnosticStatus:
+    """
+    Give the latest figures.
+    """
+    if estimate is None:
+        return _status('estimate', OK, 'none yet', {})
+    low, high = estimate.froude_valid
+    return _status(
+        'estimate',
+        OK,
+        f'{estimate.estimator} over {estimate.duration_s:.0f} s',
+        {
+            'stamp [ns]': estimate.end_ns,
+            'speed through water [m/s]': estimate.last_speed_m_s,
+            'its standard deviation [m/s]': estimate.last_speed_sigma_m_s,
+            'specific resistance [m/s^2]': estimate.last_resistance_m_s2,
+            'standard deviation of it [m/s^2]': estimate.last_sigma_m_s2,
+            'valid from Froude number [1]': low,
+            'valid to Froude number [1]': high,
+            'w, largest deviation over largest resistance [1]': estimate.w,
+            **{f'samples of {name} [1]': count for name, count in estimate.samples.items()},
+        },
+    )
+
+
+def _status(
+    name: str, level: bytes, message: str, values: Mapping[str, object]
+) -> DiagnosticStatus:
+    return DiagnosticStatus(
+        level=level,
+        name=f'coastdown_node: {name}',
+        message=message,
+        hardware_id='',
+        values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],
+    )
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return 'none'
+    return f'{value:.6g}' if isinstance(value, float) else str(value)

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The process around the node: start, spin, end cleanly on a signal.
+
+rclpy's own signal handlers shut ROS down under the node's feet. Here a signal
+only asks for the end, so that the last estimate is still published and the bag
+is closed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import tempfile
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.node.node import CoastdownNode
+
+USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """
+    Run the node until a signal; the console script.
+
+    Parameters
+    ----------
+    arguments
+        Command line, the program's name first; that of the process by default.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 user error, 2 usage.
+    """
+    line = list(sys.argv if arguments is None else arguments)
+    try:
+        return _run(line)
+    except ShipdragError as error:
+        print(f'ERROR: {error}', file=sys.stderr)
+        return 1
+
+
+def run(ship_file: Path, output_directory: Path, *, ros_arguments: Sequence[str] = ()) -> int:
+    """
+    Run the node on a ship file, recording into a directory.
+
+    Parameters
+    ----------
+    ros_arguments
+        More of what may follow `--ros-args`, for instance `['-p', 'window_s:=600.0']`.
+    """
+    # the value of -p is YAML, and a JSON string is a YAML string whatever is in it
+    given = [f'ship_file:={json.dumps(str(ship_file))}']
+    given += [f'output_directory:={json.dumps(str(output_directory))}']
+    flags = [word for assignment in given for word in ('-p', assignment)]
+    return main(['coastdown_node', '--ros-args', *flags, *ros_arguments])
+
+
+def _run(line: list[str]) -> int:
+    if 'HOME' not in os.environ:  # as under systemd; ROS refuses to start without a place for logs
+        os.environ.setdefault('ROS_LOG_DIR', tempfile.gettempdir())
+    stop = threading.Event()
+    context = rclpy.Context()
+    try:
+        rclpy.init(args=line, context=context, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise ShipdragError(f'ROS does not start: {error}') from error
+    try:
+        if stray := remove_ros_args(line)[1:]:
+            print(f'{USAGE}\nunknown: {" ".join(stray)}', file=sys.stderr)
+            return 2
+        executor = SingleThreadedExecutor(context=context)
+        _on_signal(stop, executor)
+        node = CoastdownNode(context=context, arguments=line)
+        try:
+            executor.add_node(node)
+            node.start()
+            while not stop.is_set():
+                executor.spin_once()
+        except ExternalShutdownException:
+            pass
+        finally:
+            node.close()
+    finally:
+        rclpy.try_shutdown(context=context)
+    return 0
+
+
+def _on_signal(stop: threading.Event, executor: SingleThreadedExecutor) -> None:
+    """
+    Set `stop` on SIGINT and SIGTERM.
+
+    A Python handler has to wait until the executor returns from C; the byte that
+    a signal writes at once into a pipe does not.
+    """
+    read_end, write_end = os.pipe()
+    os.set_blocking(write_end, False)
+    signal.set_wakeup_fd(write_end)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: None)
+
+    def wait() -> None:
+        os.read(read_end, 1)
+        stop.set()
+        executor.wake()
+
+    threading.Thread(target=wait, name='signals', daemon=True).start()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

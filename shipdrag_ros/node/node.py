@@ -1,0 +1,297 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The onboard node: lifecycle and wiring, nothing else.
+
+Between its topics stand the same decoder, monitor and encoder as in replay.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.context import Context
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_srvs.srv import Trigger
+
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.errors import ShipdragError, ShipFileError
+from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
+from shipdrag_ros.node import diagnostics
+from shipdrag_ros.node.inputs import InputTopic, message_class
+from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
+from shipdrag_ros.node.recorder import Recorder
+from shipdrag_ros.node.session import Session
+from shipdrag_ros.node.settings import NodeSettings
+from shipdrag_ros.ship import Ship
+
+NAME = 'coastdown_node'
+LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
+DIAGNOSE_S = 1.0
+
+
+class CoastdownNode(LifecycleNode):
+    """
+    Managed node that estimates resistance from coastdowns.
+
+    Parameters
+    ----------
+    arguments
+        Command line, to check its parameter files.
+
+    Raises
+    ------
+    ParameterError
+        If a parameter is unknown, of the wrong type or out of range.
+    """
+
+    def __init__(self, *, context: Context, arguments: Sequence[str] = ()) -> None:
+        super().__init__(
+            NAME, context=context, automatically_declare_parameters_from_overrides=True
+        )
+        check_sections(arguments, self)
+        self._node_parameters = NodeParameters(self)
+        self._failure: ShipdragError | None = None
+        self._settings: NodeSettings | None = None
+        self._ship: Ship | None = None
+        self._recorder: Recorder | None = None
+        self._session: Session | None = None
+        self._input_topics: list[InputTopic] = []
+        self._outputs: dict[str, Publisher] = {}
+        self._survive_illegal_transitions()
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
+        self.create_timer(DIAGNOSE_S, self._diagnose, clock=steady)
+        self.create_timer(LOOK_S, self._look, clock=steady)
+        for name, action in (
+            ('start_recording', self._start_recording),
+            ('stop_recording', self._stop_recording),
+            ('reset', self._reset),
+        ):
+            self.create_service(Trigger, f'~/{name}', action)
+
+    def start(self) -> None:
+        """
+        Configure and activate if `autostart` is set.
+
+        Raises
+        ------
+        ShipdragError
+            Why that is impossible.
+        """
+        if not self._node_parameters.settings().autostart:
+            self.get_logger().info('waiting to be configured: autostart is false')
+            return
+        for trigger in (self.trigger_configure, self.trigger_activate):
+            if trigger() is not TransitionCallbackReturn.SUCCESS:
+                raise self._failure or ShipdragError('the node did not start, see its log')
+
+    def close(self) -> None:
+        """
+        End what is running and destroy the node; ROS may be gone already.
+        """
+        self._deactivate('the process ends')
+        self.destroy_node()
+
+    # lifecycle
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Check the settings, load the ship, make the topics."""
+        return self._attempt(self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to estimate, and to record if so set."""
+        return self._attempt(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give the last figures and close the bag."""
+        return self._attempt(lambda: self._deactivate('deactivated'))
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Drop the topics; parameters may be set again."""
+        return self._attempt(self._release)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End what is running, for good."""
+        return self._attempt(self._release)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Go back to where the node can be configured again."""
+        return self._attempt(self._release)
+
+    def _attempt(self, action: Callable[[], None]) -> TransitionCallbackReturn:
+        """Run a transition; rclpy would swallow what it raises."""
+        try:
+            action()
+        except ShipdragError as error:
+            self._failure = error
+            self.get_logger().error(str(error))
+            return TransitionCallbackReturn.FAILURE
+        except Exception:
+            self.get_logger().fatal(traceback.format_exc())
+            return TransitionCallbackReturn.ERROR
+        return TransitionCallbackReturn.SUCCESS
+
+    def _survive_illegal_transitions(self) -> None:
+        """Refuse what any peer may ask for; rclpy would raise it out of the executor."""
+        service = self._service_change_state
+        change_state = service.callback
+
+        def refuse_or_change(request: Any, response: Any) -> Any:
+            try:
+                return change_state(request, response)
+            except rclpy_implementation.RCLError as error:
+                self.get_logger().warning(f'transition refused: {error}')
+                response.success = False
+                return response
+
+        service.callback = refuse_or_change
+
+    def _configure(self) -> None:
+        settings = self._node_parameters.settings()
+        if not settings.ship_file:
+            raise ShipFileError('ship_file', ["is '', expected the path of a ship file"])
+        self._ship = Ship.load(settings.ship_file)
+        self._settings = settings
+        self._recorder = Recorder(
+            Path(settings.output_directory),
+            namespace=self.get_namespace().rstrip('/'),
+            ship=self._ship,
+            parameters=settings.parameters,
+        )
+        self._outputs = {
+            topic.under(self.get_fully_qualified_name()): self._publisher(topic)
+            for topic in OUTPUT_TOPICS
+        }
+        self._input_topics = [
+            InputTopic(
+                self,
+                name,
+                accepted=accepted,
+                fixed=settings.types.get(name, ''),
+                receive=self._on_message,
+            )
+            for name, accepted in TOPICS.items()
+        ]
+        self._node_parameters.fixed = True
+        effective = ', '.join(f'{name}={value!r}' for name, value in settings.to_mapping().items())
+        self.get_logger().info(f'configured: {effective}')
+
+    def _activate(self) -> None:
+        assert self._ship is not None
+        assert self._settings is not None
+        assert self._recorder is not None
+        self._session = Session(
+            Monitor(self._ship, self._settings.parameters),
+            self._recorder,
+            publish=self._send,
+            node=self.get_fully_qualified_name(),
+        )
+        if self._settings.record:
+            self._recorder.start()
+        self._session.note_lifecycle('active', self._now_ns())
+        self.get_logger().info(f'active; {self._recorder.status().text}')
+
+    def _deactivate(self, why: str) -> None:
+        if self._session is not None:
+            session, self._session = self._session, None
+            session.note_lifecycle(why, self._now_ns())
+            session.finish()
+
+    def _release(self) -> None:
+        self._deactivate('released')
+        for topic in self._input_topics:
+            topic.close()
+        for publisher in self._outputs.values():
+            self.destroy_publisher(publisher)
+        self._input_topics, self._outputs = [], {}
+        self._ship = self._settings = self._recorder = None
+        self._node_parameters.fixed = False
+
+    # traffic
+
+    def _publisher(self, topic: OutputTopic) -> Publisher:
+        if topic.latched:  # who joins late still gets the last curve
+            qos = QoSProfile(
+                depth=1,
+                reliability=ReliabilityPolicy.RELIABLE,
+                durability=DurabilityPolicy.TRANSIENT_LOCAL,
+            )
+        else:
+            qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+        return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
+
+    def _send(self, message: OutputMessage) -> None:
+        if self.context.ok():  # after an outside shutdown the bag alone gets the last figures
+            self._outputs[message.topic].publish(message.payload)
+
+    def _now_ns(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
+
+    def _on_message(self, topic: InputTopic, payload: bytes) -> None:
+        now_ns = self._now_ns()
+        if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
+            topic.unused += 1
+            return
+        assert topic.type is not None
+        topic.count(self._session.receive(Source(topic.name, topic.type), payload, now_ns))
+
+    def _look(self) -> None:
+        for topic in self._input_topics:
+            topic.look()
+
+    def _diagnose(self) -> None:
+        for topic in self._input_topics:
+            topic.tick()
+        monitor = None if self._session is None else self._session.monitor
+        now_ns = self._now_ns()
+        if self._session is not None and now_ns:
+            self._session.watch_clock(now_ns)  # also while nothing arrives
+        message = DiagnosticArray()
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.status = [
+            diagnostics.state_status(
+                self._state_machine.current_state[1],
+                None if monitor is None else monitor.state.value,
+                self._input_topics,
+                clock_ns=now_ns,
+                sim_time=self.get_parameter('use_sim_time').value,
+            ),
+            *(diagnostics.input_status(topic, {}) for topic in self._input_topics),
+        ]
+        if self._recorder is not None:
+            message.status.append(diagnostics.recording_status(self._recorder.status()))
+        if self._session is not None:
+            message.status.append(diagnostics.estimate_status(self._session.latest))
+        self._diagnostics.publish(message)
+
+    # services
+
+    def _start_recording(self, request: Any, response: Any) -> Any:
+        return self._answer(response, lambda session: session.recorder.start())
+
+    def _stop_recording(self, request: Any, response: Any) -> Any:
+        return self._answer(response, lambda session: session.recorder.stop())
+
+    def _reset(self, request: Any, response: Any) -> Any:
+        return self._answer(response, lambda session: session.reset('asked for', self._now_ns()))
+
+    def _answer(self, response: Any, action: Callable[[Session], None]) -> Any:
+        if self._session is None:
+            response.success, response.message = False, 'the node is not active'
+            return response
+        try:
+            action(self._session)
+        except ShipdragError as error:
+            response.success, response.message = False, str(error)
+        else:
+            response.success, response.message = True, self._session.recorder.status().text
+        return response

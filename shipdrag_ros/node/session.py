@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+One activation of the node: from bytes received to bytes published and recorded.
+
+Free of ROS, so that what a replay must reproduce can be tested without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.events import Coastdown, Event, Update
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.messages import (
+    Decoded,
+    EventKind,
+    EventNote,
+    OutputMessage,
+    Source,
+    decode,
+    event_message,
+    outputs,
+    reset_request,
+)
+from shipdrag_ros.node.recorder import Recorder
+from shipdrag_ros.node.ring import RawMessage
+from shipdrag_ros.samples import BACKWARD_JUMP_NS
+
+Publish = Callable[[OutputMessage], None]
+
+
+class Session:
+    """
+    A monitor between what is received and what is published.
+
+    Parameters
+    ----------
+    recorder
+        Told of every message in and out.
+    publish
+        Called with every message out.
+    node
+        Full name of the node.
+
+    Attributes
+    ----------
+    latest
+        The last estimate, None before the first and after a reset.
+    """
+
+    def __init__(
+        self, monitor: Monitor, recorder: Recorder, *, publish: Publish, node: str
+    ) -> None:
+        self.monitor = monitor
+        self.recorder = recorder
+        self.latest: Estimate | None = None
+        self._publish = publish
+        self._node = node
+        self._arrival_ns = 0
+
+    def receive(self, source: Source, payload: bytes, now_ns: int) -> Decoded:
+        """
+        Take one message; `now_ns` is the clock of the node [ns].
+        """
+        arrival_ns = self.watch_clock(now_ns)
+        decoded = decode(source, [payload], [arrival_ns])
+        stamps = decoded.block.stamp_ns
+        stamp_ns = int(stamps[0]) if len(stamps) else arrival_ns
+        # also what will be rejected: the bag holds what came, not what was liked
+        self.recorder.input(RawMessage(source.input, source.type, payload, arrival_ns, stamp_ns))
+        self._report(self.monitor.update(decoded.block))
+        return decoded
+
+    def watch_clock(self, now_ns: int) -> int:
+        """
+        Return the time of arrival [ns], which never falls within a recording.
+
+        A small step back is held; a large one is a clock that was set.
+        """
+        if now_ns < self._arrival_ns - BACKWARD_JUMP_NS:
+            reason = f'the clock went back by {(self._arrival_ns - now_ns) * 1e-9:.3f} s'
+            self._reset(reason)
+            self.recorder.new_part()
+            self._arrival_ns = now_ns
+            self._note(EventKind.CLOCK_JUMP, reason)
+        self._arrival_ns = max(self._arrival_ns, now_ns)
+        return self._arrival_ns
+
+    def reset(self, reason: str, now_ns: int) -> None:
+        """
+        Drop all memory.
+        """
+        self.watch_clock(now_ns)
+        self._reset(reason)
+
+    def note_lifecycle(self, text: str, now_ns: int) -> None:
+        """
+        Publish and record a change of the node's own state.
+        """
+        self.watch_clock(now_ns)
+        self._note(EventKind.LIFECYCLE, text)
+
+    def finish(self) -> None:
+        """
+        Give the last figures and close the recording; needs no ROS.
+        """
+        self._report(self.monitor.finish())
+        self.recorder.stop()
+
+    def _reset(self, reason: str) -> None:
+        # first the request, at whose place a replay resets too
+        self._send(reset_request(self._arrival_ns, reason, node=self._node))
+        self._report(self.monitor.reset(self._arrival_ns, reason))
+        self.recorder.forget()
+        self.latest = None
+
+    def _note(self, kind: EventKind, text: str) -> None:
+        self._send(event_message(EventNote(kind, self._arrival_ns, text, {}), node=self._node))
+
+    def _report(self, events: list[Event]) -> None:
+        for event in events:
+            if isinstance(event, Update | Coastdown) and event.estimate is not None:
+                self.latest = event.estimate
+            for message in outputs(event, node=self._node):
+                self._send(message)
+
+    def _send(self, message: OutputMessage) -> None:
+        self._publish(message)
+        if self._arrival_ns:  # 0: sim time before the first /clock
+            self.recorder.output(message, self._arrival_ns)

@@ -1,0 +1,184 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Settings of the node: its own and those of the monitor and estimator.
+
+Free of ROS, because the parameter file and the documentation are made from the
+same list as the node's descriptors. `python -m shipdrag_ros.node.settings`
+prints `config/parameters.yaml`.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+from shipdrag_ros.errors import ParameterError
+from shipdrag_ros.messages import TOPICS
+from shipdrag_ros.parameters import Parameters
+
+Value = bool | int | float | str
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One parameter of the node, as documented and as declared."""
+
+    name: str
+    default: Value
+    text: str
+    unit: str = ''
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+
+
+OWN: tuple[Setting, ...] = (
+    Setting('ship_file', '', 'path of the ship file (YAML); required'),
+    Setting('record', True, 'record inputs, outputs and events while active'),
+    Setting(
+        'output_directory',
+        '.',
+        'where recordings are written; made if missing, nothing there is ever overwritten',
+    ),
+    Setting('autostart', True, 'configure and activate without being asked to'),
+)
+TYPES: tuple[Setting, ...] = tuple(
+    Setting(
+        f'{name}.type',
+        '',
+        'message type of the topic; empty: the type found in the graph',
+        choices=('', *accepted),
+    )
+    for name, accepted in TOPICS.items()
+)
+SETTINGS: tuple[Setting, ...] = (
+    *OWN,
+    *TYPES,
+    *(
+        Setting(
+            item.name,
+            getattr(Parameters(), item.name),
+            item.metadata['text'],
+            unit=item.metadata['unit'],
+            low=item.metadata['low'],
+            high=item.metadata['high'],
+            choices=item.metadata['choices'],
+        )
+        for item in fields(Parameters)
+    ),
+)
+
+
+@dataclass(frozen=True)
+class NodeSettings:
+    """
+    All settings of the node, checked.
+
+    Attributes
+    ----------
+    types
+        Message type fixed by the user, by input; inputs without one are absent.
+    """
+
+    ship_file: str
+    record: bool
+    output_directory: str
+    autostart: bool
+    types: Mapping[str, str]
+    parameters: Parameters
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, object], *, subject: str) -> NodeSettings:
+        """
+        Build from names and values; what is not named keeps its default.
+
+        Raises
+        ------
+        ParameterError
+            Naming every unknown key and every bad value at once.
+        """
+        known = {setting.name: setting for setting in SETTINGS}
+        here = {setting.name: setting for setting in (*OWN, *TYPES)}
+        problems = [
+            f'{name!r}: unknown; known are {", ".join(sorted(known))}'
+            for name in values
+            if name not in known
+        ]
+        merged = {name: values.get(name, setting.default) for name, setting in here.items()}
+        for name, value in merged.items():
+            kind = type(here[name].default)
+            choices = here[name].choices
+            if type(value) is not kind:
+                problems.append(
+                    f'{name}: {value!r} is of type {type(value).__name__}, '
+                    f'expected {kind.__name__}'
+                )
+            elif choices and value not in choices:
+                problems.append(f'{name}: {value!r}, expected one of {", ".join(choices[1:])}')
+        parameters = Parameters()
+        try:
+            parameters = Parameters.from_mapping(
+                {name: values[name] for name in values if name in known and name not in here},
+                subject=subject,
+            )
+        except ParameterError as error:
+            problems.extend(error.problems)
+        if problems:
+            raise ParameterError(subject, problems)
+        types = {name: str(merged[f'{name}.type']) for name in TOPICS if merged[f'{name}.type']}
+        return cls(
+            str(merged['ship_file']),
+            bool(merged['record']),
+            str(merged['output_directory']),
+            bool(merged['autostart']),
+            types,
+            parameters,
+        )
+
+    def to_mapping(self) -> dict[str, Value]:
+        """
+        Return the value in effect of every setting, by name.
+        """
+        values: dict[str, Value] = {}
+        for setting in SETTINGS:
+            if setting.name.endswith('.type'):
+                values[setting.name] = self.types.get(setting.name.removesuffix('.type'), '')
+            else:
+                owner = self if hasattr(self, setting.name) else self.parameters
+                values[setting.name] = getattr(owner, setting.name)
+        return values
+
+
+def parameters_file() -> str:
+    """
+    Return the text of `config/parameters.yaml`: every default.
+    """
+    lines = [
+        '# SPDX-License-Identifier: Apache-2.0',
+        '# Every parameter of coastdown_node at its default; read-only once configured.',
+        '# Made by `python -m shipdrag_ros.node.settings`.',
+        '/**:',
+        '  ros__parameters:',
+    ]
+    for setting in SETTINGS:
+        about = setting.text
+        if setting.unit:
+            about += f' [{setting.unit}]'
+        if setting.low is not None:
+            about += f'; {setting.low:g} to {setting.high:g}'
+        if setting.choices:
+            about += f'; one of {", ".join(choice for choice in setting.choices if choice)}'
+        lines += textwrap.wrap(about, 99, initial_indent='    # ', subsequent_indent='    # ')
+        lines.append(f'    {setting.name}: {_yaml(setting.default)}')
+    return '\n'.join(lines) + '\n'
+
+
+def _yaml(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return repr(value)
+
+
+if __name__ == '__main__':
+    print(parameters_file(), end='')

@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node in a process of its own, and a peer that talks to it over DDS on loopback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from shipdrag_ros.messages import encode
+from shipdrag_ros.samples import Block
+
+START_S = 30.0  # the first start of a machine compiles the kernels
+ANSWER_S = 15.0
+
+_worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
+os.environ['ROS_DOMAIN_ID'] = str(10 + _worker)
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+
+
+class NodeProcess:
+    """
+    `coastdown_node` as a user starts it.
+    """
+
+    def __init__(self, directory: Path, arguments: list[str]) -> None:
+        self._log = directory / 'node.log'
+        with self._log.open('w') as log:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', 'shipdrag_ros.node.main', *arguments],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
+
+    @property
+    def log(self) -> str:
+        return self._log.read_text()
+
+    def wait_for_log(self, text: str) -> None:
+        end = time.monotonic() + START_S
+        while text not in self.log:
+            assert self._process.poll() is None, self.log
+            assert time.monotonic() < end, f'no {text!r} in\n{self.log}'
+            time.sleep(0.05)
+
+    def wait(self) -> int:
+        return self._process.wait(timeout=START_S)
+
+    def stop(self, number: signal.Signals = signal.SIGINT) -> int:
+        """
+        Ask for the end and return the exit status.
+        """
+        self._process.send_signal(number)
+        return self._process.wait(timeout=ANSWER_S)
+
+    def kill(self) -> None:
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+
+
+class Peer:
+    """
+    The rest of the ROS graph, one context of this process.
+    """
+
+    def __init__(self) -> None:
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self._rclpy = rclpy
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context)
+        self.node = rclpy.create_node('peer', context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        self._publishers: dict[str, Any] = {}
+
+    def close(self) -> None:
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._rclpy.try_shutdown(context=self._context)
+
+    def spin_until(self, condition: Callable[[], Any], *, within_s: float = ANSWER_S) -> Any:
+        """
+        Return the first true value of the condition.
+        """
+        end = time.monotonic() + within_s
+        while not (value := condition()):
+            assert time.monotonic() < end, f'not within {within_s} s'
+            self._executor.spin_once(timeout_sec=0.05)
+        return value
+
+    def spin_for(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self._executor.spin_once(timeout_sec=left)
+
+    def listen(
+        self, topic: str, type_name: str, *, latched: bool = False, raw: bool = False
+    ) -> list[Any]:
+        """
+        Return the list that messages will appear in.
+        """
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
+        from shipdrag_ros.node.inputs import message_class
+
+        heard: list[Any] = []
+        qos = QoSProfile(depth=1000)
+        if latched:
+            qos.durability = DurabilityPolicy.TRANSIENT_LOCAL
+        self.node.create_subscription(message_class(type_name), topic, heard.append, qos, raw=raw)
+        return heard
+
+    def publisher(self, topic: str, type_name: str) -> Any:
+        from shipdrag_ros.node.inputs import message_class
+
+        if topic not in self._publishers:
+            self._publishers[topic] = self.node.create_publisher(
+                message_class(type_name), topic, 1000
+            )
+        return self._publishers[topic]
+
+    def connect(self, block: Block) -> None:
+        """
+        Wait until the node hears every input of a block.
+        """
+        for message in encode(block):
+            publisher = self.publisher(message.topic, message.type)
+            self.spin_until(publisher.get_subscription_count)
+
+    def publish(self, block: Block) -> None:
+        for message in encode(block):
+            self.publisher(message.topic, message.type).publish(message.payload)
+
+    def clock(self, time_ns: int) -> None:
+        """
+        Set simulated time.
+        """
+        from rosgraph_msgs.msg import Clock
+
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(time_ns, 10**9)
+        self.publisher('/clock', 'rosgraph_msgs/msg/Clock').publish(message)
+
+    def play(self, block: Block, *, speed: float) -> None:
+        """
+        Publish a block as fast as stated, /clock leading it.
+        """
+        start_s, first_ns = time.monotonic(), int(block.receive_ns[0])
+        seconds = (block.receive_ns - first_ns) // 10**9
+        for second in sorted(set(seconds.tolist())):
+            due_s = start_s + second / speed
+            if (left := due_s - time.monotonic()) > 0:
+                self.spin_for(left)
+            part = block[seconds == second]
+            self.clock(int(part.receive_ns[-1]))
+            self.publish(part)
+
+    def call(self, service: str, request: Any, kind: Any) -> Any:
+        """
+        Return the answer of a service.
+        """
+        client = self.node.create_client(kind, service)
+        self.spin_until(client.service_is_ready)
+        future = client.call_async(request)
+        self.spin_until(future.done)
+        self.node.destroy_client(client)
+        return future.result()
+
+    def trigger(self, name: str) -> Any:
+        from std_srvs.srv import Trigger
+
+        return self.call(f'/coastdown_node/{name}', Trigger.Request(), Trigger)
+
+    def change_state(self, label: str) -> bool:
+        from lifecycle_msgs.srv import ChangeState
+
+        request = ChangeState.Request()
+        request.transition.label = label
+        answer = self.call('/coastdown_node/change_state', request, ChangeState)
+        return bool(answer.success)
+
+    def state(self) -> str:
+        from lifecycle_msgs.srv import GetState
+
+        answer = self.call('/coastdown_node/get_state', GetState.Request(), GetState)
+        return str(answer.current_state.label)
+
+
+class Diagnostics:
+    """
+    The latest status of each part of the node.
+    """
+
+    def __init__(self, peer: Peer) -> None:
+        self._peer = peer
+        self._heard = peer.listen('/diagnostics', 'diagnostic_msgs/msg/DiagnosticArray')
+
+    def of(self, part: str) -> Any:
+        name = f'coastdown_node: {part}'
+        for array in reversed(self._heard):
+            for status in array.status:
+                if status.name == name:
+                    return status
+        return None
+
+    def wait_for(self, part: str, text: str, *, value: str | None = None) -> Any:
+        """
+        Return the status once its message contains a text, or the value of a key is that.
+        """
+
+        def found() -> Any:
+            status = self.of(part)
+            if status is None:
+                return None
+            values = {item.key: item.value for item in status.values}
+            there = text in status.message if value is None else values.get(value) == text
+            return status if there else None
+
+        try:
+            return self._peer.spin_until(found)
+        except AssertionError:
+            raise AssertionError(f'{part}: {self.of(part)}, expected {text!r}') from None
+
+
+StartNode = Callable[..., NodeProcess]
+
+
+@pytest.fixture
+def start_node(tmp_path: Path, ship_file: Path) -> Iterator[StartNode]:
+    """A function that starts a node with parameters and waits until it is up."""
+    started: list[NodeProcess] = []
+
+    def start(
+        *arguments: str, up: str | None = 'active;', ship: bool = True, **parameters: object
+    ) -> NodeProcess:
+        directory = tmp_path / f'node{len(started)}'
+        directory.mkdir()
+        given = {'output_directory': str(tmp_path / 'bags'), **parameters}
+        if ship:
+            given = {'ship_file': str(ship_file), **given}
+        file = directory / 'parameters.yaml'
+        file.write_text(yaml.safe_dump({'/**': {'ros__parameters': given}}))
+        node = NodeProcess(directory, ['--ros-args', '--params-file', str(file), *arguments])
+        started.append(node)
+        if up is not None:
+            node.wait_for_log(up)
+        return node
+
+    yield start
+    for node in started:
+        node.kill()
+
+
+@pytest.fixture
+def ship_file(tmp_path: Path) -> Path:
+    """The least that a ship file may say."""
+    path = tmp_path / 'ship.yaml'
+    path.write_text('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
+    return path
+
+
+@pytest.fixture
+def peer() -> Iterator[Peer]:
+    """The rest of the graph."""
+    pytest.importorskip('rclpy')
+    peer = Peer()
+    yield peer
+    peer.close()
+
+
+@pytest.fixture
+def diagnostics(peer: Peer) -> Diagnostics:
+    """What the node says about itself."""
+    return Diagnostics(peer)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one list of settings, and the file made from it."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+import yaml
+
+from shipdrag_ros.errors import ParameterError
+from shipdrag_ros.messages import TOPICS
+from shipdrag_ros.node.settings import SETTINGS, NodeSettings, parameters_file
+from shipdrag_ros.parameters import Parameters
+
+ROOT = Path(__file__).parents[2]
+
+
+def settings(**values: object) -> NodeSettings:
+    return NodeSettings.from_mapping(values, subject='test')
+
+
+def test_every_parameter_and_input_is_a_setting() -> None:
+    names = {setting.name for setting in SETTINGS}
+    assert {field.name for field in fields(Parameters)} <= names
+    assert {f'{name}.type' for name in TOPICS} <= names
+
+
+def test_defaults_are_those_of_the_parameters() -> None:
+    assert settings().parameters == Parameters()
+    assert settings().types == {}
+
+
+def test_mapping_goes_there_and_back() -> None:
+    given = {'record': False, 'window_s': 600.0, 'heading.type': 'sensor_msgs/msg/Imu'}
+    there = NodeSettings.from_mapping(given, subject='test')
+    assert there.types == {'heading': 'sensor_msgs/msg/Imu'}
+    assert there.parameters.window_s == 600.0
+    assert NodeSettings.from_mapping(there.to_mapping(), subject='test') == there
+
+
+def test_problems_come_together() -> None:
+    with pytest.raises(ParameterError) as caught:
+        settings(record='yes', windows_s=1.0, window_s=1.0, ship_file=3)
+    assert len(caught.value.problems) == 4
+    assert 'known are autostart, confirm_s' in caught.value.problems[0]
+
+
+def test_the_file_is_up_to_date() -> None:
+    text = (ROOT / 'config' / 'parameters.yaml').read_text()
+    assert text == parameters_file(), 'run python -m shipdrag_ros.node.settings'
+
+
+def test_the_file_holds_every_default() -> None:
+    values = yaml.safe_load(parameters_file())['/**']['ros__parameters']
+    assert values == settings().to_mapping()
+
+
+def test_the_launch_file_parses_and_sets_known_parameters() -> None:
+    tree = ast.parse((ROOT / 'launch' / 'coastdown.launch.py').read_text())
+    dicts = [node for node in ast.walk(tree) if isinstance(node, ast.Dict)]
+    names = {key.value for node in dicts for key in node.keys if isinstance(key, ast.Constant)}
+    assert names - {'use_sim_time'} <= {setting.name for setting in SETTINGS}
