@@ -15,9 +15,6 @@ from typing import Any
 import pytest
 import yaml
 
-from shipdrag_ros.messages import encode
-from shipdrag_ros.samples import Block
-
 START_S = 30.0  # the first start of a machine compiles the kernels
 ANSWER_S = 15.0
 
@@ -77,13 +74,15 @@ class Peer:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
+        from shipdrag_ros.node.player import Player
+
         self._rclpy = rclpy
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
         self.node = rclpy.create_node('peer', context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
-        self._publishers: dict[str, Any] = {}
+        self.player = Player(self.node, self._executor)
 
     def close(self) -> None:
         self._executor.shutdown()
@@ -122,50 +121,13 @@ class Peer:
         self.node.create_subscription(message_class(type_name), topic, heard.append, qos, raw=raw)
         return heard
 
-    def publisher(self, topic: str, type_name: str) -> Any:
+    def advertise(self, topic: str, type_name: str) -> Any:
+        """
+        Return a publisher that is none of the player's.
+        """
         from shipdrag_ros.node.inputs import message_class
 
-        if topic not in self._publishers:
-            self._publishers[topic] = self.node.create_publisher(
-                message_class(type_name), topic, 1000
-            )
-        return self._publishers[topic]
-
-    def connect(self, block: Block) -> None:
-        """
-        Wait until the node hears every input of a block.
-        """
-        for message in encode(block):
-            publisher = self.publisher(message.topic, message.type)
-            self.spin_until(publisher.get_subscription_count)
-
-    def publish(self, block: Block) -> None:
-        for message in encode(block):
-            self.publisher(message.topic, message.type).publish(message.payload)
-
-    def clock(self, time_ns: int) -> None:
-        """
-        Set simulated time.
-        """
-        from rosgraph_msgs.msg import Clock
-
-        message = Clock()
-        message.clock.sec, message.clock.nanosec = divmod(time_ns, 10**9)
-        self.publisher('/clock', 'rosgraph_msgs/msg/Clock').publish(message)
-
-    def play(self, block: Block, *, speed: float) -> None:
-        """
-        Publish a block as fast as stated, /clock leading it.
-        """
-        start_s, first_ns = time.monotonic(), int(block.receive_ns[0])
-        seconds = (block.receive_ns - first_ns) // 10**9
-        for second in sorted(set(seconds.tolist())):
-            due_s = start_s + second / speed
-            if (left := due_s - time.monotonic()) > 0:
-                self.spin_for(left)
-            part = block[seconds == second]
-            self.clock(int(part.receive_ns[-1]))
-            self.publish(part)
+        return self.node.create_publisher(message_class(type_name), topic, 10)
 
     def call(self, service: str, request: Any, kind: Any) -> Any:
         """

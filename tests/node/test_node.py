@@ -113,8 +113,8 @@ class TestHearing:
     def test_records_what_it_receives(self, start_node: Any, peer: Any, tmp_path: Path) -> None:
         node = start_node()
         block = speeds()
-        peer.connect(block)
-        peer.publish(block)
+        peer.player.connect(block)
+        peer.player.publish(block)
         peer.spin_for(0.5)
         assert node.stop() == 0
         assert topics_in(the_bag(tmp_path)) == {
@@ -127,12 +127,13 @@ class TestHearing:
     ) -> None:
         node = start_node()
         block = speeds()
-        peer.connect(block)
-        peer.publish(block)
-        peer.publish(block)
-        publisher = peer.publisher(
+        peer.player.connect(block)
+        peer.player.publish(block)
+        peer.player.publish(block)
+        publisher = peer.advertise(
             '/speed_through_water', 'geometry_msgs/msg/TwistWithCovarianceStamped'
         )
+        peer.spin_until(publisher.get_subscription_count)
         publisher.publish(b'\x00\x01\x00\x00 too short')
         part = 'input speed_through_water'
         diagnostics.wait_for(part, '11', value='messages')
@@ -146,7 +147,7 @@ class TestHearing:
         self, start_node: Any, peer: Any, tmp_path: Path
     ) -> None:
         node = start_node('-r', 'depth:=/sounder/depth', '-r', '__ns:=/ship')
-        publisher = peer.publisher('/sounder/depth', 'sensor_msgs/msg/Range')
+        publisher = peer.advertise('/sounder/depth', 'sensor_msgs/msg/Range')
         peer.spin_until(publisher.get_subscription_count)
         from sensor_msgs.msg import Range
 
@@ -160,10 +161,10 @@ class TestHearing:
     ) -> None:
         start_node()
         block = speeds(age_s=1.5)
-        peer.connect(block)
+        peer.player.connect(block)
 
         def offset() -> bool:
-            peer.publish(speeds(age_s=1.5))
+            peer.player.publish(speeds(age_s=1.5))
             status = diagnostics.of('input speed_through_water')
             values = {} if status is None else {item.key: item.value for item in status.values}
             offset_s = values.get('clock offset [s]', 'none')
@@ -182,14 +183,14 @@ class TestReports:
         self, start_node: Any, peer: Any, diagnostics: Any
     ) -> None:
         start_node()
-        peer.connect(speeds())
+        peer.player.connect(speeds())
         diagnostics.wait_for('input speed_through_water', 'no data')
 
     def test_a_type_that_cannot_be_used(
         self, start_node: Any, peer: Any, diagnostics: Any
     ) -> None:
         start_node()
-        peer.publisher('/speed_through_water', 'geometry_msgs/msg/Vector3Stamped')
+        peer.advertise('/speed_through_water', 'geometry_msgs/msg/Vector3Stamped')
         status = diagnostics.wait_for('input speed_through_water', 'wrong type')
         assert status.level == b'\x02'
         assert 'geometry_msgs/msg/Vector3Stamped' in status.message
@@ -199,7 +200,7 @@ class TestReports:
         self, start_node: Any, peer: Any, diagnostics: Any
     ) -> None:
         start_node(**{'heading.type': 'sensor_msgs/msg/Imu'})
-        peer.publisher('/heading', 'geometry_msgs/msg/QuaternionStamped')
+        peer.advertise('/heading', 'geometry_msgs/msg/QuaternionStamped')
         status = diagnostics.wait_for('input heading', 'wrong type')
         assert 'heard is only sensor_msgs/msg/Imu' in status.message
 
@@ -207,16 +208,16 @@ class TestReports:
         start_node(use_sim_time=True)
         diagnostics.wait_for('state', 'no /clock')
         block = speeds()
-        peer.connect(block)
-        peer.publish(block)
+        peer.player.connect(block)
+        peer.player.publish(block)
         key = 'not used, node inactive or without clock'
         diagnostics.wait_for('input speed_through_water', '5', value=key)
 
     def test_a_full_disk(self, start_node: Any, peer: Any, diagnostics: Any) -> None:
         start_node(output_directory='/proc/nowhere')
         block = speeds()
-        peer.connect(block)
-        peer.publish(block)
+        peer.player.connect(block)
+        peer.player.publish(block)
         status = diagnostics.wait_for('recording', 'recording failed')
         assert status.level == b'\x02'
         diagnostics.wait_for('recording', '6', value='messages not written')
@@ -237,12 +238,12 @@ class TestLifecycle:
     ) -> None:
         start_node()
         block = speeds()
-        peer.connect(block)
-        peer.publish(block)
+        peer.player.connect(block)
+        peer.player.publish(block)
         diagnostics.wait_for('input speed_through_water', '5', value='messages')
         assert peer.change_state('deactivate')
         assert topics_in(the_bag(tmp_path))['/speed_through_water'] == 5
-        peer.publish(speeds())
+        peer.player.publish(speeds())
         key = 'not used, node inactive or without clock'
         diagnostics.wait_for('input speed_through_water', '5', value=key)
         assert peer.change_state('cleanup')
@@ -295,8 +296,8 @@ class TestEnd:
     ) -> None:
         node = start_node()
         block = speeds()
-        peer.connect(block)
-        peer.publish(block)
+        peer.player.connect(block)
+        peer.player.publish(block)
         diagnostics.wait_for('input speed_through_water', '5', value='messages')
         assert node.stop(number) == 0
         with the_bag(tmp_path).open('rb') as stream:
@@ -311,15 +312,15 @@ class TestServices:
     def test_recording_stops_and_starts(self, start_node: Any, peer: Any, tmp_path: Path) -> None:
         node = start_node()
         block = speeds()
-        peer.connect(block)
-        peer.publish(block)
+        peer.player.connect(block)
+        peer.player.publish(block)
         peer.spin_for(0.3)
         answer = peer.trigger('stop_recording')
         assert answer.success
         assert answer.message == 'not recording'
         first = the_bag(tmp_path)
         later = speeds()
-        peer.publish(later)
+        peer.player.publish(later)
         peer.spin_for(0.3)
         answer = peer.trigger('start_recording')
         assert answer.success
@@ -355,12 +356,12 @@ class TestClock:
         events = peer.listen('/coastdown_node/events', EVENT_TYPE, raw=True)
         epoch_ns = 1_700_000_000 * 10**9
         block = Block.of(Channel.SPEED_THROUGH_WATER, epoch_ns + np.arange(3) * 10**8, [5, 6, 7])
-        peer.connect(block)
+        peer.player.connect(block)
         for start_ns in (0, -3600 * 10**9):
             moved = Block.of(Channel.SPEED_THROUGH_WATER, block.stamp_ns + start_ns, [5, 6, 7])
-            peer.clock(int(moved.stamp_ns[-1]))
+            peer.player.set_clock(int(moved.stamp_ns[-1]))
             peer.spin_for(0.3)
-            peer.publish(moved)
+            peer.player.publish(moved)
             peer.spin_for(0.3)
         peer.spin_until(lambda: EventKind.CLOCK_JUMP in kinds(events))
         assert node.stop() == 0
