@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Keeps compiled code from outliving its source.
+
+numba caches a compiled function by the date of the one file that it is in, but
+the functions and constants it uses may be in others.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+
+def digest(*paths: str) -> str:
+    """
+    Return a digest of source files, paths being relative to the package.
+
+    A compiled function that closes over it is compiled anew when one changes.
+    """
+    package = Path(__file__).parents[1]
+    return hashlib.sha256(b''.join((package / path).read_bytes() for path in paths)).hexdigest()

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the inputs are doing, from counts and the last few samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.coastdown.kernel import RECENT, Tally
+from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.samples import INPUTS, Channel, Reason
+
+
+@dataclass(frozen=True)
+class InputHealth:
+    """
+    State of one input since the monitor was made.
+
+    Attributes
+    ----------
+    messages, used
+        Samples that came and samples that were accepted.
+    rejected
+        Samples by reason, lower-case names; reasons without any are left out.
+    last_stamp_ns, last_receive_ns
+        Of the last accepted sample; None before it.
+    rate_hz
+        By the stamps of the last few accepted samples; None before two.
+    clock_offset_s
+        Median of arrival minus stamp of the last few: latency, and what the
+        clock of the sensor differs by.
+    """
+
+    messages: int
+    used: int
+    rejected: dict[str, int]
+    last_stamp_ns: int | None
+    last_receive_ns: int | None
+    rate_hz: float | None
+    clock_offset_s: float | None
+
+
+def input_health(tally: Tally) -> dict[str, InputHealth]:
+    """
+    Tell the health of every input, by its name.
+    """
+    return {name: _health(tally, name) for name in INPUTS}
+
+
+def _health(tally: Tally, name: str) -> InputHealth:
+    channels = [channel for channel in Channel if channel.input == name]
+    reasons = tally.reasons[channels].sum(axis=0)
+    # an input has one channel, but for the two encodings of a position: take the later
+    last = max(channels, key=lambda channel: int(tally.arrival_ns[channel].max()))
+    known = tally.stamp_ns[last] != NEVER
+    stamps, arrivals = tally.stamp_ns[last][known], tally.arrival_ns[last][known]
+    newest = (int(tally.reasons[last, Reason.ACCEPTED]) - 1) % RECENT
+    # after a clock was set the stamps of before are no guide to the rate
+    span = int(stamps.max() - stamps.min()) if len(stamps) else 0
+    return InputHealth(
+        messages=int(reasons.sum()),
+        used=int(reasons[Reason.ACCEPTED]),
+        rejected={
+            reason.name.lower(): int(reasons[reason])
+            for reason in Reason
+            if reason is not Reason.ACCEPTED and reasons[reason]
+        },
+        last_stamp_ns=int(tally.stamp_ns[last, newest]) if len(stamps) else None,
+        last_receive_ns=int(tally.arrival_ns[last, newest]) if len(stamps) else None,
+        rate_hz=(len(stamps) - 1) / (span * 1e-9) if span else None,
+        clock_offset_s=float(np.median(arrivals - stamps)) * 1e-9 if len(stamps) else None,
+    )

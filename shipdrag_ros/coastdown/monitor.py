@@ -1,0 +1,345 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The monitor: samples in, events out, the same live and in replay.
+
+It knows no ROS and no clock but the stamps. What comes out depends on the
+sequence of samples alone, not on how it is cut into blocks, and not on what was
+before the last `history_ns` of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from shipdrag_ros.coastdown.bins import Bins, line
+from shipdrag_ros.coastdown.ending import End, end_of
+from shipdrag_ros.coastdown.events import (
+    Coastdown,
+    EndedBy,
+    Event,
+    NoEstimate,
+    Onset,
+    Reset,
+    State,
+    Update,
+)
+from shipdrag_ros.coastdown.health import InputHealth, input_health
+from shipdrag_ros.coastdown.kernel import (
+    ALWAYS,
+    Memory,
+    Stop,
+    Tally,
+    Tuning,
+    Watch,
+    forget_all,
+    walk,
+)
+from shipdrag_ros.coastdown.onset import Candidate, Verdict, judge, propose
+from shipdrag_ros.coastdown.ring import CAPACITY, first_store, make_room, since
+from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
+from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
+from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Guard, Limits
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.ship import Ship
+
+Estimator = Callable[[Window, Ship, Parameters], Estimate]
+
+# A power reduction that passed for a coastdown and has cost no more than this is withdrawn.
+WITHDRAWN_BELOW = 0.05
+_SHAFT = int(Channel.SHAFT)
+
+
+class Monitor:
+    """
+    Finds coastdowns in a sequence of samples and estimates while they run.
+
+    Parameters
+    ----------
+    ship
+        For the minimum speed, for what a coastdown should look like, and for the estimates.
+    parameters
+        All of them matter.
+    estimate
+        The estimator; raises `EstimationError` where none is possible.
+
+    Notes
+    -----
+    Memory is bounded: `history_ns` of samples, at most `ring.CAPACITY` of them.
+    """
+
+    def __init__(
+        self, ship: Ship, parameters: Parameters, *, estimate: Estimator = estimate
+    ) -> None:
+        self._ship = ship
+        self._parameters = parameters
+        self._estimator = estimate
+        slopes = Slopes.of(parameters)
+        self._tuning = Tuning(
+            Limits.of(parameters),
+            slopes,
+            round(parameters.data_stop_s * SECOND_NS),
+            parameters.shaft_stopped_fraction,
+            float(ship.speed(parameters.froude_min)),
+        )
+        seconds = round(parameters.steady_s + 4 * parameters.confirm_s) + 6 * slopes.width + 64
+        self._memory = Memory(
+            Guard.fresh(),
+            Bins.fresh(seconds),
+            Steadiness.fresh(slopes),
+            Watch.fresh(),
+            Tally.fresh(),
+            first_store(),
+        )
+        self._window_ns = round(parameters.window_s * SECOND_NS)
+        self._update_ns = round(parameters.update_s * SECOND_NS)
+        self._history_ns = self._window_ns + seconds * SECOND_NS
+        self._candidate: Candidate | None = None
+        self._onset: Onset | None = None
+        self._heading_rad: float | None = None
+
+    @property
+    def state(self) -> State:
+        """Where the monitor stands."""
+        if self._onset is not None:
+            return State.COASTDOWN
+        if self._candidate is not None:
+            return State.CANDIDATE
+        source = int(self._memory.watch.seen_source[0])
+        if source == NEVER or np.isnan(self._memory.steadiness.limit[source]):
+            return State.WAITING
+        return State.STEADY
+
+    @property
+    def history_ns(self) -> int:
+        """
+        Length of record that decides what comes out [ns].
+
+        A monitor that has seen this much of a sequence says the same from then
+        on as one that has seen all of it, unless a coastdown longer than
+        `window_s`, or a sensor that froze longer ago, reaches back beyond it.
+        """
+        return self._history_ns
+
+    def health(self) -> dict[str, InputHealth]:
+        """
+        Tell how every input is doing, by its name.
+        """
+        return input_health(self._memory.tally)
+
+    def update(self, block: Block) -> list[Event]:
+        """
+        Take the next samples of the sequence.
+
+        Returns
+        -------
+        list
+            What has come of them, in order.
+        """
+        channel = np.ascontiguousarray(block.channel)
+        stamp_ns = np.ascontiguousarray(block.stamp_ns)
+        receive_ns = np.ascontiguousarray(block.receive_ns)
+        value = np.ascontiguousarray(block.value)
+        variance = np.ascontiguousarray(block.variance)
+        events: list[Event] = []
+        at, stop = 0, int(Stop.FULL)
+        while True:
+            at, stop = walk(
+                self._memory, self._tuning, channel, stamp_ns, receive_ns, value, variance, at
+            )
+            if stop == Stop.END:
+                return events
+            if stop == Stop.FULL:
+                self._make_room()
+            elif stop == Stop.UPDATE:
+                events.append(self._update(int(stamp_ns[at])))
+            elif stop == Stop.BIN:
+                events += self._judge()
+            elif stop == Stop.SILENCE:
+                events += self._stop_at_last_sample(EndedBy.DATA_STOP)
+            elif stop == Stop.SLOPE:
+                self._propose(int(self._memory.watch.seen[0]), np.nan)
+            elif stop == Stop.SHAFT:
+                number = int(self._memory.bins.filling[_SHAFT])
+                self._propose(number, float(self._memory.watch.shaft[0]))
+            else:
+                arrival = int(receive_ns[at])
+                events += self.reset(
+                    arrival, self._clock_set(stop, int(channel[at]), int(stamp_ns[at]), arrival)
+                )
+
+    def reset(self, receive_ns: int, reason: str) -> list[Event]:
+        """
+        Drop all memory but the counts of `health`.
+
+        Parameters
+        ----------
+        receive_ns
+            Time of arrival at which it happens [ns].
+        reason
+            For whoever reads the events.
+        """
+        events = self._stop_at_last_sample(EndedBy.RESET)
+        forget_all(self._memory)
+        return [*events, Reset(receive_ns, reason)]
+
+    def finish(self) -> list[Event]:
+        """
+        End the record, and a coastdown that runs.
+        """
+        return self._stop_at_last_sample(EndedBy.RECORD_END)
+
+    # what the walk stopped for
+
+    def _make_room(self) -> None:
+        store = make_room(
+            self._memory.store,
+            keep_ns=self._history_ns,
+            late_ns=self._tuning.limits.late_ns,
+            capacity=CAPACITY,
+        )
+        self._memory = self._memory._replace(store=store)
+
+    def _propose(self, number: int, shaft: float) -> None:
+        watch, bins = self._memory.watch, self._memory.bins
+        source = int(watch.seen_source[0])
+        watch.source[0] = source
+        self._candidate = propose(bins, self._tuning, source, number, shaft)
+        self._learn_limit()
+
+    def _learn_limit(self) -> None:
+        """Fix what chance could do before the candidate, once it is known."""
+        assert self._candidate is not None
+        if np.isnan(self._candidate.limit):
+            steadiness, source = self._memory.steadiness, self._candidate.source
+            self._candidate = self._candidate.judged_by(
+                float(steadiness.limit[source]), float(steadiness.spread[source])
+            )
+
+    def _judge(self) -> list[Event]:
+        assert self._candidate is not None
+        bins, tuning, parameters = self._memory.bins, self._tuning, self._parameters
+        number = int(bins.filling[self._candidate.source])
+        if self._onset is not None:
+            end = end_of(self._candidate, bins, tuning, parameters, number)
+            return [] if end is None else [self._end_at(end)]
+        self._learn_limit()
+        verdict, self._candidate = judge(
+            self._candidate, bins, self._ship, tuning, parameters, number
+        )
+        if verdict is Verdict.DISMISSED:
+            self._stand_down()
+        elif verdict is Verdict.CONFIRMED:
+            return [self._begin(self._candidate, number)]
+        return []
+
+    def _begin(self, candidate: Candidate, number: int) -> Onset:
+        onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)
+        self._onset = onset
+        self._memory.watch.update_ns[0] = self._grid_ns(onset.detected_ns)
+        heading = mean_heading(self._memory.bins, candidate.start - 1, HEADING_BEFORE_S)
+        self._heading_rad = (
+            None if np.isnan(heading) else rep103_yaw(heading, self._parameters.heading_convention)
+        )
+        return onset
+
+    def _grid_ns(self, stamp_ns: int) -> int:
+        """Return the first time of an update at or after a stamp."""
+        assert self._onset is not None
+        start, step = self._onset.start_ns, self._update_ns
+        return min(start + -(-(stamp_ns - start) // step) * step, ALWAYS)
+
+    def _update(self, next_stamp_ns: int) -> Event:
+        watch = self._memory.watch
+        stamp_ns = int(watch.update_ns[0])
+        watch.update_ns[0] = self._grid_ns(next_stamp_ns)
+        try:
+            return Update(stamp_ns, self._estimate(stamp_ns))
+        except EstimationError as error:
+            return NoEstimate(stamp_ns, str(error))
+
+    def _estimate(self, end_ns: int) -> Estimate:
+        assert self._onset is not None
+        start_ns = max(self._onset.start_ns, end_ns - self._window_ns)
+        kept = since(
+            self._memory.store,
+            start_ns,
+            late_ns=self._tuning.limits.late_ns,
+            capacity=CAPACITY,
+        )
+        window = Window.from_block(kept, start_ns, end_ns)
+        return self._estimator(window, self._ship, self._parameters)
+
+    # how a coastdown ends
+
+    def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
+        """End what runs, if anything, at the last sample of its speed source."""
+        events: list[Event] = []
+        if self._onset is not None and self._candidate is not None:
+            end_ns = int(self._memory.guard.last_ns[self._candidate.source])
+            events.append(self._conclude(ended_by, end_ns, None))
+        self._stand_down()
+        return events
+
+    def _end_at(self, end: End) -> Event:
+        assert self._candidate is not None
+        withdrawn = None
+        if end.ended_by is EndedBy.ENGINE:
+            withdrawn = _too_little_lost(
+                self._memory.bins, self._candidate, self._tuning.slopes.width, end.last
+            )
+        event = self._conclude(end.ended_by, (end.last + 1) * SECOND_NS, withdrawn)
+        self._stand_down()
+        return event
+
+    def _conclude(self, ended_by: EndedBy, end_ns: int, failure: str | None) -> Coastdown:
+        assert self._onset is not None
+        final = None
+        if failure is None:
+            try:
+                final = self._estimate(end_ns)
+            except EstimationError as error:
+                failure = str(error)
+        return Coastdown(
+            self._onset.start_ns,
+            end_ns,
+            self._onset.detected_ns,
+            ended_by,
+            final,
+            failure,
+            self._heading_rad,
+        )
+
+    def _stand_down(self) -> None:
+        """Watch for an onset again, once the ship has been steady."""
+        watch = self._memory.watch
+        watch.source[0] = NEVER
+        watch.update_ns[0] = ALWAYS
+        watch.armed[0] = 0
+        self._candidate = self._onset = self._heading_rad = None
+
+    def _clock_set(self, stop: int, channel: int, stamp_ns: int, receive_ns: int) -> str:
+        guard = self._memory.guard
+        if stop == Stop.STAMP_JUMPED_BACK:
+            back = int(guard.last_ns[channel]) - stamp_ns
+            return f'{Channel(channel).input}: the stamp went back by {back * 1e-9:.3f} s'
+        back = int(guard.arrival_ns[0]) - receive_ns
+        return f'the time of arrival went back by {back * 1e-9:.3f} s'
+
+
+def _too_little_lost(bins: Bins, candidate: Candidate, width: int, last: int) -> str | None:
+    """Say why what ended by the engine was no coastdown; None if it may be one."""
+    _, before, _ = line(bins, candidate.source, candidate.start - 1, width)
+    _, after, _ = line(bins, candidate.source, last, min(width, last - candidate.start + 1))
+    lost = 1.0 - after / before
+    if lost >= WITHDRAWN_BELOW:
+        return None
+    return (
+        f'withdrawn: the speed settled after {lost:.1%} of it was lost, less than '
+        f'{WITHDRAWN_BELOW:.0%}: the power was reduced, not cut'
+    )

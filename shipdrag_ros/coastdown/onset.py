@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Has a coastdown begun, and when?
+
+A fall of the speed that chance does not explain, or of the shaft speed, makes a
+candidate. Turns and slow-downs make candidates too: what tells them apart is
+the law of the deceleration. A ship that coasts follows v' = -c v^p with p about
+2 (friction) to 3 (waves); one that nears a new steady speed stops decelerating
+while it is still fast, as if p were large.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from shipdrag_ros.coastdown.bins import Bins, line, speeds
+from shipdrag_ros.coastdown.expectation import expect
+from shipdrag_ros.coastdown.kernel import Tuning
+from shipdrag_ros.coastdown.tracking import shaft_fell_at, shaft_speed, turned_at
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+EXCESS_MAX = 1.5  # of the exponent over the one expected: beyond it the speed settles
+_GUARD = 0.1  # of confirm_s: the thrust runs down first
+_TRIALS = 3  # after confirm_s, twice and three times as long
+_PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by then
+
+
+class Verdict(Enum):
+    """What has become of a candidate."""
+
+    PENDING = 'pending'
+    CONFIRMED = 'confirmed'
+    DISMISSED = 'dismissed'
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """
+    Something that may be a coastdown.
+
+    Attributes
+    ----------
+    source
+        Speed source.
+    start
+        Its first bin, as far as is known.
+    shaft
+        Steady shaft speed before it [rad/s]; NaN where the speed alone speaks.
+    limit
+        Size of a slope that chance did not explain before it [m/s^2]; NaN while unknown.
+    spread
+        Standard deviation of a slope before it [m/s^2].
+    trials
+        How often its deceleration was judged.
+    """
+
+    source: int
+    start: int
+    shaft: float
+    limit: float = math.nan
+    spread: float = math.nan
+    trials: int = 0
+
+    @property
+    def by_shaft(self) -> bool:
+        """Whether the shaft made it a candidate."""
+        return not math.isnan(self.shaft)
+
+    def judged_by(self, limit: float, spread: float) -> Candidate:
+        """
+        Return it with what chance could do before it.
+        """
+        return replace(self, limit=limit, spread=spread)
+
+
+def propose(bins: Bins, tuning: Tuning, source: int, number: int, shaft: float) -> Candidate:
+    """
+    Make a candidate of what the walk saw at bin `number`.
+    """
+    width = tuning.slopes.width
+    if math.isnan(shaft):
+        start = change_point(bins, source, number - 3 * width, number, tuning.speed_min)
+    else:
+        start = shaft_fell_at(bins, number, shaft, width)
+    return Candidate(source, start, shaft)
+
+
+def judge(
+    candidate: Candidate,
+    bins: Bins,
+    ship: Ship,
+    tuning: Tuning,
+    parameters: Parameters,
+    number: int,
+) -> tuple[Verdict, Candidate]:
+    """
+    Judge a candidate when bin `number` has closed.
+
+    Returns
+    -------
+    verdict, candidate
+        The candidate with its start as it is known now.
+    """
+    width, confirm = tuning.slopes.width, round(parameters.confirm_s)
+    pending, dismissed = (Verdict.PENDING, candidate), (Verdict.DISMISSED, candidate)
+    slope, level, _ = line(bins, candidate.source, number, width)
+    if (
+        level < tuning.speed_min
+        or turned_at(bins, candidate.start, number, width, parameters.turn_rad) is not None
+    ):
+        return dismissed
+    falls = slope < -0.5 * candidate.limit
+    age = number - candidate.start
+    if candidate.by_shaft:
+        turning = shaft_speed(bins, number) / candidate.shaft
+        if turning > parameters.shaft_stopped_fraction or age > _PATIENCE * confirm:
+            return dismissed
+        if not falls:
+            return pending
+        if turning < 0.5 * parameters.shaft_stopped_fraction:
+            return Verdict.CONFIRMED, candidate
+    elif not falls:
+        return dismissed
+    if age < confirm * (candidate.trials + 1):
+        return pending
+
+    if candidate.by_shaft:
+        start = candidate.start
+    else:
+        start = change_point(
+            bins, candidate.source, candidate.start - 2 * width, number, tuning.speed_min
+        )
+    tried = replace(candidate, start=start, trials=candidate.trials + 1)
+    if _coasts(tried, bins, ship, tuning, parameters, number):
+        return Verdict.CONFIRMED, tried
+    return Verdict.DISMISSED if tried.trials == _TRIALS else Verdict.PENDING, tried
+
+
+def _coasts(
+    candidate: Candidate,
+    bins: Bins,
+    ship: Ship,
+    tuning: Tuning,
+    parameters: Parameters,
+    number: int,
+) -> bool:
+    """Say whether the speed since the start looks like a coastdown."""
+    width = tuning.slopes.width
+    guard = round(_GUARD * parameters.confirm_s)
+    time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
+    if len(time) < 6:
+        return False
+    found = law(time, speed)
+    _, before, _ = line(bins, candidate.source, candidate.start - 1, width)
+    if not (found.slope < 0.0 and before > found.speed > 0.0):
+        return False
+    expected = expect(ship, before)
+    loss = before - (found.speed + 0.5 * found.slope * (time[-1] - time[0]))
+    fraction = loss / expected.loss(before, number - candidate.start)
+    # a curvature is the difference of the slopes of two halves
+    half = 0.5 * (time[-1] - time[0])
+    sd = math.sqrt(2.0) * candidate.spread * width / half**2 * found.speed / found.slope**2
+    excess = found.exponent - expect(ship, found.speed).exponent
+    if candidate.trials == 1:
+        return bool(fraction > expected.loss_min and excess - sd < EXCESS_MAX)
+    return bool(sd < EXCESS_MAX and excess < EXCESS_MAX)
+
+
+def change_point(bins: Bins, source: int, first: int, last: int, speed_min: float) -> int:
+    """
+    Return the bin at which a constant speed turns into a coastdown.
+
+    Parameters
+    ----------
+    first, last
+        Bins to look at; the second half of the coastdown is not needed.
+    speed_min
+        A speed below half of it is taken as half of it [m/s].
+
+    Notes
+    -----
+    Least squares of 1/v = u + c max(0, t - s): constant, then the hyperbola of
+    quadratic drag. At a given s it is linear; s is searched over all bins.
+    """
+    time, speed = speeds(bins, source, first, last)
+    inverse = 1.0 / np.maximum(speed, 0.5 * speed_min)
+    inverse = inverse - inverse.mean()
+    hinges = time[2:-2]
+    ramp = np.maximum(0.0, time - hinges[:, np.newaxis])
+    ramp -= ramp.mean(axis=1, keepdims=True)
+    gain = np.maximum(ramp @ inverse, 0.0) ** 2 / np.einsum('ij,ij->i', ramp, ramp)
+    return last + math.floor(float(hinges[np.argmax(gain)]))
+
+
+@dataclass(frozen=True)
+class Law:
+    """
+    Deceleration of a span of record, from a parabola through the speed.
+
+    Attributes
+    ----------
+    speed, slope, curvature
+        In the middle of the span [m/s, m/s^2, m/s^3].
+    """
+
+    speed: float
+    slope: float
+    curvature: float
+
+    @property
+    def exponent(self) -> float:
+        """The p of v' = -c v^p: p = v'' v / v'^2."""
+        return self.curvature * self.speed / self.slope**2
+
+
+def law(time: Float64, speed: Float64) -> Law:
+    """
+    Fit v = a + b t + c t^2 / 2 about the middle of the span.
+    """
+    middle = 0.5 * (time[0] + time[-1])
+    c, b, a = np.polyfit(time - middle, speed, 2)
+    return Law(float(a), float(b), 2.0 * float(c))

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The latest accepted samples, in constant memory and in one piece.
+
+Appending is compiled code's business; here room is made and windows are taken.
+The buffer is up to twice as long as what is kept, so that samples move rarely
+and a window is a view, not a copy.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shipdrag_ros.samples import Block, Float64, Int64, UInt8
+
+CAPACITY = 1 << 21  # samples kept at most, 100 MB: 5400 s of 390 samples a second
+_FIRST_CAPACITY = 1 << 12
+
+
+class Store(NamedTuple):
+    """
+    The buffer; `end[0]` is where the next sample goes.
+
+    The other attributes are those of a `Block`.
+    """
+
+    channel: UInt8
+    stamp_ns: Int64
+    receive_ns: Int64
+    value: Float64
+    variance: Float64
+    end: Int64
+
+    @classmethod
+    def fresh(cls, capacity: int) -> Store:
+        """
+        Return an empty buffer.
+        """
+        return cls(
+            np.empty(capacity, np.uint8),
+            np.empty(capacity, np.int64),
+            np.empty(capacity, np.int64),
+            np.empty((capacity, 2)),
+            np.empty((capacity, 2)),
+            np.zeros(1, np.int64),
+        )
+
+
+@njit
+def append(
+    store: Store,
+    channel: int,
+    stamp: int,
+    arrival: int,
+    a: float,
+    b: float,
+    variance_a: float,
+    variance_b: float,
+) -> None:
+    """
+    Keep one sample; there must be room.
+    """
+    end = store.end[0]
+    store.channel[end] = channel
+    store.stamp_ns[end] = stamp
+    store.receive_ns[end] = arrival
+    store.value[end, 0] = a
+    store.value[end, 1] = b
+    store.variance[end, 0] = variance_a
+    store.variance[end, 1] = variance_b
+    store.end[0] = end + 1
+
+
+def make_room(store: Store, *, keep_ns: int, late_ns: int, capacity: int) -> Store:
+    """
+    Drop what is older than `keep_ns`, or grow; return the store to go on with.
+
+    Parameters
+    ----------
+    keep_ns
+        Age before the newest stamp up to which samples are kept [ns].
+    late_ns
+        How far a stamp may be behind one before it [ns].
+    capacity
+        Number of samples that are kept at most, whatever their age.
+    """
+    end = int(store.end[0])
+    newest = int(store.stamp_ns[:end].max()) if end else 0
+    begin = max(_before(store, newest - keep_ns, late_ns), end - capacity)
+    room = len(store.stamp_ns)
+    if 2 * (end - begin) > room:
+        grown = Store.fresh(min(2 * room, 2 * capacity))
+    else:
+        grown = store
+    grown.channel[: end - begin] = store.channel[begin:end]
+    grown.stamp_ns[: end - begin] = store.stamp_ns[begin:end]
+    grown.receive_ns[: end - begin] = store.receive_ns[begin:end]
+    grown.value[: end - begin] = store.value[begin:end]
+    grown.variance[: end - begin] = store.variance[begin:end]
+    grown.end[0] = end - begin
+    return grown
+
+
+def first_store() -> Store:
+    """
+    Return the small buffer a monitor starts with.
+    """
+    return Store.fresh(_FIRST_CAPACITY)
+
+
+def since(store: Store, start_ns: int, *, late_ns: int, capacity: int) -> Block:
+    """
+    Return the samples kept from `start_ns` on, without copying them.
+
+    A few older ones may come first; the window leaves them out by their stamps.
+    """
+    end = int(store.end[0])
+    begin = max(_before(store, start_ns, late_ns), end - capacity)
+    return Block(
+        store.channel[begin:end],
+        store.stamp_ns[begin:end],
+        store.receive_ns[begin:end],
+        store.value[begin:end],
+        store.variance[begin:end],
+    )
+
+
+def _before(store: Store, stamp_ns: int, late_ns: int) -> int:
+    """Return an index before which all stamps are older than `stamp_ns`."""
+    # The stamps are sorted but for late_ns. A bisection for stamp_ns - late_ns drops what is
+    # in front of a stamp older than that, and all in front of it is older than stamp_ns.
+    end = int(store.end[0])
+    return int(np.searchsorted(store.stamp_ns[:end], stamp_ns - late_ns))

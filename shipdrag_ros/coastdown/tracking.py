@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Heading, course and shaft speed, read from the bins.
+
+A turn and an engine that is engaged again spoil a coastdown; both are told by
+comparing the bins since the onset with those before it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shipdrag_ros.coastdown.bins import (
+    FIRST_TRACK,
+    SOURCES,
+    Bins,
+    displacement,
+    mean_place,
+    mean_turning,
+    newest_bin,
+)
+from shipdrag_ros.samples import Channel
+
+HEADING_BEFORE_S = 60  # the heading of a coastdown is the mean over this long before it
+_HEADING = int(Channel.HEADING)
+_SHAFT = int(Channel.SHAFT)
+_YAW_S = 5  # headings are averaged over this long: a ship yaws in the waves
+_SHAFT_S = 3  # so that one bad reading does not engage the engine
+
+
+def mean_heading(bins: Bins, last: int, width: int) -> float:
+    """
+    Return the circular mean of the heading as sent [rad]; NaN without any.
+    """
+    _, cosine, sine, count = mean_place(bins, _HEADING, last, width)
+    return math.atan2(sine, cosine) if count else math.nan
+
+
+def rep103_yaw(heading: float, convention: str) -> float:
+    """
+    Return the yaw from east, anticlockwise, in (-pi, pi] [rad].
+
+    Parameters
+    ----------
+    heading
+        As sent [rad].
+    convention
+        `Parameters.heading_convention`.
+    """
+    yaw = 0.5 * math.pi - heading if convention == 'compass' else heading
+    return math.atan2(math.sin(yaw), math.cos(yaw))
+
+
+def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) -> int | None:
+    """
+    Say whether the ship has turned since bin `start`.
+
+    Parameters
+    ----------
+    start, number
+        First bin of the coastdown and the bin that closed last.
+    width
+        Length of a slope window: a course is taken over twice a half of it.
+    turn_rad
+        Change that counts as a turn.
+
+    Returns
+    -------
+    int or None
+        The last bin before the turn, where half of the change was not exceeded;
+        None where the ship has not turned, or nothing tells.
+
+    Notes
+    -----
+    The heading decides where there is one; the course over ground of a ship
+    that slows down in a cross current changes without a turn.
+    """
+    before = mean_heading(bins, start - 1, HEADING_BEFORE_S)
+    if not math.isnan(before) and newest_bin(bins, _HEADING) > start:
+
+        def change(at: int) -> float:
+            return _apart(mean_heading(bins, at, _YAW_S), before)
+    else:
+        half = max(1, width // 2)
+        tracks = [t for t in range(FIRST_TRACK, SOURCES) if newest_bin(bins, t) > start]
+        if not tracks:
+            return None
+        track = tracks[0]
+        course = _course(bins, track, start - 1, half)
+
+        def change(at: int) -> float:
+            # a way that begins before the onset tells nothing new
+            if at < start + 2 * half:
+                return math.nan
+            return _apart(_course(bins, track, at, half), course)
+
+    if not change(number) > turn_rad:
+        return None
+    last = number
+    while last > start and not change(last) <= 0.5 * turn_rad:
+        last -= 1
+    return last
+
+
+def _course(bins: Bins, track: int, last: int, half: int) -> float:
+    _, east, north = displacement(bins, track, last, half)
+    return math.atan2(north, east)
+
+
+def _apart(one: float, other: float) -> float:
+    """Return the size of the angle between two directions [rad]."""
+    return abs(math.remainder(one - other, 2.0 * math.pi))
+
+
+def shaft_speed(bins: Bins, number: int, width: int = _SHAFT_S) -> float:
+    """
+    Return the mean size of the shaft speed up to a bin [rad/s]; NaN without any.
+    """
+    return float(mean_turning(bins, _SHAFT, number, width)[0])
+
+
+def shaft_fell_at(bins: Bins, number: int, steady: float, width: int) -> int:
+    """
+    Return the first bin in which the shaft was slower than its steady speed.
+
+    Parameters
+    ----------
+    number
+        A bin in which it has slowed down.
+    steady
+        [rad/s]
+    width
+        How many bins to search.
+    """
+    for at in range(number, number - width, -1):
+        if mean_turning(bins, _SHAFT, at, 1)[0] >= 0.9 * steady:
+            return at + 1
+    return number
+
+
+def shaft_rose_at(bins: Bins, start: int, number: int, steady: float, width: int) -> int:
+    """
+    Return the last bin before the shaft speed rose again.
+
+    Parameters
+    ----------
+    start
+        First bin of the coastdown.
+    number
+        A bin in which the shaft turns again.
+    steady
+        Shaft speed before the coastdown [rad/s].
+    width
+        How many bins to search.
+    """
+    first = max(start, number - width)
+    slow = np.nanmin([mean_turning(bins, _SHAFT, at, 1)[0] for at in range(first, number + 1)])
+    for at in range(number, first, -1):
+        if mean_turning(bins, _SHAFT, at, 1)[0] <= slow + 0.1 * steady:
+            return at
+    return first

@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which samples may be used, and why not.
+
+One rule for every way in, walked sample by sample so that the way a record is
+cut cannot matter. Stamps decide; the time of arrival only tells a stamp from
+the future and a clock that was set.
+
+The tests, in this order; the first that fails names the reason:
+
+1. arrival more than 10 s before the arrival of the sample before: clock set
+2. stamp more than 2 s after its arrival: `FUTURE`
+3. stamp more than 10 s before the last accepted one of the channel: clock set
+4. equal to it: `DUPLICATE`; before it: `OUT_OF_ORDER`
+5. more than `late_s` before the newest accepted stamp of any input: `LATE`
+6. value: `NAN`, `INFINITE`, `ABSURD`, `FROZEN`
+
+A stamp comes before its value because a clock that was set is a fact whatever
+the value says. After a clock was set everything is forgotten and the same
+sample is tested again, as the first one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, cast
+
+import numpy as np
+from numba import njit, typeof, types
+
+from shipdrag_ros.coastdown.compiled import digest
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import (
+    ABSURD_SPEED_M_S,
+    BACKWARD_JUMP_NS,
+    FUTURE_NS,
+    Block,
+    Channel,
+    Float64,
+    Int64,
+    Reason,
+    UInt8,
+)
+
+CHANNELS = len(Channel)
+NEVER = -(2**62)  # a stamp before all stamps that leaves room for subtraction
+SECOND_NS = 1_000_000_000
+
+# not reasons of a sample: the clock was set, everything starts afresh
+STAMP_JUMPED_BACK = -1
+ARRIVAL_JUMPED_BACK = -2
+
+_ACCEPTED = int(Reason.ACCEPTED)
+_DUPLICATE = int(Reason.DUPLICATE)
+_OUT_OF_ORDER = int(Reason.OUT_OF_ORDER)
+_LATE = int(Reason.LATE)
+_FUTURE = int(Reason.FUTURE)
+_NAN = int(Reason.NAN)
+_INFINITE = int(Reason.INFINITE)
+_ABSURD = int(Reason.ABSURD)
+_FROZEN = int(Reason.FROZEN)
+
+_SPEEDS = int(Channel.SPEED_OVER_GROUND)  # this channel and those before it
+_GEODETIC = int(Channel.POSITION_GEODETIC)
+# The motion of a ship at sea never repeats to the last bit; a stopped shaft, a rudder
+# amidships, a steady depth and a course held by a coarse compass do, and rightly.
+_MOTION = int(Channel.POSITION_GEODETIC)  # this channel and those before it
+_TWO_COLUMNS = np.array(
+    [
+        channel in (Channel.POSITION, Channel.POSITION_GEODETIC, Channel.WIND_APPARENT)
+        for channel in Channel
+    ]
+)
+
+# Declared, so that a read-only array does not compile the kernels a second time; those that
+# own their memory pass as well.
+STAMPS = types.Array(types.int64, 1, 'C', readonly=True)
+CHANNEL_CODES = types.Array(types.uint8, 1, 'C', readonly=True)
+VALUES = types.Array(types.float64, 2, 'C', readonly=True)
+
+
+class Guard(NamedTuple):
+    """
+    What the tests remember.
+
+    Attributes
+    ----------
+    last_ns : (channels,) int64
+        Stamp of the last accepted sample of each channel [ns].
+    newest_ns : (1,) int64
+        Newest accepted stamp of any channel [ns].
+    arrival_ns : (1,) int64
+        Arrival of the sample before, used or not [ns].
+    held : (channels, 2)
+        Value of the last accepted sample.
+    held_since_ns : (channels,) int64
+        Stamp since which it has not changed [ns].
+    """
+
+    last_ns: Int64
+    newest_ns: Int64
+    arrival_ns: Int64
+    held: Float64
+    held_since_ns: Int64
+
+    @classmethod
+    def fresh(cls) -> Guard:
+        """
+        Return the memory before the first sample.
+        """
+        return cls(
+            np.full(CHANNELS, NEVER),
+            np.full(1, NEVER),
+            np.full(1, NEVER),
+            np.full((CHANNELS, 2), np.nan),
+            np.full(CHANNELS, NEVER),
+        )
+
+
+class Limits(NamedTuple):
+    """`Parameters.frozen_s` and `late_s` in nanoseconds."""
+
+    frozen_ns: int
+    late_ns: int
+
+    @classmethod
+    def of(cls, parameters: Parameters) -> Limits:
+        """
+        Take the limits from the parameters.
+        """
+        return cls(
+            round(parameters.frozen_s * SECOND_NS),
+            round(parameters.late_s * SECOND_NS),
+        )
+
+
+@njit
+def examine(
+    guard: Guard, limits: Limits, channel: int, stamp: int, arrival: int, a: float, b: float
+) -> int:
+    """
+    Return the `Reason` of one sample, or that a clock was set.
+
+    Changes nothing: `remember` does, once the sample is taken.
+    """
+    if arrival < guard.arrival_ns[0] - BACKWARD_JUMP_NS:
+        return ARRIVAL_JUMPED_BACK
+    if stamp > arrival + FUTURE_NS:
+        return _FUTURE
+    last = guard.last_ns[channel]
+    if stamp <= last:
+        if stamp < last - BACKWARD_JUMP_NS:
+            return STAMP_JUMPED_BACK
+        if stamp == last:
+            return _DUPLICATE
+        return _OUT_OF_ORDER
+    if stamp < guard.newest_ns[0] - limits.late_ns:
+        return _LATE
+    two = _TWO_COLUMNS[channel]
+    if np.isnan(a) or (two and np.isnan(b)):
+        return _NAN
+    if np.isinf(a) or (two and np.isinf(b)):
+        return _INFINITE
+    if channel <= _SPEEDS and abs(a) > ABSURD_SPEED_M_S:
+        return _ABSURD
+    if channel == _GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
+        return _ABSURD
+    if (
+        channel <= _MOTION
+        and a == guard.held[channel, 0]
+        and (not two or b == guard.held[channel, 1])
+        and stamp - guard.held_since_ns[channel] > limits.frozen_ns
+    ):
+        return _FROZEN
+    return _ACCEPTED
+
+
+@njit
+def remember(guard: Guard, channel: int, stamp: int, a: float, b: float) -> None:
+    """
+    Take an accepted sample into the memory of the tests.
+    """
+    guard.last_ns[channel] = stamp
+    guard.newest_ns[0] = max(guard.newest_ns[0], stamp)
+    same = a == guard.held[channel, 0] and (
+        not _TWO_COLUMNS[channel] or b == guard.held[channel, 1]
+    )
+    if not same:
+        guard.held[channel, 0] = a
+        guard.held[channel, 1] = b
+        guard.held_since_ns[channel] = stamp
+
+
+@njit
+def forget(guard: Guard) -> None:
+    """
+    Return to the state before the first sample.
+    """
+    guard.last_ns[:] = NEVER
+    guard.newest_ns[:] = NEVER
+    guard.arrival_ns[:] = NEVER
+    guard.held[:] = np.nan
+    guard.held_since_ns[:] = NEVER
+
+
+def validate(block: Block, parameters: Parameters) -> UInt8:
+    """
+    Return the `Reason` of every sample of a whole record.
+
+    Parameters
+    ----------
+    block : n samples
+        The record from its beginning, in arrival order.
+    parameters
+        `late_s` and `frozen_s` are used.
+
+    Returns
+    -------
+    (n,) uint8
+        `Reason.ACCEPTED` where a sample may be used.
+
+    Notes
+    -----
+    Where a clock was set the tests start afresh, as in `Monitor`.
+    """
+    reasons = np.empty(len(block), np.uint8)
+    _walk_compiled(
+        Guard.fresh(),
+        Limits.of(parameters),
+        np.ascontiguousarray(block.channel),
+        np.ascontiguousarray(block.stamp_ns),
+        np.ascontiguousarray(block.receive_ns),
+        np.ascontiguousarray(block.value),
+        reasons,
+    )
+    return reasons
+
+
+@njit
+def _walk(
+    guard: Guard,
+    limits: Limits,
+    channel: UInt8,
+    stamp_ns: Int64,
+    receive_ns: Int64,
+    value: Float64,
+    reasons: UInt8,
+) -> None:
+    for i in range(len(channel)):
+        c, stamp, a, b = int(channel[i]), stamp_ns[i], value[i, 0], value[i, 1]
+        code = examine(guard, limits, c, stamp, receive_ns[i], a, b)
+        if code < 0:
+            forget(guard)
+            code = examine(guard, limits, c, stamp, receive_ns[i], a, b)
+        if code == _ACCEPTED:
+            remember(guard, c, stamp, a, b)
+        guard.arrival_ns[0] = receive_ns[i]
+        reasons[i] = code
+
+
+_SIGNATURE = types.void(
+    typeof(Guard.fresh()),
+    typeof(Limits(0, 0)),
+    CHANNEL_CODES,
+    STAMPS,
+    STAMPS,
+    VALUES,
+    types.Array(types.uint8, 1, 'C'),
+)
+
+
+def _compile(sources: str) -> Callable[..., None]:
+    @njit(_SIGNATURE, cache=True)
+    def compiled(guard, limits, channel, stamp_ns, receive_ns, value, reasons):  # type: ignore[no-untyped-def]
+        _ = sources  # part of the key of the cache
+        _walk(guard, limits, channel, stamp_ns, receive_ns, value, reasons)
+
+    return cast(Callable[..., None], compiled)
+
+
+_walk_compiled = _compile(digest('samples.py', 'coastdown/validate.py'))
