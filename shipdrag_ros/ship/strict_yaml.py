@@ -66,6 +66,13 @@ class _Dumper(yaml.SafeDumper):
     def ignore_aliases(self, data: Any) -> bool:
         return True
 
+    def represent_text(self, data: str) -> yaml.ScalarNode:
+        # PyYAML loses rare line breaks in other styles
+        style = None if data.isprintable() else '"'
+        return self.represent_scalar('tag:yaml.org,2002:str', data, style=style)
+
+
+_Dumper.add_representer(str, _Dumper.represent_text)
 
 for _kind, _pattern, _first in _CORE_SCALARS:
     for _class in (_Loader, _Dumper):

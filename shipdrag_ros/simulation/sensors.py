@@ -163,7 +163,9 @@ def _true_values(truth: Truth, channel: Channel) -> Float64:
         case Channel.SPEED_THROUGH_WATER:
             return truth.speed_through_water_m_s[:, None].copy()
         case Channel.SPEED_OVER_GROUND:
-            return np.linalg.norm(truth.velocity_over_ground_m_s, axis=1, keepdims=True)
+            east, north = truth.velocity_over_ground_m_s.T
+            speed: Float64 = np.hypot(east, north)
+            return speed[:, None]
         case Channel.POSITION:
             return truth.position_m.copy()
         case Channel.HEADING:
@@ -180,13 +182,13 @@ def _true_values(truth: Truth, channel: Channel) -> Float64:
             cos, sin = np.cos(truth.heading_rad), np.sin(truth.heading_rad)
             return np.column_stack([east * cos + north * sin, north * cos - east * sin])
         case _:
-            raise SimulationError(f'{channel.name.lower()} is not simulated')
+            raise SimulationError(f'sensors: {channel.name.lower()} cannot be simulated')
 
 
 def _as_sent(value: Float64, channel: Channel) -> Float64:
     """Bring noisy readings to the range in which they are sent."""
     if channel is Channel.HEADING:
-        return np.angle(np.exp(1j * value))
+        return np.arctan2(np.sin(value), np.cos(value))
     if channel is Channel.SPEED_OVER_GROUND:
         return np.abs(value)
     return value
@@ -199,8 +201,6 @@ def _nanoseconds(time_s: Float64) -> NDArray[np.int64]:
 def _problems(sensor: Sensor) -> list[str]:
     name = sensor.channel.name.lower()
     problems = []
-    if sensor.channel is Channel.POSITION_GEODETIC:
-        problems.append(f'{name} is not simulated, expected position')
     if not 0.0 < sensor.rate_hz <= 1e4:
         problems.append(f'{name}: rate_hz is {sensor.rate_hz!r}, expected 0..10000 Hz')
     if not 0.0 <= sensor.outlier_fraction <= 1.0:
