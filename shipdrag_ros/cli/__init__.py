@@ -1,1 +1,108 @@
 # SPDX-License-Identifier: Apache-2.0
+"""
+The command line: one module a verb, each with `add_arguments` and `run`.
+
+Only the module of the verb that was asked for is imported, so that help comes
+at once and a verb does not pay for what another needs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import NamedTuple
+
+from shipdrag_ros import __version__
+from shipdrag_ros.cli.arguments import Help
+from shipdrag_ros.errors import ShipdragError
+
+
+class Verb(NamedTuple):
+    """A verb, its module in this package, and what it does in one line."""
+
+    name: str
+    module: str
+    summary: str
+
+
+VERBS = (
+    Verb('node', 'node', 'the onboard node: estimates live and records'),
+    Verb('simulate', 'simulate', 'simulated coastdown with sensors, as a bag'),
+)
+
+DONE, USER_ERROR, USAGE = 0, 1, 2
+INTERRUPTED, BROKEN_PIPE = 130, 141  # what a shell reports of a program killed by SIGINT, SIGPIPE
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """
+    Run a verb; the console script `shipdrag`.
+
+    Parameters
+    ----------
+    arguments
+        Command line without the program's name; that of the process by
+        default.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 user error, 2 usage, 130 interrupted.
+    """
+    line = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        status = _run(line)
+        sys.stdout.flush()  # here, where a broken pipe is still caught
+    except BrokenPipeError:
+        # the reader went away, `| head` for instance; let the last flush go nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return BROKEN_PIPE
+    return status
+
+
+def _run(line: list[str]) -> int:
+    verb = next((word for word in line if not word.startswith('-')), '')
+    try:
+        options = parser(verb).parse_args(line)
+        status: int = options.run(options)
+        return status
+    except SystemExit as end:  # argparse has said what is wrong
+        return end.code if isinstance(end.code, int) else USAGE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except ShipdragError as error:
+        print(f'ERROR: {error}', file=sys.stderr)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        print(
+            f'ERROR: {str(error.filename)!r}: {error.strerror}; '
+            'check the path and that it may be read or written',
+            file=sys.stderr,
+        )
+    return USER_ERROR
+
+
+def parser(verb: str) -> argparse.ArgumentParser:
+    """
+    Return the parser of the command line, with the arguments of one verb.
+    """
+    top = argparse.ArgumentParser(
+        prog='shipdrag',
+        description='Hydrodynamic resistance of a ship from its coastdowns. '
+        'Exit status: 0 done, 1 user error, 2 usage.',
+    )
+    top.add_argument('--version', action='version', version=f'shipdrag_ros {__version__}')
+    verbs = top.add_subparsers(title='verbs', metavar='VERB', dest='verb', required=True)
+    for known in VERBS:
+        added = verbs.add_parser(
+            known.name, help=known.summary, description=known.summary, formatter_class=Help
+        )
+        if known.name == verb:
+            module = import_module(f'{__name__}.{known.module}')
+            module.add_arguments(added)
+            added.set_defaults(run=module.run)
+    return top

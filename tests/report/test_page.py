@@ -107,9 +107,3 @@ def test_hulls_compared_come_first(run: RunResult, tmp_path: Path) -> None:
     assert page.text.index('Hulls compared') < page.text.index('sea trial.mcap')
     assert len(page.images) == 7
 
-
-def test_a_doubt_about_the_ship_is_shown(run: RunResult, tmp_path: Path) -> None:
-    slender = replace(run.ship, displaced_volume_m3=8000.0)
-    assert slender.warnings
-    write_report(tmp_path / 'report.html', [replace(run, ship=slender)])
-    assert slender.warnings[0] in Page(tmp_path / 'report.html').text

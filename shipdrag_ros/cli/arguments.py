@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arguments that several verbs share, checked where they are given."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+STDOUT = '-'
+
+
+class Help(argparse.ArgumentDefaultsHelpFormatter):
+    """Name every default that says something."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        if action.default is None or action.default is False:
+            return action.help
+        return super()._get_help_string(action)
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """
+    Add `--json [FILE]`.
+    """
+    parser.add_argument(
+        '--json',
+        nargs='?',
+        const=STDOUT,
+        type=_json_file,
+        metavar='FILE',
+        help='write the result as JSON, NaN as null, to FILE; without FILE: JSON alone on '
+        'stdout and the readable result on stderr',
+    )
+
+
+def number(
+    low: float, high: float = math.inf, *, unit: str = '', above: bool = False
+) -> Callable[[str], float]:
+    """
+    Return a reader of numbers low <= x <= high, or low < x with `above`.
+    """
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        # written so that NaN fails
+        if not (math.isfinite(value) and low <= value <= high) or (above and value == low):
+            most = f' and at most {high:g}' if math.isfinite(high) else ''
+            least = f'above {low:g}' if above else f'at least {low:g}'
+            if low == -math.inf:
+                least = 'finite'
+            raise argparse.ArgumentTypeError(
+                f'{text!r}, expected a number {least}{most}{f" [{unit}]" if unit else ""}'
+            )
+        return value
+
+    return read
+
+
+def remap(text: str) -> tuple[str, str]:
+    """
+    Read `from:=to`.
+    """
+    topic, separator, name = text.partition(':=')
+    if not (topic and separator and name):
+        raise argparse.ArgumentTypeError(
+            f'{text!r}, expected FROM:=TO, a topic of the bag and one of the inputs; '
+            'write --remap before each'
+        )
+    return topic, name
+
+
+def bag(text: str) -> Path:
+    """
+    Read the path of a bag.
+    """
+    if ':=' in text:
+        raise argparse.ArgumentTypeError(f'{text!r} is a remapping; write --remap before each')
+    return Path(text)
+
+
+def _json_file(text: str) -> str:
+    # `--json a.mcap` takes the bag for the file to write, and would destroy it
+    path = Path(text)
+    if path.suffix == '.mcap' or path.is_dir() or (path.is_file() and path.suffix != '.json'):
+        raise argparse.ArgumentTypeError(
+            f'{text!r} would be overwritten by the JSON; for stdout put --json last or write '
+            f'--json={STDOUT}, for a file give a new name or one that ends in .json'
+        )
+    return text

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where results and logs go: one to stdout, the other to stderr, never mixed."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table as RichTable
+
+from shipdrag_ros.cli.arguments import STDOUT
+from shipdrag_ros.report.cells import Table
+
+_PIPE_WIDTH = 160  # a file or a pipe has no width of its own; tables must not be cut there
+
+
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        raise BrokenPipeError  # `main` ends quietly; rich would exit with status 1
+
+
+class Output:
+    """
+    The two streams of a verb.
+
+    Parameters
+    ----------
+    json_to
+        Argument of `--json`: None, a file, or '-' for stdout, which then
+        belongs to the JSON alone.
+    """
+
+    def __init__(self, json_to: str | None = None) -> None:
+        self._json_to = json_to
+        self._result = _console(sys.stderr if json_to == STDOUT else sys.stdout)
+        self._log = _console(sys.stderr)
+
+    def say(self, text: str) -> None:
+        """
+        Print a line of the result.
+        """
+        self._result.print(text, soft_wrap=True)
+
+    def heading(self, text: str) -> None:
+        """
+        Print a heading of the result.
+        """
+        self._result.print(f'\n{text}', style='bold', soft_wrap=True)
+
+    def table(self, table: Table) -> None:
+        """
+        Print a table of the result; words to the left, figures to the right.
+        """
+        heads = any(table.columns)
+        shown = RichTable(box=None, show_header=heads, header_style='bold', pad_edge=False)
+        for number, name in enumerate(table.columns):
+            words = number == 0 or any(row[number][:1].isalpha() for row in table.rows)
+            shown.add_column(
+                name, justify='left' if words or not heads else 'right', overflow='fold'
+            )
+        for row in table.rows:
+            shown.add_row(*row)
+        self._result.print(shown)
+
+    def log(self, text: str) -> None:
+        """
+        Print a line that is not part of the result.
+        """
+        self._log.print(text, soft_wrap=True, style='dim')
+
+    @contextmanager
+    def progress(self, text: str) -> Iterator[Callable[[int, int], None]]:
+        """
+        Show a bar while something long is done; only to a terminal.
+
+        Yields
+        ------
+        callable
+            To be told how much is done, and of how much.
+        """
+        bar = Progress(
+            TextColumn('{task.description}', markup=False),
+            BarColumn(),
+            TextColumn('{task.percentage:.0f} %'),
+            TimeRemainingColumn(),
+            console=self._log,
+            transient=True,
+            disable=not self._log.is_terminal,
+        )
+        with bar:
+            task = bar.add_task(text, total=None)
+            yield lambda done, total: bar.update(task, completed=done, total=total)
+
+    def json(self, document: Mapping[str, Any]) -> None:
+        """
+        Write the result for the machine, if that was asked for.
+        """
+        if self._json_to is None:
+            return
+        text = json.dumps(_plain(document), indent=2, allow_nan=False) + '\n'
+        if self._json_to == STDOUT:
+            sys.stdout.write(text)
+        else:
+            Path(self._json_to).write_text(text, encoding='utf-8')
+            self.log(f'JSON in {self._json_to}')
+
+
+def _console(stream: TextIO) -> _Console:
+    if isinstance(stream, io.TextIOWrapper):
+        stream.reconfigure(errors='replace')  # a terminal without ± must not end the program
+    width = None if stream.isatty() else _PIPE_WIDTH
+    # names from outside are text, whatever brackets and colons they hold
+    return _Console(file=stream, width=width, markup=False, highlight=False, emoji=False)
+
+
+def _plain(value: Any) -> Any:
+    """Turn arrays into lists, and what is not finite into None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

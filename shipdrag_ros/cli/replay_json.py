@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The JSON document of `replay`, whose keys others rely on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.report.run import InputCounts, Recorded, RunResult
+
+
+def document(runs: Sequence[RunResult]) -> dict[str, Any]:
+    """
+    Return the document of one or several bags.
+
+    Counts are summed over the bags. A coastdown without an estimate has
+    empty arrays and says why under `failure`.
+    """
+    return {
+        'coastdowns': [
+            _coastdown(run.bag, coastdown) for run in runs for coastdown in run.coastdowns
+        ],
+        'combined': None,
+        'inputs': _inputs([run.inputs for run in runs]),
+        'recorded': _recorded(runs),
+    }
+
+
+def _coastdown(bag: str, coastdown: Coastdown) -> dict[str, Any]:
+    estimate = coastdown.estimate
+    found: dict[str, Any] = {
+        'bag': bag,
+        'start_ns': coastdown.start_ns,
+        'end_ns': coastdown.end_ns,
+        'onset_detected_ns': coastdown.onset_detected_ns,
+        'ended_by': coastdown.ended_by.value,
+        'failure': coastdown.failure,
+        'estimator': None,
+        'order': None,
+        'samples': {},
+        'speed_m_s': [],
+        'resistance_m_s2': [],
+        'sigma_m_s2': [],
+        'sigma_repeatable_m_s2': [],
+        'froude': [],
+        'froude_valid': None,
+        'froude_max_by': None,
+        'w': None,
+        'noise_sd': {},
+        'current_m_s': None,
+        'notes': [],
+    }
+    if estimate is None:
+        return found
+    curve = estimate.valid_curve
+    current = None
+    if estimate.current_m_s is not None:
+        current = {'value': estimate.current_m_s, 'sd': estimate.current_sigma_m_s}
+    return found | {
+        'estimator': estimate.estimator,
+        'order': estimate.order,
+        'samples': estimate.samples,
+        'speed_m_s': curve.speed_m_s,
+        'resistance_m_s2': curve.resistance_m_s2,
+        'sigma_m_s2': curve.sigma_m_s2,
+        'sigma_repeatable_m_s2': curve.sigma_repeatable_m_s2,
+        'froude': curve.froude,
+        'froude_valid': estimate.froude_valid,
+        'froude_max_by': estimate.froude_max_by.value,
+        'w': estimate.w,
+        'noise_sd': estimate.noise_sd,
+        'current_m_s': current,
+        'notes': estimate.notes,
+    }
+
+
+def _inputs(bags: Sequence[Mapping[str, InputCounts]]) -> dict[str, Any]:
+    total: dict[str, Any] = {}
+    for inputs in bags:
+        for name, counts in inputs.items():
+            here = total.setdefault(name, {'messages': 0, 'used': 0, 'rejected': {}})
+            here['messages'] += counts.messages
+            here['used'] += counts.used
+            for reason, n in counts.rejected.items():
+                here['rejected'][reason] = here['rejected'].get(reason, 0) + n
+    return total
+
+
+def _recorded(runs: Sequence[RunResult]) -> dict[str, Any]:
+    differences = [
+        run.recorded.first_difference
+        if len(runs) == 1
+        else f'{run.bag}: {run.recorded.first_difference}'
+        for run in runs
+        if run.recorded.first_difference is not None
+    ]
+    total = Recorded(
+        compared=sum(run.recorded.compared for run in runs),
+        identical=sum(run.recorded.identical for run in runs),
+        first_difference=differences[0] if differences else None,
+    )
+    return vars(total)

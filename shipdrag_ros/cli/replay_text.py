@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The readable result of `replay`, in the terminal."""
+
+from __future__ import annotations
+
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.report import cells, words
+from shipdrag_ros.report.hulls import Ranking
+from shipdrag_ros.report.run import RunResult
+
+
+def show_run(output: Output, run: RunResult) -> None:
+    """
+    Print what one bag gave.
+    """
+    output.heading(run.bag)
+    output.say(words.ship_line(run.ship))
+    if not run.coastdowns:
+        output.say('No coastdown found.')
+    for number, coastdown in enumerate(run.coastdowns, start=1):
+        output.heading(f'Coastdown {number}')
+        output.table(cells.facts(coastdown))
+        output.say(words.result_sentence(coastdown, mass_kg=run.ship.mass_kg))
+        if coastdown.estimate is not None:
+            output.table(cells.curve_table(coastdown.estimate.valid_curve, truth=run.truth))
+        for note in words.notes(coastdown):
+            output.say(f'- {note}')
+    output.heading('Messages')
+    output.table(cells.inputs_table(run.inputs))
+    output.say(words.recorded_sentence(run.recorded))
+
+
+def show_ranking(output: Output, ranking: Ranking) -> None:
+    """
+    Print hulls by Fr_max.
+    """
+    output.heading('Hulls compared: the higher Fr_max, the later a hull makes wave')
+    output.table(cells.ranking_table(ranking))
+    for note in ranking.notes:
+        output.say(f'- {note}')

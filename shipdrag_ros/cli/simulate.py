@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag simulate`: a coastdown that is known to the last digit, as a bag."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.cli.arguments import add_json, number
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.messages import encode
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.ship import Ship, TableBaseline
+from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+
+_TRUE_POINTS = 201
+_SPEED_FRACTION = 0.8  # of what the baseline reaches
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What a simulation was asked for, as `truth.yaml` states it."""
+
+    speed_m_s: float
+    duration_s: float
+    lead_in_s: float
+    heading_deg: float
+    rate_hz: float
+    noise: float
+    seed: int
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Sail steadily, stop the engine and let a simulated ship coast; write what log, position, '
+        'heading and shaft sensors read, with the truth attached as truth.yaml.'
+    )
+    parser.add_argument(
+        '--ship', required=True, type=Path, metavar='FILE', help='ship file with a baseline (YAML)'
+    )
+    parser.add_argument(
+        '-o',
+        '--out',
+        required=True,
+        type=Path,
+        metavar='BAG',
+        help='MCAP file to make; an existing one is not overwritten',
+    )
+    parser.add_argument(
+        '--speed',
+        type=number(0.0, 40.0, unit='m/s', above=True),
+        metavar='M_S',
+        help='steady speed through water before the stop [m/s] (default: '
+        f'{_SPEED_FRACTION:g} of the highest speed that the baseline is given for)',
+    )
+    parser.add_argument(
+        '--duration',
+        type=number(0.0, 1e6, unit='s', above=True),
+        default=1500.0,
+        metavar='S',
+        help='record from the stop on [s]',
+    )
+    parser.add_argument(
+        '--lead-in',
+        type=number(0.0, 1e6, unit='s'),
+        default=600.0,
+        metavar='S',
+        help='steady sailing before the stop [s]',
+    )
+    parser.add_argument(
+        '--heading',
+        type=number(-math.inf, unit='deg'),
+        default=0.0,
+        metavar='DEG',
+        help='heading [deg], anticlockwise from east as in REP-103: 90 is north',
+    )
+    parser.add_argument(
+        '--rate',
+        type=number(0.001, 1000.0, unit='Hz'),
+        default=1.0,
+        metavar='HZ',
+        help='readings of each sensor [Hz]',
+    )
+    parser.add_argument(
+        '--noise',
+        type=number(0.0, 1000.0),
+        default=1.0,
+        metavar='FACTOR',
+        help='factor [-] on the white noise of the sensors: 0.05 m/s of the log, 10 m of the '
+        'position, 0.5 deg of the heading, 0.02 rad/s of the shaft; 0: exact readings',
+    )
+    parser.add_argument(
+        '--seed',
+        type=_seed,
+        default=0,
+        metavar='N',
+        help='seed of the noise: the same seed gives the same readings',
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Simulate and write the bag.
+    """
+    output = Output(options.json)
+    ship = Ship.load(options.ship)
+    settings = Settings(
+        speed_m_s=_default_speed(ship) if options.speed is None else options.speed,
+        duration_s=options.duration,
+        lead_in_s=options.lead_in,
+        heading_deg=options.heading,
+        rate_hz=options.rate,
+        noise=options.noise,
+        seed=options.seed,
+    )
+    block, truth = make(ship, settings)
+    write_bag(options.out, block, ship, truth, output)
+    counts = Counter(Channel(code).input for code in block.channel.tolist())
+    output.say(
+        f'{options.out}: {len(block)} messages; after {settings.lead_in_s:g} s at '
+        f'{settings.speed_m_s:g} m/s the engine stops, and the ship coasts for '
+        f'{settings.duration_s:g} s'
+    )
+    output.json(
+        {
+            'bag': str(options.out),
+            'messages': counts,
+            'start_ns': block.receive_ns[0],
+            'end_ns': block.receive_ns[-1],
+            'settings': truth.settings,
+        }
+    )
+    return 0
+
+
+def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
+    """
+    Simulate a coastdown; return what the sensors read, and the truth.
+
+    Raises
+    ------
+    SimulationError
+        If the settings ask for something impossible.
+    """
+    scenario = Scenario(
+        speed_m_s=settings.speed_m_s,
+        lead_in_s=settings.lead_in_s,
+        duration_s=settings.duration_s,
+        heading_rad=math.radians(settings.heading_deg),
+        seed=settings.seed,
+    )
+    motion = simulate(ship, scenario)
+    block = sense(
+        motion,
+        standard_sensors(rate_hz=settings.rate_hz, noise=settings.noise),
+        seed=settings.seed,
+    )
+    speed = np.linspace(0.0, settings.speed_m_s, _TRUE_POINTS)
+    truth = TrueCurve(speed, motion.specific_resistance(speed), asdict(settings))
+    return block, truth
+
+
+def write_bag(path: Path, block: Block, ship: Ship, truth: TrueCurve, output: Output) -> None:
+    """
+    Write a simulated record; what is begun and not ended is removed.
+    """
+    writer = BagWriter(path)
+    try:
+        with writer, output.progress(f'writing {path}') as progress:
+            writer.attach('ship.yaml', ship.to_yaml())
+            writer.attach('parameters.yaml', Parameters().to_yaml())
+            writer.attach(ATTACHMENT, truth.to_yaml())
+            for done, message in enumerate(encode(block)):
+                writer.write(
+                    message.topic,
+                    message.type,
+                    message.payload,
+                    log_ns=message.log_ns,
+                    publish_ns=message.publish_ns,
+                )
+                if done % 1000 == 0:
+                    progress(done, len(block))
+    except BaseException:
+        path.unlink(missing_ok=True)
+        raise
+
+
+def _default_speed(ship: Ship) -> float:
+    if ship.baseline is None:
+        raise SimulationError(
+            f'ship {ship.name!r} has no baseline resistance; add `baseline` to its ship file'
+        )
+    if isinstance(ship.baseline, TableBaseline):
+        highest = ship.baseline.speed_m_s[-1]
+    else:
+        highest = float(ship.speed(ship.baseline.wave_froude[-1]))
+    return round(_SPEED_FRACTION * highest, 3)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number, 0 or more')
+    return int(text)

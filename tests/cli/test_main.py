@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Exit statuses, help, and errors without a traceback."""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros import cli
+from shipdrag_ros.cli import node
+from shipdrag_ros.errors import BagError
+
+SHIPDRAG = Path(sys.executable).with_name('shipdrag')
+
+
+def run_verb(monkeypatch: pytest.MonkeyPatch, result: int | BaseException, *arguments: str) -> int:
+    """Run a verb in whose place something else is done."""
+
+    def run(options: argparse.Namespace) -> int:
+        if isinstance(result, BaseException):
+            raise result
+        return result
+
+    monkeypatch.setattr(node, 'run', run)
+    return cli.main(['node', '--ship', 'a', '--out', 'b', *arguments])
+
+
+@pytest.mark.parametrize(
+    ('result', 'status', 'said'),
+    [
+        (0, 0, ''),
+        (1, 1, ''),
+        (BagError("'a.mcap' is empty; record again"), 1, "ERROR: 'a.mcap' is empty; record again"),
+        (FileNotFoundError(2, 'No such file', 'a'), 1, "ERROR: 'a': No such file; check the path"),
+        (KeyboardInterrupt(), 130, ''),
+        (SystemExit(143), 143, ''),
+    ],
+)
+def test_an_end_has_its_status(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    result: int | BaseException,
+    status: int,
+    said: str,
+) -> None:
+    assert run_verb(monkeypatch, result) == status
+    captured = capsys.readouterr()
+    assert captured.err.startswith(said)
+    assert bool(captured.err) == bool(said)
+    assert captured.out == ''
+
+
+def test_a_defect_is_not_taken_for_a_user_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ZeroDivisionError):
+        run_verb(monkeypatch, ZeroDivisionError())
+    with pytest.raises(OSError, match='no path'):
+        run_verb(monkeypatch, OSError('no path'))
+
+
+@pytest.mark.parametrize(
+    'line', [[], ['nonsense'], ['node'], ['node', '--nonsense'], ['--nonsense']]
+)
+def test_wrong_usage_is_2(line: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(line) == 2
+    assert 'usage: shipdrag' in capsys.readouterr().err
+
+
+def test_help_lists_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(['--help']) == 0
+    captured = capsys.readouterr().out
+    for verb in cli.VERBS:
+        assert f'    {verb.name}' in captured
+        assert verb.summary in ' '.join(captured.split())
+
+
+@pytest.mark.parametrize('verb', [verb.name for verb in cli.VERBS])
+def test_each_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([verb, '--help']) == 0
+    captured = capsys.readouterr().out
+    assert f'usage: shipdrag {verb}' in captured
+    assert 'None' not in captured
+
+
+@pytest.mark.parametrize('verb', [verb.name for verb in cli.VERBS])
+def test_each_option_is_explained(verb: str) -> None:
+    top = cli.parser(verb)
+    (verbs,) = [item for item in top._actions if isinstance(item, argparse._SubParsersAction)]
+    for action in verbs.choices[verb]._actions:
+        assert action.help, action.option_strings or action.dest
+        # what is a number says in which unit, by name or in brackets
+        if isinstance(action.default, float):
+            assert '[' in action.help, action.option_strings
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(['--version']) == 0
+    assert capsys.readouterr().out.startswith('shipdrag_ros 0.')
+
+
+def test_help_is_there_at_once_and_needs_no_ros() -> None:
+    loaded = subprocess.run(
+        [
+            sys.executable,
+            '-c',
+            'import sys; from shipdrag_ros.cli import main; main(["--help"]); '
+            'print([name for name in ("numpy", "numba", "matplotlib", "rclpy", "mcap") '
+            'if name in sys.modules])',
+        ],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert loaded.stdout.splitlines()[-1] == '[]'
+
+
+def test_a_reader_that_goes_away_is_no_error(ship_file: Path, tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [SHIPDRAG, 'simulate', '--ship', ship_file, '-o', tmp_path / 'a.mcap', '--duration', '9'],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.wait(timeout=60) == 141
+        assert process.stderr.read() == b''
