@@ -9,7 +9,8 @@ publish time = stamp.
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
@@ -112,13 +113,14 @@ class BagWriter:
         """
         Write a text file into the bag, before the first message if it is to survive a crash.
         """
-        self._writer.add_attachment(
-            create_time=0,
-            log_time=0,
-            name=name,
-            media_type='application/yaml' if name.endswith('.yaml') else 'text/plain',
-            data=text.encode(),
-        )
+        with self._errors_told():
+            self._writer.add_attachment(
+                create_time=0,
+                log_time=0,
+                name=name,
+                media_type='application/yaml' if name.endswith('.yaml') else 'text/plain',
+                data=text.encode(),
+            )
 
     def register(self, topic: str, type_name: str) -> None:
         """
@@ -129,7 +131,8 @@ class BagWriter:
         BagError
             If the definition of the type is not known.
         """
-        self._channel(topic, type_name)
+        with self._errors_told():
+            self._channel(topic, type_name)
 
     def write(
         self, topic: str, type_name: str, payload: bytes, *, log_ns: int, publish_ns: int
@@ -153,7 +156,7 @@ class BagWriter:
         BagError
             If the type is not known or the file cannot be written.
         """
-        try:
+        with self._errors_told():
             self._writer.add_message(
                 self._channel(topic, type_name),
                 log_time=log_ns,
@@ -161,8 +164,6 @@ class BagWriter:
                 # a stamp before 1970 has no place here; the message itself keeps it
                 publish_time=max(publish_ns, 0),
             )
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
 
     def close(self) -> None:
         """
@@ -176,11 +177,10 @@ class BagWriter:
         if self._file.closed:
             return
         try:
-            self._writer.finish()
-            self._file.flush()
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r} cannot be closed: {error.strerror}') from error
+            with self._errors_told():
+                self._writer.finish()
+                self._file.flush()
+                os.fsync(self._file.fileno())
         finally:
             with suppress(OSError):
                 self._file.close()
@@ -195,6 +195,13 @@ class BagWriter:
         traceback: TracebackType | None,
     ) -> None:
         self.close()
+
+    @contextmanager
+    def _errors_told(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
 
     def _channel(self, topic: str, type_name: str) -> int:
         key = (topic, type_name)

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+One MCAP file: what is in it, and its messages in order of arrival.
+
+Without a sound index the file is walked once from its beginning, and what is
+whole in it is read; the damage is told, not mended.
+"""
+
+from __future__ import annotations
+
+import sys
+from bisect import bisect_left
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from mmap import ACCESS_READ, mmap
+from pathlib import Path
+from tempfile import TemporaryFile
+from typing import IO
+
+import zstandard
+from mcap.opcode import Opcode
+
+from shipdrag_ros.bags.contents import Contents, Segment, read_index, scan
+from shipdrag_ros.bags.records import (
+    MAGIC,
+    DamagedRecord,
+    RawMessage,
+    message_head,
+    message_payload,
+    unpack_chunk,
+    walk,
+)
+from shipdrag_ros.errors import BagError
+
+CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
+_FOREIGN = {
+    b'SQLite format 3\0': 'is a bag in sqlite3 storage',
+    b'#ROSBAG V2.0': 'is a bag of ROS 1',
+}
+
+
+class McapFile:
+    """
+    An MCAP file.
+
+    Parameters
+    ----------
+    path
+        `.mcap`, or `.mcap.zstd` as rosbag2 compresses files.
+
+    Attributes
+    ----------
+    contents
+        What is in it; reading messages may add to its warnings.
+    indexed
+        Whether that was found by the index of the file.
+
+    Raises
+    ------
+    BagError
+        If it is no MCAP file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.indexed = True
+        self._unpacked: IO[bytes] | None = None
+        if path.suffix == '.zstd':
+            self._unpacked = _unpack(path)
+        with self._data() as data:
+            self.contents = self._read_contents(data)
+        self.contents.segments.sort()
+
+    @property
+    def span_ns(self) -> tuple[int, int] | None:
+        """First and last log time [ns]; None without messages."""
+        segments = self.contents.segments
+        if not segments:
+            return None
+        return segments[0].start_ns, max(segment.end_ns for segment in segments)
+
+    def messages(
+        self, channels: Collection[int], *, start_ns: int = 0, end_ns: int = sys.maxsize
+    ) -> Iterator[list[RawMessage]]:
+        """
+        Yield messages in order of log time, then of place, some at a time.
+
+        Parameters
+        ----------
+        channels
+            Numbers of those to read.
+        start_ns, end_ns
+            First and last log time to read [ns].
+        """
+        wanted = set(channels)
+        segments = [
+            s for s in self.contents.segments if s.end_ns >= start_ns and s.start_ns <= end_ns
+        ]
+        found = 0
+        waiting: list[RawMessage] = []
+        with self._data() as data:
+            for index, segment in enumerate(segments):
+                loaded = self._load(data, segment, wanted)
+                found += len(loaded)
+                waiting += (m for m in loaded if start_ns <= m.log_ns <= end_ns)
+                waiting.sort()
+                ready = len(waiting)
+                if index + 1 < len(segments):  # which may begin before this one ends
+                    ready = bisect_left(waiting, segments[index + 1].start_ns, key=_log_ns)
+                if ready:
+                    yield waiting[:ready]
+                    del waiting[:ready]
+        expected = sum(self.contents.counts[channel] for channel in wanted)
+        if len(segments) == len(self.contents.segments) and found != expected:
+            self._warn(f'{found} messages are there where the index tells of {expected}')
+
+    def _load(self, data: mmap, segment: Segment, wanted: set[int]) -> list[RawMessage]:
+        loaded: list[RawMessage] = []
+        source: bytes | mmap = data
+        start, end = segment.offset, segment.end
+        try:
+            first = next(walk(data, start, end))
+            if first.opcode == Opcode.CHUNK:
+                _, source = unpack_chunk(data, first)
+                start, end = 0, len(source)
+            for place in walk(source, start, end):
+                if place.opcode == Opcode.MESSAGE:
+                    channel, log_ns = message_head(source, place)
+                    if channel in wanted:
+                        payload = message_payload(source, place)
+                        loaded.append(
+                            RawMessage(log_ns, segment.offset, place.offset, channel, payload)
+                        )
+        except DamagedRecord as damage:
+            self._warn(f'{damage}: {len(loaded)} messages before the damage are used')
+        return loaded
+
+    def _read_contents(self, data: mmap) -> Contents:
+        head = data[:16]
+        if not head.startswith(MAGIC):
+            for magic, what in _FOREIGN.items():
+                if head.startswith(magic):
+                    raise BagError(f'{str(self.path)!r} {what}; {CONVERT}')
+            raise BagError(
+                f'{str(self.path)!r} is no MCAP file, it begins with {head[:8]!r}; '
+                'give a .mcap file or a rosbag2 directory'
+            )
+        warnings: list[str] = []
+        try:
+            contents = read_index(data)
+        except DamagedRecord as damage:
+            contents = None
+            warnings = [f'{damage}: read from its beginning, without an index']
+        if contents is None:
+            self.indexed = False
+            contents = scan(data)
+            contents.warnings[:0] = warnings
+        return contents
+
+    def _warn(self, text: str) -> None:
+        if text not in self.contents.warnings:  # a file may be read twice
+            self.contents.warnings.append(text)
+
+    @contextmanager
+    def _data(self) -> Iterator[mmap]:
+        try:
+            with self.path.open('rb') as file:
+                if self.path.stat().st_size == 0:
+                    raise BagError(f'{str(self.path)!r} is empty; nothing was recorded')
+                data = mmap((self._unpacked or file).fileno(), 0, access=ACCESS_READ)
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r} cannot be read: {error.strerror}') from error
+        with data:
+            yield data
+
+
+def _log_ns(message: RawMessage) -> int:
+    return message.log_ns
+
+
+def _unpack(path: Path) -> IO[bytes]:
+    unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
+    try:
+        with path.open('rb') as packed:
+            zstandard.ZstdDecompressor().copy_stream(packed, unpacked)
+    except OSError as error:
+        raise BagError(f'{str(path)!r} cannot be unpacked: {error.strerror}') from error
+    except zstandard.ZstdError as error:
+        raise BagError(f'{str(path)!r} cannot be unpacked: {error}') from error
+    unpacked.flush()
+    if unpacked.tell() == 0:
+        raise BagError(f'{str(path)!r} is empty; nothing was recorded')
+    return unpacked

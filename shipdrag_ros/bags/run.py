@@ -1,0 +1,303 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run: the samples of a recording as one sequence in order of arrival."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import zstandard
+
+from shipdrag_ros.bags.contents import FileChannel
+from shipdrag_ros.bags.locate import BagFiles
+from shipdrag_ros.bags.mcap_file import McapFile
+from shipdrag_ros.bags.records import RawMessage
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import (
+    OUTPUT_TOPICS,
+    EventKind,
+    MalformedMessage,
+    MatchedTopics,
+    OutputMessage,
+    Source,
+    decode,
+    match_inputs,
+    read_event,
+    types,
+)
+from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
+from shipdrag_ros.samples import Block, concatenate
+
+BATCH = 4096
+
+
+@dataclass(frozen=True)
+class ResetMark:
+    """All memory was dropped on request, at arrival time `receive_ns`."""
+
+    receive_ns: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """
+    A topic of a run.
+
+    `input` is the input it carries, None where it carries none; `refused` says
+    that its name is an input's and its type is not accepted.
+    """
+
+    topic: str
+    type: str
+    messages: int
+    input: str | None
+    refused: bool
+
+
+class Run:
+    """
+    One recording, of one or several files.
+
+    Parameters
+    ----------
+    bag
+        The files, in the order of the parts.
+    parts
+        The same, opened.
+    remap
+        Recorded topic -> input.
+
+    Attributes
+    ----------
+    name
+        As the user gave it.
+    parts
+        Its files.
+    attachments
+        Text by name.
+    topics
+        What is in it, by name.
+    node
+        Full name of the node whose outputs it holds, None without any.
+    """
+
+    def __init__(
+        self, bag: BagFiles, parts: Sequence[McapFile], *, remap: Mapping[str, str] | None = None
+    ) -> None:
+        self.name = bag.name
+        self.parts = tuple(parts)
+        self._message_compression = bag.message_compression
+        self._warnings = list(bag.warnings)
+        counts: Counter[tuple[str, str]] = Counter()
+        for part in parts:
+            for number, channel in part.contents.channels.items():
+                counts[_key(channel)] += part.contents.counts[number]
+        try:
+            self._matched = match_inputs(counts, remap=remap)
+        except BagError as error:
+            raise BagError(f'{self.name!r}: {error}') from None
+        self.topics = tuple(_topic_info(key, counts[key], self._matched) for key in sorted(counts))
+        self.node = self._find_node(set(counts))
+        self.attachments = self._join_attachments()
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files of the run."""
+        return tuple(part.path for part in self.parts)
+
+    @property
+    def span_ns(self) -> tuple[int, int] | None:
+        """First and last time of arrival [ns]; None without messages."""
+        spans = [part.span_ns for part in self.parts if part.span_ns is not None]
+        if not spans:
+            return None
+        return min(start for start, _ in spans), max(end for _, end in spans)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is wrong with the files; reading them may find more."""
+        found = list(self._warnings)
+        for part in self.parts:
+            found += (f'{part.path.name}: {warning}' for warning in part.contents.warnings)
+        return tuple(found)
+
+    def inputs(self, *, start_ns: int = 0, end_ns: int = sys.maxsize) -> Inputs:
+        """
+        Return the samples in order of arrival.
+
+        Parameters
+        ----------
+        start_ns, end_ns
+            First and last time of arrival [ns].
+        """
+        return Inputs(self, start_ns, end_ns)
+
+    def outputs(self) -> Iterator[OutputMessage]:
+        """
+        Yield the outputs that the node recorded, in order of arrival.
+
+        Those that cannot be read have stamp 0.
+        """
+        if self.node is None:
+            return
+        wanted = {(topic.under(self.node), topic.type) for topic in OUTPUT_TOPICS}
+        for batch in self.messages(wanted):
+            for (topic, type_name), message in batch:
+                try:
+                    stamp_ns = types.stamp_ns(types.deserialize(type_name, message.payload))
+                except MalformedMessage:
+                    stamp_ns = 0
+                yield OutputMessage(topic, type_name, message.payload, stamp_ns)
+
+    def messages(
+        self, keys: Iterable[tuple[str, str]], *, start_ns: int = 0, end_ns: int = sys.maxsize
+    ) -> Iterator[list[tuple[tuple[str, str], RawMessage]]]:
+        """
+        Yield messages of some (topic, type) in order of arrival, some at a time.
+
+        Parts follow each other; inside a part the log time counts, then the place.
+        """
+        wanted = set(keys)
+        for part in self.parts:
+            channels = {
+                number: _key(channel)
+                for number, channel in part.contents.channels.items()
+                if _key(channel) in wanted
+            }
+            for batch in part.messages(channels, start_ns=start_ns, end_ns=end_ns):
+                yield [
+                    (channels[m.channel], m._replace(payload=self._unpack(m.payload)))
+                    if self._message_compression
+                    else (channels[m.channel], m)
+                    for m in batch
+                ]
+
+    def _unpack(self, payload: bytes) -> bytes:
+        try:
+            return zstandard.decompress(payload)
+        except zstandard.ZstdError:
+            return b''  # counted as malformed by whoever decodes it
+
+    def _find_node(self, keys: set[tuple[str, str]]) -> str | None:
+        nodes = sorted(
+            {
+                topic.removesuffix(f'/{output.name}')
+                for output in (EVENTS, RESISTANCE)
+                for topic, type_name in keys
+                if type_name == output.type and topic.endswith(f'/{output.name}')
+            }
+        )
+        if len(nodes) > 1:
+            self._warnings.append(
+                f'outputs of {len(nodes)} nodes, {", ".join(nodes)}: none of them is compared'
+            )
+        return nodes[0] if len(nodes) == 1 else None
+
+    def _join_attachments(self) -> dict[str, str]:
+        joined: dict[str, str] = {}
+        for part in self.parts:
+            for name, data in part.contents.attachments.items():
+                text = data.decode(errors='replace')
+                if joined.setdefault(name, text) != text:
+                    self._warnings.append(
+                        f'{part.path.name}: its {name} differs from that of the first part, '
+                        'which is used'
+                    )
+        return joined
+
+
+class Inputs:
+    """
+    The samples of a run, in order of arrival; to be read once.
+
+    Attributes
+    ----------
+    messages
+        Messages read so far, by input.
+    unreadable
+        Of these, how many gave no sample, by input and reason.
+    """
+
+    def __init__(self, run: Run, start_ns: int, end_ns: int) -> None:
+        self.messages: Counter[str] = Counter()
+        self.unreadable: dict[str, Counter[str]] = {}
+        self._run = run
+        self._span = (start_ns, end_ns)
+
+    def __iter__(self) -> Iterator[Block | ResetMark]:
+        """Yield blocks of at most `BATCH` samples, and resets at their place."""
+        heard = self._run._matched.heard
+        keys = set(heard)
+        if self._run.node is not None:
+            keys.add((EVENTS.under(self._run.node), EVENTS.type))
+        start_ns, end_ns = self._span
+        waiting: list[tuple[Source, RawMessage]] = []
+        for batch in self._run.messages(keys, start_ns=start_ns, end_ns=end_ns):
+            for key, message in batch:
+                source = heard.get(key)
+                if source is not None:
+                    waiting.append((source, message))
+                    if len(waiting) == BATCH:
+                        yield self._block(waiting)
+                        waiting = []
+                    continue
+                mark = _reset_mark(message.payload)
+                if mark is not None:
+                    if waiting:
+                        yield self._block(waiting)
+                        waiting = []
+                    yield mark
+        if waiting:
+            yield self._block(waiting)
+
+    def _block(self, messages: list[tuple[Source, RawMessage]]) -> Block:
+        places: dict[Source, list[int]] = {}
+        for place, (source, _) in enumerate(messages):
+            places.setdefault(source, []).append(place)
+        blocks: list[Block] = []
+        order: list[np.ndarray[tuple[int], np.dtype[np.intp]]] = []
+        for source, mine in places.items():
+            decoded = decode(
+                source,
+                [messages[place][1].payload for place in mine],
+                [messages[place][1].log_ns for place in mine],
+            )
+            self.messages[source.input] += len(mine)
+            for reason, count in decoded.unreadable.items():
+                self.unreadable.setdefault(source.input, Counter())[reason.value] += count
+            blocks.append(decoded.block)
+            order.append(np.array(mine, np.intp)[decoded.kept])
+        return concatenate(blocks)[np.argsort(np.concatenate(order))]
+
+
+def _key(channel: FileChannel) -> tuple[str, str]:
+    """Return topic and type; a type in another encoding is another type."""
+    topic = channel.topic if channel.topic.startswith('/') else f'/{channel.topic}'
+    if channel.encoding == 'cdr':
+        return topic, channel.type
+    return topic, f'{channel.type} ({channel.encoding})'
+
+
+def _topic_info(key: tuple[str, str], messages: int, matched: MatchedTopics) -> TopicInfo:
+    source = matched.heard.get(key)
+    return TopicInfo(
+        *key,
+        messages=messages,
+        input=None if source is None else source.input,
+        refused=key in matched.unaccepted,
+    )
+
+
+def _reset_mark(payload: bytes) -> ResetMark | None:
+    try:
+        note = read_event(payload)
+    except MalformedMessage:
+        return None
+    if note.kind is not EventKind.RESET_REQUEST:
+        return None
+    return ResetMark(note.stamp_ns, note.text)

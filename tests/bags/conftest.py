@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags to read, made by this package and by others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.messages import encode
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+
+START_NS = 1_700_000_000_000_000_000
+
+
+def record(seed: int = 1, seconds: int = 60) -> Block:
+    """All channels, noisy and at uneven times, in order of arrival."""
+    rng = np.random.default_rng(seed)
+    blocks = []
+    for channel in Channel:
+        if channel is Channel.POSITION_GEODETIC:
+            continue  # one type a topic
+        n = int(rng.integers(seconds, 3 * seconds))
+        stamps = START_NS + np.sort(rng.integers(0, seconds * 10**9, n))
+        two = channel in (Channel.POSITION, Channel.WIND_APPARENT)
+        value = rng.normal(3.0, 0.1, (n, 2)) if two else rng.normal(3.0, 0.1, n)
+        if channel in (Channel.DEPTH, Channel.HEADING):
+            value = np.full(n, 0.25)  # survives float32, and sine and cosine
+        variance = np.full((n, 2), np.nan)
+        if channel <= Channel.SPEED_OVER_GROUND:
+            variance[:, 0] = 0.01
+        if channel is Channel.POSITION:
+            variance[:] = 4.0
+        delays = rng.integers(10**6, 10**8, n)
+        blocks.append(
+            Block.of(channel, stamps, value, receive_ns=stamps + delays, variance=variance)
+        )
+    return in_arrival_order(blocks)
+
+
+def write(path: Path, block: Block, **options: Any) -> Path:
+    with BagWriter(path, **options) as bag:
+        for message in encode(block):
+            bag.write(
+                message.topic,
+                message.type,
+                message.payload,
+                log_ns=message.log_ns,
+                publish_ns=message.publish_ns,
+            )
+    return path
+
+
+@pytest.fixture(scope='session')
+def block() -> Block:
+    return record()
+
+
+@pytest.fixture
+def write_bag(tmp_path: Path) -> Callable[..., Path]:
+    """Write a block to a new file of the test's folder."""
+
+    def new(name: str, block: Block, **options: Any) -> Path:
+        return write(tmp_path / name, block, **options)
+
+    return new
+
+
+@pytest.fixture(scope='session')
+def sample_bag(tmp_path_factory: pytest.TempPathFactory, block: Block) -> bytes:
+    """The bytes of a small bag with attachments, several chunks and an index."""
+    path = tmp_path_factory.mktemp('sample') / 'sample.mcap'
+    with BagWriter(path, chunk_bytes=4096) as bag:
+        bag.attach('ship.yaml', 'name: x\n')
+        for message in encode(block[:200]):
+            bag.write(
+                message.topic,
+                message.type,
+                message.payload,
+                log_ns=message.log_ns,
+                publish_ns=message.publish_ns,
+            )
+    return path.read_bytes()
+
+
+def samples(items: Sequence[Any]) -> Block:
+    """Join the blocks among what a run gives."""
+    from shipdrag_ros.samples import concatenate
+
+    return concatenate([item for item in items if isinstance(item, Block)])
+
+
+@pytest.fixture
+def read_samples() -> Callable[[Any], Block]:
+    return lambda run: samples(list(run.inputs()))
+
+
+@pytest.fixture
+def assert_same() -> Callable[[Block, Block], None]:
+    def check(one: Block, other: Block) -> None:
+        for name in ('channel', 'stamp_ns', 'receive_ns', 'variance'):
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+        # a heading has passed through sine and cosine
+        np.testing.assert_allclose(one.value, other.value, rtol=0, atol=1e-15)
+
+    return check
