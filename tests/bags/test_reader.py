@@ -1,0 +1,402 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever the container, the samples come out in order of arrival."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, IndexType, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+from rosbags.rosbag2 import Writer as Rosbag2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from shipdrag_ros.bags import BagWriter, Compression, ResetMark, Run, open_runs
+from shipdrag_ros.bags import run as run_module
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import encode, reset_request, types
+from shipdrag_ros.samples import Block, Channel, concatenate
+
+WriteBag = Callable[..., Path]
+ReadSamples = Callable[[Run], Block]
+AssertSame = Callable[[Block, Block], None]
+
+
+def foreign(path: Path, block: Block, **options: Any) -> Path:
+    """Write a file with the reference writer, any way it can."""
+    with path.open('wb') as file:
+        writer = Writer(file, **options)
+        writer.start(profile='ros2')
+        channels: dict[str, int] = {}
+        for message in encode(block, namespace='/ship'):
+            if message.topic not in channels:
+                schema = writer.register_schema(
+                    message.type, 'ros2msg', types.definition(message.type).encode()
+                )
+                channels[message.topic] = writer.register_channel(message.topic, 'cdr', schema)
+            writer.add_message(
+                channels[message.topic], message.log_ns, message.payload, message.publish_ns
+            )
+        writer.finish()
+    return path
+
+
+def rosbag2(path: Path, block: Block, mode: CompressionMode = CompressionMode.NONE) -> Path:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    writer = Rosbag2Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connections: dict[str, Any] = {}
+        for message in encode(block):
+            if message.topic not in connections:
+                connections[message.topic] = writer.add_connection(
+                    message.topic, message.type, typestore=store
+                )
+            writer.write(connections[message.topic], message.log_ns, message.payload)
+    return path
+
+
+@pytest.mark.parametrize('compression', Compression)
+def test_what_was_written_is_read(
+    write_bag: WriteBag,
+    block: Block,
+    compression: Compression,
+    read_samples: ReadSamples,
+    assert_same: AssertSame,
+) -> None:
+    path = write_bag('a.mcap', block, compression=compression, chunk_bytes=5000)
+    (run,) = open_runs([path])
+    assert_same(read_samples(run), block)
+    assert run.name == str(path)
+    assert run.paths == (path,)
+    assert run.warnings == ()
+    assert run.span_ns == (block.receive_ns[0], block.receive_ns[-1])
+    counted = {topic.input: topic.messages for topic in run.topics}
+    for channel in np.unique(block.channel):
+        assert counted[Channel(channel).input] == np.count_nonzero(block.channel == channel)
+
+
+@pytest.mark.parametrize(
+    'options',
+    [
+        {'use_chunking': False},
+        {'use_chunking': False, 'use_statistics': False},
+        {'index_types': IndexType.NONE},
+        {'index_types': IndexType.NONE, 'compression': CompressionType.LZ4, 'chunk_size': 3000},
+        {'use_statistics': False, 'chunk_size': 3000},
+        {'repeat_channels': False},
+        {'repeat_schemas': False},
+        {
+            'repeat_channels': False,
+            'repeat_schemas': False,
+            'use_statistics': False,
+            'use_summary_offsets': False,
+            'index_types': IndexType.NONE,
+        },
+        {'enable_crcs': False, 'chunk_size': 3000},
+    ],
+    ids=lambda options: '-'.join(options),
+)
+def test_files_without_an_index_are_read_too(
+    tmp_path: Path,
+    block: Block,
+    options: dict[str, Any],
+    read_samples: ReadSamples,
+    assert_same: AssertSame,
+) -> None:
+    (run,) = open_runs([foreign(tmp_path / 'a.mcap', block, **options)])
+    assert_same(read_samples(run), block)
+    assert run.warnings == ()
+    assert {topic.topic.rpartition('/')[0] for topic in run.topics} == {'/ship'}
+
+
+@pytest.mark.parametrize('mode', CompressionMode)
+def test_bags_of_rosbag2_by_another_tool(
+    tmp_path: Path,
+    block: Block,
+    mode: CompressionMode,
+    read_samples: ReadSamples,
+    assert_same: AssertSame,
+) -> None:
+    path = rosbag2(tmp_path / 'bag', block, mode)
+    (run,) = open_runs([path])
+    assert_same(read_samples(run), block)
+    assert run.warnings == ()
+    (same,) = open_runs([path / 'metadata.yaml'])
+    assert_same(read_samples(same), block)
+    if mode is not CompressionMode.MESSAGE:  # which only metadata.yaml tells of
+        (single,) = open_runs([next(path.glob('*.mcap*'))])
+        assert_same(read_samples(single), block)
+
+
+@pytest.mark.parametrize('chunked', [True, False])
+def test_arrival_decides_the_order_and_then_the_place(
+    tmp_path: Path,
+    chunked: bool,
+    read_samples: ReadSamples,
+    assert_same: AssertSame,
+) -> None:
+    # written out of order, with ties, over many chunks
+    rng = np.random.default_rng(4)
+    n = 3000
+    received = rng.integers(0, 400, n) + np.arange(n) // 10
+    block = Block.of(Channel.SHAFT, np.arange(n), rng.normal(size=n), receive_ns=received)
+    path = foreign(tmp_path / 'a.mcap', block, chunk_size=2000, use_chunking=chunked)
+    (run,) = open_runs([path])
+    assert_same(read_samples(run), block[np.argsort(received, kind='stable')])
+
+
+def test_a_batch_is_bounded_and_its_size_changes_nothing(
+    write_bag: WriteBag,
+    block: Block,
+    monkeypatch: pytest.MonkeyPatch,
+    assert_same: AssertSame,
+) -> None:
+    (run,) = open_runs([write_bag('a.mcap', block, chunk_bytes=3000)])
+    monkeypatch.setattr(run_module, 'BATCH', 7)
+    blocks = [item for item in run.inputs() if isinstance(item, Block)]
+    assert max(map(len, blocks)) == 7
+    assert_same(concatenate(blocks), block)
+
+
+def test_a_range_of_time(write_bag: WriteBag, block: Block, assert_same: AssertSame) -> None:
+    (run,) = open_runs([write_bag('a.mcap', block, chunk_bytes=3000)])
+    start, end = block.receive_ns[[100, 300]].tolist()
+    (part,) = run.inputs(start_ns=start, end_ns=end)
+    assert isinstance(part, Block)
+    assert_same(part, block[100:301])
+    assert run.warnings == ()
+
+
+def test_parts_of_one_recording_are_joined_in_their_order(
+    write_bag: WriteBag, block: Block, read_samples: ReadSamples, assert_same: AssertSame
+) -> None:
+    paths = [
+        write_bag(f'{name}.mcap', block[start : start + 100], recording_id='r', part=part)
+        for name, part, start in (('c', 0, 0), ('a', 2, 200), ('b', 1, 100))
+    ]
+    other = write_bag('other.mcap', block[:50])
+    run, alone = open_runs([paths[1], other, paths[0], paths[2]])
+    assert_same(read_samples(run), block[:300])
+    assert [path.name for path in run.paths] == ['c.mcap', 'b.mcap', 'a.mcap']
+    assert_same(read_samples(alone), block[:50])
+    (short,) = open_runs([paths[1], paths[0]])
+    assert short.warnings == ('part 1 of the recording is missing',)
+    with pytest.raises(BagError, match='are the same part 0'):
+        open_runs([paths[0], paths[0]])
+
+
+def test_parts_follow_each_other_even_if_the_clock_went_back(
+    write_bag: WriteBag, block: Block, read_samples: ReadSamples, assert_same: AssertSame
+) -> None:
+    paths = [
+        write_bag('0.mcap', block[100:200], recording_id='r', part=0),
+        write_bag('1.mcap', block[:100], recording_id='r', part=1),
+    ]
+    (run,) = open_runs(paths)
+    assert_same(read_samples(run), concatenate([block[100:200], block[:100]]))
+    assert run.span_ns == (block.receive_ns[0], block.receive_ns[199])
+
+
+def test_bags_given_together_are_runs_of_their_own(write_bag: WriteBag, block: Block) -> None:
+    paths = [write_bag(f'{i}.mcap', block[: i + 1]) for i in range(3)]
+    runs = open_runs(paths)
+    assert [run.name for run in runs] == [str(path) for path in paths]
+    # and so are those of a folder
+    assert [run.paths for run in open_runs([paths[0].parent])] == [run.paths for run in runs]
+
+
+def test_a_split_bag_of_rosbag2_with_and_without_its_metadata(
+    tmp_path: Path, block: Block, read_samples: ReadSamples, assert_same: AssertSame
+) -> None:
+    folder = tmp_path / 'split'
+    folder.mkdir()
+    for i in range(11):
+        foreign(folder / f'split_{i}.mcap', block[i * 20 : i * 20 + 20])
+    (run,) = open_runs([folder])
+    assert_same(read_samples(run), block[:220])
+    assert 'metadata.yaml is missing' in run.warnings[0]
+    files = [f'split_{i}.mcap' for i in range(12)]
+    (folder / 'metadata.yaml').write_text(
+        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
+        f'  relative_file_paths: {files}\n  compression_mode: ""\n'
+    )
+    (run,) = open_runs([folder])
+    assert_same(read_samples(run), block[:220])
+    assert run.warnings == ('split_11.mcap is listed in metadata.yaml and is not there',)
+
+
+def test_attachments_are_read_and_a_difference_between_parts_is_told(tmp_path: Path) -> None:
+    for part, text in enumerate(['a: 1\n', 'a: 1\n', 'a: 2\n']):
+        with BagWriter(tmp_path / f'{part}.mcap', recording_id='r', part=part) as bag:
+            bag.attach('ship.yaml', text)
+    (run,) = open_runs([tmp_path])
+    assert run.attachments == {'ship.yaml': 'a: 1\n'}
+    (warning,) = run.warnings
+    assert warning.startswith('2.mcap: its ship.yaml differs')
+
+
+def test_resets_are_read_at_their_place(
+    tmp_path: Path, block: Block, assert_same: AssertSame
+) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for i, message in enumerate(encode(block[:20])):
+            if i in (5, 12):
+                mark = reset_request(message.log_ns, f'reason {i}')
+                bag.write(mark.topic, mark.type, mark.payload, log_ns=message.log_ns, publish_ns=0)
+            bag.write(
+                message.topic,
+                message.type,
+                message.payload,
+                log_ns=message.log_ns,
+                publish_ns=message.publish_ns,
+            )
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    first, reset, second, again, third = run.inputs()
+    assert isinstance(first, Block)
+    assert isinstance(second, Block)
+    assert isinstance(third, Block)
+    assert_same(first, block[:5])
+    assert_same(second, block[5:12])
+    assert_same(third, block[12:20])
+    assert reset == ResetMark(int(block.receive_ns[5]), 'reason 5')
+    assert again == ResetMark(int(block.receive_ns[12]), 'reason 12')
+    assert run.node == '/coastdown_node'
+    assert [message.topic for message in run.outputs()] == ['/coastdown_node/events'] * 2
+
+
+def test_outputs_of_two_nodes_are_told_and_not_mixed(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for node in ('/a', '/b'):
+            mark = reset_request(5, 'x', node=node)
+            bag.write(mark.topic, mark.type, mark.payload, log_ns=5, publish_ns=5)
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    assert run.node is None
+    assert list(run.outputs()) == []
+    assert 'outputs of 2 nodes, /a, /b' in run.warnings[0]
+
+
+def test_what_cannot_be_decoded_is_counted(tmp_path: Path) -> None:
+    message, *_ = encode(Block.of(Channel.SHAFT, [1], [2.0]))
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for log_ns, payload in enumerate([message.payload, message.payload[:30], b'']):
+            bag.write('/shaft', message.type, payload, log_ns=log_ns, publish_ns=0)
+        bag.write('/rudder', message.type, message.payload, log_ns=9, publish_ns=0)
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    inputs = run.inputs()
+    (block,) = inputs
+    assert isinstance(block, Block)
+    assert len(block) == 1
+    assert inputs.messages == {'shaft': 3, 'rudder': 1}
+    assert inputs.unreadable == {'shaft': {'malformed': 2}, 'rudder': {'no_joint': 1}}
+
+
+def test_types_and_encodings_that_are_not_accepted_are_refused(tmp_path: Path) -> None:
+    with (tmp_path / 'a.mcap').open('wb') as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema('std_msgs/msg/Float32', 'ros2msg', b'float32 data')
+        writer.add_message(writer.register_channel('/shaft', 'cdr', schema), 1, b'', 1)
+        schema = writer.register_schema('sensor_msgs/Range', 'jsonschema', b'{}')
+        writer.add_message(writer.register_channel('/depth', 'json', schema), 1, b'{}', 1)
+        writer.add_message(writer.register_channel('/chatter', 'cdr', 0), 1, b'', 1)
+        writer.finish()
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    assert [(t.topic, t.type, t.refused, t.input) for t in run.topics] == [
+        ('/chatter', '', False, None),
+        ('/depth', 'sensor_msgs/msg/Range (json)', True, None),
+        ('/shaft', 'std_msgs/msg/Float32', True, None),
+    ]
+    assert list(run.inputs()) == []
+
+
+def test_a_remap_chooses_a_topic(tmp_path: Path, read_samples: ReadSamples) -> None:
+    block = Block.of(Channel.SPEED_THROUGH_WATER, [1, 2], [3.0, 4.0])
+    path = foreign(tmp_path / 'a.mcap', block)
+    (run,) = open_runs([path], remap={'/ship/speed_through_water': 'speed_over_ground'})
+    assert read_samples(run).channel.tolist() == [Channel.SPEED_OVER_GROUND] * 2
+    with pytest.raises(BagError, match=r"a\.mcap.*no topic '/nothing'"):
+        open_runs([path], remap={'/nothing': 'depth'})
+
+
+@pytest.mark.parametrize('name', ['a.mcap', 'bag'])
+def test_a_path_that_is_not_there(tmp_path: Path, name: str) -> None:
+    with pytest.raises(BagError, match='does not exist'):
+        open_runs([tmp_path / name])
+
+
+@pytest.mark.parametrize(
+    ('content', 'expected'),
+    [
+        (b'', 'is empty'),
+        (b'SQLite format 3\0 and more', 'sqlite3 storage; convert it with `rosbags-convert'),
+        (b'#ROSBAG V2.0\n', 'ROS 1; convert it with `rosbags-convert'),
+        (b'time,speed\n1,2\n', "no MCAP file, it begins with b'time,spe'"),
+        (b'\x89PNG\r\n\x1a\n' + bytes(100), 'no MCAP file'),
+    ],
+)
+def test_files_that_are_no_bags(tmp_path: Path, content: bytes, expected: str) -> None:
+    (tmp_path / 'a.mcap').write_bytes(content)
+    with pytest.raises(BagError, match=expected):
+        open_runs([tmp_path / 'a.mcap'])
+
+
+@pytest.mark.parametrize(
+    ('files', 'expected'),
+    [
+        ({}, r'holds no \.mcap file'),
+        ({'bag_0.db3': 'x'}, 'sqlite3 storage; convert'),
+        ({'metadata.yaml': '{'}, 'is no metadata of rosbag2'),
+        ({'metadata.yaml': 'a: 1'}, 'is no metadata of rosbag2'),
+        ({'metadata.yaml': 'rosbag2_bagfile_information: 3'}, 'holds 3, expected'),
+        (
+            {'metadata.yaml': 'rosbag2_bagfile_information: {storage_identifier: sqlite3}'},
+            "'sqlite3' storage; convert",
+        ),
+        (
+            {
+                'metadata.yaml': 'rosbag2_bagfile_information: '
+                '{storage_identifier: mcap, relative_file_paths: [a.mcap]}'
+            },
+            'lists no file that is there',
+        ),
+        (
+            {
+                'metadata.yaml': 'rosbag2_bagfile_information: '
+                '{storage_identifier: mcap, compression_format: xz}'
+            },
+            "compressed with 'xz'",
+        ),
+        ({'a.mcap.zstd': 'x'}, 'cannot be unpacked'),
+    ],
+)
+def test_folders_that_are_no_bags(tmp_path: Path, files: dict[str, str], expected: str) -> None:
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+    with pytest.raises(BagError, match=expected):
+        open_runs([tmp_path])
+
+
+def test_a_bag_that_may_not_be_read(tmp_path: Path, sample_bag: bytes) -> None:
+    path = tmp_path / 'a.mcap'
+    path.write_bytes(sample_bag)
+    path.chmod(0)
+    try:
+        path.read_bytes()
+    except PermissionError:
+        with pytest.raises(BagError, match='cannot be read: Permission denied'):
+            open_runs([path])
+    else:
+        pytest.skip('this user may read everything')
+
+
+def test_a_bag_without_messages_is_a_run_without_samples(tmp_path: Path) -> None:
+    BagWriter(tmp_path / 'a.mcap').close()
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    assert list(run.inputs()) == []
+    assert run.span_ns is None
+    shutil.rmtree(tmp_path)
