@@ -16,7 +16,7 @@ from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-SIGNIFICANT_FALL = 2.0  # in standard deviations of dr/dFr
+SIGNIFICANT = 2.0  # fall or rise of dr/dFr, in its standard deviations
 _MIN_POINTS = 3  # fewer are no curve
 
 
@@ -118,20 +118,22 @@ def froude_max(curve: ResistanceCurve) -> tuple[float, FroudeMax]:
     Notes
     -----
     S1 takes argmax dr/dFr: above that inflection the curve still carries the
-    transient of the start. Over everything that is the transient itself, and
-    the first maximum is a wiggle. So: the first maximum from which dr/dFr falls,
-    before it rises above it again, by more than `SIGNIFICANT_FALL` of its
-    standard deviations (of the larger one of top and bottom). Many hulls have
-    none: then the top of the branch.
+    transient of the start. Over everything that is the transient itself, so:
+    the first maximum from which dr/dFr falls, before it rises above it again,
+    by more than `SIGNIFICANT` of its standard deviations (of the larger one of
+    the two places). Polynomials also wiggle at low speed by more than their
+    standard deviation says; a maximum that is exceeded by as much further up
+    is such a wiggle. Many hulls have none: then the top of the branch.
     """
     slope, slope_sigma = curve.slope, curve.slope_sigma
     rises = slope[1:-1] > slope[:-2]
     falls = slope[1:-1] >= slope[2:]
     for top in np.flatnonzero(rises & falls) + 1:
-        after = slope[top + 1 :]
-        higher = np.flatnonzero(after > slope[top])
-        stop = higher[0] if len(higher) else len(after)
-        doubt = np.maximum(slope_sigma[top], slope_sigma[top + 1 :][:stop])
-        if np.any(slope[top] - after[:stop] > SIGNIFICANT_FALL * doubt):
+        doubt = np.maximum(slope_sigma[top], slope_sigma[top + 1 :])
+        fall = (slope[top] - slope[top + 1 :]) / doubt
+        if np.any(fall < -SIGNIFICANT):
+            continue
+        higher = np.flatnonzero(fall < 0.0)
+        if np.any(fall[: higher[0] if len(higher) else None] > SIGNIFICANT):
             return float(curve.froude[top]), FroudeMax.INFLECTION
     return float(curve.froude[-1]), FroudeMax.BRANCH_TOP

@@ -206,29 +206,18 @@ def _choose(table: OrderTable, known: float) -> tuple[int, bool, tuple[str, ...]
     """
     Choose the order; say whether a known variance (0: unknown) was trusted.
     """
-    plateau = table.plateau()
     if known == 0.0:
-        return plateau, False, ()
-    row = table.consistent(known)
+        return table.plateau(), False, ()
+    row = table.plateau_at(known)
     if row is None:
-        return (
-            plateau,
-            False,
-            (
-                'the residuals of every order are too large for the stated standard deviation: '
-                'the order is that of the plateau, the variance that of the residuals',
-            ),
+        note = (
+            'the residuals of every order are too large for the stated standard deviation: '
+            'it was not used for the order and the band'
         )
-    if row < plateau:
-        return (
-            row,
-            True,
-            (
-                f'the stated standard deviation allows {table.coefficients[row]} coefficients, '
-                f'but s^2 falls significantly up to {table.coefficients[plateau]}: '
-                'it is stated too large',
-            ),
-        )
+        return table.plateau(), False, (note,)
+    if table.is_below(row, known):
+        note = 'the residuals are too small for the stated standard deviation: the band is wide'
+        return row, True, (note,)
     return row, True, ()
 
 

@@ -15,12 +15,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, fdtrc
+from scipy.special import chdtr, chdtrc, fdtrc
 
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64
 
-SIGNIFICANCE = 0.01  # probability at which a step by chance counts as a fall of s^2
+SIGNIFICANCE = 0.05  # a step less probable than this by chance counts as a fall of s^2
+IMPLAUSIBLE = 1e-3  # an s^2 less probable than this contradicts a known variance
 NEIGHBOURS = 2  # even and odd terms alternate: one idle step is not yet a plateau
 
 
@@ -112,20 +113,16 @@ class OrderTable:
         `NEIGHBOURS` steps has p < `SIGNIFICANCE`. s^2 falls where F > 1; the
         test asks for more than chance gives.
         """
-        step = self.p[1:] < SIGNIFICANCE
-        for row in range(len(self.sse)):
-            if not step[row : row + NEIGHBOURS].any():
-                return row
-        raise AssertionError('the last row has no step after it')
+        return int(np.argmax(self._settled))
 
     @property
     def plateau_order(self) -> int:
         """How many coefficients the smallest fit in the plateau has."""
         return int(self.coefficients[self.plateau()])
 
-    def consistent(self, variance: float) -> int | None:
+    def plateau_at(self, variance: float) -> int | None:
         """
-        Return the row of the smallest fit that a known variance allows.
+        Return the row of the smallest fit in a plateau at a known variance.
 
         Parameters
         ----------
@@ -135,15 +132,31 @@ class OrderTable:
         Returns
         -------
         int or None
-            None where the residuals of every fit are too large for it.
+            None where s^2 of every such fit is too large for it.
 
         Notes
         -----
-        S1's other comparison: the smallest fit whose sum of squares over
-        `variance` does not exceed chi^2 with probability < `SIGNIFICANCE`.
+        S1's other comparison. A plateau above the known variance, by chi^2 at
+        `IMPLAUSIBLE`, is not the last one.
         """
-        allowed = chdtrc(self.freedom, self.sse / variance) >= SIGNIFICANCE
-        return int(np.argmax(allowed)) if allowed.any() else None
+        plausible = chdtrc(self.freedom, self.sse / variance) >= IMPLAUSIBLE
+        rows = np.flatnonzero(self._settled & plausible)
+        return int(rows[0]) if len(rows) else None
+
+    def is_below(self, row: int, variance: float) -> bool:
+        """
+        Say whether s^2 of a fit is too small for a known variance.
+        """
+        return bool(chdtr(self.freedom[row], self.sse[row] / variance) < IMPLAUSIBLE)
+
+    @cached_property
+    def _settled(self) -> NDArray[np.bool_]:
+        """(m,) No significant step follows soon; always so of the last fit."""
+        falls = np.concatenate([self.p[1:] < SIGNIFICANCE, np.zeros(NEIGHBOURS, np.bool_)])
+        soon: NDArray[np.bool_] = np.any(
+            [falls[i : i + len(self.sse)] for i in range(NEIGHBOURS)], axis=0
+        )
+        return ~soon
 
 
 def fit_orders(basis: OrthogonalBasis, values: Float64) -> tuple[Float64, OrderTable]:

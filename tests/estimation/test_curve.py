@@ -128,9 +128,16 @@ HUMP = np.exp(-(((FROUDE - 0.16) / 0.02) ** 2))
         (0.5 * HUMP - 4.0 * np.minimum(FROUDE, 0.1), 0.05, 0.16, FroudeMax.INFLECTION),
         # a dip that is overcome before it is significant, then the transient
         (10.0 * FROUDE + 0.05 * HUMP, 0.1, 0.25, FroudeMax.BRANCH_TOP),
+        # a significant wiggle at low speed, far exceeded further up
+        (
+            FROUDE + 0.5 * np.exp(-(((FROUDE - 0.06) / 0.005) ** 2)) + 5.0 * FROUDE,
+            0.1,
+            0.25,
+            FroudeMax.BRANCH_TOP,
+        ),
         (np.zeros(201), 0.1, 0.25, FroudeMax.BRANCH_TOP),
     ],
-    ids=['hump', 'in the band', 'wiggle', 'falling', 'fall first', 'overcome', 'flat'],
+    ids=['hump', 'in the band', 'wiggle', 'falling', 'fall first', 'overcome', 'exceeded', 'flat'],
 )
 def test_upper_end(slope: np.ndarray, slope_sigma: float, expected: float, by: FroudeMax) -> None:
     top, rule = froude_max(curve(FROUDE, slope, slope_sigma))

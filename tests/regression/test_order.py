@@ -60,10 +60,20 @@ def test_known_variance() -> None:
     time = np.linspace(-1.0, 1.0, 200)
     values = 1.0 + time + 0.2 * time**3 + 0.05 * rng.normal(size=200)
     _, table = fit_orders(OrthogonalBasis.on(time, 12), values)
-    assert table.consistent(0.05**2) == 3
-    # larger noise claimed: fewer coefficients allowed; smaller: none is enough
-    assert table.consistent(0.3**2) == 1
-    assert table.consistent(0.02**2) is None
+    row = table.plateau_at(0.05**2)
+    assert row == table.plateau() == 3
+    assert not table.is_below(3, 0.05**2)
+    # more noise claimed is noticed; with less no fit is good enough
+    assert table.plateau_at(0.1**2) == 3
+    assert table.is_below(3, 0.1**2)
+    assert table.plateau_at(0.02**2) is None
+
+
+def test_a_plateau_above_the_known_variance_is_not_the_last() -> None:
+    # a term of high order behind idle ones
+    table = OrderTable.of(range(1, 8), [1e4, 110.0, 109.0, 108.0, 107.0, 52.0, 51.5], rows=60)
+    assert table.plateau_order == 2
+    assert table.coefficients[table.plateau_at(1.0)] == 6
 
 
 def test_refuses_what_is_no_table() -> None:
@@ -75,8 +85,8 @@ def test_refuses_what_is_no_table() -> None:
 
 def test_false_choice_rate() -> None:
     """
-    Too high an order in 2..4 % of records, as two tests of 1 % let expect; with
-    terms at 8 sigma none is missed. N = 2000, seed 1, 99.9 % binomial bounds.
+    Too high an order in 7..11 % of records, as two tests of 5 % let expect; with terms
+    at 8 sigma none is missed. N = 2000, seed 1, 99.9 % binomial bounds.
     """
     rng = np.random.default_rng(1)
     time = np.linspace(-1.0, 1.0, 100)
@@ -91,5 +101,5 @@ def test_false_choice_rate() -> None:
         ]
     )
     assert stats.binom.cdf((orders < 5).sum(), runs, 1e-4) < 0.999
-    low, high = stats.binom.ppf([0.0005, 0.9995], runs, [0.015, 0.030])
+    low, high = stats.binom.ppf([0.0005, 0.9995], runs, [0.07, 0.11])
     assert low <= (orders > 5).sum() <= high
