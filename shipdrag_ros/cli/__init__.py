@@ -33,7 +33,7 @@ VERBS = (
     Verb('simulate', 'simulate', 'simulated coastdown with sensors, as a bag'),
 )
 
-DONE, USER_ERROR, USAGE = 0, 1, 2
+USER_ERROR = 1
 INTERRUPTED, BROKEN_PIPE = 130, 141  # what a shell reports of a program killed by SIGINT, SIGPIPE
 
 
@@ -50,17 +50,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0 done, 1 user error, 2 usage, 130 interrupted.
+        Exit status: 0 done, 1 user error, 130 interrupted.
+
+    Raises
+    ------
+    SystemExit
+        As argparse does, with 0 after help and 2 after wrong usage.
     """
     line = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        status = _run(line)
-        sys.stdout.flush()  # here, where a broken pipe is still caught
+        try:
+            return _run(line)
+        finally:
+            sys.stdout.flush()  # here, where a broken pipe is still caught
     except BrokenPipeError:
         # the reader went away, `| head` for instance; let the last flush go nowhere
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
-    return status
 
 
 def _run(line: list[str]) -> int:
@@ -69,8 +75,6 @@ def _run(line: list[str]) -> int:
         options = parser(verb).parse_args(line)
         status: int = options.run(options)
         return status
-    except SystemExit as end:  # argparse has said what is wrong
-        return end.code if isinstance(end.code, int) else USAGE
     except KeyboardInterrupt:
         return INTERRUPTED
     except ShipdragError as error:

@@ -184,4 +184,6 @@ def test_an_impossible_value_is_wrong_usage(
     ship_file: Path, tmp_path: Path, arguments: tuple[str, ...]
 ) -> None:
     line = ['simulate', '--ship', str(ship_file), '-o', str(tmp_path / 'a.mcap'), *arguments]
-    assert main(line) == 2
+    with pytest.raises(SystemExit) as end:
+        main(line)
+    assert end.value.code == 2
