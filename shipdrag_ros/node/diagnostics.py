@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from shipdrag_ros.coastdown import InputHealth
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
@@ -63,9 +64,9 @@ def state_status(
     return _status('state', OK, monitor, values)
 
 
-def input_status(topic: InputTopic, rejected: Mapping[str, int]) -> DiagnosticStatus:
+def input_status(topic: InputTopic, health: InputHealth | None) -> DiagnosticStatus:
     """
-    Say how one input is doing; `rejected` counts samples by reason.
+    Say how one input is doing; there is no health while the node is not active.
     """
     level, message = _input_health(topic)
     values: dict[str, object] = {
@@ -75,13 +76,13 @@ def input_status(topic: InputTopic, rejected: Mapping[str, int]) -> DiagnosticSt
         'messages': topic.received,
         'rate [Hz]': topic.rate_hz,
         'age [s]': topic.age_s,
-        'clock offset [s]': (
-            None if topic.clock_offset_ns is None else topic.clock_offset_ns * 1e-9
-        ),
+        'clock offset [s]': None if health is None else health.clock_offset_s,
         'not used, node inactive or without clock': topic.unused,
         **{f'unreadable {reason}': times for reason, times in topic.unreadable.items()},
-        **{f'rejected {reason}': times for reason, times in rejected.items()},
     }
+    if health is not None:
+        values['used'] = health.used
+        values |= {f'rejected {reason}': times for reason, times in health.rejected.items()}
     return _status(f'input {topic.name}', level, message, values)
 
 

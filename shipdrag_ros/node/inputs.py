@@ -69,8 +69,8 @@ class InputTopic:
         Messages heard; heard while not active or without a clock.
     unreadable
         Messages that gave no sample, by reason.
-    clock_offset_ns
-        Smallest arrival minus stamp since `tick`, None where nothing came.
+    rate_hz
+        Messages a second of steady time, before the last `tick`.
     """
 
     def __init__(
@@ -82,7 +82,6 @@ class InputTopic:
         self._last_s: float | None = None
         self._tick_s = time.monotonic()
         self._tick_received = 0
-        self._next_offset_ns: int | None = None
         self.name = name
         self.topic = node.resolve_topic_name(name)
         self.accepted = accepted
@@ -93,7 +92,6 @@ class InputTopic:
         self.unused = 0
         self.unreadable: Counter[str] = Counter()
         self.rate_hz = 0.0
-        self.clock_offset_ns: int | None = None
         if fixed:
             self._subscribe(fixed)
 
@@ -124,19 +122,15 @@ class InputTopic:
         """
         for reason, times in decoded.unreadable.items():
             self.unreadable[reason.value] += times
-        for offset_ns in (decoded.block.receive_ns - decoded.block.stamp_ns).tolist():
-            if self._next_offset_ns is None or offset_ns < self._next_offset_ns:
-                self._next_offset_ns = offset_ns
 
     def tick(self) -> None:
         """
-        Refresh the rate and the clock offset, since the last tick.
+        Refresh the rate, from the messages since the last tick.
         """
         now = time.monotonic()
         if now > self._tick_s:
             self.rate_hz = (self.received - self._tick_received) / (now - self._tick_s)
         self._tick_s, self._tick_received = now, self.received
-        self.clock_offset_ns, self._next_offset_ns = self._next_offset_ns, None
 
     def close(self) -> None:
         """

@@ -161,12 +161,6 @@ class CoastdownNode(LifecycleNode):
             raise ShipFileError('ship_file', ["is '', expected the path of a ship file"])
         self._ship = Ship.load(settings.ship_file)
         self._settings = settings
-        self._recorder = Recorder(
-            Path(settings.output_directory),
-            namespace=self.get_namespace().rstrip('/'),
-            ship=self._ship,
-            parameters=settings.parameters,
-        )
         self._outputs = {
             topic.under(self.get_fully_qualified_name()): self._publisher(topic)
             for topic in OUTPUT_TOPICS
@@ -188,9 +182,16 @@ class CoastdownNode(LifecycleNode):
     def _activate(self) -> None:
         assert self._ship is not None
         assert self._settings is not None
-        assert self._recorder is not None
+        monitor = Monitor(self._ship, self._settings.parameters)
+        self._recorder = Recorder(
+            Path(self._settings.output_directory),
+            namespace=self.get_namespace().rstrip('/'),
+            ship=self._ship,
+            parameters=self._settings.parameters,
+            history_ns=monitor.history_ns,
+        )
         self._session = Session(
-            Monitor(self._ship, self._settings.parameters),
+            monitor,
             self._recorder,
             publish=self._send,
             node=self.get_fully_qualified_name(),
@@ -252,6 +253,7 @@ class CoastdownNode(LifecycleNode):
         for topic in self._input_topics:
             topic.tick()
         monitor = None if self._session is None else self._session.monitor
+        health = {} if monitor is None else monitor.health()
         now_ns = self._now_ns()
         if self._session is not None and now_ns:
             self._session.watch_clock(now_ns)  # also while nothing arrives
@@ -265,7 +267,10 @@ class CoastdownNode(LifecycleNode):
                 clock_ns=now_ns,
                 sim_time=self.get_parameter('use_sim_time').value,
             ),
-            *(diagnostics.input_status(topic, {}) for topic in self._input_topics),
+            *(
+                diagnostics.input_status(topic, health.get(topic.name))
+                for topic in self._input_topics
+            ),
         ]
         if self._recorder is not None:
             message.status.append(diagnostics.recording_status(self._recorder.status()))

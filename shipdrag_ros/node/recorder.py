@@ -22,8 +22,8 @@ from shipdrag_ros.node.ring import RawMessage, RawRing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
-# beyond the longest window and the record that noise is learnt from: what an onset needs
-MARGIN_S = 600.0
+# the ring is cut by arrival, the monitor's memory by stamps
+MARGIN_NS = 600_000_000_000
 
 
 class RecordingState(Enum):
@@ -85,17 +85,25 @@ class Recorder:
     namespace
         Of the node, '' or `/ship`; inputs are recorded below it by their own name,
         whatever topic they were remapped to, so that a replay finds them.
+    history_ns
+        Length of record that the monitor's words depend on [ns]; a bag begun later
+        begins with it.
     """
 
     def __init__(
-        self, directory: Path, *, namespace: str, ship: Ship, parameters: Parameters
+        self,
+        directory: Path,
+        *,
+        namespace: str,
+        ship: Ship,
+        parameters: Parameters,
+        history_ns: int,
     ) -> None:
         self._directory = directory
         self._namespace = namespace
         self._ship = ship
         self._parameters = parameters
-        keep_s = parameters.window_s + parameters.steady_s + MARGIN_S
-        self._ring = RawRing(round(keep_s * 1e9))
+        self._ring = RawRing(history_ns + MARGIN_NS)
         self._writer: BagWriter | None = None
         self._path: Path | None = None
         self._messages = 0

@@ -364,6 +364,7 @@ class TestClock:
             peer.player.publish(moved)
             peer.spin_for(0.3)
         peer.spin_until(lambda: EventKind.CLOCK_JUMP in kinds(events))
+        diagnostics.wait_for('input speed_through_water', '6', value='messages')
         assert node.stop() == 0
         bags = sorted((tmp_path / 'bags').glob('*.mcap'))
         assert [topics_in(bag)['/speed_through_water'] for bag in bags] == [3, 3]

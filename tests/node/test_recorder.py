@@ -22,7 +22,9 @@ PARAMETERS = Parameters(window_s=60.0, steady_s=60.0)
 
 
 def recorder(directory: Path) -> Recorder:
-    return Recorder(directory, namespace='/ship', ship=SHIP, parameters=PARAMETERS)
+    return Recorder(
+        directory, namespace='/ship', ship=SHIP, parameters=PARAMETERS, history_ns=10**9
+    )
 
 
 def received(arrival_ns: int) -> RawMessage:

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rest of the ship, for a demonstration: sends samples, hears the estimates."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from shipdrag_ros.messages import DEFAULT_NODE
+from shipdrag_ros.messages.topics import RESISTANCE, SPEED
+from shipdrag_ros.node.inputs import message_class
+from shipdrag_ros.node.player import Player
+from shipdrag_ros.samples import Block
+
+
+@dataclass(frozen=True)
+class LiveEstimate:
+    """What the node said of one moment, as a subscriber hears it."""
+
+    stamp_ns: int
+    speed_m_s: float
+    resistance_m_s2: float
+    sigma_m_s2: float
+
+
+class Rehearsal:
+    """
+    A peer of the node on the ROS graph; a context manager.
+
+    Parameters
+    ----------
+    heard
+        Called with every estimate.
+
+    Attributes
+    ----------
+    estimates
+        How many were heard.
+    """
+
+    def __init__(self, heard: Callable[[LiveEstimate], None]) -> None:
+        self.estimates = 0
+        self._heard = heard
+        self._speeds: dict[int, float] = {}
+        self._resistances: dict[int, tuple[float, float]] = {}
+        self._context = rclpy.Context()
+        # Ctrl-C stays what it is in Python; the caller has a process to end
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = rclpy.create_node('rehearsal', context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._player = Player(self._node, self._executor)
+        for topic, callback in ((SPEED, self._hear_speed), (RESISTANCE, self._hear_resistance)):
+            self._node.create_subscription(
+                message_class(topic.type), topic.under(DEFAULT_NODE), callback, 1000
+            )
+
+    def play(
+        self,
+        block: Block,
+        *,
+        speed: float,
+        connect_s: float,
+        progress: Callable[[float], None],
+    ) -> None:
+        """
+        Send samples under simulated time once the node hears all of them.
+
+        Parameters
+        ----------
+        speed
+            Seconds of data in a second of life.
+        connect_s
+            How long to wait for the node.
+        progress
+            Called with the fraction done.
+
+        Raises
+        ------
+        ShipdragError
+            If an input is not heard in time.
+        """
+        self._player.connect(block, timeout_s=connect_s)
+        self._player.play(block, speed=speed, progress=progress)
+
+    def listen(self, until: Callable[[], bool], *, timeout_s: float) -> bool:
+        """
+        Hear on until a condition holds; say whether it did in time.
+        """
+        end_s = time.monotonic() + timeout_s
+        while not until():
+            if time.monotonic() > end_s:
+                return False
+            self._executor.spin_once(timeout_sec=0.05)
+        return True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._executor.shutdown()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+    def _hear_speed(self, message: Any) -> None:
+        self._speeds[_stamp_ns(message)] = message.twist.twist.linear.x
+        self._join(_stamp_ns(message))
+
+    def _hear_resistance(self, message: Any) -> None:
+        variance = message.accel.covariance[0]
+        self._resistances[_stamp_ns(message)] = message.accel.accel.linear.x, variance**0.5
+        self._join(_stamp_ns(message))
+
+    def _join(self, stamp_ns: int) -> None:
+        """Tell of a moment once both of its figures are there, whichever came first."""
+        if stamp_ns not in self._speeds or stamp_ns not in self._resistances:
+            return
+        resistance, sigma = self._resistances.pop(stamp_ns)
+        self.estimates += 1
+        self._heard(LiveEstimate(stamp_ns, self._speeds.pop(stamp_ns), resistance, sigma))
+
+
+def _stamp_ns(message: Any) -> int:
+    stamp = message.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From bytes received to bytes published and recorded, without ROS."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.messages import EventKind, OutputMessage, Source, encode, read_event
+from shipdrag_ros.node.recorder import Recorder
+from shipdrag_ros.node.session import Session
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.ship import Ship
+
+SECOND_NS = 10**9
+START_NS = 1_700_000_000 * SECOND_NS
+SHIP = Ship.from_yaml('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n', subject='test')
+PARAMETERS = Parameters()
+NODE = '/coastdown_node'
+
+
+class Row(NamedTuple):
+    topic: str
+    log_ns: int
+    payload: bytes
+
+
+def rows(path: Path) -> list[Row]:
+    with path.open('rb') as stream:
+        messages = make_reader(stream).iter_messages(log_time_order=False)
+        return [Row(c.topic, m.log_time, m.data) for _, c, m in messages]
+
+
+class Desk:
+    """A session with what it published."""
+
+    def __init__(self, directory: Path) -> None:
+        monitor = Monitor(SHIP, PARAMETERS)
+        self.published: list[OutputMessage] = []
+        self.directory = directory
+        self.recorder = Recorder(
+            directory,
+            namespace='',
+            ship=SHIP,
+            parameters=PARAMETERS,
+            history_ns=monitor.history_ns,
+        )
+        self.session = Session(monitor, self.recorder, publish=self.published.append, node=NODE)
+
+    def feed(self, block: Block) -> None:
+        for message in encode(block):
+            source = Source(message.topic.strip('/'), message.type)
+            self.session.receive(source, message.payload, message.log_ns)
+
+    def kinds(self) -> list[EventKind]:
+        events = [it for it in self.published if it.topic == f'{NODE}/events']
+        return [read_event(it.payload).kind for it in events]
+
+    def bags(self) -> list[list[Row]]:
+        self.session.finish()
+        return [rows(path) for path in sorted(self.directory.glob('*.mcap'))]
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    desk = Desk(tmp_path)
+    desk.recorder.start()
+    return desk
+
+
+def speeds(arrival_s: list[float]) -> Block:
+    """One reading at each arrival, stamped 10 ms before it."""
+    arrival_ns = START_NS + np.round(np.array(arrival_s) * SECOND_NS).astype(np.int64)
+    values = 5.0 + 0.01 * np.arange(len(arrival_s))
+    return Block.of(Channel.SPEED_THROUGH_WATER, arrival_ns - 10**7, values, receive_ns=arrival_ns)
+
+
+def test_records_bytes_as_received_with_both_times(desk: Desk) -> None:
+    block = speeds([0, 1, 2])
+    desk.feed(block)
+    (bag,) = desk.bags()
+    assert [row.payload for row in bag] == [message.payload for message in encode(block)]
+    assert [row.log_ns for row in bag] == block.receive_ns.tolist()
+
+
+def test_a_small_step_back_of_the_clock_is_held(desk: Desk) -> None:
+    desk.feed(speeds([0, 5, 1, 6]))
+    (bag,) = desk.bags()
+    assert [(row.log_ns - START_NS) // SECOND_NS for row in bag] == [0, 5, 5, 6]
+    assert desk.published == []
+
+
+def test_a_clock_set_back_resets_and_begins_a_new_bag(desk: Desk) -> None:
+    desk.feed(speeds([100, 101, 50, 51]))
+    assert desk.kinds() == [EventKind.RESET_REQUEST, EventKind.RESET, EventKind.CLOCK_JUMP]
+    first, second = desk.bags()
+    assert [row.topic for row in first] == ['/speed_through_water'] * 2 + [f'{NODE}/events'] * 2
+    assert [row.topic for row in second] == [f'{NODE}/events'] + ['/speed_through_water'] * 2
+    for bag in (first, second):
+        assert np.all(np.diff([row.log_ns for row in bag]) >= 0)
+
+
+def test_the_clock_is_watched_also_while_nothing_arrives(desk: Desk) -> None:
+    desk.feed(speeds([100]))
+    desk.session.watch_clock(START_NS)
+    assert EventKind.CLOCK_JUMP in desk.kinds()
+
+
+def test_a_reset_is_recorded_before_what_comes_of_it(desk: Desk) -> None:
+    desk.feed(speeds([0, 1]))
+    desk.session.reset('asked for', START_NS + 2 * SECOND_NS)
+    desk.feed(speeds([3]))
+    (bag,) = desk.bags()
+    kinds = [read_event(row.payload).kind for row in bag if row.topic == f'{NODE}/events']
+    assert kinds == [EventKind.RESET_REQUEST, EventKind.RESET]
+    assert [row.topic for row in bag][2:4] == [f'{NODE}/events'] * 2
+
+
+def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.feed(speeds([0, 1]))
+    desk.session.reset('asked for', START_NS + 2 * SECOND_NS)
+    desk.feed(speeds([3]))
+    desk.recorder.start()
+    desk.feed(speeds([4]))
+    (bag,) = desk.bags()
+    assert [(row.log_ns - START_NS) // SECOND_NS for row in bag] == [3, 4]
+
+
+def test_what_is_not_understood_is_recorded_too(desk: Desk) -> None:
+    source = Source('depth', 'sensor_msgs/msg/Range')
+    decoded = desk.session.receive(source, b'rubbish', START_NS)
+    assert sum(decoded.unreadable.values()) == 1
+    (bag,) = desk.bags()
+    assert [row.payload for row in bag] == [b'rubbish']
+
+
+def test_every_output_is_recorded_as_published(desk: Desk) -> None:
+    desk.session.note_lifecycle('active', START_NS)
+    desk.session.reset('asked for', START_NS)
+    (bag,) = desk.bags()
+    assert [row.payload for row in bag] == [it.payload for it in desk.published]
+
+
+def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
+    desk.session.note_lifecycle('active', 0)
+    assert desk.kinds() == [EventKind.LIFECYCLE]
+    assert desk.bags() == [[]]
