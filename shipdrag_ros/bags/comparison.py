@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The outputs in a bag against the replayed ones, byte by byte.
+
+Both are read in step, so that little is held however long the bag is.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.messages import MalformedMessage, OutputMessage, types
+from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE, SPEED
+
+COMPARED = (SPEED, RESISTANCE, RESISTANCE_CURVE)
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """
+    The bag's own outputs against the replayed ones.
+
+    Attributes
+    ----------
+    compared
+        Messages that are in the bag, or should be.
+    identical
+        Of these, those that the replay gave to the last bit.
+    first_difference
+        Topic, stamp and both contents; None if all are identical.
+    """
+
+    compared: int
+    identical: int
+    first_difference: str | None
+
+
+class Comparison:
+    """
+    Compares topic by topic, in order.
+
+    Parameters
+    ----------
+    recorded
+        Outputs as recorded, in order of arrival.
+
+    Notes
+    -----
+    A recording that began when the node had been running for a while lacks
+    what was published before; one that was stopped lacks what came after. What
+    the replay gives before the first and after the last recorded message of a
+    topic is therefore no difference.
+    """
+
+    def __init__(self, recorded: Iterator[OutputMessage]) -> None:
+        self._recorded = recorded
+        self._queues: dict[str, deque[OutputMessage]] = {topic.name: deque() for topic in COMPARED}
+        self._begun: set[str] = set()
+        self._compared = 0
+        self._identical = 0
+        self._first_difference: str | None = None
+
+    def add(self, replayed: OutputMessage) -> None:
+        """
+        Take the next message of the replay.
+        """
+        name = _name(replayed)
+        queue = self._queues.get(name)
+        if queue is None:
+            return
+        while True:
+            while not queue and self._read_one():
+                pass
+            if not queue:
+                return
+            if queue[0].stamp_ns >= replayed.stamp_ns:
+                break
+            self._differ(queue.popleft(), None)
+        if queue[0].stamp_ns == replayed.stamp_ns:
+            self._begun.add(name)
+            self._compare(queue.popleft(), replayed)
+        elif name in self._begun:
+            self._differ(None, replayed)
+
+    def finish(self) -> Recorded:
+        """
+        Take note that the replay has ended, and return what was found.
+        """
+        while self._read_one():
+            pass
+        for queue in self._queues.values():
+            for message in queue:
+                self._differ(message, None)
+            queue.clear()
+        return Recorded(self._compared, self._identical, self._first_difference)
+
+    def _read_one(self) -> bool:
+        """Put one more recorded message into its queue; False behind the last."""
+        message = next(self._recorded, None)
+        if message is None:
+            return False
+        if _name(message) in self._queues:
+            self._queues[_name(message)].append(message)
+        return True
+
+    def _compare(self, recorded: OutputMessage, replayed: OutputMessage) -> None:
+        if recorded.payload != replayed.payload:
+            self._differ(recorded, replayed)
+        else:
+            self._compared += 1
+            self._identical += 1
+
+    def _differ(self, recorded: OutputMessage | None, replayed: OutputMessage | None) -> None:
+        self._compared += 1
+        message = recorded or replayed
+        if self._first_difference is None and message is not None:
+            self._first_difference = (
+                f'{message.topic} at {message.stamp_ns} ns: recorded {_content(recorded)}, '
+                f'replayed {_content(replayed)}'
+            )
+
+
+def _name(message: OutputMessage) -> str:
+    return message.topic.rpartition('/')[2]
+
+
+def _content(message: OutputMessage | None) -> str:
+    """Describe a message so that it can be told from another."""
+    if message is None:
+        return 'nothing'
+    try:
+        content = types.deserialize(message.type, message.payload)
+    except MalformedMessage:
+        return f'{len(message.payload)} bytes that are no {message.type}'
+    match message.type:
+        case SPEED.type:
+            return f'{content.twist.twist.linear.x!r} m/s (variance {content.twist.covariance[0]})'
+        case RESISTANCE.type:
+            return (
+                f'{content.accel.accel.linear.x!r} m/s^2 (variance {content.accel.covariance[0]})'
+            )
+        case _:
+            total = np.sum(content.data, dtype=np.int64)
+            return f'{content.width} points (sum of bytes {total})'

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One window of a run, given by hand: what is read for it and what it gives."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.bags.run import Inputs, Run
+from shipdrag_ros.coastdown import validate
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, rep103_yaw
+from shipdrag_ros.errors import BagError, EstimationError
+from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel, Float64, Reason, UInt8, concatenate
+from shipdrag_ros.ship import Ship
+
+SECOND_NS = 1_000_000_000
+_SET_CLOCK_NS = 10 * SECOND_NS
+
+
+class WindowSamples(NamedTuple):
+    """
+    What is read for a window.
+
+    Attributes
+    ----------
+    inputs
+        Spent, with its counts.
+    block, reasons
+        Samples and the `Reason` of each.
+    start_ns, end_ns
+        The window in stamps [ns].
+    """
+
+    inputs: Inputs
+    block: Block
+    reasons: UInt8
+    start_ns: int
+    end_ns: int
+
+
+def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -> WindowSamples:
+    """
+    Read and validate the samples of a window, and of a while around it.
+
+    Parameters
+    ----------
+    run
+        From `open_runs`.
+    parameters
+        For the validation, which needs some record before the window.
+    window
+        Begin and end [s from the start of the bag].
+
+    Raises
+    ------
+    BagError
+        If the window lies outside of the bag.
+
+    Notes
+    -----
+    The bag starts at its first time of arrival; stamps decide what is inside.
+    Where the clock of the sensors is another than that of the recorder, the
+    window is shifted by what they differ at the first sample used.
+    """
+    span = run.span_ns
+    start_s, end_s = window
+    length_s = 0.0 if span is None else (span[1] - span[0]) / SECOND_NS
+    if span is None or not (0.0 <= start_s < end_s < math.inf and start_s < length_s):
+        raise BagError(
+            f'window {start_s:g} to {end_s:g} s: expected 0 <= start < end inside of '
+            f'{run.name!r}, which is {length_s:.3f} s long'
+        )
+    start_ns, end_ns = (span[0] + round(edge_s * SECOND_NS) for edge_s in window)
+    margin_ns = round((parameters.frozen_s + parameters.late_s) * SECOND_NS) + _SET_CLOCK_NS
+    inputs = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
+    block = concatenate([item for item in inputs if isinstance(item, Block)])
+    reasons = validate(block, parameters)
+    accepted = np.flatnonzero(reasons == Reason.ACCEPTED)
+    if len(accepted):
+        clock_ns = int(block.stamp_ns[accepted[0]] - block.receive_ns[accepted[0]])
+        start_ns, end_ns = start_ns + clock_ns, end_ns + clock_ns
+    return WindowSamples(inputs, block, reasons, start_ns, end_ns)
+
+
+def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) -> Coastdown:
+    """
+    Estimate r(v) from a window.
+    """
+    accepted = samples.block[samples.reasons == Reason.ACCEPTED]
+    start_ns, end_ns = samples.start_ns, samples.end_ns
+    found = None
+    failure = None
+    try:
+        found = estimate(Window.from_block(accepted, start_ns, end_ns), ship, parameters)
+    except EstimationError as error:
+        failure = str(error)
+    except ValueError:  # accepted stamps ascend but for this
+        failure = 'a clock was set in the window; choose one before or after'
+    heading = _heading(accepted, start_ns)
+    return Coastdown(
+        start_ns,
+        end_ns,
+        None,
+        EndedBy.GIVEN,
+        found,
+        failure,
+        None if heading is None else rep103_yaw(heading, parameters.heading_convention),
+    )
+
+
+def _heading(accepted: Block, start_ns: int) -> float | None:
+    """Return the mean heading before a time, or else just after it, as sent [rad]."""
+    is_heading = accepted.channel == Channel.HEADING
+    yaw: Float64 = accepted.value[is_heading, 0]
+    after_s = (accepted.stamp_ns[is_heading] - start_ns) / SECOND_NS
+    for near in (
+        (after_s <= 0.0) & (after_s >= -HEADING_BEFORE_S),
+        (after_s >= 0.0) & (after_s <= HEADING_BEFORE_S),
+    ):
+        if near.any():
+            return math.atan2(float(np.sin(yaw[near]).mean()), float(np.cos(yaw[near]).mean()))
+    return None
