@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Replay of what a session recorded gives its figures again, to the last bit.
+
+The same over DDS is in `test_coastdown.py`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.bags import ReplayResult, open_runs, replay
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.messages import OutputMessage, Source, encode
+from shipdrag_ros.node.recorder import Recorder
+from shipdrag_ros.node.session import Session
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+
+SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
+SECOND_NS = 10**9
+LEAD_IN_S = 300.0
+DURATION_S = 500.0
+PARAMETERS = Parameters(
+    steady_s=120.0, slope_window_s=30.0, confirm_s=60.0, window_s=600.0, update_s=20.0
+)
+
+
+@cache
+def record() -> Block:
+    """Two coastdowns, an hour apart."""
+    ship = Ship.load(SHIP_FILE)
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=DURATION_S)
+    truth = simulate(ship, scenario)
+    one = sense(truth, standard_sensors(), seed=1)
+    two = sense(
+        truth, standard_sensors(), seed=2, start_ns=int(one.receive_ns[0]) + 3600 * SECOND_NS
+    )
+    return concatenate([one, two])
+
+
+def seconds(block: Block) -> np.ndarray:
+    return (block.receive_ns - record().receive_ns[0]) / SECOND_NS
+
+
+class Desk:
+    """A session, what it published while recording, and the replay of that."""
+
+    def __init__(self, directory: Path) -> None:
+        ship = Ship.load(SHIP_FILE)
+        monitor = Monitor(ship, PARAMETERS)
+        self.directory = directory
+        self.recorder = Recorder(
+            directory,
+            namespace='',
+            ship=ship,
+            parameters=PARAMETERS,
+            history_ns=monitor.history_ns,
+        )
+        self.published: list[OutputMessage] = []
+        self.session = Session(
+            monitor, self.recorder, publish=self.published.append, node='/coastdown_node'
+        )
+
+    def feed(self, from_s: float, to_s: float) -> None:
+        """Receive this part of the record."""
+        block = record()
+        time_s = seconds(block)
+        for message in encode(block[(time_s >= from_s) & (time_s < to_s)]):
+            source = Source(message.topic.strip('/'), message.type)
+            self.session.receive(source, message.payload, message.log_ns)
+
+    def replay(self) -> list[ReplayResult]:
+        self.session.finish()
+        paths = sorted(self.directory.glob('*.mcap'))
+        return [replay(run) for run in open_runs(paths)]
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    return Desk(tmp_path)
+
+
+def assert_identical(result: ReplayResult, *, at_least: int) -> None:
+    assert result.recorded.first_difference is None
+    assert result.recorded.compared == result.recorded.identical
+    assert result.recorded.compared >= at_least
+
+
+def test_from_the_beginning(desk: Desk) -> None:
+    desk.recorder.start()
+    desk.feed(0, 1e9)
+    (result,) = desk.replay()
+    assert [it.ended_by for it in result.coastdowns] == [EndedBy.DATA_STOP, EndedBy.RECORD_END]
+    figures = [it for it in desk.published if not it.topic.endswith('/events')]
+    assert_identical(result, at_least=len(figures))
+    assert len(figures) > 100
+
+
+@pytest.mark.parametrize('start_s', [LEAD_IN_S - 50.0, LEAD_IN_S + 250.0, 3500.0, 4200.0])
+def test_a_recording_that_starts_mid_run(desk: Desk, start_s: float) -> None:
+    desk.feed(0, start_s)
+    desk.recorder.start()
+    desk.feed(start_s, 1e9)
+    (result,) = desk.replay()
+    assert_identical(result, at_least=20)
+
+
+def test_a_recording_that_stops_and_starts_mid_run(desk: Desk) -> None:
+    desk.recorder.start()
+    desk.feed(0, LEAD_IN_S + 200.0)
+    desk.recorder.stop()
+    desk.feed(LEAD_IN_S + 200.0, LEAD_IN_S + 300.0)
+    desk.recorder.start()
+    desk.feed(LEAD_IN_S + 300.0, 1e9)
+    first, second = desk.replay()
+    assert_identical(first, at_least=10)
+    assert_identical(second, at_least=20)
+
+
+def test_after_a_reset(desk: Desk) -> None:
+    desk.recorder.start()
+    start_ns = int(record().receive_ns[0])
+    desk.feed(0, LEAD_IN_S + 250.0)
+    desk.session.reset('asked for', start_ns + round((LEAD_IN_S + 250.0) * SECOND_NS))
+    desk.feed(LEAD_IN_S + 250.0, 1e9)
+    (result,) = desk.replay()
+    assert [it.ended_by for it in result.coastdowns] == [EndedBy.RESET, EndedBy.RECORD_END]
+    assert_identical(result, at_least=50)
+
+
+def test_a_recording_that_starts_after_a_reset(desk: Desk) -> None:
+    start_ns = int(record().receive_ns[0])
+    desk.feed(0, LEAD_IN_S + 250.0)
+    desk.session.reset('asked for', start_ns + round((LEAD_IN_S + 250.0) * SECOND_NS))
+    desk.feed(LEAD_IN_S + 250.0, 3700.0)
+    desk.recorder.start()
+    desk.feed(3700.0, 1e9)
+    (result,) = desk.replay()
+    assert_identical(result, at_least=50)
+
+
+def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
+    desk.recorder.start()
+    desk.feed(0, LEAD_IN_S + 250.0)
+    desk.feed(0, 1e9)
+    first, second = desk.replay()
+    assert [it.ended_by for it in first.coastdowns] == [EndedBy.RESET]
+    assert_identical(first, at_least=10)
+    assert_identical(second, at_least=100)
+
+
+@settings(
+    max_examples=8,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    start_s=st.floats(0.0, 4400.0),
+    reset_s=st.floats(0.0, 4400.0),
+)
+def test_any_start_and_any_reset(
+    tmp_path_factory: pytest.TempPathFactory, start_s: float, reset_s: float
+) -> None:
+    desk = Desk(tmp_path_factory.mktemp('bags'))
+    start_ns = int(record().receive_ns[0])
+    steps = sorted([(start_s, 'record'), (reset_s, 'reset')])
+    done_s = 0.0
+    for at_s, what in steps:
+        desk.feed(done_s, at_s)
+        if what == 'record':
+            desk.recorder.start()
+        else:
+            desk.session.reset('asked for', start_ns + round(at_s * SECOND_NS))
+        done_s = at_s
+    desk.feed(done_s, 1e9)
+    results = desk.replay()
+    for result in results:
+        assert_identical(result, at_least=0)
