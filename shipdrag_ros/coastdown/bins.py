@@ -229,33 +229,33 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
         fewer than four bins, or bins from less than 2/3 of the width, are there.
     """
     size = bins.number.shape[1]
+    numbers, speeds, offsets = bins.number[source], bins.speed[source], bins.speed_offset[source]
     count = 0
-    sum_t, sum_v, oldest, newest = 0.0, 0.0, 0.0, 0.0
-    for number in range(last - width + 1, last + 1):
-        slot = number % size
-        v = bins.speed[source, slot]
-        if bins.number[source, slot] != number or np.isnan(v):
-            continue
-        newest = number - last + bins.speed_offset[source, slot]
-        if count == 0:
-            oldest = newest
-        count += 1
-        sum_t += newest
-        sum_v += v
+    sum_t, sum_v, sum_tt, sum_tv = 0.0, 0.0, 0.0, 0.0
+    origin, oldest, newest = 0.0, 0.0, 0.0
+    first = last - width + 1
+    slot = first % size
+    for number in range(first, last + 1):
+        v = speeds[slot]
+        if numbers[slot] == number and not np.isnan(v):
+            newest = number - last + offsets[slot]
+            if count == 0:
+                # differences from one of the speeds: the sums keep their digits
+                oldest, origin = newest, v
+            v -= origin
+            count += 1
+            sum_t += newest
+            sum_v += v
+            sum_tt += newest * newest
+            sum_tv += newest * v
+        slot += 1
+        if slot == size:
+            slot = 0
     if count < 4 or 1.5 * (newest - oldest) < width - 1:
         return np.nan, np.nan, count
     mean_t, mean_v = sum_t / count, sum_v / count
-    sum_tt, sum_tv = 0.0, 0.0
-    for number in range(last - width + 1, last + 1):
-        slot = number % size
-        v = bins.speed[source, slot]
-        if bins.number[source, slot] != number or np.isnan(v):
-            continue
-        t = number - last + bins.speed_offset[source, slot] - mean_t
-        sum_tt += t * t
-        sum_tv += t * (v - mean_v)
-    slope = sum_tv / sum_tt
-    return slope, mean_v + slope * (newest - mean_t), count
+    slope = (sum_tv - sum_t * mean_v) / (sum_tt - sum_t * mean_t)
+    return slope, origin + mean_v + slope * (newest - mean_t), count
 
 
 @njit

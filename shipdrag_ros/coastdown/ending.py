@@ -9,7 +9,6 @@ where the cause began, not where it was noticed.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.bins import Bins, line
@@ -70,20 +69,30 @@ def _settled_since(
     level: float,
 ) -> int | None:
     """Return the last bin before the speed settled or rose; None where it falls on."""
-    width = tuning.slopes.width
+    width, start, source = tuning.slopes.width, coasting.start, coasting.source
     earlier = number - width
-    span = min(_EARLIER_WINDOWS * width, earlier - coasting.start)
+    span = min(_EARLIER_WINDOWS * width, earlier - start)
     if span >= width:
-        was, last_speed, _ = line(bins, coasting.source, earlier, span)
-        # both slopes are those of the middle of their span
-        speed = last_speed - 0.5 * was * span
-        ratio = max(0.0, (level - 0.5 * slope * width) / speed) if speed > 0.0 else 0.0
-        expected = min(was, 0.0) * min(1.0, ratio) ** _EXPONENT
-        if slope - expected > coasting.limit:
+        expected = _extrapolated(bins, source, earlier, span, level - 0.5 * slope * width)
+        if slope - expected > coasting.limits[0]:
             return earlier
-    long = 2 * round(parameters.confirm_s)
-    if number - coasting.start >= long + width:
-        overall, _, _ = line(bins, coasting.source, number, long)
-        if not math.isnan(overall) and overall >= 0.0:
+    confirm = round(parameters.confirm_s)
+    long = 2 * confirm
+    if number - long >= start + long:
+        overall, newest, _ = line(bins, source, number, long)
+        expected = _extrapolated(
+            bins, source, start + long, confirm, newest - 0.5 * overall * long
+        )
+        # slopes over a longer span wander less, at least in proportion
+        if overall - expected > coasting.limits[0] * width / long:
             return number - long
     return None
+
+
+def _extrapolated(bins: Bins, source: int, last: int, span: int, speed: float) -> float:
+    """Return the gentlest slope that coasting on at `speed` explains [m/s^2]."""
+    slope, level, _ = line(bins, source, last, span)
+    middle = level - 0.5 * slope * span
+    if not middle > 0.0:
+        return 0.0
+    return min(slope, 0.0) * min(1.0, max(0.0, speed / middle)) ** _EXPONENT

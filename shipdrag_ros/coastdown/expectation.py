@@ -38,13 +38,13 @@ class Coasting:
         At that speed.
     exponent
         The p of v' = -c v^p about that speed.
-    loss_min
-        Fraction of the expected loss of speed below which power must be on.
+    fraction_min
+        Fraction of the expected deceleration below which power may be on.
     """
 
     deceleration_m_s2: float
     exponent: float
-    loss_min: float
+    fraction_min: float
 
     def loss(self, speed_m_s: float, time_s: float) -> float:
         """
@@ -80,4 +80,4 @@ def expect(ship: Ship, speed_m_s: float) -> Coasting:
         )  # fmt: skip
         return Coasting(force / mass, _EXPONENT, 0.5)
     exponent = math.log(faster / slower) / math.log(near[1] / near[0])
-    return Coasting(float(faster) / mass, float(exponent), 0.75)
+    return Coasting(float(faster) / mass, float(exponent), 0.7)

@@ -31,6 +31,7 @@ from shipdrag_ros.coastdown.bins import (
 from shipdrag_ros.coastdown.compiled import digest
 from shipdrag_ros.coastdown.ring import Store, append
 from shipdrag_ros.coastdown.steadiness import (
+    SCALES,
     Slopes,
     Steadiness,
     forget_steadiness,
@@ -51,6 +52,7 @@ from shipdrag_ros.coastdown.validate import (
     forget,
     remember,
 )
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
 
 ALWAYS = 2**62  # a stamp after all stamps
@@ -98,8 +100,8 @@ class Watch(NamedTuple):
         0 after a candidate or coastdown until the speed has been steady again.
     seen_source, seen : int64
         Speed source and number of the bin looked at last.
-    slope, level : float64
-        Slope [m/s^2] and speed [m/s] there.
+    level : float64
+        Speed there [m/s].
     shaft : float64
         Steady rate of turn before the shaft slowed down [rad/s].
     """
@@ -109,7 +111,6 @@ class Watch(NamedTuple):
     armed: Int64
     seen_source: Int64
     seen: Int64
-    slope: Float64
     level: Float64
     shaft: Float64
 
@@ -124,7 +125,6 @@ class Watch(NamedTuple):
             np.ones(1, np.int64),
             np.full(1, NEVER),
             np.full(1, NEVER),
-            np.full(1, np.nan),
             np.full(1, np.nan),
             np.full(1, np.nan),
         )
@@ -241,18 +241,25 @@ def _look_at_speed(memory: Memory, tuning: Tuning, source: int, number: int) -> 
     if not _is_primary(bins, tuning, source, number):
         return 0
     learn(memory.steadiness, tuning.slopes, bins, source, number)
-    slope, level, _ = line(bins, source, number, tuning.slopes.width)
     watch.seen_source[0] = source
     watch.seen[0] = number
-    watch.slope[0] = slope
-    watch.level[0] = level
-    limit = memory.steadiness.limit[source]
-    if slope > -0.5 * limit:
+    limits = memory.steadiness.limit[source]
+    steady, falls = True, False
+    for scale in range(SCALES):
+        # a longer window changes more slowly: one look in two, one in four
+        if number % (1 << scale) != 0:
+            continue
+        slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
+        if scale == 0:
+            watch.level[0] = level
+        steady = steady and not slope < -0.5 * limits[scale]
+        falls = falls or slope < -limits[scale]
+    if steady and number % (1 << (SCALES - 1)) == 0:
         watch.armed[0] = 1
-    elif (
-        slope < -limit
+    if (
+        falls
         and watch.armed[0]
-        and level > tuning.speed_min
+        and watch.level[0] > tuning.speed_min
         and not _shaft_tells(bins, tuning, number)
     ):
         return _SLOPE
@@ -342,18 +349,20 @@ def _walk(
     return len(channel), 0
 
 
+_SLOPES = Slopes.of(Parameters())
+_STEADINESS = Steadiness.fresh(_SLOPES)
 _SIGNATURE = types.UniTuple(types.int64, 2)(
     typeof(
         Memory(
             Guard.fresh(),
             Bins.fresh(1),
-            Steadiness(np.zeros((1, 1)), np.zeros(1, np.int64), np.zeros(1), np.zeros(1)),
+            _STEADINESS,
             Watch.fresh(),
             Tally.fresh(),
             Store.fresh(1),
         )
     ),
-    typeof(Tuning(Limits(0, 0), Slopes(0, 0, 0, 0, np.zeros(1), 0.0), 0, 0.0, 0.0)),
+    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0, 0.0)),
     CHANNEL_CODES,
     STAMPS,
     STAMPS,

@@ -10,6 +10,7 @@ before the last `history_ns` of it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -87,7 +88,7 @@ class Monitor:
             parameters.shaft_stopped_fraction,
             float(ship.speed(parameters.froude_min)),
         )
-        seconds = round(parameters.steady_s + 4 * parameters.confirm_s) + 6 * slopes.width + 64
+        seconds = round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
         self._memory = Memory(
             Guard.fresh(),
             Bins.fresh(seconds),
@@ -111,7 +112,7 @@ class Monitor:
         if self._candidate is not None:
             return State.CANDIDATE
         source = int(self._memory.watch.seen_source[0])
-        if source == NEVER or np.isnan(self._memory.steadiness.limit[source]):
+        if source == NEVER or np.isnan(self._memory.steadiness.limit[source, 0]):
             return State.WAITING
         return State.STEADY
 
@@ -215,10 +216,12 @@ class Monitor:
     def _learn_limit(self) -> None:
         """Fix what chance could do before the candidate, once it is known."""
         assert self._candidate is not None
-        if np.isnan(self._candidate.limit):
+        if np.isnan(self._candidate.spread):
             steadiness, source = self._memory.steadiness, self._candidate.source
-            self._candidate = self._candidate.judged_by(
-                float(steadiness.limit[source]), float(steadiness.spread[source])
+            self._candidate = replace(
+                self._candidate,
+                limits=tuple(float(limit) for limit in steadiness.limit[source]),
+                spread=float(steadiness.spread[source, 0]),
             )
 
     def _judge(self) -> list[Event]:

@@ -25,7 +25,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-EXCESS_MAX = 1.5  # of the exponent over the one expected: beyond it the speed settles
+EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed settles
 _GUARD = 0.1  # of confirm_s: the thrust runs down first
 _TRIALS = 3  # after confirm_s, twice and three times as long
 _PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by then
@@ -52,10 +52,11 @@ class Candidate:
         Its first bin, as far as is known.
     shaft
         Steady shaft speed before it [rad/s]; NaN where the speed alone speaks.
-    limit
-        Size of a slope that chance did not explain before it [m/s^2]; NaN while unknown.
+    limits
+        Size of a slope that chance did not explain before it, over one, two and
+        four times slope_window_s [m/s^2]; NaN while unknown.
     spread
-        Standard deviation of a slope before it [m/s^2].
+        Standard deviation of the first of these slopes before it [m/s^2].
     trials
         How often its deceleration was judged.
     """
@@ -63,7 +64,7 @@ class Candidate:
     source: int
     start: int
     shaft: float
-    limit: float = math.nan
+    limits: tuple[float, ...] = ()
     spread: float = math.nan
     trials: int = 0
 
@@ -72,11 +73,14 @@ class Candidate:
         """Whether the shaft made it a candidate."""
         return not math.isnan(self.shaft)
 
-    def judged_by(self, limit: float, spread: float) -> Candidate:
+    def falls(self, bins: Bins, number: int, width: int) -> bool:
         """
-        Return it with what chance could do before it.
+        Say whether the speed still falls faster than chance explains.
         """
-        return replace(self, limit=limit, spread=spread)
+        return any(
+            line(bins, self.source, number, width << scale)[0] < -0.5 * limit
+            for scale, limit in enumerate(self.limits)
+        )
 
 
 def propose(bins: Bins, tuning: Tuning, source: int, number: int, shaft: float) -> Candidate:
@@ -85,7 +89,7 @@ def propose(bins: Bins, tuning: Tuning, source: int, number: int, shaft: float) 
     """
     width = tuning.slopes.width
     if math.isnan(shaft):
-        start = change_point(bins, source, number - 3 * width, number, tuning.speed_min)
+        start = change_point(bins, source, number - 6 * width, number, tuning.speed_min)
     else:
         start = shaft_fell_at(bins, number, shaft, width)
     return Candidate(source, start, shaft)
@@ -109,13 +113,13 @@ def judge(
     """
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
     pending, dismissed = (Verdict.PENDING, candidate), (Verdict.DISMISSED, candidate)
-    slope, level, _ = line(bins, candidate.source, number, width)
+    level = line(bins, candidate.source, number, width)[1]
     if (
         level < tuning.speed_min
         or turned_at(bins, candidate.start, number, width, parameters.turn_rad) is not None
     ):
         return dismissed
-    falls = slope < -0.5 * candidate.limit
+    falls = candidate.falls(bins, number, width)
     age = number - candidate.start
     if candidate.by_shaft:
         turning = shaft_speed(bins, number) / candidate.shaft
@@ -136,7 +140,10 @@ def judge(
         start = change_point(
             bins, candidate.source, candidate.start - 2 * width, number, tuning.speed_min
         )
-    tried = replace(candidate, start=start, trials=candidate.trials + 1)
+    tried = replace(candidate, start=start)
+    if 2 * (number - start) < confirm * (2 * candidate.trials + 1):
+        return Verdict.PENDING, tried  # chance made it a candidate, then it began in earnest
+    tried = replace(tried, trials=candidate.trials + 1)
     if _coasts(tried, bins, ship, tuning, parameters, number):
         return Verdict.CONFIRMED, tried
     return Verdict.DISMISSED if tried.trials == _TRIALS else Verdict.PENDING, tried
@@ -154,22 +161,22 @@ def _coasts(
     width = tuning.slopes.width
     guard = round(_GUARD * parameters.confirm_s)
     time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
-    if len(time) < 6:
-        return False
-    found = law(time, speed)
+    slope, level, _ = line(bins, candidate.source, number, width)
     _, before, _ = line(bins, candidate.source, candidate.start - 1, width)
-    if not (found.slope < 0.0 and before > found.speed > 0.0):
+    if len(time) < 6 or not before > level:
         return False
-    expected = expect(ship, before)
-    loss = before - (found.speed + 0.5 * found.slope * (time[-1] - time[0]))
-    fraction = loss / expected.loss(before, number - candidate.start)
+    if candidate.trials == 1:
+        expected, now = expect(ship, before), expect(ship, level - 0.5 * slope * width)
+        lost = (before - level) / expected.loss(before, number - candidate.start)
+        return min(lost, -slope / now.deceleration_m_s2) > expected.fraction_min
+    found = law(time, speed)
+    if not (found.slope < 0.0 < found.speed):
+        return False
     # a curvature is the difference of the slopes of two halves
-    half = 0.5 * (time[-1] - time[0])
+    half = 0.5 * float(time[-1] - time[0])
     sd = math.sqrt(2.0) * candidate.spread * width / half**2 * found.speed / found.slope**2
     excess = found.exponent - expect(ship, found.speed).exponent
-    if candidate.trials == 1:
-        return bool(fraction > expected.loss_min and excess - sd < EXCESS_MAX)
-    return bool(sd < EXCESS_MAX and excess < EXCESS_MAX)
+    return sd < EXCESS_MAX and excess < EXCESS_MAX
 
 
 def change_point(bins: Bins, source: int, first: int, last: int, speed_min: float) -> int:
