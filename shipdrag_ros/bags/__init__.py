@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """MCAP in and out."""
 
+from shipdrag_ros.bags.columns import parse_input, parse_time
 from shipdrag_ros.bags.comparison import Recorded
+from shipdrag_ros.bags.csv_import import ImportResult, import_csv
+from shipdrag_ros.bags.playback import InputCounts, ReplayResult, replay
 from shipdrag_ros.bags.reader import open_runs
-from shipdrag_ros.bags.replay import InputCounts, ReplayResult, replay
 from shipdrag_ros.bags.run import Inputs, ResetMark, Run, TopicInfo
+from shipdrag_ros.bags.summary import BagInfo, info
 from shipdrag_ros.bags.writer import BagWriter, Compression
 
 __all__ = [
+    'BagInfo',
     'BagWriter',
     'Compression',
+    'ImportResult',
     'InputCounts',
     'Inputs',
     'Recorded',
@@ -17,6 +22,10 @@ __all__ = [
     'ResetMark',
     'Run',
     'TopicInfo',
+    'import_csv',
+    'info',
     'open_runs',
+    'parse_input',
+    'parse_time',
     'replay',
 ]

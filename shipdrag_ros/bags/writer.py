@@ -21,7 +21,8 @@ from mcap.writer import CompressionType, Writer
 
 from shipdrag_ros import __version__
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import OUTPUT_TOPICS, types
+from shipdrag_ros.messages import OUTPUT_TOPICS, encode, types
+from shipdrag_ros.samples import Block
 
 METADATA = 'shipdrag_ros'
 """Name of the metadata record that tells which recording a file is part of."""
@@ -163,6 +164,24 @@ class BagWriter:
                 data=payload,
                 # a stamp before 1970 has no place here; the message itself keeps it
                 publish_time=max(publish_ns, 0),
+            )
+
+    def write_samples(self, block: Block) -> None:
+        """
+        Write samples as messages, each on the topic of its input.
+
+        Raises
+        ------
+        BagError
+            If the file cannot be written.
+        """
+        for message in encode(block):
+            self.write(
+                message.topic,
+                message.type,
+                message.payload,
+                log_ns=message.log_ns,
+                publish_ns=message.publish_ns,
             )
 
     def close(self) -> None:

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which column of a table is which input, and in which unit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+from math import pi
+
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.samples import Channel
+
+_SPEED = {'m/s': 1.0, 'kn': 1852.0 / 3600.0, 'km/h': 1.0 / 3.6, 'ft/s': 0.3048}
+_LENGTH = {'m': 1.0, 'km': 1000.0, 'ft': 0.3048, 'nmi': 1852.0}
+_ANGLE = {'rad': 1.0, 'deg': pi / 180.0}
+_TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0}
+_LATITUDE = {'deg': 1.0}  # as they are sent
+_UNITS: Mapping[Channel, Mapping[str, float]] = {
+    Channel.SPEED_THROUGH_WATER: _SPEED,
+    Channel.SPEED_OVER_GROUND: _SPEED,
+    Channel.POSITION: _LENGTH,
+    Channel.POSITION_GEODETIC: _LATITUDE,
+    Channel.HEADING: _ANGLE,
+    Channel.SHAFT: _TURN_RATE,
+    Channel.RUDDER: _ANGLE,
+    Channel.WIND_APPARENT: _SPEED,
+    Channel.DEPTH: _LENGTH,
+}
+_TWO_COLUMNS = ('position', 'wind_apparent')
+NANOSECONDS: Mapping[str, Decimal] = {
+    's': Decimal(10**9),
+    'ms': Decimal(10**6),
+    'us': Decimal(10**3),
+    'ns': Decimal(1),
+}
+
+
+@dataclass(frozen=True)
+class InputColumns:
+    """
+    The columns of one input.
+
+    Attributes
+    ----------
+    channel
+        What they hold.
+    names
+        Names or numbers, counted from 1; one or two.
+    factors
+        What each is multiplied by for the unit of `Channel`.
+    """
+
+    channel: Channel
+    names: tuple[str, ...]
+    factors: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """The column of the time of measurement, and its unit in nanoseconds."""
+
+    name: str
+    unit_ns: Decimal
+
+
+def parse_input(text: str) -> InputColumns:
+    """
+    Read `INPUT=COLUMN[:unit]`.
+
+    `position` and `wind_apparent` take two columns, `position=x,y:km` for
+    instance; a position in `deg` is latitude and longitude. Without a unit
+    the values are SI.
+
+    Raises
+    ------
+    ImportDataError
+        If the input or a unit is not known, or a column is missing.
+    """
+    name, _, rest = text.partition('=')
+    name = name.strip()
+    channels = [channel for channel in Channel if channel.input == name]
+    if not channels:
+        known = ', '.join(dict.fromkeys(channel.input for channel in Channel))
+        raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {known}')
+    count = 2 if name in _TWO_COLUMNS else 1
+    columns = [_split_unit(piece, _units_of(channels)) for piece in rest.split(',')]
+    if len(columns) != count or not all(column for column, _ in columns):
+        example = f'{name}={",".join(["COLUMN[:unit]"] * count)}'
+        raise ImportDataError(f'--map {text!r}: expected {count} column(s), {example}')
+    units = [unit for _, unit in columns]
+    channel = channels[0]
+    if 'deg' in units and channel is Channel.POSITION:
+        channel = Channel.POSITION_GEODETIC
+    factors = _UNITS[channel]
+    if any(unit not in (None, *factors) for unit in units) or (
+        channel is Channel.POSITION_GEODETIC and None in units
+    ):
+        raise ImportDataError(
+            f'--map {text!r}: expected both columns in deg, or both in {", ".join(_LENGTH)}'
+        )
+    return InputColumns(
+        channel,
+        tuple(column for column, _ in columns),
+        tuple(1.0 if unit is None else factors[unit] for unit in units),
+    )
+
+
+def parse_time(text: str) -> TimeColumn:
+    """
+    Read `COLUMN[:unit]` of the time; s without a unit.
+
+    Raises
+    ------
+    ImportDataError
+        If the unit is not known.
+    """
+    column, unit = _split_unit(text, NANOSECONDS)
+    if not column:
+        raise ImportDataError(f'--time {text!r}: expected COLUMN[:unit]')
+    return TimeColumn(column, NANOSECONDS[unit or 's'])
+
+
+def _units_of(channels: list[Channel]) -> set[str]:
+    return {unit for channel in channels for unit in _UNITS[channel]}
+
+
+def _split_unit(text: str, units: Mapping[str, object] | set[str]) -> tuple[str, str | None]:
+    """Return column and unit; a colon may also be part of a column's name."""
+    column, colon, unit = text.strip().rpartition(':')
+    if not colon:
+        return text.strip(), None
+    if unit.strip() in units:
+        return column.strip(), unit.strip()
+    raise ImportDataError(
+        f'{text!r}: no unit {unit!r} here; units are {", ".join(sorted(units))}. '
+        'For a colon in the name of a column write its number'
+    )
