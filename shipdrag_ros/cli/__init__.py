@@ -29,8 +29,11 @@ class Verb(NamedTuple):
 
 
 VERBS = (
+    Verb('demo', 'demo', 'simulated ship -> ROS topics -> node -> bag -> replay -> report'),
     Verb('node', 'node', 'the onboard node: estimates live and records'),
+    Verb('replay', 'replay', 'the same estimator over bags, without ROS'),
     Verb('simulate', 'simulate', 'simulated coastdown with sensors, as a bag'),
+    Verb('info', 'info', 'what is in a bag'),
 )
 
 USER_ERROR = 1

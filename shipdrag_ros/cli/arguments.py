@@ -83,6 +83,29 @@ def bag(text: str) -> Path:
     return Path(text)
 
 
+def new_file(ending: str) -> Callable[[str], Path]:
+    """
+    Return a reader of the path of a file to write, in a folder that exists.
+    """
+
+    def read(text: str) -> Path:
+        path = Path(text)
+        if path.suffix != ending:
+            raise argparse.ArgumentTypeError(f'{text!r}, expected a name that ends in {ending}')
+        _check_folder(path)
+        return path
+
+    return read
+
+
+def _check_folder(path: Path) -> None:
+    """Refuse now, not when the work is done."""
+    if not path.parent.is_dir():
+        raise argparse.ArgumentTypeError(
+            f'{str(path)!r}: no folder {str(path.parent)!r}; make it first'
+        )
+
+
 def _json_file(text: str) -> str:
     # `--json a.mcap` takes the bag for the file to write, and would destroy it
     path = Path(text)
@@ -91,4 +114,5 @@ def _json_file(text: str) -> str:
             f'{text!r} would be overwritten by the JSON; for stdout put --json last or write '
             f'--json={STDOUT}, for a file give a new name or one that ends in .json'
         )
+    _check_folder(path)
     return text

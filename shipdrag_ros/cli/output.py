@@ -106,12 +106,19 @@ class Output:
         """
         if self._json_to is None:
             return
-        text = json.dumps(_plain(document), indent=2, allow_nan=False) + '\n'
+        text = json_text(document)
         if self._json_to == STDOUT:
             sys.stdout.write(text)
         else:
             Path(self._json_to).write_text(text, encoding='utf-8')
             self.log(f'JSON in {self._json_to}')
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """
+    Return a document as JSON; arrays are lists, and what is not finite is null.
+    """
+    return json.dumps(_plain(document), indent=2, allow_nan=False) + '\n'
 
 
 def _console(stream: TextIO) -> _Console:

@@ -6,18 +6,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from shipdrag_ros.bags import InputCounts, Recorded
 from shipdrag_ros.coastdown.events import Coastdown
-from shipdrag_ros.report.run import InputCounts, Recorded, RunResult
+from shipdrag_ros.report.hulls import Ranking
+from shipdrag_ros.report.run import RunResult
 
 
-def document(runs: Sequence[RunResult]) -> dict[str, Any]:
+def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> dict[str, Any]:
     """
     Return the document of one or several bags.
 
     Counts are summed over the bags. A coastdown without an estimate has
-    empty arrays and says why under `failure`.
+    empty arrays and says why under `failure`; `hulls` is there only if they
+    were compared.
     """
-    return {
+    found = {
         'coastdowns': [
             _coastdown(run.bag, coastdown) for run in runs for coastdown in run.coastdowns
         ],
@@ -25,6 +28,17 @@ def document(runs: Sequence[RunResult]) -> dict[str, Any]:
         'inputs': _inputs([run.inputs for run in runs]),
         'recorded': _recorded(runs),
     }
+    if ranking is not None:
+        found['hulls'] = [
+            {
+                'name': hull.label,
+                'froude_max': hull.froude_max,
+                'froude_max_by': hull.found_by.value,
+                'others': hull.others,
+            }
+            for hull in ranking.hulls
+        ]
+    return found
 
 
 def _coastdown(bag: str, coastdown: Coastdown) -> dict[str, Any]:

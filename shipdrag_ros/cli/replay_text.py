@@ -15,6 +15,8 @@ def show_run(output: Output, run: RunResult) -> None:
     """
     output.heading(run.bag)
     output.say(words.ship_line(run.ship))
+    for warning in run.warnings:
+        output.say(f'Warning: {warning}')
     if not run.coastdowns:
         output.say('No coastdown found.')
     for number, coastdown in enumerate(run.coastdowns, start=1):

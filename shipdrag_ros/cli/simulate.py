@@ -23,6 +23,7 @@ from shipdrag_ros.ship import Ship, TableBaseline
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 
 _TRUE_POINTS = 201
+_TRUE_MARGIN = 1.05
 _SPEED_FRACTION = 0.8  # of what the baseline reaches
 
 
@@ -117,8 +118,11 @@ def run(options: argparse.Namespace) -> int:
     """
     output = Output(options.json)
     ship = Ship.load(options.ship)
+    speed_m_s = options.speed
+    if speed_m_s is None:
+        speed_m_s = round(_SPEED_FRACTION * _highest_speed(ship), 3)
     settings = Settings(
-        speed_m_s=_default_speed(ship) if options.speed is None else options.speed,
+        speed_m_s=speed_m_s,
         duration_s=options.duration,
         lead_in_s=options.lead_in,
         heading_deg=options.heading,
@@ -168,7 +172,9 @@ def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
         standard_sensors(rate_hz=settings.rate_hz, noise=settings.noise),
         seed=settings.seed,
     )
-    speed = np.linspace(0.0, settings.speed_m_s, _TRUE_POINTS)
+    # the fit starts a little above or below the true speed
+    highest = min(_TRUE_MARGIN * settings.speed_m_s, _highest_speed(ship))
+    speed = np.linspace(0.0, highest, _TRUE_POINTS)
     truth = TrueCurve(speed, motion.specific_resistance(speed), asdict(settings))
     return block, truth
 
@@ -198,16 +204,16 @@ def write_bag(path: Path, block: Block, ship: Ship, truth: TrueCurve, output: Ou
         raise
 
 
-def _default_speed(ship: Ship) -> float:
+def _highest_speed(ship: Ship) -> float:
+    """Return the highest speed [m/s] that the baseline is given for."""
     if ship.baseline is None:
         raise SimulationError(
             f'ship {ship.name!r} has no baseline resistance; add `baseline` to its ship file'
         )
     if isinstance(ship.baseline, TableBaseline):
-        highest = ship.baseline.speed_m_s[-1]
-    else:
-        highest = float(ship.speed(ship.baseline.wave_froude[-1]))
-    return round(_SPEED_FRACTION * highest, 3)
+        return ship.baseline.speed_m_s[-1]
+    # a rounding error above the last point of the table is outside of it
+    return float(np.nextafter(ship.speed(ship.baseline.wave_froude[-1]), 0.0))
 
 
 def _seed(text: str) -> int:

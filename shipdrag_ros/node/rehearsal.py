@@ -13,6 +13,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import DEFAULT_NODE
 from shipdrag_ros.messages.topics import RESISTANCE, SPEED
 from shipdrag_ros.node.inputs import message_class
@@ -62,44 +63,49 @@ class Rehearsal:
                 message_class(topic.type), topic.under(DEFAULT_NODE), callback, 1000
             )
 
-    def play(
-        self,
-        block: Block,
-        *,
-        speed: float,
-        connect_s: float,
-        progress: Callable[[float], None],
-    ) -> None:
+    def wait_for_node(self, block: Block, *, alive: Callable[[], None], timeout_s: float) -> None:
         """
-        Send samples under simulated time once the node hears all of them.
+        Wait until the node hears every input of a block.
+
+        Parameters
+        ----------
+        alive
+            Called now and then; raises if there is nothing to wait for.
+
+        Raises
+        ------
+        ShipdragError
+            Naming the inputs that are not heard in time.
+        """
+        end_s = time.monotonic() + timeout_s
+        while True:
+            alive()
+            try:
+                return self._player.connect(block, timeout_s=1.0)
+            except ShipdragError:
+                if time.monotonic() > end_s:
+                    raise
+
+    def play(self, block: Block, *, speed: float, progress: Callable[[float], None]) -> None:
+        """
+        Send samples under simulated time.
 
         Parameters
         ----------
         speed
             Seconds of data in a second of life.
-        connect_s
-            How long to wait for the node.
         progress
             Called with the fraction done.
-
-        Raises
-        ------
-        ShipdragError
-            If an input is not heard in time.
         """
-        self._player.connect(block, timeout_s=connect_s)
         self._player.play(block, speed=speed, progress=progress)
 
-    def listen(self, until: Callable[[], bool], *, timeout_s: float) -> bool:
+    def listen(self, *, until: Callable[[], bool] = lambda: False, timeout_s: float) -> None:
         """
-        Hear on until a condition holds; say whether it did in time.
+        Hear on until a condition holds, or time is up.
         """
         end_s = time.monotonic() + timeout_s
-        while not until():
-            if time.monotonic() > end_s:
-                return False
+        while not until() and time.monotonic() < end_s:
             self._executor.spin_once(timeout_sec=0.05)
-        return True
 
     def __enter__(self) -> Self:
         return self

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.bags import InputCounts
 from shipdrag_ros.coastdown.events import Coastdown
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.report import words
 from shipdrag_ros.report.hulls import Ranking
-from shipdrag_ros.report.run import InputCounts
 from shipdrag_ros.report.truth import TrueCurve
 
 _UNITS = {'speed_through_water': 'm/s', 'speed_over_ground': 'm/s', 'position': 'm'}
@@ -42,6 +42,9 @@ def curve_table(
         return Table(columns, ())
     wanted = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], count)
     chosen = np.unique(np.abs(curve.speed_m_s[:, None] - wanted).argmin(axis=0))
+    # as many decimals in every row as the best of them deserves
+    least = float(np.min(curve.sigma_m_s2[chosen]))
+    decimals = max(words.decimals_of(least), 0) if least > 0.0 else 6
     rows = []
     for i in chosen:
         speed, r = float(curve.speed_m_s[i]), float(curve.resistance_m_s2[i])
@@ -49,12 +52,17 @@ def curve_table(
             f'{speed:.2f}',
             f'{speed / words.M_S_PER_KNOT:.1f}',
             f'{curve.froude[i]:.3f}',
-            f'{r:.4g}',
-            f'{curve.sigma_m_s2[i]:.2g}',
+            f'{r:.{decimals}f}',
+            f'{curve.sigma_m_s2[i]:.{decimals}f}',
         )
         if truth is not None:
             true = float(truth.at(curve.speed_m_s[i]))
-            cells = (*cells, f'{true:.4g}', f'{100.0 * (r / true - 1.0):+.1f}')
+            known = np.isfinite(true)  # the truth of a simulation ends at its highest speed
+            cells = (
+                *cells,
+                f'{true:.{decimals}f}' if known else '-',
+                f'{100.0 * (r / true - 1.0):+.1f}' if known else '-',
+            )
         rows.append(cells)
     return Table(columns, tuple(rows))
 

@@ -37,6 +37,7 @@ class _Coastdown:
 class _Run:
     heading: str
     ship: str
+    warnings: tuple[str, ...]
     coastdowns: tuple[_Coastdown, ...]
     inputs: Table
     recorded: str
@@ -83,6 +84,7 @@ def _run(run: RunResult) -> _Run:
     return _Run(
         heading=run.bag,
         ship=words.ship_line(run.ship),
+        warnings=run.warnings,
         coastdowns=tuple(
             _coastdown(number, coastdown, run)
             for number, coastdown in enumerate(run.coastdowns, start=1)

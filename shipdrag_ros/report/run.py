@@ -1,32 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one bag gave: the input of a page, of the terminal and of the JSON."""
+"""What one bag gave, as the page, the terminal and the JSON tell it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from shipdrag_ros.bags import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.coastdown.events import Coastdown
-from shipdrag_ros.report.truth import TrueCurve
+from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.ship import Ship
-
-
-@dataclass(frozen=True)
-class InputCounts:
-    """Messages of one input: how many came, were used, and were rejected why."""
-
-    messages: int
-    used: int
-    rejected: Mapping[str, int]
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """The bag's own outputs against the replayed ones."""
-
-    compared: int
-    identical: int
-    first_difference: str | None
 
 
 @dataclass(frozen=True)
@@ -46,6 +29,8 @@ class RunResult:
         Messages counted, by input.
     recorded
         Comparison with the outputs in the bag.
+    warnings
+        What is wrong with the bag, a sentence each.
     truth
         The true curve, where the record is simulated.
     """
@@ -55,4 +40,27 @@ class RunResult:
     coastdowns: tuple[Coastdown, ...]
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
+    warnings: tuple[str, ...] = ()
     truth: TrueCurve | None = None
+
+    @classmethod
+    def of(cls, result: ReplayResult) -> RunResult:
+        """
+        Take what a replay gave, and the truth if the bag holds it.
+
+        Raises
+        ------
+        BagError
+            If the truth in the bag cannot be read.
+        """
+        run = result.run
+        text = run.attachments.get(ATTACHMENT)
+        return cls(
+            bag=run.name,
+            ship=result.ship,
+            coastdowns=result.coastdowns,
+            inputs=result.inputs,
+            recorded=result.recorded,
+            warnings=run.warnings,
+            truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
+        )

@@ -11,9 +11,11 @@ from __future__ import annotations
 import math
 from datetime import UTC, datetime
 
+import numpy as np
+
+from shipdrag_ros.bags import Recorded
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
-from shipdrag_ros.report.run import Recorded
 from shipdrag_ros.ship import Ship
 
 M_S_PER_KNOT = 1852.0 / 3600.0
@@ -68,10 +70,17 @@ def plus_minus(value: float, spread: float) -> str:
     """
     if not (math.isfinite(value) and math.isfinite(spread) and spread > 0.0):
         return f'{value:.4g} ± {spread:.2g}'
-    decimals = 1 - math.floor(math.log10(spread))
+    decimals = decimals_of(spread)
     if decimals < 0:
         value, spread, decimals = round(value, decimals), round(spread, decimals), 0
     return f'{value:.{decimals}f} ± {spread:.{decimals}f}'
+
+
+def decimals_of(spread: float) -> int:
+    """
+    Return the decimals that show two digits of a spread > 0; negative above 100.
+    """
+    return 1 - math.floor(math.log10(spread))
 
 
 def estimator(name: str) -> str:
@@ -117,13 +126,17 @@ def result_sentence(coastdown: Coastdown, *, mass_kg: float | None = None) -> st
     if not len(curve):
         return 'No speed of this record lies inside the range where r(v) may be used.'
     low, high = float(curve.speed_m_s[0]), float(curve.speed_m_s[-1])
-    r, sigma = float(curve.resistance_m_s2[-1]), float(curve.sigma_m_s2[-1])
+    # where it is known best: the ends of the range are the weakest part of any fit
+    best = int(np.argmin(curve.sigma_m_s2 / np.abs(curve.resistance_m_s2)))
+    speed = float(curve.speed_m_s[best])
+    r, sigma = float(curve.resistance_m_s2[best]), float(curve.sigma_m_s2[best])
     force = ''
     if mass_kg is not None:
         force = f', that is {plus_minus(r * mass_kg * 1e-3, 2e-3 * sigma * mass_kg)} kN'
     return (
         f'The resistance is known from {low:.2f} to {high:.2f} m/s '
-        f'({low / M_S_PER_KNOT:.1f} to {high / M_S_PER_KNOT:.1f} knots); at {high:.2f} m/s the '
+        f'({low / M_S_PER_KNOT:.1f} to {high / M_S_PER_KNOT:.1f} knots), best at '
+        f'{speed:.2f} m/s: there the '
         f'specific resistance is {plus_minus(r, 2.0 * sigma)} m/s² (two standard deviations)'
         f'{force}.'
     )

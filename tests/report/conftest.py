@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipdrag_ros.bags import InputCounts, Recorded
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.estimation.result import (
     Estimate,
@@ -16,7 +17,7 @@ from shipdrag_ros.estimation.result import (
     ResistanceCurve,
     Track,
 )
-from shipdrag_ros.report.run import InputCounts, Recorded, RunResult
+from shipdrag_ros.report.run import RunResult
 from shipdrag_ros.report.truth import TrueCurve
 from shipdrag_ros.ship import Ship
 

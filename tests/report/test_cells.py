@@ -31,6 +31,20 @@ def test_a_short_curve_repeats_no_point(estimate: Estimate) -> None:
     assert cells.curve_table(estimate.curve.between(0.5, 0.6)).rows == ()
 
 
+def test_every_row_has_as_many_decimals(estimate: Estimate) -> None:
+    table = cells.curve_table(estimate.valid_curve)
+    # the smallest sigma is 0.02 * 1.95^2 / 3000 + 1e-4 = 0.00013
+    assert {len(row[3].partition('.')[2]) for row in table.rows} == {5}
+    assert table.rows[0][3:] == ('0.00127', '0.00013')
+    exact = replace(estimate.valid_curve, sigma_m_s2=0.0 * estimate.valid_curve.sigma_m_s2)
+    assert cells.curve_table(exact).rows[0][3:] == ('0.001267', '0.000000')
+
+
+def test_the_truth_is_not_known_above_its_curve(estimate: Estimate, truth: TrueCurve) -> None:
+    short = TrueCurve(truth.speed_m_s[:50], truth.resistance_m_s2[:50], {})
+    assert cells.curve_table(estimate.valid_curve, truth=short).rows[-1][-2:] == ('-', '-')
+
+
 def test_the_truth_adds_its_error(estimate: Estimate, truth: TrueCurve) -> None:
     table = cells.curve_table(estimate.valid_curve, truth=truth)
     assert table.columns[-1] == 'error [%]'

@@ -107,3 +107,7 @@ def test_hulls_compared_come_first(run: RunResult, tmp_path: Path) -> None:
     assert page.text.index('Hulls compared') < page.text.index('sea trial.mcap')
     assert len(page.images) == 7
 
+
+def test_a_warning_about_the_bag_is_shown(run: RunResult, tmp_path: Path) -> None:
+    write_report(tmp_path / 'report.html', [replace(run, warnings=('part 2 is missing',))])
+    assert 'Warning: part 2 is missing' in Page(tmp_path / 'report.html').text

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+`shipdrag demo`: the whole way once, on this machine alone.
+
+A simulated ship sends its readings over real ROS topics to the node, in a
+process of its own; what the node records is replayed and compared with the
+truth of the simulation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, NoReturn
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.cli import simulate
+from shipdrag_ros.cli.arguments import number
+from shipdrag_ros.cli.node import no_ros
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, replay_run, write_results
+from shipdrag_ros.cli.replay_text import show_run
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.report import words
+from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.report.truth import TrueCurve
+from shipdrag_ros.samples import Block
+from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:  # help must not need ROS
+    from shipdrag_ros.node.rehearsal import LiveEstimate, Rehearsal
+
+SHIP = 'vitus_bering.yaml'
+SETTINGS = simulate.Settings(
+    speed_m_s=8.2,
+    duration_s=1500.0,
+    lead_in_s=900.0,
+    heading_deg=30.0,
+    rate_hz=1.0,
+    noise=1.0,
+    seed=1,
+)
+_CONNECT_S = 120.0  # the first start on a machine compiles the kernels
+_ANSWER_S = 1.0
+_END_S = 30.0
+_FIRST_DOMAIN, _DOMAINS = 61, 41  # above 101 the ports run into those for outgoing traffic
+_SHOWN_NS = 100_000_000_000  # an estimate every 10 s of data is too much to read
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Simulate a coastdown, send its readings over ROS topics on this machine to the node, '
+        'show the estimates as they come, replay what the node recorded and write a report.'
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        default=Path('demo'),
+        metavar='DIR',
+        help='where everything is written; made if missing',
+    )
+    parser.add_argument(
+        '--speed-up',
+        type=number(1.0, 200.0),
+        default=60.0,
+        metavar='N',
+        help='seconds of the simulation in a second of life [-], 1 to 200',
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Run the demonstration.
+    """
+    try:
+        from shipdrag_ros.node.rehearsal import Rehearsal
+    except ModuleNotFoundError as error:
+        raise no_ros(error) from error
+    output = Output()
+    out: Path = options.out
+    recordings = out / 'recordings'
+    recordings.mkdir(parents=True, exist_ok=True)
+    ship_file = out / SHIP
+    ship_file.write_text(
+        files('shipdrag_ros').joinpath('data', SHIP).read_text(encoding='utf-8'), encoding='utf-8'
+    )
+    ship = Ship.load(ship_file)
+    block, truth = simulate.make(ship, SETTINGS)
+    seconds = SETTINGS.lead_in_s + SETTINGS.duration_s
+    output.say(
+        f'A simulated {words.ship_line(ship)},\n'
+        f'sails at {SETTINGS.speed_m_s:g} m/s; after {SETTINGS.lead_in_s:.0f} s her engine is '
+        f'stopped. {seconds:.0f} s of data take {seconds / options.speed_up:.0f} s.\n'
+    )
+    before = set(recordings.iterdir())
+    with _ended_by_sigterm(), _node(ship_file, recordings, out / 'node.log') as node:
+        live = _Live(truth, block, output)
+        with Rehearsal(live.show) as rehearsal:
+            _sail(rehearsal, node, block, speed_up=options.speed_up, output=output)
+    bags = sorted(set(recordings.iterdir()) - before)
+    if not bags:
+        raise node.failed('the node recorded nothing')
+
+    output.heading('What the node recorded, replayed without ROS')
+    results = [replace(replay_run(each, output), truth=truth) for each in open_runs(bags)]
+    for result in results:
+        show_run(output, result)
+    write_results(out, results)
+    output.heading('Where everything is')
+    files_made = [ship_file, *bags, *(out / name for name in (REPORT, JSON, CURVES)), node.log]
+    for path in files_made:
+        output.say(str(path))
+    return _verdict(results)
+
+
+def _verdict(results: Sequence[RunResult]) -> int:
+    """Fail if what was to be demonstrated was not."""
+    for result in results:
+        recorded = result.recorded
+        if recorded.identical < recorded.compared or not recorded.compared:
+            raise ShipdragError(
+                f'{result.bag!r}: {words.recorded_sentence(recorded)} Live and replay should '
+                'agree bit by bit; please report this'
+            )
+    if not any(part.estimate for result in results for part in result.coastdowns):
+        raise ShipdragError('the coastdown was not found; see the node log, and report this')
+    return 0
+
+
+def _sail(
+    rehearsal: Rehearsal, node: _Node, block: Block, *, speed_up: float, output: Output
+) -> None:
+    """Send the readings and let the node end."""
+    rehearsal.wait_for_node(block, alive=node.check, timeout_s=_CONNECT_S)
+    output.heading('Live from the node, over ROS topics')
+    rehearsal.play(block, speed=speed_up, progress=lambda _: node.check())
+    # the answers to the last samples are on their way
+    rehearsal.listen(timeout_s=_ANSWER_S)
+    node.interrupt()
+    rehearsal.listen(until=lambda: not node.is_running, timeout_s=_END_S)
+    if node.is_running:
+        raise node.failed(f'the node did not end within {_END_S:g} s of SIGINT')
+    if not rehearsal.estimates:
+        raise node.failed('no estimate was heard')
+
+
+class _Live:
+    """Prints estimates beside the truth as they come, but not all of them."""
+
+    def __init__(self, truth: TrueCurve, block: Block, output: Output) -> None:
+        self._truth = truth
+        self._output = output
+        self._stop_ns = int(block.receive_ns[0]) + round(SETTINGS.lead_in_s * 1e9)
+        self._next_ns = 0
+
+    def show(self, estimate: LiveEstimate) -> None:
+        if estimate.stamp_ns < self._next_ns:
+            return
+        self._next_ns = estimate.stamp_ns + _SHOWN_NS
+        self._output.say(
+            f'{(estimate.stamp_ns - self._stop_ns) * 1e-9:7.0f} s after the stop: '
+            f'{estimate.speed_m_s:6.3f} m/s, r = '
+            f'{words.plus_minus(estimate.resistance_m_s2, 2.0 * estimate.sigma_m_s2)} m/s², '
+            f'true {self._truth.at(estimate.speed_m_s):.5f}'
+        )
+
+
+class _Node:
+    """The node in a process of its own, on a domain that nobody else uses."""
+
+    def __init__(self, ship_file: Path, recordings: Path, log: Path) -> None:
+        self.log = log
+        with log.open('w') as file:
+            self._process = subprocess.Popen(
+                [
+                    *(sys.executable, '-m', 'shipdrag_ros.cli', 'node'),
+                    *('--ship', ship_file, '--out', recordings),
+                    *('--ros-args', '-p', 'use_sim_time:=true'),
+                ],
+                stdin=subprocess.DEVNULL,
+                stdout=file,
+                stderr=subprocess.STDOUT,
+            )
+
+    @property
+    def is_running(self) -> bool:
+        return self._process.poll() is None
+
+    def check(self) -> None:
+        """Raise if the process has ended."""
+        if not self.is_running:
+            raise self.failed(f'the node ended with status {self._process.returncode}')
+
+    def interrupt(self) -> None:
+        self._process.send_signal(signal.SIGINT)
+
+    def end(self) -> None:
+        """Leave no process behind, whatever happened."""
+        if self.is_running:
+            self.interrupt()
+            try:
+                self._process.wait(timeout=_END_S)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+    def failed(self, what: str) -> ShipdragError:
+        """Return an error that shows the end of the log."""
+        lines = self.log.read_text(encoding='utf-8', errors='replace').splitlines()[-10:]
+        return ShipdragError('\n  '.join([f'{what}; the end of {str(self.log)!r}:', *lines]))
+
+
+@contextmanager
+def _node(ship_file: Path, recordings: Path, log: Path) -> Iterator[_Node]:
+    # nothing leaves this machine, and no other ROS on it hears or is heard
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    os.environ['ROS_DOMAIN_ID'] = str(_FIRST_DOMAIN + os.getpid() % _DOMAINS)
+    node = _Node(ship_file, recordings, log)
+    try:
+        yield node
+    finally:
+        node.end()
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Unwind on SIGTERM as on Ctrl-C, so that the node's process is ended too."""
+
+    def leave(number: int, frame: FrameType | None) -> NoReturn:
+        sys.exit(128 + number)
+
+    before = signal.signal(signal.SIGTERM, leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

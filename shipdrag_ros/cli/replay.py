@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag replay`: the estimates of a bag, without ROS."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from shipdrag_ros.bags import Run, open_runs, replay
+from shipdrag_ros.cli import replay_json, replay_text
+from shipdrag_ros.cli.arguments import add_json, bag, new_file, number, remap
+from shipdrag_ros.cli.output import Output, json_text
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.report.hulls import Ranking, rank
+from shipdrag_ros.report.page import write_report
+from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.report.spreadsheet import write_curves
+from shipdrag_ros.ship import Ship
+
+REPORT, JSON, CURVES = 'report.html', 'result.json', 'curves.csv'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Find the coastdowns in bags and estimate r(v) as the node would have. What the node '
+        'itself recorded is compared bit by bit.'
+    )
+    parser.add_argument(
+        'bags',
+        nargs='+',
+        type=bag,
+        metavar='BAG',
+        help='MCAP file or rosbag2 directory; each is a run of its own, parts of one recording '
+        'are joined',
+    )
+    parser.add_argument(
+        '--ship',
+        type=Path,
+        metavar='FILE',
+        help='ship file (YAML) (default: the one attached to the bag)',
+    )
+    parser.add_argument(
+        '--parameters',
+        type=Path,
+        metavar='FILE',
+        help='parameters as `name: value` (YAML) (default: those attached to the bag)',
+    )
+    parser.add_argument(
+        '--window',
+        nargs=2,
+        type=number(0.0, unit='s'),
+        metavar=('START', 'END'),
+        help='estimate from this part [s from the start of the bag], without looking for a '
+        'coastdown',
+    )
+    parser.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        type=remap,
+        metavar='FROM:=TO',
+        help='hear topic FROM of the bag as input TO; may be given more than once',
+    )
+    parser.add_argument(
+        '--compare',
+        action='store_true',
+        help='rank the hulls, one a bag, by the Froude number of the steepest rise of r',
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        metavar='DIR',
+        help=f'write {REPORT}, {JSON} and {CURVES} there; made if missing',
+    )
+    parser.add_argument(
+        '--report',
+        type=new_file('.html'),
+        metavar='FILE.html',
+        help='write the report with its pictures to one HTML file',
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Replay the bags and tell what they gave.
+    """
+    output = Output(options.json)
+    ship = None if options.ship is None else Ship.load(options.ship)
+    parameters = None
+    if options.parameters is not None:
+        text = options.parameters.read_text(encoding='utf-8')
+        parameters = Parameters.from_yaml(text, subject=str(options.parameters))
+    if options.out is not None:
+        options.out.mkdir(parents=True, exist_ok=True)
+    window = None if options.window is None else tuple(options.window)
+    results = [
+        replay_run(each, output, ship=ship, parameters=parameters, window=window)
+        for each in open_runs(options.bags, remap=dict(options.remap))
+    ]
+    ranking = rank(results) if options.compare else None
+
+    for result in results:
+        replay_text.show_run(output, result)
+    if ranking is not None:
+        replay_text.show_ranking(output, ranking)
+    if options.report is not None:
+        write_report(options.report, results, ranking=ranking)
+        output.log(f'report in {options.report}')
+    if options.out is not None:
+        write_results(options.out, results, ranking=ranking)
+        output.log(f'{REPORT}, {JSON} and {CURVES} in {options.out}')
+    output.json(replay_json.document(results, ranking=ranking))
+    return 0
+
+
+def replay_run(
+    each: Run,
+    output: Output,
+    *,
+    ship: Ship | None = None,
+    parameters: Parameters | None = None,
+    window: tuple[float, float] | None = None,
+) -> RunResult:
+    """
+    Replay one run; its progress is shown.
+
+    Raises
+    ------
+    EstimationError
+        If a window was given and nothing can be estimated from it.
+    """
+    with output.progress(f'replaying {each.name}') as progress:
+        result = RunResult.of(
+            replay(each, ship=ship, parameters=parameters, window=window, progress=progress)
+        )
+    if window is not None:
+        for coastdown in result.coastdowns:
+            if coastdown.estimate is None:
+                raise EstimationError(
+                    f'{each.name!r}: no estimate from {window[0]:g} to {window[1]:g} s: '
+                    f'{coastdown.failure}; give another --window'
+                )
+    return result
+
+
+def write_results(
+    directory: Path, results: Sequence[RunResult], *, ranking: Ranking | None = None
+) -> None:
+    """
+    Write the page, the JSON and the curves into a directory.
+    """
+    write_report(directory / REPORT, results, ranking=ranking)
+    document: dict[str, Any] = replay_json.document(results, ranking=ranking)
+    (directory / JSON).write_text(json_text(document), encoding='utf-8')
+    write_curves(directory / CURVES, results)

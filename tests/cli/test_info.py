@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`info` tells what is in a bag."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros import __version__
+from shipdrag_ros.cli import main
+
+
+def test_the_words(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert main(['info', str(steady_bag)]) == 0
+    captured = capsys.readouterr().out
+    assert f'recorded by  shipdrag_ros {__version__}' in captured
+    assert 'ship.yaml (' in captured
+    assert '/shaft' in captured
+    assert 'sensor_msgs/msg/JointState' in captured
+    assert 'not there: speed_over_ground, rudder, wind_apparent, depth' in captured
+
+
+def test_the_json(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    capsys.readouterr()
+    assert main(['info', str(steady_bag), '--json']) == 0
+    (about,) = json.loads(capsys.readouterr().out)['bags']
+    assert about['bag'] == str(steady_bag)
+    assert about['duration_s'] == 301.0
+    assert about['messages'] == 4 * 302
+    assert about['indexed'] is True
+    assert about['warnings'] == []
+    shaft = next(topic for topic in about['topics'] if topic['topic'] == '/shaft')
+    assert (shaft['input'], shaft['messages'], shaft['rate_hz']) == ('shaft', 302, 1.0)
+
+
+def test_a_remapping_changes_what_is_heard(
+    steady_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ['info', str(steady_bag), '--remap', '/speed_through_water:=speed_over_ground']
+    capsys.readouterr()
+    assert main([*line, '--json']) == 0
+    (about,) = json.loads(capsys.readouterr().out)['bags']
+    assert 'speed_through_water' in about['missing_inputs']
+
+
+def test_no_bag_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['info', 'no such.mcap']) == 1
+    assert capsys.readouterr().err.startswith("ERROR: 'no such.mcap' does not exist")

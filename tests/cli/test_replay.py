@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `replay` says, in words, in JSON and in files."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.cli import main
+from shipdrag_ros.ship import Ship
+
+# the whole coastdown, without the estimates on the way
+WINDOW = ('--window', '300', '1800')
+
+
+def replay(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> dict[str, Any]:
+    """Replay and return the JSON."""
+    capsys.readouterr()
+    assert main(['replay', *map(str, arguments), '--json']) == 0
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
+    coastdown_bag: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = replay(capsys, coastdown_bag)
+    assert set(found) == {'coastdowns', 'combined', 'inputs', 'recorded'}
+    assert found['combined'] is None
+    assert found['recorded'] == {'compared': 0, 'identical': 0, 'first_difference': None}
+    assert found['inputs']['position'] == {'messages': 1801, 'used': 1801, 'rejected': {}}
+    (coastdown,) = found['coastdowns']
+    assert {
+        'bag',
+        'start_ns',
+        'end_ns',
+        'onset_detected_ns',
+        'ended_by',
+        'estimator',
+        'order',
+        'samples',
+        'speed_m_s',
+        'resistance_m_s2',
+        'sigma_m_s2',
+        'sigma_repeatable_m_s2',
+        'froude',
+        'froude_valid',
+        'noise_sd',
+        'current_m_s',
+    } <= set(coastdown)
+    assert coastdown['bag'] == str(coastdown_bag)
+    assert coastdown['estimator'] == 's1_joint'
+    assert coastdown['start_ns'] < coastdown['onset_detected_ns'] < coastdown['end_ns']
+    low, high = coastdown['froude_valid']
+    froude = np.array(coastdown['froude'])
+    assert np.all((froude >= low) & (froude <= high))
+    speed = np.array(coastdown['speed_m_s'])
+    assert np.all(np.diff(speed) > 0)
+
+    ship = Ship.load(ship_file)
+    middle = (speed > 3.0) & (speed < 7.0)
+    r = np.array(coastdown['resistance_m_s2'])[middle]
+    true = ship.resistance_n(speed[middle]) / ship.mass_kg
+    np.testing.assert_allclose(r, true, rtol=0.10)
+    total = np.array(coastdown['sigma_m_s2'])
+    assert np.all(total > np.array(coastdown['sigma_repeatable_m_s2']))
+
+
+def test_the_words_give_every_figure(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(['replay', str(coastdown_bag)]) == 0
+    captured = capsys.readouterr()
+    for text in (
+        'start',
+        'duration',
+        'ended because',
+        's1_joint',
+        'coefficients',
+        'samples used',
+        'valid range',
+        'speed [m/s]  [knots]     Fr',
+        'true r',
+        'speed_through_water      1801  1801         -',
+        'no outputs of its own',
+    ):
+        assert text in captured.out
+    assert captured.err == ''
+
+
+def test_no_coastdown_is_a_result(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert replay(capsys, steady_bag)['coastdowns'] == []
+    assert main(['replay', str(steady_bag)]) == 0
+    assert 'No coastdown found.' in capsys.readouterr().out
+
+
+def test_a_given_window_is_estimated_as_it_is(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (coastdown,) = replay(capsys, coastdown_bag, '--window', '400', '1200')['coastdowns']
+    assert (coastdown['ended_by'], coastdown['onset_detected_ns']) == ('given', None)
+    assert coastdown['samples'] == {'speed_through_water': 801, 'position': 801}
+
+
+def test_a_window_without_an_estimate_is_an_error(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['replay', str(coastdown_bag), '--window', '400', '401']) == 1
+    captured = capsys.readouterr()
+    assert captured.err.startswith(f'ERROR: {str(coastdown_bag)!r}: no estimate from 400 to 401 s')
+    assert captured.out == ''
+    assert main(['replay', str(coastdown_bag), '--window', '1200', '400']) == 1
+    assert 'window' in capsys.readouterr().err
+
+
+def test_another_ship_gives_another_range(
+    coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / 'ship.yaml'
+    other.write_text(
+        '{length_m: 150, displaced_volume_m3: 20200, added_mass: {model: constant, value: 0.2}}'
+    )
+    (own,) = replay(capsys, coastdown_bag, *WINDOW)['coastdowns']
+    (given,) = replay(capsys, coastdown_bag, *WINDOW, '--ship', other)['coastdowns']
+    np.testing.assert_allclose(given['speed_m_s'][-1], own['speed_m_s'][-1], rtol=1e-3)
+    # 1.2 instead of 1.06 to 1.10
+    assert 1.05 < given['resistance_m_s2'][-1] / own['resistance_m_s2'][-1] < 1.15
+
+
+def test_other_parameters_give_another_estimate(
+    coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'parameters.yaml').write_text('estimator: s1_speed')
+    found = replay(capsys, coastdown_bag, '--parameters', tmp_path / 'parameters.yaml', *WINDOW)
+    assert found['coastdowns'][0]['estimator'] == 's1_speed'
+
+
+def test_a_topic_is_heard_under_another_name(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    remap = ('--remap', '/speed_through_water:=speed_over_ground')
+    found = replay(capsys, coastdown_bag, *WINDOW, *remap)
+    assert 'speed_through_water' not in found['inputs']
+    assert found['inputs']['speed_over_ground']['messages'] > 1500
+
+
+def test_everything_is_written_to_a_folder(
+    coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / 'new' / 'folder'
+    found = replay(capsys, coastdown_bag, *WINDOW, '--out', out)
+    assert json.loads((out / 'result.json').read_text()) == found
+    with (out / 'curves.csv').open(newline='') as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row['speed_m_s']) for row in rows] == found['coastdowns'][0]['speed_m_s']
+    assert 'data:image/svg+xml;base64' in (out / 'report.html').read_text()
+
+
+def test_a_report_is_one_file(coastdown_bag: Path, tmp_path: Path) -> None:
+    assert main(['replay', str(coastdown_bag), *WINDOW, '--report', str(tmp_path / 'a.html')]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ['a.html']
+
+
+def test_hulls_are_compared(
+    coastdown_bag: Path, ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / 'slow.mcap'
+    line = ['simulate', '--ship', str(ship_file), '-o', str(other), '--speed', '6']
+    assert main([*line, '--lead-in', '300']) == 0
+    found = replay(capsys, other, coastdown_bag, *WINDOW, '--compare')
+    tops = [hull['froude_max'] for hull in found['hulls']]
+    assert tops == sorted(tops, reverse=True)
+    assert str(coastdown_bag) in found['hulls'][0]['name']
+    assert main(['replay', str(other), str(coastdown_bag), *WINDOW, '--compare']) == 0
+    captured = capsys.readouterr().out
+    assert '1. Vitus Bering' in captured
+    assert 'ranks the onset of wave making and nothing else' in captured
+
+
+def test_one_hull_cannot_be_compared(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['replay', str(coastdown_bag), *WINDOW, '--compare']) == 1
+    assert 'at least 2 are needed' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('line', 'said'),
+    [
+        (['--json', 'BAG'], 'would be overwritten by the JSON'),
+        ([], 'the following arguments are required: BAG'),
+        (['BAG', '--report', 'a.mcap'], 'expected a name that ends in .html'),
+        (['BAG', '--report', 'no such folder/a.html'], "no folder 'no such folder'"),
+        (['BAG', '--json', 'no such folder/a.json'], "no folder 'no such folder'"),
+        (['BAG', '--window', '1'], 'expected 2 arguments'),
+        (['BAG', '--window', '-1', '5'], 'at least 0'),
+        (['BAG', '--remap', 'a=b'], 'expected FROM:=TO'),
+        (['--remap', 'a:=b', 'c:=d', 'BAG'], 'write --remap before each'),
+    ],
+)
+def test_wrong_usage_is_explained(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str], line: list[str], said: str
+) -> None:
+    before = coastdown_bag.read_bytes()
+    with pytest.raises(SystemExit) as end:
+        main(['replay', *(str(coastdown_bag) if word == 'BAG' else word for word in line)])
+    assert end.value.code == 2
+    assert said in capsys.readouterr().err
+    assert coastdown_bag.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ('line', 'said'),
+    [
+        (['no such.mcap'], "ERROR: 'no such.mcap' does not exist"),
+        (['BAG', '--ship', 'no such.yaml'], 'ERROR: no such.yaml: 1 problem(s)'),
+        (['BAG', '--parameters', 'no such.yaml'], "ERROR: 'no such.yaml': No such file"),
+        (['BAG', '--remap', '/a:=position'], "no topic '/a' in the bag"),
+        (['BAG', '--out', 'BAG'], 'File exists'),
+    ],
+)
+def test_a_user_error_is_told(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str], line: list[str], said: str
+) -> None:
+    words = [str(coastdown_bag) if word == 'BAG' else word for word in line]
+    assert main(['replay', *words]) == 1
+    assert said in capsys.readouterr().err
+
+
+def test_a_bag_that_is_none_is_told(
+    tmp_path: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(ship_file, tmp_path / 'ship.mcap')
+    assert main(['replay', str(tmp_path / 'ship.mcap')]) == 1
+    assert capsys.readouterr().err.startswith('ERROR: ')
