@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -10,7 +11,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from tempfile import gettempdir
+from typing import Any, TextIO
 
 import pytest
 import yaml
@@ -18,8 +20,22 @@ import yaml
 START_S = 90.0  # the first start of a machine compiles the kernels
 ANSWER_S = 15.0
 
-_worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
-os.environ['ROS_DOMAIN_ID'] = str(10 + _worker)
+
+def _own_domain() -> tuple[int, TextIO]:
+    """Find a domain that no other test process of this machine is in, and lock it."""
+    for domain in range(10, 102):
+        lock = (Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock').open('w')
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+        else:
+            return domain, lock
+    raise RuntimeError('92 test processes run already')
+
+
+_domain, _lock = _own_domain()
+os.environ['ROS_DOMAIN_ID'] = str(_domain)
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
