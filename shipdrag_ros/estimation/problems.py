@@ -12,13 +12,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from shipdrag_ros.estimation.motion import PolynomialMotion
 from shipdrag_ros.estimation.result import OrderTrial
 from shipdrag_ros.regression.order import OrderTable, fit_orders, rounding
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
-from shipdrag_ros.regression.triangle import triangle
+from shipdrag_ros.regression.triangle import inverse, triangle
 from shipdrag_ros.samples import Float64, Int64
 
 
@@ -177,13 +176,11 @@ def solve_joint(speed: Measured, position: Measured) -> Solution:
     )
     row, trusted, notes = _choose(table, float(all(data.known_sigma for data in inputs)))
     order = int(table.coefficients[row])
-    triangular = r[:order, :order]
-    factor = 1.0 if trusted else float(table.variance[row])
-    root = solve_triangular(triangular, np.eye(order)) * math.sqrt(factor)
+    unscaled = inverse(r[:order, :order])
+    coefficients = np.einsum('ij,j->i', unscaled, projected[:order])
+    root = unscaled if trusted else unscaled * math.sqrt(table.variance[row])
     return Solution(
-        PolynomialMotion(
-            scale, basis, solve_triangular(triangular, projected[:order]), root, speed_at=1
-        ),
+        PolynomialMotion(scale, basis, coefficients, root, speed_at=1),
         order,
         _trials(table, variances[1], variances[0]),
         {data.name: math.sqrt(variances[i, row]) for i, data in enumerate(inputs)},

@@ -123,7 +123,8 @@ class Estimate:
     froude_max_argmax
         argmax dr/dFr over the branch, as S1 has it.
     w
-        max sigma_r / max r over the valid range, S1's figure of merit.
+        max sigma_r / max r over the valid range, S1's figure of merit; of the
+        repeatable sigma, as in S1. It says nothing about bias.
     last_speed_m_s, last_speed_sigma_m_s, last_resistance_m_s2, last_sigma_m_s2
         Estimates at `end_ns`.
     tracks

@@ -3,6 +3,6 @@
 
 from shipdrag_ros.regression.order import OrderTable, fit_orders
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
-from shipdrag_ros.regression.triangle import triangle
+from shipdrag_ros.regression.triangle import inverse, triangle
 
-__all__ = ['OrderTable', 'OrthogonalBasis', 'TimeScale', 'fit_orders', 'triangle']
+__all__ = ['OrderTable', 'OrthogonalBasis', 'TimeScale', 'fit_orders', 'inverse', 'triangle']

@@ -51,3 +51,23 @@ def triangle(rows: Float64) -> Float64:
         rows = np.concatenate([rows, np.zeros((k - len(rows), k))])
     factor: Float64 = householder(rows, mode='r')
     return factor
+
+
+def inverse(upper: Float64) -> Float64:
+    """
+    Return the inverse of a small upper triangular matrix.
+
+    Parameters
+    ----------
+    upper : (k, k)
+        Without zeros on the diagonal.
+
+    Notes
+    -----
+    Back substitution; the library's solver starts threads for any size.
+    """
+    result = np.eye(len(upper))
+    for i in reversed(range(len(upper))):
+        result[i] -= upper[i, i + 1 :] @ result[i + 1 :]
+        result[i] /= upper[i, i]
+    return result

@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from shipdrag_ros.regression import triangle
+from shipdrag_ros.regression import inverse, triangle
 
 
 @pytest.mark.parametrize('n', [1, 5, 127, 128, 129, 5000])
@@ -41,6 +41,12 @@ def test_residual_sum_without_cancellation() -> None:
 def test_too_many_columns_are_refused() -> None:
     with pytest.raises(ValueError, match='65 columns'):
         triangle(np.zeros((200, 65)))
+
+
+def test_inverse() -> None:
+    upper = triangle(np.random.default_rng(3).normal(size=(60, 20)))
+    np.testing.assert_allclose(inverse(upper) @ upper, np.eye(20), rtol=0.0, atol=1e-13)
+    np.testing.assert_array_equal(inverse(upper), np.triu(inverse(upper)))
 
 
 def test_threads_of_blas_change_no_bit() -> None:
