@@ -9,7 +9,7 @@ can be read is written, plausible or not, for the monitor to judge.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
@@ -103,6 +103,7 @@ def import_csv(
     rate_hz: float | None = None,
     where: Sequence[tuple[str, str]] = (),
     start_ns: int = BASE_NS,
+    attachments: Mapping[str, str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> ImportResult:
     """
@@ -124,6 +125,8 @@ def import_csv(
         (column, text): only rows with this text there are taken.
     start_ns
         Date of time 0, for times that count from the start of a test [ns].
+    attachments
+        Text by name, a ship file for instance.
     progress
         Told how many bytes are read, and of how many.
 
@@ -146,6 +149,8 @@ def import_csv(
     writer = BagWriter(out)
     try:
         with writer:
+            for name, text in (attachments or {}).items():
+                writer.attach(name, text)
             writer.attach(ATTACHMENT, _provenance(source, inputs, time, rate_hz, where))
             for row in table.rows(progress):
                 record.take(row)

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`import` makes a bag that `replay` reads, and tells what it left out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.cli import main
+
+KNOT = 1852.0 / 3600.0
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    """A coast of v = 8 / (1 + t / 300), 600 s at 2 Hz, twice: run a and run b."""
+    time = np.arange(0.0, 600.0, 0.5)
+    speed = 8.0 / (1.0 + time / 300.0)
+    x = 2400.0 * np.log1p(time / 300.0)
+    lines = ['run,t,v,x,y']
+    for run in 'ab':
+        lines += [
+            f'{run},{t:.1f},{v / KNOT:.9f},{x_i:.6f},0'
+            for t, v, x_i in zip(time, speed, x, strict=True)
+        ]
+    path = tmp_path / 'trial.csv'
+    path.write_text('\n'.join(lines))
+    return path
+
+
+def convert(
+    capsys: pytest.CaptureFixture[str], table: Path, *arguments: str
+) -> tuple[Path, dict[str, Any]]:
+    """Import run a and return the bag and the JSON."""
+    bag = table.with_name(f'{len(list(table.parent.iterdir()))}.mcap')
+    capsys.readouterr()
+    assert main(['import', str(table), '-o', str(bag), *arguments, '--json']) == 0
+    return bag, json.loads(capsys.readouterr().out)
+
+
+def test_a_table_becomes_a_curve(
+    table: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag, said = convert(
+        capsys,
+        table,
+        *('--time', 't', '--map', 'speed_through_water=v:kn', '--map', 'position=x,y'),
+        *('--where', 'run=a', '--ship', str(ship_file)),
+    )
+    assert said['bag'] == str(bag)
+    assert (said['rows'], said['left_out']) == (2400, 1200)
+    assert said['written'] == {'speed_through_water': 1200, 'position': 1200}
+    assert main(['replay', str(bag), '--window', '0', '600', '--json']) == 0
+    (coastdown,) = json.loads(capsys.readouterr().out)['coastdowns']
+    assert coastdown['estimator'] == 's1_joint'
+    # -dv/dt = v^2 / 2400, and r = (1 + n_r) times that with n_r of 0.055 to 0.10
+    ratio = np.array(coastdown['resistance_m_s2']) / (np.array(coastdown['speed_m_s']) ** 2 / 2400)
+    assert np.all((ratio > 1.05) & (ratio < 1.11))
+
+
+def test_a_rate_takes_the_place_of_a_time(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, said = convert(capsys, table, '--rate', '4', '--map', 'speed_through_water=v')
+    assert said['end_ns'] - said['start_ns'] == 2399 * 250_000_000
+
+
+def test_the_words_tell_what_was_left_out(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with table.open('a') as file:
+        file.write('\na,700,fast,1,2\n')
+    line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
+    assert main([*line, '--map', 'speed_through_water=v:kn', '--where', 'run=a']) == 0
+    captured = capsys.readouterr().out
+    assert '1200 messages of 1201 rows' in captured
+    assert 'The times count from a start; it was put at 2000-01-01' in captured
+    assert '1200 rows were not chosen by --where.' in captured
+    assert "speed_through_water: 1 cells rejected, not a number: line 2402: 'fast'" in captured
+
+
+def test_times_that_go_back_are_told(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), '--time', 't']
+    assert main([*line, '--map', 'speed_through_water=v:kn']) == 0
+    # the last of run b is as late as the last of run a
+    assert 'In 1199 rows the time is before' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'status', 'said'),
+    [
+        (('--map', 'speed=v', '--time', 't'), 1, "ERROR: --map 'speed=v': no input 'speed'"),
+        (('--map', 'depth=v:furlong', '--time', 't'), 1, "no unit 'furlong'"),
+        (('--map', 'depth=z', '--time', 't'), 1, "'z'"),
+        (('--map', 'depth=v', '--time', 't:year'), 1, "no unit 'year'"),
+        (('--map', 'depth=v', '--time', 't', '--where', 'run=c'), 1, 'chooses none of them'),
+        (('--map', 'depth=v', '--time', 't', '--ship', 'no.yaml'), 1, 'no.yaml: 1 problem'),
+        (('--map', 'depth=v'), 2, 'one of the arguments --time --rate is required'),
+        (('--map', 'depth=v', '--time', 't', '--rate', '1'), 2, 'not allowed with'),
+        (('--map', 'depth=v', '--rate', '0'), 2, 'above 0 [Hz]'),
+        (('--map', 'depth=v', '--time', 't', '--where', 'run'), 2, 'expected COLUMN=VALUE'),
+        (('--time', 't'), 2, 'required: --map'),
+    ],
+)
+def test_a_mistake_is_told_and_leaves_no_bag(
+    table: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    status: int,
+    said: str,
+) -> None:
+    line = ['import', str(table), '-o', str(tmp_path / 'a.mcap'), *arguments]
+    if status == 2:
+        with pytest.raises(SystemExit) as end:
+            main(line)
+        assert end.value.code == 2
+    else:
+        assert main(line) == status
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / 'a.mcap').exists()
