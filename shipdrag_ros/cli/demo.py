@@ -207,12 +207,15 @@ class _Node:
         self._process.send_signal(signal.SIGINT)
 
     def end(self) -> None:
-        """Leave no process behind, whatever happened."""
-        if self.is_running:
-            self.interrupt()
-            try:
+        """Leave no process behind, whatever happens meanwhile."""
+        try:
+            if self.is_running:
+                self.interrupt()
                 self._process.wait(timeout=_END_S)
-            except subprocess.TimeoutExpired:
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            if self.is_running:
                 self._process.kill()
                 self._process.wait()
 

@@ -45,12 +45,13 @@ def curve_table(
     # as many decimals in every row as the best of them deserves
     least = float(np.min(curve.sigma_m_s2[chosen]))
     decimals = max(words.decimals_of(least), 0) if least > 0.0 else 6
+    highest = float(curve.speed_m_s[-1])
     rows = []
     for i in chosen:
         speed, r = float(curve.speed_m_s[i]), float(curve.resistance_m_s2[i])
         cells: tuple[str, ...] = (
-            f'{speed:.2f}',
-            f'{speed / words.M_S_PER_KNOT:.1f}',
+            words.speed_text(speed, highest_m_s=highest),
+            words.speed_text(speed / words.M_S_PER_KNOT, highest_m_s=highest)[:-1],
             f'{curve.froude[i]:.3f}',
             f'{r:.{decimals}f}',
             f'{curve.sigma_m_s2[i]:.{decimals}f}',

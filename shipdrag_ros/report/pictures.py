@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.report.truth import TrueCurve
-from shipdrag_ros.report.words import M_S_PER_KNOT
+from shipdrag_ros.report.words import M_S_PER_KNOT, force_unit
 
 # Okabe and Ito's colours, told apart by colour-blind readers; line styles and
 # shades of grey differ as well, for print
@@ -153,7 +153,7 @@ def resistance_picture(
     estimate
         What was found.
     mass_kg
-        Mass of the ship, for a second scale in kN.
+        Mass of the ship, for a second scale of force.
     truth
         The curve of the simulation, where the record is simulated.
     """
@@ -190,8 +190,9 @@ def resistance_picture(
         knots = axis.secondary_xaxis('top', functions=_scaled_by(1.0 / M_S_PER_KNOT))
         knots.set_xlabel('speed through water [knots]')
         if mass_kg is not None:
-            newtons = axis.secondary_yaxis('right', functions=_scaled_by(mass_kg * 1e-3))
-            newtons.set_ylabel('resistance [kN]')
+            newtons, unit = force_unit(mass_kg)
+            force = axis.secondary_yaxis('right', functions=_scaled_by(mass_kg / newtons))
+            force.set_ylabel(f'resistance [{unit}]')
         axis.set_xlabel('speed through water [m/s]')
         axis.set_ylabel('specific resistance r [m/s² = N/kg]')
         axis.legend(loc='upper left')

@@ -19,6 +19,7 @@ from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.ship import Ship
 
 M_S_PER_KNOT = 1852.0 / 3600.0
+_LIGHT_KG = 1e4
 
 ENDED_BY = {
     EndedBy.SPEED: 'the minimum speed was reached',
@@ -83,6 +84,20 @@ def decimals_of(spread: float) -> int:
     return 1 - math.floor(math.log10(spread))
 
 
+def force_unit(mass_kg: float) -> tuple[float, str]:
+    """
+    Return what a force of a ship is shown in: newtons in the unit, and its name.
+    """
+    return (1.0, 'N') if mass_kg < _LIGHT_KG else (1000.0, 'kN')
+
+
+def speed_text(speed_m_s: float, *, highest_m_s: float) -> str:
+    """
+    Return a speed without its unit; a model ship needs one digit more.
+    """
+    return f'{speed_m_s:.{2 if highest_m_s >= 1.0 else 3}f}'
+
+
 def estimator(name: str) -> str:
     """
     Name an estimator, with what it is.
@@ -95,7 +110,8 @@ def ship_line(ship: Ship) -> str:
     Return the ship in one line.
     """
     name = ship.name or 'a ship without a name'
-    mass = f'{ship.mass_kg:.4g} kg' if ship.mass_kg < 1e4 else f'{ship.mass_kg * 1e-3:,.0f} t'
+    light = ship.mass_kg < _LIGHT_KG
+    mass = f'{ship.mass_kg:.4g} kg' if light else f'{ship.mass_kg * 1e-3:,.0f} t'
     return (
         f'{name}: length {ship.length_m:g} m, displacement {ship.displaced_volume_m3:g} m³ '
         f'({mass})'
@@ -132,11 +148,17 @@ def result_sentence(coastdown: Coastdown, *, mass_kg: float | None = None) -> st
     r, sigma = float(curve.resistance_m_s2[best]), float(curve.sigma_m_s2[best])
     force = ''
     if mass_kg is not None:
-        force = f', that is {plus_minus(r * mass_kg * 1e-3, 2e-3 * sigma * mass_kg)} kN'
+        newtons, unit = force_unit(mass_kg)
+        scale = mass_kg / newtons
+        force = f', that is {plus_minus(r * scale, 2.0 * sigma * scale)} {unit}'
+
+    def shown(speed_m_s: float) -> str:
+        return speed_text(speed_m_s, highest_m_s=high)
+
     return (
-        f'The resistance is known from {low:.2f} to {high:.2f} m/s '
+        f'The resistance is known from {shown(low)} to {shown(high)} m/s '
         f'({low / M_S_PER_KNOT:.1f} to {high / M_S_PER_KNOT:.1f} knots), best at '
-        f'{speed:.2f} m/s: there the '
+        f'{shown(speed)} m/s: there the '
         f'specific resistance is {plus_minus(r, 2.0 * sigma)} m/s² (two standard deviations)'
         f'{force}.'
     )
@@ -159,9 +181,12 @@ def _range_notes(estimate: Estimate) -> list[str]:
     found = []
     if len(curve):
         fastest = float(estimate.curve.speed_m_s[-1])
+        low, high, top = (
+            speed_text(float(speed), highest_m_s=fastest)
+            for speed in (curve.speed_m_s[0], curve.speed_m_s[-1], fastest)
+        )
         found.append(
-            f'Nothing is said outside {curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f} m/s; '
-            f'the record itself reaches {fastest:.2f} m/s.'
+            f'Nothing is said outside {low} to {high} m/s; the record itself reaches {top} m/s.'
         )
     found.append(
         f'The upper end, Fr {estimate.froude_valid[1]:.3f}, is '

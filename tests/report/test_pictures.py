@@ -70,6 +70,9 @@ def test_the_curve_has_its_band_range_scales_and_truth(
     curve = estimate.valid_curve
     np.testing.assert_allclose(top, (curve.resistance_m_s2 + 2 * curve.sigma_m_s2).max())
     assert len(axis.child_axes) == 2
+    assert axis.child_axes[1].get_ylabel() == 'resistance [kN]'
+    light = pictures.resistance_picture(estimate, mass_kg=14.0).axes[0]
+    assert light.child_axes[1].get_ylabel() == 'resistance [N]'
 
     plain = pictures.resistance_picture(estimate).axes[0]
     assert len(plain.child_axes) == 1

@@ -54,6 +54,15 @@ def test_the_sentence_gives_range_figure_and_force(coastdown: Coastdown, ship: S
     assert 'kN' not in words.result_sentence(coastdown)
 
 
+def test_a_model_ship_is_told_in_newtons_and_millimetres(coastdown: Coastdown) -> None:
+    assert coastdown.estimate is not None
+    curve = coastdown.estimate.curve
+    slow = replace(coastdown.estimate, curve=replace(curve, speed_m_s=0.1 * curve.speed_m_s))
+    sentence = words.result_sentence(replace(coastdown, estimate=slow), mass_kg=14.0)
+    assert 'from 0.195 to 0.690 m/s' in sentence
+    assert '0.222 ± 0.012 N.' in sentence
+
+
 def test_the_sentence_of_a_failure_gives_its_reason(coastdown: Coastdown) -> None:
     failed = replace(coastdown, estimate=None, failure='too few samples')
     assert 'too few samples' in words.result_sentence(failed)
