@@ -60,8 +60,9 @@ class Table:
             ) from error
         if not first:
             raise ImportDataError(f'{str(path)!r} is empty; give a table with a line a sample')
-        self.delimiter = max(DELIMITERS, key=first.count)
-        cells = next(iter(self._rows(iter([first])))).cells
+        # a delimiter in quotes is none
+        self.delimiter = max(DELIMITERS, key=lambda mark: len(self._cells(first, mark)))
+        cells = self._cells(first, self.delimiter)
         numbers = all(NUMBER.fullmatch(cell) for cell in cells if cell)
         self.header: tuple[str, ...] | None = None if numbers else tuple(cells)
         self._width = len(cells)
@@ -103,15 +104,18 @@ class Table:
         """
         total = self.path.stat().st_size
         with self.path.open('rb') as read, self._decoded(read) as file:
-            for count, row in enumerate(self._rows(file)):
+            for count, row in enumerate(self._rows(file, self.delimiter)):
                 if count == 0 and self.header is not None:
                     continue
                 if progress is not None and count % 1000 == 0:
                     progress(read.tell(), total)
                 yield row
 
-    def _rows(self, lines: Iterable[str]) -> Iterator[Row]:
-        reader = csv.reader(lines, delimiter=self.delimiter)
+    def _cells(self, line: str, delimiter: str) -> Sequence[str]:
+        return next((row.cells for row in self._rows([line], delimiter)), ())
+
+    def _rows(self, lines: Iterable[str], delimiter: str) -> Iterator[Row]:
+        reader = csv.reader(lines, delimiter=delimiter)
         try:
             for cells in reader:
                 stripped = [cell.strip() for cell in cells]
