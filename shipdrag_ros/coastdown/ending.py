@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from shipdrag_ros.coastdown.bins import Bins, line
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.coastdown.kernel import Tuning
-from shipdrag_ros.coastdown.onset import Candidate
+from shipdrag_ros.coastdown.onset import Candidate, bend
 from shipdrag_ros.coastdown.tracking import shaft_rose_at, shaft_speed, turned_at
 from shipdrag_ros.parameters import Parameters
 
@@ -75,7 +75,7 @@ def _settled_since(
     if span >= width:
         expected = _extrapolated(bins, source, earlier, span, level - 0.5 * slope * width)
         if slope - expected > coasting.limits[0]:
-            return earlier
+            return _bend(bins, coasting, tuning, earlier - width, number)
     confirm = round(parameters.confirm_s)
     long = 2 * confirm
     if number - long >= start + long:
@@ -85,8 +85,16 @@ def _settled_since(
         )
         # slopes over a longer span wander less, at least in proportion
         if overall - expected > coasting.limits[0] * width / long:
-            return number - long
+            return _bend(bins, coasting, tuning, start, number)
     return None
+
+
+def _bend(bins: Bins, coasting: Candidate, tuning: Tuning, first: int, number: int) -> int:
+    """Return the last bin before the speed began to settle or to rise."""
+    first = max(first, coasting.start)
+    at = bend(bins, coasting.source, first, number, tuning.speed_min, degree=1, sign=-1)
+    # the thrust builds up before the speed shows it
+    return max(first, at - tuning.slopes.width // 6)
 
 
 def _extrapolated(bins: Bins, source: int, last: int, span: int, speed: float) -> float:
@@ -95,4 +103,4 @@ def _extrapolated(bins: Bins, source: int, last: int, span: int, speed: float) -
     middle = level - 0.5 * slope * span
     if not middle > 0.0:
         return 0.0
-    return min(slope, 0.0) * min(1.0, max(0.0, speed / middle)) ** _EXPONENT
+    return float(min(slope, 0.0) * min(1.0, max(0.0, speed / middle)) ** _EXPONENT)

@@ -210,19 +210,19 @@ class Monitor:
         watch, bins = self._memory.watch, self._memory.bins
         source = int(watch.seen_source[0])
         watch.source[0] = source
-        self._candidate = propose(bins, self._tuning, source, number, shaft)
-        self._learn_limit()
+        seen = self._knowing_chance(Candidate(source, number, shaft))
+        self._candidate = propose(bins, self._tuning, seen, number)
 
-    def _learn_limit(self) -> None:
+    def _knowing_chance(self, candidate: Candidate) -> Candidate:
         """Fix what chance could do before the candidate, once it is known."""
-        assert self._candidate is not None
-        if np.isnan(self._candidate.spread):
-            steadiness, source = self._memory.steadiness, self._candidate.source
-            self._candidate = replace(
-                self._candidate,
-                limits=tuple(float(limit) for limit in steadiness.limit[source]),
-                spread=float(steadiness.spread[source, 0]),
-            )
+        if not np.isnan(candidate.spread):
+            return candidate
+        steadiness, source = self._memory.steadiness, candidate.source
+        return replace(
+            candidate,
+            limits=tuple(float(limit) for limit in steadiness.limit[source]),
+            spread=float(steadiness.spread[source, 0]),
+        )
 
     def _judge(self) -> list[Event]:
         assert self._candidate is not None
@@ -231,10 +231,8 @@ class Monitor:
         if self._onset is not None:
             end = end_of(self._candidate, bins, tuning, parameters, number)
             return [] if end is None else [self._end_at(end)]
-        self._learn_limit()
-        verdict, self._candidate = judge(
-            self._candidate, bins, self._ship, tuning, parameters, number
-        )
+        candidate = self._knowing_chance(self._candidate)
+        verdict, self._candidate = judge(candidate, bins, self._ship, tuning, parameters, number)
         if verdict is Verdict.DISMISSED:
             self._stand_down()
         elif verdict is Verdict.CONFIRMED:

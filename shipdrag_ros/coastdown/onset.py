@@ -26,6 +26,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed settles
+_LAW_BINS_MIN = 6
 _GUARD = 0.1  # of confirm_s: the thrust runs down first
 _TRIALS = 3  # after confirm_s, twice and three times as long
 _PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by then
@@ -77,22 +78,39 @@ class Candidate:
         """
         Say whether the speed still falls faster than chance explains.
         """
-        return any(
-            line(bins, self.source, number, width << scale)[0] < -0.5 * limit
-            for scale, limit in enumerate(self.limits)
-        )
+        return self.falls_over(bins, number, width, 0.5) is not None
+
+    def falls_over(self, bins: Bins, number: int, width: int, part: float) -> int | None:
+        """
+        Return the shortest span that shows a fall; None if none does.
+
+        Parameters
+        ----------
+        part
+            Of the limits, that the slope must exceed.
+        """
+        for scale, limit in enumerate(self.limits):
+            if line(bins, self.source, number, width << scale)[0] < -part * limit:
+                return width << scale
+        return None
 
 
-def propose(bins: Bins, tuning: Tuning, source: int, number: int, shaft: float) -> Candidate:
+def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candidate:
     """
-    Make a candidate of what the walk saw at bin `number`.
+    Date back what the walk saw at bin `number`.
+
+    Parameters
+    ----------
+    seen
+        As seen, its start being `number`.
     """
     width = tuning.slopes.width
-    if math.isnan(shaft):
-        start = change_point(bins, source, number - 6 * width, number, tuning.speed_min)
-    else:
-        start = shaft_fell_at(bins, number, shaft, width)
-    return Candidate(source, start, shaft)
+    if seen.by_shaft:
+        return replace(seen, start=shaft_fell_at(bins, number, seen.shaft, width))
+    # the window that shows the fall holds its start, and one as long before it the steady speed
+    span = seen.falls_over(bins, number, width, 1.0) or width
+    start = change_point(bins, seen.source, number - 2 * span, number, tuning.speed_min)
+    return replace(seen, start=start)
 
 
 def judge(
@@ -158,23 +176,35 @@ def _coasts(
     number: int,
 ) -> bool:
     """Say whether the speed since the start looks like a coastdown."""
-    width = tuning.slopes.width
+    age = number - candidate.start
+    # the longer it lasts, the longer the span that its present slope can be taken over
+    span = max(tuning.slopes.width, age // 2)
+    slope, level, _ = line(bins, candidate.source, number, span)
+    _, before, _ = line(bins, candidate.source, candidate.start - 1, tuning.slopes.width)
+    middle = level - 0.5 * slope * span
+    if not before > level > 0.0 or not slope < 0.0:
+        return False
+    expected = expect(ship, before)
+    lost = (before - level) / expected.loss(before, age)
+    falling = -slope / expect(ship, middle).deceleration_m_s2
+    if min(lost, falling) > expected.fraction_min:
+        return True
+    # a ship that is heavier than its file says: the law alone, once there is enough of it
     guard = round(_GUARD * parameters.confirm_s)
     time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
-    slope, level, _ = line(bins, candidate.source, number, width)
-    _, before, _ = line(bins, candidate.source, candidate.start - 1, width)
-    if len(time) < 6 or not before > level:
+    if candidate.trials == 1 or len(time) < _LAW_BINS_MIN:
         return False
-    if candidate.trials == 1:
-        expected, now = expect(ship, before), expect(ship, level - 0.5 * slope * width)
-        lost = (before - level) / expected.loss(before, number - candidate.start)
-        return min(lost, -slope / now.deceleration_m_s2) > expected.fraction_min
     found = law(time, speed)
     if not (found.slope < 0.0 < found.speed):
         return False
     # a curvature is the difference of the slopes of two halves
     half = 0.5 * float(time[-1] - time[0])
-    sd = math.sqrt(2.0) * candidate.spread * width / half**2 * found.speed / found.slope**2
+    sd = (
+        math.sqrt(2.0)
+        * candidate.spread
+        * (tuning.slopes.width / half**2)
+        * (found.speed / found.slope**2)
+    )
     excess = found.exponent - expect(ship, found.speed).exponent
     return sd < EXCESS_MAX and excess < EXCESS_MAX
 
@@ -192,16 +222,37 @@ def change_point(bins: Bins, source: int, first: int, last: int, speed_min: floa
 
     Notes
     -----
-    Least squares of 1/v = u + c max(0, t - s): constant, then the hyperbola of
-    quadratic drag. At a given s it is linear; s is searched over all bins.
+    Quadratic drag makes 1/v rise linearly.
+    """
+    return bend(bins, source, first, last, speed_min, degree=0, sign=1)
+
+
+def bend(
+    bins: Bins, source: int, first: int, last: int, speed_min: float, *, degree: int, sign: int
+) -> int:
+    """
+    Return the bin at which 1/v bends most.
+
+    Parameters
+    ----------
+    degree
+        Of the polynomial that 1/v follows before: 0 steady, 1 coasting.
+    sign
+        1: where it begins to rise faster, -1: slower.
+
+    Notes
+    -----
+    Least squares of 1/v = polynomial + c max(0, t - s), s searched over all bins.
     """
     time, speed = speeds(bins, source, first, last)
     inverse = 1.0 / np.maximum(speed, 0.5 * speed_min)
-    inverse = inverse - inverse.mean()
     hinges = time[2:-2]
     ramp = np.maximum(0.0, time - hinges[:, np.newaxis])
-    ramp -= ramp.mean(axis=1, keepdims=True)
-    gain = np.maximum(ramp @ inverse, 0.0) ** 2 / np.einsum('ij,ij->i', ramp, ramp)
+    # what the polynomial explains is taken out of both
+    basis, _ = np.linalg.qr(np.vander(time, degree + 1))
+    inverse = inverse - basis @ (basis.T @ inverse)
+    ramp -= (ramp @ basis) @ basis.T
+    gain = np.maximum(0.0, sign * (ramp @ inverse)) ** 2 / np.einsum('ij,ij->i', ramp, ramp)
     return last + math.floor(float(hinges[np.argmax(gain)]))
 
 

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.coastdown.bins import (
+    Bins,
+    add,
+    close,
+    displacement,
+    line,
+    mean_place,
+    mean_turning,
+    speeds,
+)
+from shipdrag_ros.samples import Channel
+
+SECOND_NS = 1_000_000_000
+FIRST = 1_700_000_000
+LOG = int(Channel.SPEED_THROUGH_WATER)
+WIDTH = 60
+
+
+def binned(channel: int, time_s, a, b=None, *, size: int = 1000) -> Bins:
+    """Put samples into bins, the last bin left open."""
+    bins = Bins.fresh(size)
+    b = np.zeros(len(time_s)) if b is None else b
+    for t, x, y in zip(time_s, a, b):
+        stamp = FIRST * SECOND_NS + round(t * 1e9)
+        number = stamp // SECOND_NS
+        if bins.samples[channel] and number > bins.filling[channel]:
+            close(bins, channel, WIDTH)
+        add(bins, channel, number, stamp, float(x), float(y))
+    return bins
+
+
+def test_a_bin_is_the_mean_of_its_second() -> None:
+    bins = binned(LOG, [0.0, 0.5, 0.9, 1.2, 2.5], [1.0, 2.0, 6.0, 4.0, 9.0])
+    time, speed = speeds(bins, LOG, FIRST, FIRST + 1)
+    np.testing.assert_allclose(speed, [3.0, 4.0], rtol=1e-15)
+    np.testing.assert_allclose(time, [-1.0 + 1.4 / 3.0, 0.2], rtol=1e-12)
+
+
+@pytest.mark.parametrize('rate_hz', [0.2, 1.0, 20.0])
+def test_a_line_is_least_squares(rate_hz: float) -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(0.3, 100.0, 1.0 / rate_hz)
+    bins = binned(LOG, time, 8.0 - 0.02 * time + 0.05 * rng.standard_normal(len(time)))
+    slope, level, count = line(bins, LOG, FIRST + 90, WIDTH)
+    t, v = speeds(bins, LOG, FIRST + 31, FIRST + 90)
+    expected = np.polyfit(t, v, 1)
+    assert count == len(t)
+    np.testing.assert_allclose(slope, expected[0], rtol=1e-9)
+    np.testing.assert_allclose(level, np.polyval(expected, t[-1]), rtol=1e-12)
+
+
+def test_a_line_needs_points_over_the_window() -> None:
+    bins = binned(LOG, np.arange(100.0), np.arange(100.0))
+    assert np.isnan(line(bins, LOG, FIRST + 140, WIDTH)[0])
+    assert np.isnan(line(bins, LOG, FIRST + 2, WIDTH)[0])
+    assert not np.isnan(line(bins, LOG, FIRST + 98, WIDTH)[0])
+
+
+def test_old_bins_are_overwritten_and_not_mistaken_for_new_ones() -> None:
+    bins = binned(LOG, np.arange(100.0), np.arange(100.0), size=64)
+    assert len(speeds(bins, LOG, FIRST, FIRST + 98)[1]) == 64
+    assert line(bins, LOG, FIRST + 30, 20)[2] == 0
+
+
+@pytest.mark.parametrize('channel', [Channel.POSITION, Channel.POSITION_GEODETIC])
+def test_speed_of_a_track(channel: Channel) -> None:
+    time = np.arange(0.0, 200.0, 0.5)
+    east, north = 3.0 * time, 4.0 * time
+    if channel is Channel.POSITION:
+        bins = binned(int(channel), time, east, north)
+    else:
+        # across the date line
+        latitude = 60.0 + np.degrees(north / 6_371_008.8)
+        longitude = 179.999 + np.degrees(east / 6_371_008.8 / np.cos(np.radians(60.0)))
+        longitude = (longitude + 180.0) % 360.0 - 180.0
+        assert longitude.min() < 0.0 < longitude.max()
+        bins = binned(int(channel), time, latitude, longitude)
+    t, v = speeds(bins, int(channel), FIRST + 50, FIRST + 150)
+    np.testing.assert_allclose(v, 5.0, rtol=1e-4)
+    # the mean of 20 s of positions is behind the bin by half of that
+    np.testing.assert_allclose(t[-1], 0.25 - 9.5, atol=1e-9)
+    _, way_east, way_north = displacement(bins, int(channel), FIRST + 150, 10)
+    np.testing.assert_allclose([way_east, way_north], [30.0, 40.0], rtol=1e-3)
+
+
+def test_headings_are_averaged_on_the_circle() -> None:
+    bins = binned(int(Channel.HEADING), np.arange(10.0), np.pi + 0.1 * (-1.0) ** np.arange(10))
+    _, cosine, sine, count = mean_place(bins, int(Channel.HEADING), FIRST + 7, 4)
+    assert count == 4
+    np.testing.assert_allclose(abs(np.arctan2(sine, cosine)), np.pi, rtol=1e-12)
+
+
+def test_a_shaft_that_turns_astern_turns() -> None:
+    bins = binned(int(Channel.SHAFT), np.arange(10.0), np.full(10, -3.0))
+    turning, count = mean_turning(bins, int(Channel.SHAFT), FIRST + 8, 4)
+    assert (turning, count) == (3.0, 4)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.simulation import EngineOrder, Turn
+
+START_NS = 1_700_000_000_000_000_000
+S = 1_000_000_000
+STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
+
+
+def the_coastdown(events) -> Coastdown:
+    (coastdown,) = [event for event in events if isinstance(event, Coastdown)]
+    return coastdown
+
+
+def end_s(coastdown: Coastdown) -> float:
+    return (coastdown.end_ns - START_NS) / S - 900.0
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_the_minimum_speed_ends_it(ship, watch, record, seed: int) -> None:
+    block = record(duration_s=2500.0, seed=seed)
+    coastdown = the_coastdown(watch(block))
+    assert coastdown.ended_by is EndedBy.SPEED
+    at = np.argmin(np.abs(block.stamp_ns - coastdown.end_ns))
+    mean = np.mean(block.value[at - 60 : at + 1, 0])
+    np.testing.assert_allclose(mean, ship.speed(0.05), atol=0.1)
+
+
+def test_froude_min_says_which_speed_that_is(watch, record) -> None:
+    block = record(duration_s=2500.0)
+    early = the_coastdown(watch(block, Parameters(froude_min=0.1)))
+    assert early.ended_by is EndedBy.SPEED
+    assert end_s(early) < 0.6 * end_s(the_coastdown(watch(block)))
+
+
+@pytest.mark.parametrize('second', ['compass', 'radar'])
+@pytest.mark.parametrize('rate_rad_s', [0.02, -0.005])
+def test_a_turn_ends_it_where_it_begins(
+    watch, record, sensors, second: str, rate_rad_s: float
+) -> None:
+    block = record(
+        sensors=(sensors['log'], sensors[second]), turns=(Turn(300.0, 200.0, rate_rad_s),)
+    )
+    coastdown = the_coastdown(watch(block))
+    assert coastdown.ended_by is EndedBy.TURN
+    # half of the 0.35 rad are still in; a course is the mean of a minute
+    half_s = 0.175 / abs(rate_rad_s)
+    assert 295.0 <= end_s(coastdown) <= 305.0 + half_s + (30.0 if second == 'radar' else 0.0)
+
+
+@pytest.mark.parametrize('thrust', [1.0, 0.5])
+@pytest.mark.parametrize('seed', range(3))
+def test_an_engaged_engine_shows_in_the_speed(watch, record, thrust: float, seed: int) -> None:
+    block = record(
+        orders=(STOP, EngineOrder(400.0, shaft=0.8, thrust=thrust)), duration_s=700.0, seed=seed
+    )
+    coastdown = the_coastdown(watch(block))
+    assert coastdown.ended_by is EndedBy.ENGINE
+    assert coastdown.failure != 'withdrawn'
+    assert 360.0 <= end_s(coastdown) <= 405.0
+
+
+@pytest.mark.parametrize('shaft', [1.0, -0.8])
+def test_an_engaged_engine_shows_in_the_shaft_at_once(
+    watch, record, sensors, shaft: float
+) -> None:
+    block = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        orders=(STOP, EngineOrder(400.0, shaft=shaft, thrust=0.1)),
+        duration_s=420.0,
+    )
+    coastdown = the_coastdown(watch(block))
+    assert coastdown.ended_by is EndedBy.ENGINE
+    assert 395.0 <= end_s(coastdown) <= 402.0
+
+
+def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn(watch, record, sensors) -> None:
+    # stopped for 45 s only: confirmed by the shaft, and over before it has cost 5 % of the speed
+    block = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        orders=(STOP, EngineOrder(25.0, shaft=1.0, thrust=1.0)),
+    )
+    events = watch(block, Parameters(slope_window_s=20.0))
+    coastdown = the_coastdown(events)
+    assert coastdown.ended_by is EndedBy.ENGINE
+    assert coastdown.estimate is None
+    assert coastdown.failure is not None
+    assert coastdown.failure.startswith('withdrawn')
+
+
+def test_several_coastdowns_in_one_record(watch, record) -> None:
+    full = EngineOrder(700.0, shaft=1.0, thrust=1.0)
+    orders = (STOP, full, EngineOrder(2000.0, shaft=0.0, thrust=0.0))
+    events = watch(record(orders=orders, duration_s=3000.0))
+    onsets = [event for event in events if isinstance(event, Onset)]
+    starts = [(onset.start_ns - START_NS) / S - 900.0 for onset in onsets]
+    np.testing.assert_allclose(starts, [6.0, 2006.0], atol=12.0)
+    ends = [event.ended_by for event in events if isinstance(event, Coastdown)]
+    assert ends == [EndedBy.ENGINE, EndedBy.RECORD_END]
+
+
+def test_a_coastdown_that_was_ended_is_not_taken_up_again(watch, record, sensors) -> None:
+    # the ship coasts on after the turn; only from a steady speed a new one begins
+    block = record(
+        sensors=(sensors['log'], sensors['compass']),
+        turns=(Turn(300.0, 30.0, 0.02),),
+        duration_s=2000.0,
+    )
+    events = watch(block)
+    assert len([event for event in events if isinstance(event, Onset)]) == 1

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a record is cut, and what was long before, must not change one bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.events import Coastdown, Onset, Reset, Update
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
+from shipdrag_ros.simulation import EngineOrder, Sensor, Turn
+
+START_NS = 1_700_000_000_000_000_000
+S = 1_000_000_000
+LOG = Channel.SPEED_THROUGH_WATER
+
+QUICK = Parameters(
+    steady_s=300.0,
+    slope_window_s=20.0,
+    confirm_s=40.0,
+    window_s=150.0,
+    update_s=7.0,
+    data_stop_s=20.0,
+    frozen_s=15.0,
+)
+
+
+def window_only(window, ship, parameters):
+    return window
+
+
+def spoil(block: Block, seed: int) -> Block:
+    """Strew every kind of bad sample and a clock that was set over a record."""
+    rng = np.random.default_rng(seed)
+    n = len(block)
+    arrays = [
+        block.channel.copy(),
+        block.stamp_ns.copy(),
+        block.receive_ns.copy(),
+        block.value.copy(),
+        block.variance.copy(),
+    ]
+    _, stamp, receive, value, _ = arrays
+    receive += rng.integers(0, 400_000_000, n)
+    stamp += rng.integers(-100_000_000, 100_000_000, n)
+    for share, change in (
+        (0.01, lambda i: value.__setitem__((i, 0), np.nan)),
+        (0.01, lambda i: value.__setitem__((i, 0), np.inf)),
+        (0.01, lambda i: value.__setitem__((i, 0), 1e4)),
+        (0.01, lambda i: stamp.__setitem__(i, stamp[i] - 9 * S)),
+        (0.01, lambda i: stamp.__setitem__(i, stamp[i] + 9 * S)),
+        (0.01, lambda i: stamp.__setitem__(i, stamp[max(0, i - 4)])),
+    ):
+        for i in np.flatnonzero(rng.random(n) < share):
+            change(i)
+    at = int(rng.integers(0, n))
+    value[at : at + 100] = value[at]
+    at = int(rng.integers(0, n))
+    stamp[at:] -= 30 * S
+    at = int(rng.integers(0, n))
+    receive[at:] -= 300 * S
+    stamp[at:] -= 300 * S
+    order = np.argsort(receive[:at], kind='stable')
+    later = at + np.argsort(receive[at:], kind='stable')
+    return Block(*arrays)[np.concatenate([order, later])]
+
+
+@pytest.fixture(scope='module')
+def eventful(record, sensors) -> Block:
+    """Two coastdowns, the second with a turn, on five inputs at uneven rates."""
+    parts = []
+    for i, turns in enumerate(((), (Turn(200.0, 60.0, 0.02),))):
+        block = record(
+            sensors=(
+                replace(sensors['log'], rate_hz=1.0),
+                Sensor(channel=Channel.SPEED_OVER_GROUND, rate_hz=0.7, sd=0.1),
+                replace(sensors['radar'], rate_hz=0.5),
+                replace(sensors['compass'], rate_hz=2.0),
+                sensors['shaft'],
+            ),
+            lead_in_s=400.0,
+            duration_s=450.0,
+            turns=turns,
+            seed=i,
+        )
+        shift = i * 850 * S
+        parts.append(
+            replace(block, stamp_ns=block.stamp_ns + shift, receive_ns=block.receive_ns + shift)
+        )
+    return concatenate(parts)
+
+
+def run(ship, blocks, estimate=window_only) -> tuple[list, dict]:
+    monitor = Monitor(ship, QUICK, estimate=estimate)
+    events = []
+    for block in blocks:
+        events += monitor.update(block)
+    return events + monitor.finish(), monitor.health()
+
+
+def cut(block: Block, places) -> list[Block]:
+    edges = [0, *sorted(places), len(block)]
+    return [block[a:b] for a, b in pairwise(edges)]
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data(), seed=st.integers(0, 1000))
+def test_where_the_record_is_cut_changes_no_bit(ship, eventful, bits, data, seed: int) -> None:
+    block = spoil(eventful, seed)
+    places = data.draw(st.lists(st.integers(0, len(block)), max_size=60))
+    events, health = run(ship, [block])
+    assert len(events) > 0
+    again, health_again = run(ship, cut(block, places))
+    assert bits(again) == bits(events)
+    assert health_again == health
+
+
+def test_sample_by_sample_changes_no_bit(ship, eventful, bits) -> None:
+    block = spoil(eventful, 5)
+    events, _ = run(ship, [block])
+    assert {Onset, Update, Coastdown, Reset} <= {type(event) for event in events}
+    assert bits(run(ship, cut(block, range(1, len(block))))[0]) == bits(events)
+
+
+def test_real_estimates_change_no_bit(ship, record, bits) -> None:
+    block = record(lead_in_s=300.0, duration_s=200.0)
+    whole, part = Monitor(ship, QUICK), Monitor(ship, QUICK)
+    events = whole.update(block) + whole.finish()
+    again = [event for piece in cut(block, range(0, 500, 3)) for event in part.update(piece)]
+    assert any(isinstance(event, Update) for event in events)
+    assert bits(again + part.finish()) == bits(events)
+
+
+def test_strided_and_read_only_blocks_change_no_bit(ship, eventful, bits) -> None:
+    twice = eventful[np.repeat(np.arange(len(eventful)), 2)]
+    strided = twice[::2]
+    for array in (strided.stamp_ns, strided.value, strided.channel):
+        array.flags.writeable = False
+    assert not strided.value.flags.c_contiguous
+    assert bits(run(ship, [strided])) == bits(run(ship, [eventful]))
+
+
+@pytest.fixture(scope='module')
+def long_record(record, sensors) -> Block:
+    """Ninety minutes with coastdowns, slow-downs and turns, the engine engaged between them."""
+    orders = []
+    for start in (0.0, 1100.0, 2300.0, 3300.0):
+        orders += [
+            EngineOrder(start, shaft=0.0, thrust=0.0),
+            EngineOrder(start + 400.0, shaft=1.0, thrust=1.0),
+        ]
+    orders.insert(4, EngineOrder(1900.0, shaft=0.7, thrust=0.5))
+    return record(
+        sensors=(sensors['log'], sensors['radar'], sensors['compass']),
+        orders=tuple(orders),
+        turns=(Turn(1300.0, 60.0, 0.02), Turn(3900.0, 100.0, 0.01)),
+        lead_in_s=600.0,
+        duration_s=4800.0,
+    )
+
+
+@settings(max_examples=15, deadline=None)
+@given(start_s=st.integers(1, 3500))
+def test_a_monitor_that_starts_later_says_the_same(ship, long_record, bits, start_s: int) -> None:
+    whole, _ = run(ship, [long_record])
+    later = long_record[long_record.stamp_ns >= START_NS + start_s * S]
+    part, _ = run(ship, [later])
+    known_ns = START_NS + start_s * S + Monitor(ship, QUICK).history_ns
+
+    def known(events) -> list:
+        return [
+            event
+            for event in events
+            if (event.start_ns if isinstance(event, Onset | Coastdown) else event.stamp_ns)
+            >= known_ns
+        ]
+
+    assert bits(known(part)) == bits(known(whole))
+    assert known(whole)
+
+
+def test_the_order_of_arrival_decides_between_inputs(ship, eventful) -> None:
+    # the same samples, all of the compass a second later: still one sequence, still events
+    late = np.where(eventful.channel == Channel.HEADING, S, 0)
+    moved = in_arrival_order([replace(eventful, receive_ns=eventful.receive_ns + late)])
+    events, health = run(ship, [moved])
+    assert health['heading'].clock_offset_s == pytest.approx(1.0)
+    assert sum(isinstance(event, Onset) for event in events) == 2

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.coastdown.bins import Bins, add, close
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset
+from shipdrag_ros.coastdown.onset import bend, change_point, law
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Channel
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import (
+    EngineOrder,
+    GaussMarkov,
+    Scenario,
+    Sensor,
+    Turn,
+    sense,
+    simulate,
+)
+
+START_NS = 1_700_000_000_000_000_000
+S = 1_000_000_000
+LOG = int(Channel.SPEED_THROUGH_WATER)
+STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
+
+
+def onsets(events):
+    return [event for event in events if isinstance(event, Onset)]
+
+
+def after_s(ns: int, lead_in_s: float) -> float:
+    return (ns - START_NS) / S - lead_in_s
+
+
+def binned(speed) -> Bins:
+    bins = Bins.fresh(1000)
+    for number, v in enumerate(speed):
+        if bins.samples[LOG]:
+            close(bins, LOG, 60)
+        add(bins, LOG, number, number * S, float(v), 0.0)
+    return bins
+
+
+def test_a_change_point_is_found_in_noise() -> None:
+    time = np.maximum(0.0, np.arange(300.0) - 170.0)
+    found = []
+    for seed in range(30):
+        noise = 0.05 * np.random.default_rng(seed).standard_normal(300)
+        found.append(change_point(binned(8.2 / (1 + time / 410) + noise), LOG, 50, 298, 2.0))
+    # 30 records, each good to 2 s or so
+    assert abs(np.mean(found) - 170.0) < 1.5
+    assert np.std(found) < 4.0
+
+
+def test_the_end_of_coasting_is_found_in_noise() -> None:
+    time = np.arange(300.0)
+    coasting = 8.2 / (1 + np.minimum(time, 200.0) / 410)
+    speed = coasting + 0.01 * np.maximum(0.0, time - 200.0)
+    speed += 0.02 * np.random.default_rng(1).standard_normal(300)
+    found = bend(binned(speed), LOG, 0, 298, 2.0, degree=1, sign=-1)
+    assert abs(found - 200) < 5
+
+
+@pytest.mark.parametrize('p', [1.5, 2.0, 3.0])
+def test_the_exponent_of_the_law(p: float) -> None:
+    time = np.arange(120.0)
+    grown = 1.0 + (p - 1.0) * 0.02 * time / 8.2
+    found = law(time, 8.2 * grown ** (-1.0 / (p - 1.0)))
+    np.testing.assert_allclose(found.exponent, p, rtol=0.05)
+
+
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('lead_in_s', [90.0, 200.0, 900.0, 2400.0])
+def test_onset_from_speed_alone(watch, record, lead_in_s: float, seed: int) -> None:
+    events = watch(record(lead_in_s=lead_in_s, duration_s=400.0, seed=seed))
+    (onset,) = onsets(events)
+    assert -5.0 <= after_s(onset.start_ns, lead_in_s) <= 15.0
+    assert 100.0 <= after_s(onset.detected_ns, lead_in_s) <= 150.0
+
+
+def test_onset_with_the_shaft_is_sooner_and_sharper(watch, record, sensors) -> None:
+    block = record(sensors=(sensors['log'], sensors['shaft']), duration_s=400.0)
+    (onset,) = onsets(watch(block))
+    assert -1.0 <= after_s(onset.start_ns, 900.0) <= 3.0
+    assert after_s(onset.detected_ns, 900.0) <= 45.0
+
+
+def test_shaft_stopped_fraction_says_when_it_has_stopped(watch, record, sensors) -> None:
+    # an engine that only slows down, to 0.2 of its speed
+    block = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        orders=(EngineOrder(0.0, shaft=0.2, thrust=0.0),),
+    )
+    assert len(onsets(watch(block))) == 1
+    assert onsets(watch(block, Parameters(shaft_stopped_fraction=0.15))) == []
+
+
+def test_a_windmilling_shaft_is_judged_by_the_speed(watch, record, sensors) -> None:
+    block = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        orders=(EngineOrder(0.0, shaft=0.4, thrust=0.0),),
+    )
+    (onset,) = onsets(watch(block))
+    assert -1.0 <= after_s(onset.start_ns, 900.0) <= 3.0
+    assert 100.0 <= after_s(onset.detected_ns, 900.0) <= 130.0
+    # the same shaft, but it still drives
+    driven = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        orders=(EngineOrder(0.0, shaft=0.4, thrust=0.5),),
+    )
+    assert onsets(watch(driven)) == []
+
+
+def test_a_turning_shaft_vetoes_the_speed(watch, record, sensors) -> None:
+    # the shaft turns on as if nothing had happened: whatever slows the ship is no coastdown
+    block = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        orders=(EngineOrder(0.0, shaft=1.0, thrust=0.0),),
+    )
+    assert onsets(watch(block)) == []
+
+
+def test_a_shaft_sensor_that_reads_nothing_does_not_veto(watch, record, sensors) -> None:
+    block = record(sensors=(sensors['log'], sensors['shaft']), shaft_rad_s=0.0)
+    assert len(onsets(watch(block))) == 1
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_a_slow_down_is_no_coastdown(watch, record, seed: int) -> None:
+    block = record(orders=(EngineOrder(0.0, shaft=0.7, thrust=0.49),), seed=seed)
+    assert onsets(watch(block)) == []
+
+
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('second', ['compass', 'radar'])
+def test_a_turn_is_no_coastdown(watch, record, sensors, second: str, seed: int) -> None:
+    block = record(
+        sensors=(sensors['log'], sensors[second]),
+        orders=(),
+        turns=(Turn(0.0, 150.0, 0.015, drag_area_m2=12.0),),
+        seed=seed,
+    )
+    assert onsets(watch(block)) == []
+
+
+def test_confirm_s_says_how_long_a_deceleration_is_looked_at(watch, record) -> None:
+    block = record(duration_s=400.0)
+    soon = onsets(watch(block, Parameters(confirm_s=60.0)))[0]
+    late = onsets(watch(block, Parameters(confirm_s=200.0)))[0]
+    assert after_s(soon.detected_ns, 900.0) <= 80.0
+    assert 180.0 <= after_s(late.detected_ns, 900.0) <= 240.0
+
+
+def test_false_alarms_per_day_sets_what_is_noticed(ship, record) -> None:
+    from shipdrag_ros.coastdown import Monitor
+    from shipdrag_ros.coastdown.events import State
+
+    block = record(duration_s=100.0)
+
+    def noticed_s(parameters: Parameters) -> int:
+        monitor = Monitor(ship, parameters)
+        for i in range(900, len(block)):
+            monitor.update(block[i : i + 1] if i > 900 else block[: i + 1])
+            if monitor.state is State.CANDIDATE:
+                return i - 900
+        raise AssertionError('nothing was noticed')
+
+    eager = noticed_s(Parameters(false_alarms_per_day=100.0))
+    assert eager + 2 < noticed_s(Parameters(false_alarms_per_day=0.001))
+
+
+def test_a_tanker_is_found_in_a_moderate_sea() -> None:
+    # 320 m, 312 000 m^3: 5 mm/s^2 at 8 m/s, less than a third of the cargo ship's
+    tanker = Ship.from_yaml(
+        'length_m: 320.0\n'
+        'displaced_volume_m3: 312600.0\n'
+        'added_mass: {model: constant, value: 0.08, sd: 0.02}\n'
+        'baseline: {speed_m_s: [0.0, 2.0, 4.0, 6.0, 8.0, 9.0],\n'
+        '  resistance_n: [0.0, 1.13e5, 4.3e5, 9.4e5, 1.65e6, 2.1e6], relative_sd: 0.05}\n',
+        subject='tanker',
+    )
+    from shipdrag_ros.coastdown import Monitor
+    from shipdrag_ros.errors import EstimationError
+
+    def refuse(window, ship, parameters):
+        raise EstimationError('not asked for')
+
+    found = 0
+    for seed in range(10):
+        scenario = Scenario(
+            speed_m_s=8.0,
+            lead_in_s=2400.0,
+            duration_s=700.0,
+            water_speed=GaussMarkov(0.03, 60.0),
+            seed=seed,
+        )
+        log = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.05)
+        block = sense(simulate(tanker, scenario), (log,), seed=seed, start_ns=START_NS)
+        found += len(onsets(Monitor(tanker, Parameters(), estimate=refuse).update(block)))
+    # of 10, seeds 0..9; each is found with a chance of more than 0.9: 7 or fewer once in 70
+    assert found >= 8
+
+
+def test_a_ship_without_a_baseline_is_judged_by_its_size(record) -> None:
+    from shipdrag_ros.coastdown import Monitor
+    from shipdrag_ros.errors import EstimationError
+
+    def refuse(window, ship, parameters):
+        raise EstimationError('not asked for')
+
+    bare = Ship(length_m=150.0, displaced_volume_m3=20200.0)
+    events = Monitor(bare, Parameters(), estimate=refuse).update(record())
+    assert len(onsets(events)) == 1
+
+
+def test_a_small_craft_with_short_windows() -> None:
+    # 1.2 m, 20 Hz, coasting for 27 s: the record of a towing tank
+    model = Ship.from_yaml(
+        'length_m: 1.2\n'
+        'displaced_volume_m3: 0.015\n'
+        'added_mass: {model: constant, value: 0.06, sd: 0.02}\n',
+        subject='model',
+    )
+    from shipdrag_ros.coastdown import Monitor
+    from shipdrag_ros.errors import EstimationError
+
+    def refuse(window, ship, parameters):
+        raise EstimationError('not asked for')
+
+    parameters = Parameters(
+        slope_window_s=5.0, confirm_s=10.0, steady_s=60.0, window_s=60.0, data_stop_s=5.0
+    )
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 87.0, 0.05)
+    coasting = np.maximum(0.0, time - 60.0)
+    from shipdrag_ros.samples import Block
+
+    block = Block.of(
+        Channel.SPEED_THROUGH_WATER,
+        START_NS + np.round(time * 1e9).astype(np.int64),
+        0.8 / (1 + coasting * 0.045 / 0.8) + 0.01 * rng.standard_normal(len(time)),
+    )
+    monitor = Monitor(model, parameters, estimate=refuse)
+    events = monitor.update(block) + monitor.finish()
+    (onset,) = onsets(events)
+    assert abs(after_s(onset.start_ns, 60.0)) <= 3.0
+    assert after_s(onset.detected_ns, 60.0) <= 20.0
+    (coastdown,) = [event for event in events if isinstance(event, Coastdown)]
+    assert coastdown.ended_by is EndedBy.RECORD_END
+
+
+def test_nothing_starts_below_the_minimum_speed(watch, record) -> None:
+    slow = record(speed_m_s=2.3)
+    assert onsets(watch(slow, Parameters(froude_min=0.07))) == []
+    fast = record(speed_m_s=4.0)
+    assert len(onsets(watch(fast, Parameters(froude_min=0.02)))) == 1
+
+
+def test_turn_rad_says_what_a_turn_is(watch, record, sensors) -> None:
+    # the heading drifts by 0.6 rad while the ship slows down
+    block = record(sensors=(sensors['log'], sensors['compass']), turns=(Turn(30.0, 60.0, 0.01),))
+    assert onsets(watch(block)) == []
+    assert len(onsets(watch(block, Parameters(turn_rad=1.0)))) == 1
+
+
+def test_outliers_do_not_hide_an_onset(watch, record, sensors) -> None:
+    spiky = replace(sensors['log'], outlier_fraction=0.01, outlier_size=2.0)
+    found = [
+        len(onsets(watch(record(sensors=(spiky,), lead_in_s=2400.0, seed=seed))))
+        for seed in range(6)
+    ]
+    assert sum(found) >= 5

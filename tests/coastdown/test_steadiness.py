@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.coastdown.bins import Bins, add, close
+from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, learn
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Channel
+
+SECOND_NS = 1_000_000_000
+LOG = int(Channel.SPEED_THROUGH_WATER)
+FIRST = 1_700_000_000
+
+
+def learnt(speed, *, first: int = FIRST, **parameters) -> Steadiness:
+    slopes = Slopes.of(Parameters(**parameters))
+    bins, steadiness = Bins.fresh(4000), Steadiness.fresh(slopes)
+    for number, v in enumerate(speed, start=first):
+        if bins.samples[LOG]:
+            learn(steadiness, slopes, bins, LOG, close(bins, LOG, slopes.width))
+        add(bins, LOG, number, number * SECOND_NS, float(v), 0.0)
+    return steadiness
+
+
+def noise(seconds: int, seed: int) -> np.ndarray:
+    return 8.0 + 0.05 * np.random.default_rng(seed).standard_normal(seconds)
+
+
+def test_spread_of_white_noise() -> None:
+    # 12 sigma^2 / W^3 is the variance of a slope; over 40 records the mean of the spread, of
+    # which each is good to 15 %, is within 4 standard errors, 10 %
+    found = np.mean([learnt(noise(2200, seed)).spread[LOG] for seed in range(40)], axis=0)
+    width = 60.0 * 2.0 ** np.arange(SCALES)
+    np.testing.assert_allclose(found, 0.05 * np.sqrt(12.0 / width**3), rtol=0.1)
+
+
+def test_a_coastdown_in_the_record_hardly_matters() -> None:
+    speed = noise(2200, 3)
+    before = learnt(speed).spread[LOG, 0]
+    time = np.maximum(0.0, np.arange(2200) - 1000.0)
+    after = learnt(speed * 410.0 / (410.0 + time)).spread[LOG, 0]
+    assert before < after < 1.6 * before
+
+
+def test_only_the_last_steady_s_matters() -> None:
+    speed = noise(5000, 4)
+    speed[:2000] += 3.0 * np.random.default_rng(5).standard_normal(2000)
+    steady_s, windows = 1800, 2 * 4 * 60
+    later = 5000 - steady_s - windows - 4 * 60
+    whole = learnt(speed)
+    part = learnt(speed[later:], first=FIRST + later)
+    assert np.array_equal(whole.spread[LOG], part.spread[LOG])
+    assert np.array_equal(whole.limit[LOG], part.limit[LOG])
+
+
+def test_steady_s_says_how_much_record_is_learnt_from() -> None:
+    speed = noise(3000, 6)
+    speed[:2000] += 0.3 * np.random.default_rng(7).standard_normal(2000)
+    assert learnt(speed, steady_s=600.0).spread[LOG, 0] < 0.7 * learnt(speed).spread[LOG, 0]
+
+
+def test_slope_window_s_says_how_long_a_slope_is() -> None:
+    speed = noise(3000, 8)
+    short, long = learnt(speed, slope_window_s=30.0), learnt(speed, slope_window_s=120.0)
+    np.testing.assert_allclose(short.spread[LOG, 0] / long.spread[LOG, 0], 8.0, rtol=0.5)
+
+
+def test_fewer_false_alarms_need_a_higher_limit() -> None:
+    speed = noise(3000, 9)
+    rare = learnt(speed, false_alarms_per_day=0.001)
+    assert np.all(rare.limit[LOG] > learnt(speed, false_alarms_per_day=10.0).limit[LOG])
+
+
+def test_nothing_is_known_at_first_then_a_guess_then_more() -> None:
+    speed = noise(2200, 10)
+    assert np.isnan(learnt(speed[:20]).limit[LOG, 0])
+    guess = learnt(speed[:90])
+    assert 0.0 < guess.limit[LOG, 0] < 0.02
+    assert np.isnan(guess.limit[LOG, 1])
+    assert np.all(learnt(speed).limit[LOG] < guess.limit[LOG, 0])
+
+
+@pytest.mark.parametrize('window', [5.0, 60.0])
+def test_a_gap_in_the_record_is_survived(window: float) -> None:
+    speed = noise(1500, 11)
+    slopes = Slopes.of(Parameters(slope_window_s=window))
+    bins, steadiness = Bins.fresh(4000), Steadiness.fresh(slopes)
+    for i in [*range(700), *range(1_000_000, 1_000_700)]:
+        if bins.samples[LOG]:
+            learn(steadiness, slopes, bins, LOG, close(bins, LOG, slopes.width))
+        add(bins, LOG, FIRST + i, (FIRST + i) * SECOND_NS, float(speed[i % 1500]), 0.0)
+    assert 0.0 < steadiness.limit[LOG, 0] < 1.0
