@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from typing import Any
 
@@ -101,6 +102,23 @@ def test_a_batch_gives_the_bits_of_single_messages(
     singles = [decode(source, [p], [t]).block for p, t in zip(payloads, received, strict=True)]
     assert same_bits(batch, concatenate(singles))
     assert batch.stamp_ns.tolist() == [s for s, *_ in rows]
+
+
+@settings(max_examples=60, deadline=None)
+@given(source=st.sampled_from(SOURCES), stamp_ns=stamps, frame=frames, numbers=eight)
+def test_what_rclpy_sends_is_decoded_the_same(
+    reference: Any, source: Source, stamp_ns: int, frame: str, numbers: list[float]
+) -> None:
+    serialization = pytest.importorskip('rclpy.serialization')
+    package, _, name = source.type.split('/')
+    kind = getattr(importlib.import_module(f'{package}.msg'), name)
+    ours = reference.serialize(
+        source.type, reference.message(source.type, stamp_ns, frame, numbers)
+    )
+    theirs = serialization.serialize_message(serialization.deserialize_message(ours, kind))
+    first, second = (decode(source, [payload], [0]) for payload in (ours, theirs))
+    assert len(first.block) == 1
+    assert same_bits(first.block, second.block)
 
 
 def test_magnitudes_and_yaws_do_not_depend_on_the_batch(reference: Any) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import importlib
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,24 @@ def test_an_update_is_speed_resistance_and_curve(reference: Any, estimate: Estim
     np.testing.assert_array_equal(points[:, 1], valid.resistance_m_s2)
     np.testing.assert_array_equal(points[:, 2], valid.sigma_m_s2)
     np.testing.assert_array_equal(points[:, 3], valid.froude)
+
+
+def test_rclpy_reads_what_is_published(estimate: Estimate) -> None:
+    serialization = pytest.importorskip('rclpy.serialization')
+    events = [Update(STAMP_NS, estimate), Coastdown(1, 2, 3, EndedBy.TURN, estimate)]
+    for message in [message for event in events for message in outputs(event)]:
+        package, _, name = message.type.split('/')
+        kind = getattr(importlib.import_module(f'{package}.msg'), name)
+        read = serialization.deserialize_message(message.payload, kind)
+        stamp = read.header.stamp
+        assert stamp.sec * 10**9 + stamp.nanosec == message.stamp_ns
+        if name == 'PointCloud2':
+            assert len(read.data) == read.row_step == 32 * read.width > 0
+        if name == 'DiagnosticArray':
+            assert read.status[0].level == b'\0'
+            assert {item.key for item in read.status[0].values} > {'start_ns', 'ended_by'}
+        if name == 'AccelWithCovarianceStamped':
+            assert read.accel.accel.linear.x == estimate.last_resistance_m_s2
 
 
 def test_the_node_name_is_that_given(estimate: Estimate) -> None:
