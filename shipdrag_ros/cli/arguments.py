@@ -15,7 +15,7 @@ class Help(argparse.ArgumentDefaultsHelpFormatter):
     """Name every default that says something."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        if action.default is None or action.default is False:
+        if action.default in (None, False, []):
             return action.help
         return super()._get_help_string(action)
 

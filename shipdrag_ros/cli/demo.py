@@ -104,6 +104,7 @@ def run(options: argparse.Namespace) -> int:
         f'sails at {SETTINGS.speed_m_s:g} m/s; after {SETTINGS.lead_in_s:.0f} s her engine is '
         f'stopped. {seconds:.0f} s of data take {seconds / options.speed_up:.0f} s.\n'
     )
+    output.log('starting the node; the first start on a machine compiles for some seconds')
     before = set(recordings.iterdir())
     with _ended_by_sigterm(), _node(ship_file, recordings, out / 'node.log') as node:
         live = _Live(truth, block, output)
@@ -230,6 +231,8 @@ def _node(ship_file: Path, recordings: Path, log: Path) -> Iterator[_Node]:
     # nothing leaves this machine, and no other ROS on it hears or is heard
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = str(_FIRST_DOMAIN + os.getpid() % _DOMAINS)
+    os.environ.pop('ROS_STATIC_PEERS', None)
+    os.environ.setdefault('ROS_LOG_DIR', str(log.parent / 'ros'))
     node = _Node(ship_file, recordings, log)
     try:
         yield node

@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.report.truth import TrueCurve
-from shipdrag_ros.report.words import M_S_PER_KNOT, force_unit
+from shipdrag_ros.report.words import M_S_PER_KNOT, force_unit, speed_name
 
 # Okabe and Ito's colours, told apart by colour-blind readers; line styles and
 # shades of grey differ as well, for print
@@ -188,12 +188,12 @@ def resistance_picture(
             )
         _frame_resistance(axis, whole, valid, truth)
         knots = axis.secondary_xaxis('top', functions=_scaled_by(1.0 / M_S_PER_KNOT))
-        knots.set_xlabel('speed through water [knots]')
+        knots.set_xlabel(f'{speed_name(estimate)} [knots]')
         if mass_kg is not None:
             newtons, unit = force_unit(mass_kg)
             force = axis.secondary_yaxis('right', functions=_scaled_by(mass_kg / newtons))
             force.set_ylabel(f'resistance [{unit}]')
-        axis.set_xlabel('speed through water [m/s]')
+        axis.set_xlabel(f'{speed_name(estimate)} [m/s]')
         axis.set_ylabel('specific resistance r [m/s² = N/kg]')
         axis.legend(loc='upper left')
     return figure

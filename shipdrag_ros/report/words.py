@@ -98,6 +98,14 @@ def speed_text(speed_m_s: float, *, highest_m_s: float) -> str:
     return f'{speed_m_s:.{2 if highest_m_s >= 1.0 else 3}f}'
 
 
+def speed_name(estimate: Estimate) -> str:
+    """
+    Name the speed that a curve is given against.
+    """
+    through_water = 'speed_through_water' in estimate.samples
+    return f'speed {"through water" if through_water else "over ground"}'
+
+
 def estimator(name: str) -> str:
     """
     Name an estimator, with what it is.
@@ -173,7 +181,12 @@ def notes(coastdown: Coastdown) -> tuple[str, ...]:
     estimate = coastdown.estimate
     if estimate is None:
         return ()
-    return (*estimate.notes, *_range_notes(estimate), *_method_notes(estimate))
+    return (
+        *estimate.notes,
+        *_range_notes(estimate),
+        *_residual_notes(estimate),
+        *_method_notes(estimate),
+    )
 
 
 def _range_notes(estimate: Estimate) -> list[str]:
@@ -196,6 +209,34 @@ def _range_notes(estimate: Estimate) -> list[str]:
         found.append(
             'So it depends on the starting speed; hulls compared, it is only a lower bound.'
         )
+    return found
+
+
+def _residual_notes(estimate: Estimate) -> list[str]:
+    """Tell of residuals that are not the independent scatter that the band counts on."""
+    found = []
+    for name, track in estimate.tracks.items():
+        residual = track.measured - track.fitted
+        energy = float(np.sum(residual**2))
+        if energy == 0.0:
+            continue
+        correlation = float(np.sum(residual[1:] * residual[:-1])) / energy
+        # of independent ones 1 / sqrt(n) is the standard deviation of this
+        if correlation > max(0.1, 4.0 / math.sqrt(len(residual))):
+            found.append(
+                f'What the fit leaves of {name} does not scatter: the correlation of neighbours '
+                f'is {correlation:.2f}. The sensor, the sea or the fit errs slowly, and the band '
+                'is too narrow for that.'
+            )
+    speed = estimate.tracks.get('speed_through_water')
+    if speed is not None and 'position' in estimate.tracks and estimate.current_m_s is None:
+        residual = speed.measured - speed.fitted
+        mean, spread = float(np.mean(residual)), float(np.std(residual))
+        if abs(mean) > max(0.2 * spread, 4.0 * spread / math.sqrt(len(residual))):
+            found.append(
+                f'The log reads {abs(mean):.2g} m/s {"more" if mean > 0.0 else "less"} on average '
+                'than the position moves: a current, or a log that reads wrong.'
+            )
     return found
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from shipdrag_ros.bags import Recorded
@@ -95,6 +96,35 @@ def test_notes_say_what_the_record_cannot_show(coastdown: Coastdown) -> None:
     notes = ' '.join(words.notes(ground))
     assert 'a run on the opposite heading would tell' in notes
     assert 'only a lower bound' in notes
+
+
+def test_residuals_that_do_not_scatter_are_told(coastdown: Coastdown) -> None:
+    estimate = coastdown.estimate
+    assert estimate is not None
+    # white residuals, N = 1500, seed 5: a correlation above 0.1 has a chance of 1e-4
+    assert not any('does not scatter' in note for note in words.notes(coastdown))
+    assert not any('on average' in note for note in words.notes(coastdown))
+
+    speed = estimate.tracks['speed_through_water']
+    slow = 0.05 * np.sin(np.arange(len(speed.fitted)) / 50.0)
+
+    def notes_with(measured: np.ndarray) -> str:
+        tracks = {**estimate.tracks, 'speed_through_water': replace(speed, measured=measured)}
+        other = replace(coastdown, estimate=replace(estimate, tracks=tracks))
+        return ' '.join(words.notes(other))
+
+    assert 'leaves of speed_through_water does not scatter' in notes_with(speed.measured + slow)
+    assert 'The log reads 0.2 m/s more' in notes_with(speed.fitted + 0.2)
+    assert 'm/s more on average' in notes_with(speed.measured + 0.1)
+    assert 'm/s less on average' in notes_with(speed.measured - 0.1)
+    assert 'scatter' not in notes_with(speed.fitted)
+
+
+def test_a_curve_over_ground_is_named_so(coastdown: Coastdown) -> None:
+    assert coastdown.estimate is not None
+    assert words.speed_name(coastdown.estimate) == 'speed through water'
+    ground = replace(coastdown.estimate, samples={'position': 3})
+    assert words.speed_name(ground) == 'speed over ground'
 
 
 def test_a_ship_is_one_line(ship: Ship) -> None:
