@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import shutil
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from shipdrag_ros.messages import encode, reset_request, types
 from shipdrag_ros.samples import Block, Channel, concatenate
 
 WriteBag = Callable[..., Path]
+START_NS = 1_700_000_000_000_000_000
 ReadSamples = Callable[[Run], Block]
 AssertSame = Callable[[Block, Block], None]
 
@@ -161,6 +163,23 @@ def test_a_batch_is_bounded_and_its_size_changes_nothing(
     blocks = [item for item in run.inputs() if isinstance(item, Block)]
     assert max(map(len, blocks)) == 7
     assert_same(concatenate(blocks), block)
+
+
+def test_memory_does_not_grow_with_the_bag(
+    write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run_module, 'BATCH', 256)
+    peaks = []
+    for n in (2000, 20_000):
+        block = Block.of(Channel.SHAFT, START_NS + np.arange(n) * 10**8, 1.0)
+        (run,) = open_runs([write_bag(f'{n}.mcap', block, chunk_bytes=20_000)])
+        tracemalloc.start()
+        for _ in run.inputs():
+            pass
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    # the samples alone would be 10 times as many bytes
+    assert peaks[1] < 1.5 * peaks[0]
 
 
 def test_a_range_of_time(write_bag: WriteBag, block: Block, assert_same: AssertSame) -> None:
