@@ -9,7 +9,7 @@ and in the order of time, however the record was cut on the way here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -61,6 +61,9 @@ class Window:
         Rate of turn [rad/s].
     notes
         What was left out, a sentence each.
+    before
+        The record that ends where this window starts, positions in the same
+        plane; None where there is none.
 
     Notes
     -----
@@ -76,9 +79,12 @@ class Window:
     heading: Series
     shaft: Series
     notes: tuple[str, ...] = ()
+    before: Window | None = None
 
     @classmethod
-    def from_block(cls, block: Block, start_ns: int, end_ns: int) -> Window:
+    def from_block(
+        cls, block: Block, start_ns: int, end_ns: int, *, before_ns: int | None = None
+    ) -> Window:
         """
         Cut a window from accepted samples.
 
@@ -89,6 +95,8 @@ class Window:
             ascend strictly.
         start_ns, end_ns
             Bounds, both included [ns].
+        before_ns
+            Where the record before the window starts [ns]; None: not taken.
 
         Raises
         ------
@@ -123,24 +131,41 @@ class Window:
                 f'position came as metres ({len(metres)}) and as latitude and longitude '
                 f'({len(degrees)}): the larger part was used, the other left out',
             )
-        return cls(
+        in_degrees = len(degrees) > len(metres)
+        window = cls(
             start_ns,
             end_ns,
             series(Channel.SPEED_THROUGH_WATER),
             series(Channel.SPEED_OVER_GROUND),
-            _local_plane(degrees) if len(degrees) > len(metres) else metres,
+            _local_plane(degrees, degrees.value[0]) if in_degrees else metres,
             series(Channel.HEADING),
             series(Channel.SHAFT),
             notes,
         )
+        if before_ns is None or before_ns >= start_ns:
+            return window
+        inside = (block.stamp_ns >= before_ns) & (block.stamp_ns < start_ns)
+        metres_before = series(Channel.POSITION)
+        if in_degrees:
+            metres_before = _local_plane(series(Channel.POSITION_GEODETIC), degrees.value[0])
+        before = cls(
+            before_ns,
+            start_ns,
+            series(Channel.SPEED_THROUGH_WATER),
+            series(Channel.SPEED_OVER_GROUND),
+            metres_before,
+            series(Channel.HEADING),
+            series(Channel.SHAFT),
+        )
+        return replace(window, before=before)
 
 
-def _local_plane(geodetic: Series) -> Series:
-    """Turn latitude, longitude [deg] into metres east and north of the first."""
+def _local_plane(geodetic: Series, origin: Float64) -> Series:
+    """Turn latitude, longitude [deg] into metres east and north of an origin."""
     latitude = np.radians(geodetic.value[:, 0])
-    first = float(latitude[0])
+    first = float(np.radians(origin[0]))
     # the short way round, also across the date line
-    turned = np.radians((geodetic.value[:, 1] - geodetic.value[0, 1] + 180.0) % 360.0 - 180.0)
+    turned = np.radians((geodetic.value[:, 1] - origin[1] + 180.0) % 360.0 - 180.0)
     curvature = 1.0 - _ECCENTRICITY_2 * math.sin(first) ** 2
     prime_vertical = _SEMI_MAJOR_M / math.sqrt(curvature)
     meridian = prime_vertical * (1.0 - _ECCENTRICITY_2) / curvature

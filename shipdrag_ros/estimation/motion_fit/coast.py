@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Compiled integration of the equation of motion, with its sensitivities.
+
+    (1 + n_r(v)) dv/dt = -r(v) + a r(v0) exp(-t / T),    r(v) = sum of c_k (v / v_ref)^k
+
+The last term is the thrust of an engine that runs down, a = 1; with a = 0 it has
+ended at once. Time t counts from the engine stop; before it the speed is v0.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shipdrag_ros.samples import Float64, Int64
+
+# Columns of the unknowns behind the k coefficients.
+V0, RUN_DOWN, ONSET, X0, CURRENT, LOG_SCALE = range(6)
+EXTRAS = 6
+_OF_MOTION = 2  # of these, the ones that change the motion by themselves
+
+LOG, OVER_GROUND, POSITION = range(3)  # kinds of rows
+
+
+class Rows(NamedTuple):
+    """
+    Measurements in ascending time.
+
+    Attributes
+    ----------
+    time_s : (n,)
+        After the engine stop, as far as that is known before the fit.
+    kind : (n,)
+        LOG, OVER_GROUND or POSITION.
+    value : (n,)
+        [m/s], or the distance along the track [m].
+    """
+
+    time_s: Float64
+    kind: Int64
+    value: Float64
+
+
+class Law(NamedTuple):
+    """
+    What is not fitted.
+
+    Attributes
+    ----------
+    powers : (k,)
+        Of the speed, ascending.
+    v_ref_m_s
+        Speed that the powers are relative to.
+    thrust
+        The a above: 1 or 0.
+    n_r : (j,)
+        Polynomial of n_r in v, lowest power first.
+    """
+
+    powers: Int64
+    v_ref_m_s: float
+    thrust: float
+    n_r: Float64
+
+
+@njit(cache=True)
+def resistance(law: Law, unknowns: Float64, v: float) -> tuple[float, float]:
+    """
+    Return r and dr/dv at one speed.
+    """
+    s = v / law.v_ref_m_s
+    r = 0.0
+    slope = 0.0
+    for j in range(len(law.powers)):
+        power = s ** (law.powers[j] - 1)
+        r += unknowns[j] * power * s
+        slope += unknowns[j] * law.powers[j] * power
+    return r, slope / law.v_ref_m_s
+
+
+@njit(cache=True)
+def _rates(law: Law, unknowns: Float64, t: float, state: Float64, rate: Float64) -> None:
+    """
+    Fill in the rates of (v, dv/du, x, dx/du), u the unknowns of the motion.
+    """
+    k = len(law.powers)
+    q = k + _OF_MOTION
+    v = state[0]
+    v0 = unknowns[k + V0]
+    n_r = 0.0
+    n_r_slope = 0.0
+    for j in range(len(law.n_r) - 1, -1, -1):
+        n_r_slope = n_r_slope * v + n_r
+        n_r = n_r * v + law.n_r[j]
+    inertia = 1.0 + n_r
+    r, slope = resistance(law, unknowns, v)
+    decay = 0.0
+    r0 = 0.0
+    slope0 = 0.0
+    if law.thrust != 0.0:
+        decay = np.exp(-t / unknowns[k + RUN_DOWN])
+        r0, slope0 = resistance(law, unknowns, v0)
+    thrust = law.thrust * decay
+    acceleration = (thrust * r0 - r) / inertia
+    by_v = (-slope - n_r_slope * acceleration) / inertia
+    rate[0] = acceleration
+    for j in range(q):
+        rate[1 + j] = by_v * state[1 + j]
+    s = v / law.v_ref_m_s
+    s0 = v0 / law.v_ref_m_s
+    for j in range(k):
+        by_c = -(s ** law.powers[j])
+        if thrust != 0.0:
+            by_c += thrust * s0 ** law.powers[j]
+        rate[1 + j] += by_c / inertia
+    rate[1 + k + V0] += thrust * slope0 / inertia
+    if thrust != 0.0:
+        rate[1 + k + RUN_DOWN] += thrust * r0 * t / unknowns[k + RUN_DOWN] ** 2 / inertia
+    for j in range(q + 1):
+        rate[q + 1 + j] = state[j]
+
+
+@njit(cache=True)
+def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Float64]:
+    """
+    Follow the motion and its sensitivities over a grid of times from 0 on.
+
+    Returns
+    -------
+    state, rate : (m, 2 (k + 3))
+        (v, dv/du, x, dx/du), u the k coefficients, v0 and T; x is 0 at 0.
+
+    Notes
+    -----
+    Runge-Kutta of fourth order, with fixed steps.
+    """
+    k = len(law.powers)
+    size = 2 * (k + _OF_MOTION + 1)
+    m = len(grid_s)
+    state = np.zeros((m, size))
+    rate = np.zeros((m, size))
+    state[0, 0] = unknowns[k + V0]
+    state[0, 1 + k + V0] = 1.0
+    k2 = np.empty(size)
+    k3 = np.empty(size)
+    k4 = np.empty(size)
+    trial = np.empty(size)
+    _rates(law, unknowns, grid_s[0], state[0], rate[0])
+    for i in range(m - 1):
+        t = grid_s[i]
+        h = grid_s[i + 1] - t
+        now = state[i]
+        k1 = rate[i]
+        for j in range(size):
+            trial[j] = now[j] + 0.5 * h * k1[j]
+        _rates(law, unknowns, t + 0.5 * h, trial, k2)
+        for j in range(size):
+            trial[j] = now[j] + 0.5 * h * k2[j]
+        _rates(law, unknowns, t + 0.5 * h, trial, k3)
+        for j in range(size):
+            trial[j] = now[j] + h * k3[j]
+        _rates(law, unknowns, t + h, trial, k4)
+        for j in range(size):
+            state[i + 1, j] = now[j] + h * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]) / 6.0
+        _rates(law, unknowns, t + h, state[i + 1], rate[i + 1])
+    return state, rate
+
+
+@njit(cache=True)
+def predict(
+    law: Law, unknowns: Float64, grid_s: Float64, rows: Rows, active: Int64
+) -> tuple[Float64, Float64, Float64]:
+    """
+    Predict the rows, with their derivatives by the active unknowns.
+
+    Returns
+    -------
+    residual : (n,)
+        Measured less predicted.
+    jacobian : (n, p)
+        Of the prediction.
+    speed : (n,)
+        Speed through water at the rows.
+    """
+    k = len(law.powers)
+    q = k + _OF_MOTION
+    state, rate = integrate(law, unknowns, grid_s)
+    n = len(rows.time_s)
+    residual = np.empty(n)
+    jacobian = np.zeros((n, len(active)))
+    speed = np.empty(n)
+    v0, x0, onset = unknowns[k + V0], unknowns[k + X0], unknowns[k + ONSET]
+    current, scale = unknowns[k + CURRENT], 1.0 + unknowns[k + LOG_SCALE]
+    here = np.empty(2 * (q + 1))
+    cell = 0
+    for i in range(n):
+        t = rows.time_s[i] - onset
+        acceleration = 0.0
+        if t < 0.0:
+            here[:] = 0.0
+            here[0] = v0
+            here[1 + k + V0] = 1.0
+            here[q + 1] = v0 * t
+            here[q + 2 + k + V0] = t
+        else:
+            while cell < len(grid_s) - 2 and grid_s[cell + 1] < t:
+                cell += 1
+            h = grid_s[cell + 1] - grid_s[cell]
+            s = (t - grid_s[cell]) / h
+            # cubic Hermite
+            a = (1.0 + 2.0 * s) * (1.0 - s) * (1.0 - s)
+            b = s * (1.0 - s) * (1.0 - s) * h
+            c = s * s * (s - 1.0) * h
+            for j in range(2 * (q + 1)):
+                here[j] = (
+                    a * state[cell, j]
+                    + (1.0 - a) * state[cell + 1, j]
+                    + b * rate[cell, j]
+                    + c * rate[cell + 1, j]
+                )
+            acceleration = (1.0 - s) * rate[cell, 0] + s * rate[cell + 1, 0]
+        speed[i] = here[0]
+        kind = rows.kind[i]
+        if kind == LOG:
+            predicted = scale * here[0]
+        elif kind == OVER_GROUND:
+            predicted = here[0] + current
+        else:
+            predicted = x0 + v0 * onset + here[q + 1] + current * rows.time_s[i]
+        residual[i] = rows.value[i] - predicted
+        for p in range(len(active)):
+            u = active[p]
+            if u < q:
+                if kind == LOG:
+                    jacobian[i, p] = scale * here[1 + u]
+                elif kind == OVER_GROUND:
+                    jacobian[i, p] = here[1 + u]
+                else:
+                    jacobian[i, p] = here[q + 2 + u] + (onset if u == k + V0 else 0.0)
+            elif u == k + ONSET:
+                if kind == POSITION:
+                    jacobian[i, p] = v0 - here[0]
+                else:
+                    jacobian[i, p] = -acceleration * (scale if kind == LOG else 1.0)
+            elif u == k + X0:
+                jacobian[i, p] = 1.0 if kind == POSITION else 0.0
+            elif u == k + CURRENT:
+                if kind == POSITION:
+                    jacobian[i, p] = rows.time_s[i]
+                elif kind == OVER_GROUND:
+                    jacobian[i, p] = 1.0
+            elif kind == LOG:
+                jacobian[i, p] = here[0]
+    return residual, jacobian, speed

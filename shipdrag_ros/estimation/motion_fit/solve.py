@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiled fit of one family of r(v): damped Gauss-Newton."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from shipdrag_ros.estimation.motion_fit.coast import Law, Rows, predict
+from shipdrag_ros.estimation.motion_fit.whitening import Disturbance, damping_at, whiten
+from shipdrag_ros.samples import Float64, Int64
+
+_RISES = 8  # of the damping, in one iteration
+_CONVERGED = 1e-4  # fall of chi^2: far below what tells families apart
+
+
+@njit(cache=True)
+def normal_equations(
+    law: Law,
+    unknowns: Float64,
+    grid_s: Float64,
+    rows: Rows,
+    variance: Float64,
+    about: Disturbance,
+    active: Int64,
+    prior: Float64,
+) -> tuple[float, Float64, Float64, Float64]:
+    """
+    Linearise the whitened rows about some unknowns.
+
+    Parameters
+    ----------
+    prior : (2, K)
+        Mean and precision of each unknown; a precision of 0: none.
+
+    Returns
+    -------
+    chi2
+        Sum of the squared whitened residuals and of the prior.
+    matrix, gradient : (p, p), (p,)
+        Of the active unknowns.
+    white : (n,)
+        Whitened residuals.
+    """
+    residual, jacobian, speed = predict(law, unknowns, grid_s, rows, active)
+    n, p = jacobian.shape
+    table = np.empty((n, p + 1))
+    damping = np.empty(n)
+    inertia = np.empty(n)
+    for i in range(n):
+        table[i, 0] = residual[i]
+        table[i, 1:] = jacobian[i]
+        damping[i], inertia[i] = damping_at(law, unknowns, speed[i])
+    whiten(rows, table, variance, about, damping, inertia)
+    matrix = np.zeros((p, p))
+    gradient = np.zeros(p)
+    chi2 = 0.0
+    for i in range(n):
+        z = table[i, 0]
+        chi2 += z * z
+        for a in range(p):
+            column = table[i, 1 + a]
+            gradient[a] += column * z
+            for b in range(a + 1):
+                matrix[a, b] += column * table[i, 1 + b]
+    for a in range(p):
+        u = active[a]
+        off = prior[0, u] - unknowns[u]
+        chi2 += prior[1, u] * off * off
+        matrix[a, a] += prior[1, u]
+        gradient[a] += prior[1, u] * off
+        for b in range(a):
+            matrix[b, a] = matrix[a, b]
+    return chi2, matrix, gradient, table[:, 0].copy()
+
+
+@njit(cache=True)
+def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[bool, Float64]:
+    """
+    Solve (M + damping diag M) x = b for columns of b, M scaled to unit diagonal.
+    """
+    p = len(matrix)
+    scale = np.empty(p)
+    for a in range(p):
+        if not matrix[a, a] > 0.0:
+            return False, right
+        scale[a] = 1.0 / np.sqrt(matrix[a, a])
+    lower = np.zeros((p, p))
+    for a in range(p):
+        for b in range(a + 1):
+            total = matrix[a, b] * scale[a] * scale[b]
+            if a == b:
+                total = 1.0 + damping
+            for c in range(b):
+                total -= lower[a, c] * lower[b, c]
+            if a == b:
+                if not total > 1e-14:
+                    return False, right
+                lower[a, a] = np.sqrt(total)
+            else:
+                lower[a, b] = total / lower[b, b]
+    x = right.copy()
+    for j in range(right.shape[1]):
+        for a in range(p):
+            total = x[a, j] * scale[a]
+            for c in range(a):
+                total -= lower[a, c] * x[c, j]
+            x[a, j] = total / lower[a, a]
+        for a in range(p - 1, -1, -1):
+            total = x[a, j]
+            for c in range(a + 1, p):
+                total -= lower[c, a] * x[c, j]
+            x[a, j] = total / lower[a, a]
+        for a in range(p):
+            x[a, j] *= scale[a]
+    return True, x
+
+
+@njit(cache=True)
+def fit(
+    law: Law,
+    start: Float64,
+    grid_s: Float64,
+    rows: Rows,
+    variance: Float64,
+    about: Disturbance,
+    active: Int64,
+    prior: Float64,
+    iterations: int,
+) -> tuple[bool, float, Float64, Float64, Float64]:
+    """
+    Minimise chi^2 over the active unknowns.
+
+    Returns
+    -------
+    converged, chi2, unknowns, covariance, white
+        The covariance (p, p) is of the active unknowns.
+    """
+    unknowns = start.copy()
+    chi2, matrix, gradient, white = normal_equations(
+        law, unknowns, grid_s, rows, variance, about, active, prior
+    )
+    damping = 0.0
+    converged = False
+    for _ in range(iterations):
+        better = False
+        for _ in range(_RISES):
+            solved, step = cholesky_solve(matrix, gradient.reshape(-1, 1), damping)
+            if solved:
+                trial = unknowns.copy()
+                for a in range(len(active)):
+                    trial[active[a]] += step[a, 0]
+                found = normal_equations(
+                    law, trial, grid_s, rows, variance, about, active, prior
+                )
+                # written so that NaN fails
+                if found[0] <= chi2 + _CONVERGED:
+                    better = True
+                    break
+            damping = max(10.0 * damping, 1e-3)
+        if not better:
+            break
+        fall = chi2 - found[0]
+        unknowns = trial
+        chi2, matrix, gradient, white = found
+        damping = 0.1 * damping if damping > 1e-4 else 0.0
+        if abs(fall) < _CONVERGED and damping == 0.0:
+            converged = True
+            break
+    solved, covariance = cholesky_solve(matrix, np.eye(len(active)), 0.0)
+    return converged and solved, chi2, unknowns, covariance, white

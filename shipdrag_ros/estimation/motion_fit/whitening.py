@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Generalised least squares under sensor noise and slow disturbances.
+
+The rows are whitened by a Kalman filter of what disturbs the motion: linear in
+the data, so residual and columns of the design pass the same gains, and exact
+for uneven stamps, gaps and a disturbance that is not stationary. A gust FORCE
+moves the ship through the equation of motion, whose damping falls with the
+speed; a disturbance of the water's speed is read by the log alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Law, Rows, resistance
+from shipdrag_ros.samples import Float64
+
+_STATES = 4  # speed, distance, gust, water
+_LONGEST_STEP_S = 15.0  # of the prediction through a gap
+
+
+class Disturbance(NamedTuple):
+    """
+    Slow Gauss-Markov disturbances of first order; an sd of 0: none.
+
+    Attributes
+    ----------
+    gust_m_s2, gust_s
+        Standard deviation of the force per mass, and its correlation time.
+    water_m_s, water_s
+        The same of what the log reads of the water's own motion.
+    """
+
+    gust_m_s2: float
+    gust_s: float
+    water_m_s: float
+    water_s: float
+
+
+CALM = Disturbance(0.0, 60.0, 0.0, 60.0)
+
+
+@njit(cache=True)
+def _step(
+    cov: Float64,
+    mean: Float64,
+    about: Disturbance,
+    damping: float,
+    inertia: float,
+    dt: float,
+) -> None:
+    """Carry covariance and means over a step."""
+    gust_decay = np.exp(-dt / about.gust_s)
+    water_decay = np.exp(-dt / about.water_s)
+    decay = np.exp(-damping * dt)
+    by_gust = dt * np.exp(-0.5 * damping * dt) * 0.5 * (1.0 + gust_decay) / inertia
+    way = 0.5 * dt * (1.0 + decay)
+    way_by_gust = 0.5 * dt * by_gust
+    for c in range(mean.shape[1]):
+        u, g = mean[0, c], mean[2, c]
+        mean[1, c] += way * u + way_by_gust * g
+        mean[0, c] = decay * u + by_gust * g
+        mean[2, c] = gust_decay * g
+        mean[3, c] *= water_decay
+    # F P, then (F P) F'
+    for c in range(_STATES):
+        u, g = cov[0, c], cov[2, c]
+        cov[1, c] += way * u + way_by_gust * g
+        cov[0, c] = decay * u + by_gust * g
+        cov[2, c] = gust_decay * g
+        cov[3, c] *= water_decay
+    for r in range(_STATES):
+        u, g = cov[r, 0], cov[r, 2]
+        cov[r, 1] += way * u + way_by_gust * g
+        cov[r, 0] = decay * u + by_gust * g
+        cov[r, 2] = gust_decay * g
+        cov[r, 3] *= water_decay
+    cov[2, 2] += about.gust_m_s2**2 * (1.0 - gust_decay**2)
+    cov[3, 3] += about.water_m_s**2 * (1.0 - water_decay**2)
+
+
+@njit(cache=True)
+def damping_at(law: Law, unknowns: Float64, v: float) -> tuple[float, float]:
+    """
+    Return dr/dv over the inertia [1/s], and the inertia 1 + n_r.
+    """
+    n_r = 0.0
+    for j in range(len(law.n_r) - 1, -1, -1):
+        n_r = n_r * v + law.n_r[j]
+    _, slope = resistance(law, unknowns, v)
+    # a fit may wiggle; a disturbance never grows by itself
+    return max(slope / (1.0 + n_r), 1e-6), 1.0 + n_r
+
+
+@njit(cache=True)
+def whiten(
+    rows: Rows,
+    table: Float64,
+    variance: Float64,
+    about: Disturbance,
+    damping: Float64,
+    inertia: Float64,
+) -> float:
+    """
+    Whiten, in place, the columns of a table of rows.
+
+    Parameters
+    ----------
+    rows
+        In ascending time.
+    table : (n, c)
+        Residual and columns of the design.
+    variance : (n,)
+        Of the white noise of each row.
+    about
+        The disturbances, in their stationary state at the first row.
+    damping, inertia : (n,)
+        dr/dv over 1 + n_r [1/s], and 1 + n_r, at each row.
+
+    Returns
+    -------
+    float
+        Logarithm of the determinant of the covariance of the rows.
+    """
+    n, columns = table.shape
+    log_det = 0.0
+    if about.gust_m_s2 == 0.0 and about.water_m_s == 0.0:
+        for i in range(n):
+            weight = 1.0 / np.sqrt(variance[i])
+            for c in range(columns):
+                table[i, c] *= weight
+            log_det += np.log(variance[i])
+        return log_det
+    cov = np.zeros((_STATES, _STATES))
+    mean = np.zeros((_STATES, columns))
+    gain = np.empty(_STATES)
+    seen = np.empty(_STATES)
+    rate = damping[0] + 1.0 / about.gust_s
+    cov[2, 2] = about.gust_m_s2**2
+    cov[0, 2] = cov[2, 0] = cov[2, 2] / inertia[0] / rate
+    cov[0, 0] = cov[0, 2] / inertia[0] / damping[0]
+    cov[3, 3] = about.water_m_s**2
+    for i in range(n):
+        if i:
+            dt = rows.time_s[i] - rows.time_s[i - 1]
+            if dt > 0.0:
+                parts = int(np.ceil(dt / _LONGEST_STEP_S))
+                mid = 0.5 * (damping[i] + damping[i - 1])
+                for _ in range(parts):
+                    _step(cov, mean, about, mid, inertia[i], dt / parts)
+        first = 1 if rows.kind[i] == POSITION else 0
+        of_water = 1.0 if rows.kind[i] == LOG else 0.0
+        for s in range(_STATES):
+            seen[s] = cov[s, first] + of_water * cov[s, 3]
+        total = seen[first] + of_water * seen[3] + variance[i]
+        weight = 1.0 / np.sqrt(total)
+        log_det += np.log(total)
+        for s in range(_STATES):
+            gain[s] = seen[s] / total
+        for c in range(columns):
+            innovation = table[i, c] - mean[first, c] - of_water * mean[3, c]
+            for s in range(_STATES):
+                mean[s, c] += gain[s] * innovation
+            table[i, c] = innovation * weight
+        for a in range(_STATES):
+            for b in range(_STATES):
+                cov[a, b] -= gain[a] * seen[b]
+    return log_det
