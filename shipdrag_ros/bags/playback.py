@@ -188,11 +188,7 @@ def _counts(
     """Join what the decoder, the matching of types and the validation have counted."""
     counts: dict[str, InputCounts] = {}
     for name in TOPICS:
-        refused = sum(
-            topic.messages
-            for topic in run.topics
-            if topic.refused and topic.topic.rpartition('/')[2] == name
-        )
+        refused = run.refused[name]
         reasons = dict(inputs.unreadable.get(name, {})) | dict(rejected.get(name, {}))
         if refused:
             reasons[WRONG_TYPE] = refused

@@ -82,6 +82,8 @@ class Run:
         Text by name.
     topics
         What is in it, by name.
+    refused
+        Messages of types that are not accepted, by input.
     node
         Full name of the node whose outputs it holds, None without any.
     """
@@ -102,6 +104,9 @@ class Run:
         except BagError as error:
             raise BagError(f'{self.name!r}: {error}') from None
         self.topics = tuple(_topic_info(key, counts[key], self._matched) for key in sorted(counts))
+        self.refused: Counter[str] = Counter()
+        for key, name in self._matched.unaccepted.items():
+            self.refused[name] += counts[key]
         self.node = self._find_node(set(counts))
         self.attachments = self._join_attachments()
 

@@ -73,12 +73,12 @@ class MatchedTopics:
     heard
         Source of each (topic, type) that carries an input.
     unaccepted
-        (topic, type) whose name is an input's and whose type is not accepted,
-        or is not the one type heard.
+        Input of each (topic, type) that should carry one, and whose type is
+        not accepted or not the one type heard.
     """
 
     heard: dict[tuple[str, str], Source]
-    unaccepted: tuple[tuple[str, str], ...]
+    unaccepted: dict[tuple[str, str], str]
 
 
 def match_inputs(
@@ -106,7 +106,7 @@ def match_inputs(
     problems = _remap_problems(renamed, types_of)
 
     heard: dict[tuple[str, str], Source] = {}
-    unaccepted: list[tuple[str, str]] = []
+    unaccepted: dict[tuple[str, str], str] = {}
     for name, accepted in TOPICS.items():
         candidates = [topic for topic in types_of if renamed.get(topic) == name]
         if not candidates:
@@ -125,15 +125,15 @@ def match_inputs(
         if audible:
             chosen = next(t for t in accepted if t in types_of[audible[0]])
             heard[audible[0], chosen] = Source(name, chosen)
-        unaccepted += [
-            (topic, type_name)
+        unaccepted |= {
+            (topic, type_name): name
             for topic in candidates
             for type_name in types_of[topic]
             if (topic, type_name) not in heard
-        ]
+        }
     if problems:
         raise BagError('topics cannot be matched to inputs: ' + '; '.join(problems))
-    return MatchedTopics(heard, tuple(unaccepted))
+    return MatchedTopics(heard, unaccepted)
 
 
 def _remap_problems(renamed: Mapping[str, str], types_of: Mapping[str, list[str]]) -> list[str]:

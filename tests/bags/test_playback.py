@@ -359,12 +359,14 @@ def test_unreadable_messages_and_wrong_types_are_counted_among_the_rejected(
         for payload in (good.payload, b'', good.payload[:20]):
             bag.write('/shaft', good.type, payload, log_ns=1, publish_ns=1)
         bag.write('/depth', good.type, good.payload, log_ns=2, publish_ns=2)
-    (run,) = open_runs([tmp_path / 'a.mcap'])
+        bag.write('/log', good.type, good.payload, log_ns=2, publish_ns=2)
+    (run,) = open_runs([tmp_path / 'a.mcap'], remap={'/log': 'speed_through_water'})
     result = replay(run, ship=ship)
     assert result.inputs['shaft'].messages == 3
     assert result.inputs['shaft'].used == 1
     assert result.inputs['shaft'].rejected == {'malformed': 2}
     assert result.inputs['depth'].rejected == {'type': 1}
+    assert result.inputs['speed_through_water'].rejected == {'type': 1}
 
 
 def test_a_bag_without_a_ship_file_asks_for_one(tmp_path: Path, ship: Ship) -> None:

@@ -28,7 +28,7 @@ def test_any_namespace(topic: str) -> None:
     matched = match_inputs([(topic, TWIST), ('/log/speed_through_water_raw', TWIST)])
     (source,) = matched.heard.values()
     assert source == Source('speed_through_water', TWIST)
-    assert matched.unaccepted == ()
+    assert matched.unaccepted == {}
 
 
 def test_two_namespaces_are_an_error_that_lists_both() -> None:
@@ -50,7 +50,7 @@ def test_a_type_that_is_not_accepted_is_reported_and_not_heard() -> None:
         [('/depth', 'std_msgs/msg/Float32'), ('/x/depth', 'sensor_msgs/msg/Range')]
     )
     assert list(matched.heard) == [('/x/depth', 'sensor_msgs/msg/Range')]
-    assert matched.unaccepted == (('/depth', 'std_msgs/msg/Float32'),)
+    assert matched.unaccepted == {('/depth', 'std_msgs/msg/Float32'): 'depth'}
 
 
 def test_of_two_types_on_one_topic_the_preferred_is_heard() -> None:
@@ -58,7 +58,7 @@ def test_of_two_types_on_one_topic_the_preferred_is_heard() -> None:
         [('/speed_over_ground', TWIST), ('/speed_over_ground', TWIST_COVARIANCE)]
     )
     assert list(matched.heard) == [('/speed_over_ground', TWIST_COVARIANCE)]
-    assert matched.unaccepted == (('/speed_over_ground', TWIST),)
+    assert matched.unaccepted == {('/speed_over_ground', TWIST): 'speed_over_ground'}
 
 
 def test_a_remapped_topic_is_heard_and_no_longer_under_its_own_name() -> None:
