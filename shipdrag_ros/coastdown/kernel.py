@@ -276,7 +276,9 @@ def _look_at_shaft(memory: Memory, tuning: Tuning, number: int) -> int:
         or not watch.level[0] > tuning.speed_min
     ):
         return 0
-    steady, count = mean_turning(bins, _SHAFT, number - 1, tuning.slopes.width)
+    # half a window ago, so that a shaft that runs down slowly is not its own measure
+    width = tuning.slopes.width
+    steady, count = mean_turning(bins, _SHAFT, number - (width + 1) // 2, width)
     if count < 3 or steady < SHAFT_TURNING_RAD_S:
         return 0
     if mean_turning(bins, _SHAFT, number, 1)[0] < tuning.shaft_stopped * steady:

@@ -178,7 +178,7 @@ def _coasts(
     """Say whether the speed since the start looks like a coastdown."""
     age = number - candidate.start
     # the longer it lasts, the longer the span that its present slope can be taken over
-    span = max(tuning.slopes.width, age // 2)
+    span = max(tuning.slopes.width, 2 * age // 3)
     slope, level, _ = line(bins, candidate.source, number, span)
     _, before, _ = line(bins, candidate.source, candidate.start - 1, tuning.slopes.width)
     middle = level - 0.5 * slope * span
@@ -187,12 +187,11 @@ def _coasts(
     expected = expect(ship, before)
     lost = (before - level) / expected.loss(before, age)
     falling = -slope / expect(ship, middle).deceleration_m_s2
-    if min(lost, falling) > expected.fraction_min:
-        return True
-    # a ship that is heavier than its file says: the law alone, once there is enough of it
+    as_expected = min(lost, falling) > expected.fraction_min
+
     guard = round(_GUARD * parameters.confirm_s)
     time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
-    if candidate.trials == 1 or len(time) < _LAW_BINS_MIN:
+    if len(time) < _LAW_BINS_MIN:
         return False
     found = law(time, speed)
     if not (found.slope < 0.0 < found.speed):
@@ -206,7 +205,10 @@ def _coasts(
         * (found.speed / found.slope**2)
     )
     excess = found.exponent - expect(ship, found.speed).exponent
-    return sd < EXCESS_MAX and excess < EXCESS_MAX
+    if as_expected:
+        return excess - sd < EXCESS_MAX
+    # a ship that is heavier than its file says: the law alone, once there is enough of it
+    return candidate.trials > 1 and excess + sd < EXCESS_MAX
 
 
 def change_point(bins: Bins, source: int, first: int, last: int, speed_min: float) -> int:

@@ -27,8 +27,8 @@ from shipdrag_ros.samples import Float64, Int64
 SCALES = 3  # windows of one, two and four times slope_window_s
 _STRIDES_PER_WINDOW = 4
 # independent slopes that a window's length holds, as far as chance excursions go
-_LOOKS_PER_WINDOW = 6.0
-_FREEDOM_PER_WINDOW = 1.0  # degrees of freedom of the spread, per window's length of record
+_LOOKS_PER_WINDOW = 4.0
+_FREEDOM_PER_WINDOW = 1.2  # degrees of freedom of the spread, per window's length of record
 _WINDOWS_LEARNT = 6  # windows' lengths of record below which the spread is not trusted
 # until then: how much larger than white noise the spread may be
 _COLOUR = 3.0
