@@ -34,7 +34,7 @@ class Settings:
     speed_m_s: float
     duration_s: float
     lead_in_s: float
-    heading_deg: float
+    heading_rad: float
     rate_hz: float
     noise: float
     seed: int
@@ -82,10 +82,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--heading',
-        type=number(-math.inf, unit='deg'),
+        type=number(-2 * math.pi, 2 * math.pi, unit='rad'),
         default=0.0,
-        metavar='DEG',
-        help='heading [deg], anticlockwise from east as in REP-103: 90 is north',
+        metavar='RAD',
+        help='heading [rad], anticlockwise from east as in REP-103: 1.5708 is north',
     )
     parser.add_argument(
         '--rate',
@@ -125,7 +125,7 @@ def run(options: argparse.Namespace) -> int:
         speed_m_s=speed_m_s,
         duration_s=options.duration,
         lead_in_s=options.lead_in,
-        heading_deg=options.heading,
+        heading_rad=options.heading,
         rate_hz=options.rate,
         noise=options.noise,
         seed=options.seed,
@@ -163,7 +163,7 @@ def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
         speed_m_s=settings.speed_m_s,
         lead_in_s=settings.lead_in_s,
         duration_s=settings.duration_s,
-        heading_rad=math.radians(settings.heading_deg),
+        heading_rad=settings.heading_rad,
         seed=settings.seed,
     )
     motion = simulate(ship, scenario)

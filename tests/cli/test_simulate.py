@@ -97,7 +97,7 @@ def test_without_a_speed_the_baseline_gives_one(simulate, ship_file: Path) -> No
 
 
 def test_the_heading_turns_from_east_to_north(simulate) -> None:
-    bag = simulate('--heading', '90', '--noise', '0')
+    bag = simulate('--heading', str(np.pi / 2), '--noise', '0')
     np.testing.assert_allclose(bag.of(Channel.HEADING).value[:, 0], np.pi / 2, rtol=1e-9)
     east, north = bag.of(Channel.POSITION).value[-1]
     assert north > 100.0
