@@ -89,36 +89,47 @@ def _rates(law: Law, unknowns: Float64, t: float, state: Float64, rate: Float64)
     k = len(law.powers)
     q = k + _OF_MOTION
     v = state[0]
-    v0 = unknowns[k + V0]
     n_r = 0.0
     n_r_slope = 0.0
     for j in range(len(law.n_r) - 1, -1, -1):
         n_r_slope = n_r_slope * v + n_r
         n_r = n_r * v + law.n_r[j]
     inertia = 1.0 + n_r
-    r, slope = resistance(law, unknowns, v)
+    # the powers by one chain of products; what is between the powers is skipped
+    s = v / law.v_ref_m_s
+    s0 = unknowns[k + V0] / law.v_ref_m_s
     decay = 0.0
-    r0 = 0.0
-    slope0 = 0.0
     if law.thrust != 0.0:
         decay = np.exp(-t / unknowns[k + RUN_DOWN])
-        r0, slope0 = resistance(law, unknowns, v0)
     thrust = law.thrust * decay
+    r, r0, slope, slope0 = 0.0, 0.0, 0.0, 0.0
+    power, power0 = 1.0, 1.0
+    exponent = 0
+    for j in range(k):
+        while exponent < law.powers[j] - 1:
+            power *= s
+            power0 *= s0
+            exponent += 1
+        c = unknowns[j]
+        slope += c * law.powers[j] * power
+        slope0 += c * law.powers[j] * power0
+        power *= s
+        power0 *= s0
+        exponent += 1
+        r += c * power
+        r0 += c * power0
+        rate[1 + j] = (thrust * power0 - power) / inertia
+    slope /= law.v_ref_m_s
+    slope0 /= law.v_ref_m_s
     acceleration = (thrust * r0 - r) / inertia
     by_v = (-slope - n_r_slope * acceleration) / inertia
     rate[0] = acceleration
-    for j in range(q):
-        rate[1 + j] = by_v * state[1 + j]
-    s = v / law.v_ref_m_s
-    s0 = v0 / law.v_ref_m_s
-    for j in range(k):
-        by_c = -(s ** law.powers[j])
-        if thrust != 0.0:
-            by_c += thrust * s0 ** law.powers[j]
-        rate[1 + j] += by_c / inertia
-    rate[1 + k + V0] += thrust * slope0 / inertia
+    rate[1 + k + V0] = thrust * slope0 / inertia
+    rate[1 + k + RUN_DOWN] = 0.0
     if thrust != 0.0:
-        rate[1 + k + RUN_DOWN] += thrust * r0 * t / unknowns[k + RUN_DOWN] ** 2 / inertia
+        rate[1 + k + RUN_DOWN] = thrust * r0 * t / unknowns[k + RUN_DOWN] ** 2 / inertia
+    for j in range(q):
+        rate[1 + j] += by_v * state[1 + j]
     for j in range(q + 1):
         rate[q + 1 + j] = state[j]
 
@@ -172,16 +183,14 @@ def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Fl
 @njit(cache=True)
 def predict(
     law: Law, unknowns: Float64, grid_s: Float64, rows: Rows, active: Int64
-) -> tuple[Float64, Float64, Float64]:
+) -> tuple[Float64, Float64]:
     """
     Predict the rows, with their derivatives by the active unknowns.
 
     Returns
     -------
-    residual : (n,)
-        Measured less predicted.
-    jacobian : (n, p)
-        Of the prediction.
+    table : (1 + p, n)
+        Measured less predicted, then the derivatives of the prediction.
     speed : (n,)
         Speed through water at the rows.
     """
@@ -189,8 +198,7 @@ def predict(
     q = k + _OF_MOTION
     state, rate = integrate(law, unknowns, grid_s)
     n = len(rows.time_s)
-    residual = np.empty(n)
-    jacobian = np.zeros((n, len(active)))
+    table = np.zeros((1 + len(active), n))
     speed = np.empty(n)
     v0, x0, onset = unknowns[k + V0], unknowns[k + X0], unknowns[k + ONSET]
     current, scale = unknowns[k + CURRENT], 1.0 + unknowns[k + LOG_SCALE]
@@ -230,28 +238,28 @@ def predict(
             predicted = here[0] + current
         else:
             predicted = x0 + v0 * onset + here[q + 1] + current * rows.time_s[i]
-        residual[i] = rows.value[i] - predicted
+        table[0, i] = rows.value[i] - predicted
         for p in range(len(active)):
             u = active[p]
             if u < q:
                 if kind == LOG:
-                    jacobian[i, p] = scale * here[1 + u]
+                    table[1 + p, i] = scale * here[1 + u]
                 elif kind == OVER_GROUND:
-                    jacobian[i, p] = here[1 + u]
+                    table[1 + p, i] = here[1 + u]
                 else:
-                    jacobian[i, p] = here[q + 2 + u] + (onset if u == k + V0 else 0.0)
+                    table[1 + p, i] = here[q + 2 + u] + (onset if u == k + V0 else 0.0)
             elif u == k + ONSET:
                 if kind == POSITION:
-                    jacobian[i, p] = v0 - here[0]
+                    table[1 + p, i] = v0 - here[0]
                 else:
-                    jacobian[i, p] = -acceleration * (scale if kind == LOG else 1.0)
+                    table[1 + p, i] = -acceleration * (scale if kind == LOG else 1.0)
             elif u == k + X0:
-                jacobian[i, p] = 1.0 if kind == POSITION else 0.0
+                table[1 + p, i] = 1.0 if kind == POSITION else 0.0
             elif u == k + CURRENT:
                 if kind == POSITION:
-                    jacobian[i, p] = rows.time_s[i]
+                    table[1 + p, i] = rows.time_s[i]
                 elif kind == OVER_GROUND:
-                    jacobian[i, p] = 1.0
+                    table[1 + p, i] = 1.0
             elif kind == LOG:
-                jacobian[i, p] = here[0]
-    return residual, jacobian, speed
+                table[1 + p, i] = here[0]
+    return table, speed

@@ -48,7 +48,7 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
 NAME = 'motion'
-_STEPS = 128  # of the integration, longer as the ship slows down
+_STEPS = 96  # of the integration, longer as the ship slows down
 _CURVE_POINTS = 257
 _HUBER = 2.5  # whitened residuals beyond it count by their size only
 _ROUNDS = 3  # of the weights
@@ -191,23 +191,20 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     n_r = ship.n_r_polynomial()
     guess = _Guess.of(record.coast, float(ship.n_r(1.0)))
     notes = [*window.notes, *ship.warnings, f'{run_down.source}']
-    problem = _problem(record, run_down, n_r, guess)
-    weights_of = np.ones(len(problem.rows.time_s))
-
-    # first as if nothing but sensor noise disturbed
-    first, problem = _robust(problem, record, None, guess)
+    # first the coastdown alone, as if nothing but sensor noise disturbed
+    alone = record.without_steady()
+    first, problem = _robust(_problem(alone, run_down, n_r, guess), alone, None, guess)
     if record.steady_s >= LEAST_S:
         about = _learn(record, first, run_down)
-        problem = _with(problem, about=about)
-        if about != CALM:
-            first, problem = _robust(problem, record, first, guess)
+        problem = _with(_problem(record, run_down, n_r, guess), about=about)
+        first, problem = _robust(problem, record, first, guess)
         notes.append(_disturbance_note(about, record.steady_s))
     else:
+        record = alone
         notes.append(
             'there is no steady record before the onset to learn slow disturbances from: the '
             'band holds the noise of the sensors alone'
         )
-    del weights_of
     first, problem = _log_scale(problem, first, notes)
     average = _average(problem, first, guess)
     return _result(average, problem, record, window, ship, parameters, tuple(notes))
@@ -355,11 +352,12 @@ def _result(
     every = np.arange(k + EXTRAS, dtype=np.int64)
     plain = best.unknowns.copy()
     plain[k + LOG_SCALE] = 0.0
-    _, jacobian, speed = predict(best.law, plain, problem.grid_s, ends, every[:-1])
-    last_var = jacobian[0] @ best.covariance[:-1, :-1] @ jacobian[0]
+    table, speed = predict(best.law, plain, problem.grid_s, ends, every[:-1])
+    by_unknown = table[1:, 0]
+    last_var = np.einsum('i,ij,j->', by_unknown, best.covariance[:-1, :-1], by_unknown)
     low = max(float(speed[0]), float(ship.speed(parameters.froude_min)))
     high, _ = average.unknown(V0)
-    _, _, at_start = predict(best.law, plain, problem.grid_s, coast, every[:1])
+    _, at_start = predict(best.law, plain, problem.grid_s, coast, every[:1])
     high = min(high, float(at_start.max()))
     if not high > low * 1.02:
         raise EstimationError(
@@ -368,7 +366,7 @@ def _result(
             'froude_min'
         )
     curve = _curve(average, np.linspace(low, high, _CURVE_POINTS), ship)
-    residual, _, _ = predict(best.law, best.unknowns, problem.grid_s, coast, every[:1])
+    residual = predict(best.law, best.unknowns, problem.grid_s, coast, every[:1])[0][0]
     tracks = {}
     for name, stamps in record.stamps.items():
         chosen = coast.kind == KINDS[name]

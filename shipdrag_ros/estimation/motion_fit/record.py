@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,6 +114,13 @@ class Record:
     def steady_s(self) -> float:
         """Length of the steady record [s]."""
         return float(np.ptp(self.steady.time_s)) if len(self.steady.time_s) else 0.0
+
+    def without_steady(self) -> Record:
+        """
+        Return the coastdown alone.
+        """
+        rows, count = _merge([])
+        return replace(self, steady=rows, steady_count=count)
 
     def variance(self, rows: Rows, count: Int64 | int = 1) -> Float64:
         """

@@ -11,7 +11,21 @@ from shipdrag_ros.estimation.motion_fit.whitening import Disturbance, damping_at
 from shipdrag_ros.samples import Float64, Int64
 
 _RISES = 8  # of the damping, in one iteration
-_CONVERGED = 1e-4  # fall of chi^2: far below what tells families apart
+_CONVERGED = 1e-3  # fall of chi^2 still to come: far below what tells families apart
+
+
+@njit(cache=True, fastmath={'reassoc', 'contract'})
+def _products(table: Float64) -> Float64:
+    """Return all products of two lines of a table; no library, whose threads may differ."""
+    size, n = table.shape
+    products = np.empty((size, size))
+    for a in range(size):
+        for b in range(a + 1):
+            total = 0.0
+            for i in range(n):
+                total += table[a, i] * table[b, i]
+            products[a, b] = products[b, a] = total
+    return products
 
 
 @njit(cache=True)
@@ -42,36 +56,29 @@ def normal_equations(
     white : (n,)
         Whitened residuals.
     """
-    residual, jacobian, speed = predict(law, unknowns, grid_s, rows, active)
-    n, p = jacobian.shape
-    table = np.empty((n, p + 1))
+    table, speed = predict(law, unknowns, grid_s, rows, active)
+    p = len(active)
+    n = len(speed)
     damping = np.empty(n)
     inertia = np.empty(n)
-    for i in range(n):
-        table[i, 0] = residual[i]
-        table[i, 1:] = jacobian[i]
-        damping[i], inertia[i] = damping_at(law, unknowns, speed[i])
+    if about.gust_m_s2 > 0.0:
+        for i in range(n):
+            damping[i], inertia[i] = damping_at(law, unknowns, speed[i])
+    else:
+        damping[:], inertia[:] = damping_at(law, unknowns, speed[0])
     whiten(rows, table, variance, about, damping, inertia)
-    matrix = np.zeros((p, p))
-    gradient = np.zeros(p)
-    chi2 = 0.0
-    for i in range(n):
-        z = table[i, 0]
-        chi2 += z * z
-        for a in range(p):
-            column = table[i, 1 + a]
-            gradient[a] += column * z
-            for b in range(a + 1):
-                matrix[a, b] += column * table[i, 1 + b]
+    # of residual and columns
+    products = _products(table)
+    matrix = products[1:, 1:].copy()
+    gradient = products[1:, 0].copy()
+    chi2 = products[0, 0]
     for a in range(p):
         u = active[a]
         off = prior[0, u] - unknowns[u]
         chi2 += prior[1, u] * off * off
         matrix[a, a] += prior[1, u]
         gradient[a] += prior[1, u] * off
-        for b in range(a):
-            matrix[b, a] = matrix[a, b]
-    return chi2, matrix, gradient, table[:, 0].copy()
+    return chi2, matrix, gradient, table[0].copy()
 
 
 @njit(cache=True)
@@ -142,8 +149,14 @@ def fit(
     )
     damping = 0.0
     converged = False
+    idle = 0
     for _ in range(iterations):
         better = False
+        if damping == 0.0:
+            solved, step = cholesky_solve(matrix, gradient.reshape(-1, 1), 0.0)
+            if solved and np.sum(step[:, 0] * gradient) < _CONVERGED:
+                converged = True
+                break
         for _ in range(_RISES):
             solved, step = cholesky_solve(matrix, gradient.reshape(-1, 1), damping)
             if solved:
@@ -154,17 +167,21 @@ def fit(
                     law, trial, grid_s, rows, variance, about, active, prior
                 )
                 # written so that NaN fails
-                if found[0] <= chi2 + _CONVERGED:
+                if found[0] <= chi2 + 0.1 * _CONVERGED:
                     better = True
                     break
             damping = max(10.0 * damping, 1e-3)
         if not better:
+            # no step helps: as low as rounding, or samples at a kink, allow
+            converged = True
             break
         fall = chi2 - found[0]
         unknowns = trial
         chi2, matrix, gradient, white = found
         damping = 0.1 * damping if damping > 1e-4 else 0.0
-        if abs(fall) < _CONVERGED and damping == 0.0:
+        # a small fall may be the damping's doing; two of them are not
+        idle = idle + 1 if abs(fall) < _CONVERGED else 0
+        if idle == 2:
             converged = True
             break
     solved, covariance = cholesky_solve(matrix, np.eye(len(active)), 0.0)

@@ -27,7 +27,7 @@ _BLOCK_S = 60.0
 _UNSTEADY = 0.06  # of the speed: a block that differs by more ends the steady record
 _OUTLIER = 5.0  # robust standard deviations
 _MAD_TO_SD = 1.4826
-_TYPICAL_S = 120.0  # correlation time; known from experience within a factor of e
+_TYPICAL_S = 240.0  # correlation time; known from experience within a factor of e
 _SHORTEST_S, _LONGEST_S = 15.0, 3000.0
 
 
@@ -159,19 +159,19 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
         used.append(1)
     if LOG in kinds and len(kinds) > 1:
         used.append(2)
-    table = np.column_stack([rows.value, design[:, used]])
+    table = np.vstack([rows.value, design[:, used].T])
     dampings, inertias = np.full(n, damping), np.full(n, inertia)
 
     def cost(about: Disturbance) -> float:
         white = table.copy()
         log_det = whiten(rows, white, variance, about, dampings, inertias)
-        columns, z = white[:, 1:], white[:, 0]
-        matrix = np.einsum('ij,ik->jk', columns, columns)
-        right = np.einsum('ij,i->j', columns, z)[:, None]
+        columns, z = white[1:], white[0]
+        matrix = np.einsum('ji,ki->jk', columns, columns)
+        right = np.einsum('ji,i->j', columns, z)[:, None]
         solved, found = cholesky_solve(matrix, right, 0.0)
         if not solved:
             return math.inf
-        away = z - np.einsum('ij,j->i', columns, found[:, 0])
+        away = z - np.einsum('ji,j->i', columns, found[:, 0])
         _, log_of_design = np.linalg.slogdet(matrix)
         return log_det + float((away * away).sum()) + float(log_of_design)
 
@@ -198,7 +198,15 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
 
         start = np.zeros(2 * (gust + water))
         found = minimize(
-            penalised, start, method='Nelder-Mead', options={'xatol': 0.05, 'fatol': 0.05, 'maxfev': 160}
+            penalised,
+            start,
+            method='Nelder-Mead',
+            options={
+                'initial_simplex': np.vstack([start, np.eye(len(start))]),
+                'xatol': 0.05,
+                'fatol': 0.05,
+                'maxfev': 160,
+            },
         )
         criterion = float(found.fun) + 2.0 * len(start)
         if criterion < best:

@@ -106,13 +106,13 @@ def whiten(
     inertia: Float64,
 ) -> float:
     """
-    Whiten, in place, the columns of a table of rows.
+    Whiten, in place, residual and columns of the design.
 
     Parameters
     ----------
     rows
         In ascending time.
-    table : (n, c)
+    table : (c, n)
         Residual and columns of the design.
     variance : (n,)
         Of the white noise of each row.
@@ -126,13 +126,14 @@ def whiten(
     float
         Logarithm of the determinant of the covariance of the rows.
     """
-    n, columns = table.shape
+    columns, n = table.shape
     log_det = 0.0
     if about.gust_m_s2 == 0.0 and about.water_m_s == 0.0:
+        weights = 1.0 / np.sqrt(variance)
+        for c in range(columns):
+            for i in range(n):
+                table[c, i] *= weights[i]
         for i in range(n):
-            weight = 1.0 / np.sqrt(variance[i])
-            for c in range(columns):
-                table[i, c] *= weight
             log_det += np.log(variance[i])
         return log_det
     cov = np.zeros((_STATES, _STATES))
@@ -162,10 +163,10 @@ def whiten(
         for s in range(_STATES):
             gain[s] = seen[s] / total
         for c in range(columns):
-            innovation = table[i, c] - mean[first, c] - of_water * mean[3, c]
+            innovation = table[c, i] - mean[first, c] - of_water * mean[3, c]
             for s in range(_STATES):
                 mean[s, c] += gain[s] * innovation
-            table[i, c] = innovation * weight
+            table[c, i] = innovation * weight
         for a in range(_STATES):
             for b in range(_STATES):
                 cov[a, b] -= gain[a] * seen[b]
