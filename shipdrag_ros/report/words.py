@@ -34,6 +34,7 @@ FROUDE_MAX_BY = {
     FroudeMax.INFLECTION: 'the steepest rise of r, beyond which it falls significantly',
     FroudeMax.BRANCH_TOP: 'the highest speed of the record; no steepest rise was found',
 }
+_STRAIGHT = {'s1_speed': 2, 's1_position': 3, 's1_joint': 3}  # coefficients of a constant r
 _ESTIMATORS = {
     's1_joint': 'orthogonal polynomial, speed and position jointly',
     's1_position': 'orthogonal polynomial, position alone',
@@ -185,6 +186,7 @@ def notes(coastdown: Coastdown) -> tuple[str, ...]:
         *estimate.notes,
         *_range_notes(estimate),
         *_residual_notes(estimate),
+        *_astern_notes(estimate),
         *_method_notes(estimate),
     )
 
@@ -240,6 +242,21 @@ def _residual_notes(estimate: Estimate) -> list[str]:
     return found
 
 
+def _astern_notes(estimate: Estimate) -> list[str]:
+    """Tell of a ship that drag alone would have left at rest."""
+    speed = estimate.tracks.get('speed_through_water')
+    if speed is None:
+        return []
+    lowest = float(np.min(speed.fitted))
+    if lowest >= -2.0 * estimate.noise_sd['speed_through_water']:
+        return []
+    return [
+        f'The speed goes through zero, to {lowest:.2g} m/s: no drag does that. A constant force '
+        '(wind, a propeller) or a current acts in this record and is part of r, most of it at '
+        'the lowest speeds; one run cannot tell which it is.'
+    ]
+
+
 def _method_notes(estimate: Estimate) -> list[str]:
     found = []
     if 'speed_through_water' not in estimate.samples and estimate.current_m_s is None:
@@ -251,6 +268,11 @@ def _method_notes(estimate: Estimate) -> list[str]:
         found.append(
             'The joint fit takes log and position to show the same speed: a current, or a log '
             'that reads wrong by a factor, bends r(v).'
+        )
+    if estimate.order is not None and estimate.order == _STRAIGHT.get(estimate.estimator):
+        found.append(
+            f'{estimate.order} coefficients make r the same at every speed: these samples show '
+            'its mean, not its shape, and the band holds for the mean alone.'
         )
     if estimate.estimator.startswith('s1_'):
         found.append(

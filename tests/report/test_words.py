@@ -120,6 +120,41 @@ def test_residuals_that_do_not_scatter_are_told(coastdown: Coastdown) -> None:
     assert 'scatter' not in notes_with(speed.fitted)
 
 
+def test_a_ship_that_drifts_astern_is_told(coastdown: Coastdown) -> None:
+    estimate = coastdown.estimate
+    assert estimate is not None
+    assert not any('through zero' in note for note in words.notes(coastdown))
+    speed = estimate.tracks['speed_through_water']
+    noise = estimate.noise_sd['speed_through_water']
+    for lowest, told in ((-1.9 * noise, False), (-2.1 * noise, True)):
+        lower = lowest - float(speed.fitted.min())
+        moved = replace(speed, measured=speed.measured + lower, fitted=speed.fitted + lower)
+        tracks = {**estimate.tracks, 'speed_through_water': moved}
+        notes = words.notes(replace(coastdown, estimate=replace(estimate, tracks=tracks)))
+        assert any('through zero' in note for note in notes) is told
+
+
+@pytest.mark.parametrize(
+    ('estimator', 'order', 'told'),
+    [
+        ('s1_speed', 2, True),
+        ('s1_speed', 3, False),
+        ('s1_position', 3, True),
+        ('s1_joint', 3, True),
+        ('s1_joint', 4, False),
+        ('another', 3, False),
+        ('another', None, False),
+    ],
+)
+def test_a_constant_r_is_told_to_be_a_mean(
+    coastdown: Coastdown, estimator: str, order: int | None, told: bool
+) -> None:
+    assert coastdown.estimate is not None
+    other = replace(coastdown.estimate, estimator=estimator, order=order)
+    notes = words.notes(replace(coastdown, estimate=other))
+    assert any('its mean, not its shape' in note for note in notes) is told
+
+
 def test_a_curve_over_ground_is_named_so(coastdown: Coastdown) -> None:
     assert coastdown.estimate is not None
     assert words.speed_name(coastdown.estimate) == 'speed through water'
