@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -101,6 +102,9 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         failure = str(error)
     except ValueError:  # accepted stamps ascend but for this
         failure = 'a clock was set in the window; choose one before or after'
+    else:
+        turned = _turn_notes(accepted, samples, parameters)
+        found = replace(found, notes=(*found.notes, *turned))
     heading = _heading(accepted, start_ns)
     return Coastdown(
         start_ns,
@@ -111,6 +115,20 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         failure,
         None if heading is None else rep103_yaw(heading, parameters.heading_convention),
     )
+
+
+def _turn_notes(accepted: Block, samples: WindowSamples, parameters: Parameters) -> list[str]:
+    """Tell of a turn, which would have ended a coastdown that was watched."""
+    inside = (accepted.stamp_ns >= samples.start_ns) & (accepted.stamp_ns <= samples.end_ns)
+    yaw = accepted.value[inside & (accepted.channel == Channel.HEADING), 0]
+    turn_rad = float(np.ptp(np.unwrap(yaw))) if len(yaw) else 0.0
+    if turn_rad <= parameters.turn_rad:
+        return []
+    return [
+        f'the heading swings over {math.degrees(turn_rad):.0f} degrees in the window, more than '
+        f'turn_rad, {math.degrees(parameters.turn_rad):.0f} degrees: the drag of drifting and '
+        'turning is part of r'
+    ]
 
 
 def _heading(accepted: Block, start_ns: int) -> float | None:
