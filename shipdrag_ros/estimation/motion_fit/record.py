@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -56,9 +57,7 @@ class Record:
             If no input has enough samples.
         """
         inputs = {
-            name: series
-            for name in KINDS
-            if len(series := getattr(window, name)) >= LEAST_STAMPS
+            name: series for name in KINDS if len(series := getattr(window, name)) >= LEAST_STAMPS
         }
         if not inputs:
             found = ', '.join(f'{name} {len(getattr(window, name))}' for name in KINDS)
@@ -83,16 +82,19 @@ class Record:
         coast: list[tuple[Float64, int, Float64, Int64]] = []
         white: dict[str, float] = {}
         for name, series in inputs.items():
-            time_s = (series.time_ns - zero_ns) * 1e-9
-            before_s, before = np.empty(0), series.value[:0]
+            time_s = _seconds(series.time_ns, zero_ns)
+            before_s: Float64 = np.empty(0)
+            before = series.value[:0]
             if window.before is not None:
                 earlier: Series = getattr(window.before, name)
-                before_s = (earlier.time_ns - zero_ns) * 1e-9
+                before_s = _seconds(earlier.time_ns, zero_ns)
                 keep = before_s >= since
                 before_s, before = before_s[keep], earlier.value[keep]
             value = series.value
             if name == 'position':
-                both = _distance(np.concatenate([before_s, time_s]), np.concatenate([before, value]))
+                both = _distance(
+                    np.concatenate([before_s, time_s]), np.concatenate([before, value])
+                )
                 before, value = both[: len(before_s)], both[len(before_s) :]
             white[name] = known[name] or max(
                 white_sd(np.concatenate([before, value])), 1e-6 * float(np.ptp(value)), 1e-9
@@ -133,6 +135,10 @@ class Record:
         return result
 
 
+def _seconds(time_ns: Int64, zero_ns: int) -> Float64:
+    return np.asarray((time_ns - zero_ns) * 1e-9, np.float64)
+
+
 def _merge(parts: list[tuple[Float64, int, Float64, Int64]]) -> tuple[Rows, Int64]:
     """Sort rows of several inputs by time; ties keep the order of the inputs."""
     if not parts:
@@ -149,23 +155,21 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
     """Return the time [s after the stop] from which the record before is steady."""
     assert window.before is not None
     heading = window.before.heading
-    heading_s = (heading.time_ns - zero_ns) * 1e-9
+    heading_s = _seconds(heading.time_ns, zero_ns)
     for name in ('speed_through_water', 'speed_over_ground'):
         if name in inputs:
             series: Series = getattr(window.before, name)
-            time_s = (series.time_ns - zero_ns) * 1e-9
+            time_s = _seconds(series.time_ns, zero_ns)
             return steady_since(time_s, series.value, heading_s, heading.value)
     # positions alone do not tell from sample to sample: by their means
     series = window.before.position
     if len(series) < LEAST_STAMPS:
         return np.inf
-    time_s = (series.time_ns - zero_ns) * 1e-9
+    time_s = _seconds(series.time_ns, zero_ns)
     edges = np.arange(time_s[-1], time_s[0] - 60.0, -60.0)[::-1]
     blocks = np.searchsorted(time_s, edges)
     rows = [
-        (time_s[a:b].mean(), series.value[a:b].mean(axis=0))
-        for a, b in zip(blocks, blocks[1:])
-        if b > a
+        (time_s[a:b].mean(), series.value[a:b].mean(axis=0)) for a, b in pairwise(blocks) if b > a
     ]
     if len(rows) < 3:
         return np.inf

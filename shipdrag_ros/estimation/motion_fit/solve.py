@@ -163,9 +163,7 @@ def fit(
                 trial = unknowns.copy()
                 for a in range(len(active)):
                     trial[active[a]] += step[a, 0]
-                found = normal_equations(
-                    law, trial, grid_s, rows, variance, about, active, prior
-                )
+                found = normal_equations(law, trial, grid_s, rows, variance, about, active, prior)
                 # written so that NaN fails
                 if found[0] <= chi2 + 0.1 * _CONVERGED:
                     better = True

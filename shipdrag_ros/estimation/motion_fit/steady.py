@@ -11,6 +11,7 @@ would not do: a fit takes part of the disturbance for resistance.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -96,15 +97,11 @@ def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
     -------
     time_s, value, count : (b,)
     """
-    away = value - np.median(value)
-    spread = np.diff(value)
-    if len(spread) > 2:
-        # outliers are told from what is near in time: the record may drift
-        smooth = value - np.interp(time_s, *_medians(time_s, value))
-        typical = _MAD_TO_SD * float(np.median(np.abs(smooth)))
-        away = smooth
-        keep = np.abs(away) <= max(_OUTLIER * typical, 1e-12)
-        time_s, value = time_s[keep], value[keep]
+    # outliers are told from what is near in time: the record may drift
+    away = value - np.interp(time_s, *_medians(time_s, value))
+    typical = _MAD_TO_SD * float(np.median(np.abs(away)))
+    keep = np.abs(away) <= _OUTLIER * typical
+    time_s, value = time_s[keep], value[keep]
     number = np.floor((time_s - time_s[0]) / BIN_S)
     first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
     count = np.diff(np.concatenate([first, [len(time_s)]]))
@@ -173,9 +170,11 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
             return math.inf
         away = z - np.einsum('ji,j->i', columns, found[:, 0])
         _, log_of_design = np.linalg.slogdet(matrix)
-        return log_det + float((away * away).sum()) + float(log_of_design)
+        return float(log_det) + float((away * away).sum()) + float(log_of_design)
 
-    speed_sd = float(np.sqrt(np.median(variance[rows.kind != POSITION]))) if used != [0, 1] else 0.1
+    speed_sd = (
+        float(np.sqrt(np.median(variance[rows.kind != POSITION]))) if used != [0, 1] else 0.1
+    )
     # a force that moves the ship by about as much as its log scatters
     force = 0.3 * speed_sd * inertia * math.sqrt(damping * (damping + 1.0 / _TYPICAL_S))
     best, chosen = cost(CALM), CALM
@@ -187,12 +186,14 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
             values = np.exp(np.clip(x, -12.0, 12.0))
             parts = iter(values)
             of_gust = (force * next(parts), _TYPICAL_S * next(parts)) if gust else CALM[:2]
-            of_water = (0.3 * speed_sd * next(parts), _TYPICAL_S * next(parts)) if water else CALM[2:]
+            of_water = (
+                (0.3 * speed_sd * next(parts), _TYPICAL_S * next(parts)) if water else CALM[2:]
+            )
             return Disturbance(
                 float(of_gust[0]), _bounded(of_gust[1]), float(of_water[0]), _bounded(of_water[1])
             )
 
-        def penalised(x: Float64, about=about) -> float:  # type: ignore[no-untyped-def]
+        def penalised(x: Float64, about: Callable[[Float64], Disturbance] = about) -> float:
             times = x[1::2]
             return cost(about(x)) + float((times**2).sum())
 

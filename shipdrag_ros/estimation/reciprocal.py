@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Several coastdowns of one ship: one r(v), the current taken out.
+
+A run measured over ground alone shifts its speeds by the current along its
+track. On opposite headings the shifts are opposite: the current is the one
+under which the curves agree. What still differs from run to run (wind, waves,
+a current that changes) widens the band.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.samples import Float64
+
+_POINTS = 101
+_OPPOSITE = 0.5  # cosine of the angle between runs below which they are told apart
+_LARGEST_CURRENT = 0.4  # of the lowest speed
+
+
+@dataclass(frozen=True)
+class Combined:
+    """
+    r(v) from several coastdowns, ascending in speed.
+
+    Attributes
+    ----------
+    speed_m_s, froude : (m,)
+        Inside the valid range of every run.
+    resistance_m_s2 : (m,)
+        Mean weighted by the repeatable variances.
+    sigma_m_s2 : (m,)
+        Standard deviation with the error of n_r, which all runs share.
+    sigma_repeatable_m_s2 : (m,)
+        The same without it, widened where the runs differ by more than it says.
+    scatter_m_s2 : (m,)
+        Standard deviation of one run about the mean.
+    runs
+        How many.
+    current_m_s, current_sigma_m_s
+        Velocity of the water along the heading of the first run; None where
+        the runs do not tell it.
+    """
+
+    speed_m_s: Float64
+    resistance_m_s2: Float64
+    sigma_m_s2: Float64
+    sigma_repeatable_m_s2: Float64
+    scatter_m_s2: Float64
+    froude: Float64
+    runs: int
+    current_m_s: float | None
+    current_sigma_m_s: float | None
+
+
+def combine(estimates: Sequence[Estimate], headings_rad: Sequence[float | None]) -> Combined:
+    """
+    Combine the estimates of several coastdowns of one ship.
+
+    Parameters
+    ----------
+    estimates
+        Two or more.
+    headings_rad
+        Yaw of each run; None where it is not known.
+
+    Raises
+    ------
+    EstimationError
+        If there are fewer than two, or their valid ranges do not overlap.
+
+    Notes
+    -----
+    The band is widened by Birge's ratio, the root of chi^2 per degree of
+    freedom between the runs where it is above 1.
+    """
+    if len(estimates) < 2:
+        raise EstimationError(f'{len(estimates)} coastdown(s) to combine, give two or more')
+    along = _along_first(headings_rad)
+    over_ground = np.array(
+        [
+            'speed_through_water' not in item.samples and item.current_m_s is None
+            for item in estimates
+        ]
+    )
+    current, current_sigma = _current(estimates, along)
+    if current is None and over_ground.any():
+        current, current_sigma = _agreement(estimates, over_ground, along)
+    shifts = np.zeros(len(estimates))
+    if current is not None:
+        shifts = np.where(over_ground, current * np.nan_to_num(along), 0.0)
+    return _mean(estimates, shifts, current, current_sigma)
+
+
+def _along_first(headings_rad: Sequence[float | None]) -> Float64:
+    """Return the cosine of each heading with the first; NaN where one is unknown."""
+    first = headings_rad[0]
+    return np.array(
+        [
+            math.nan if heading is None or first is None else math.cos(heading - first)
+            for heading in headings_rad
+        ]
+    )
+
+
+def _current(estimates: Sequence[Estimate], along: Float64) -> tuple[float | None, float | None]:
+    """Average the currents that the runs have found by themselves."""
+    found = [
+        (item.current_m_s * np.sign(cosine), item.current_sigma_m_s)
+        for item, cosine in zip(estimates, along)
+        if item.current_m_s is not None and item.current_sigma_m_s and abs(cosine) > _OPPOSITE
+    ]
+    if not found:
+        return None, None
+    value, sigma = np.array(found).T
+    weight = 1.0 / sigma**2
+    mean = float((weight * value).sum() / weight.sum())
+    excess = float((weight * (value - mean) ** 2).sum()) / max(len(found) - 1, 1)
+    return mean, math.sqrt(max(excess, 1.0) / float(weight.sum()))
+
+
+def _agreement(
+    estimates: Sequence[Estimate], over_ground: np.ndarray, along: Float64
+) -> tuple[float | None, float | None]:
+    """Find the current under which the runs agree, where they were on opposite headings."""
+    known = along[over_ground]
+    spread = float(np.nanmax(known) - np.nanmin(known)) if np.isfinite(known).any() else 0.0
+    reference = bool((~over_ground).any()) and bool((np.abs(known) > _OPPOSITE).any())
+    if np.isnan(known).any() or not (spread > 2.0 * _OPPOSITE or reference):
+        return None, None
+    bound = _LARGEST_CURRENT * min(float(item.valid_curve.speed_m_s[0]) for item in estimates)
+
+    def misfit(current: float) -> float:
+        chi2, _ = _between(estimates, np.where(over_ground, current * along, 0.0))
+        return chi2
+
+    found = minimize_scalar(misfit, bounds=(-bound, bound), method='bounded')
+    best = float(found.x)
+    step = 1e-3 + 0.05 * bound
+    curvature = (misfit(best + step) - 2.0 * misfit(best) + misfit(best - step)) / step**2
+    sigma = math.sqrt(2.0 / curvature) if curvature > 0.0 else bound
+    return best, sigma
+
+
+def _grid(estimates: Sequence[Estimate], shifts: Float64) -> Float64:
+    low = max(float(item.valid_curve.speed_m_s[0]) - s for item, s in zip(estimates, shifts))
+    high = min(float(item.valid_curve.speed_m_s[-1]) - s for item, s in zip(estimates, shifts))
+    if not high > low:
+        raise EstimationError(
+            f'the valid ranges of the {len(estimates)} coastdowns do not overlap: from '
+            f'{low:.3g} m/s up, but to {high:.3g} m/s only; give runs over the same speeds'
+        )
+    return np.linspace(low, high, _POINTS)
+
+
+def _at(estimates: Sequence[Estimate], shifts: Float64, speed: Float64) -> Float64:
+    """Return r, repeatable variance and variance of n_r: (3, runs, m)."""
+    found = np.empty((3, len(estimates), len(speed)))
+    for i, (item, shift) in enumerate(zip(estimates, shifts)):
+        curve = item.valid_curve
+        for k, values in enumerate(
+            (
+                curve.resistance_m_s2,
+                curve.sigma_repeatable_m_s2**2,
+                curve.sigma_m_s2**2 - curve.sigma_repeatable_m_s2**2,
+            )
+        ):
+            found[k, i] = np.interp(speed + shift, curve.speed_m_s, values)
+    return found
+
+
+def _between(estimates: Sequence[Estimate], shifts: Float64) -> tuple[float, Float64]:
+    """Return chi^2 between the runs, mean over the speeds, and the speeds."""
+    speed = _grid(estimates, shifts)
+    r, variance, _ = _at(estimates, shifts, speed)
+    weight = 1.0 / variance
+    mean = (weight * r).sum(axis=0) / weight.sum(axis=0)
+    return float((weight * (r - mean) ** 2).sum(axis=0).mean()), speed
+
+
+def _mean(
+    estimates: Sequence[Estimate],
+    shifts: Float64,
+    current: float | None,
+    current_sigma: float | None,
+) -> Combined:
+    chi2, speed = _between(estimates, shifts)
+    r, variance, of_n_r = _at(estimates, shifts, speed)
+    runs = len(estimates)
+    weight = 1.0 / variance
+    mean = (weight * r).sum(axis=0) / weight.sum(axis=0)
+    excess = max(1.0, chi2 / (runs - 1))
+    repeatable = np.sqrt(excess / weight.sum(axis=0))
+    first = estimates[0].curve
+    return Combined(
+        speed_m_s=speed,
+        resistance_m_s2=mean,
+        sigma_m_s2=np.sqrt(repeatable**2 + of_n_r.mean(axis=0)),
+        sigma_repeatable_m_s2=repeatable,
+        scatter_m_s2=r.std(axis=0, ddof=1),
+        froude=speed * float(first.froude[-1] / first.speed_m_s[-1]),
+        runs=runs,
+        current_m_s=current,
+        current_sigma_m_s=current_sigma,
+    )
