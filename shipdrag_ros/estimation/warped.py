@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The live estimator: all inputs at once, in warped time, averaged over models.
+
+A pure function of the window, the ship and the parameters, as S1's. It assumes
+what S1 does not: that drag is roughly quadratic, that inputs differ by a
+current and a factor, that some samples are wrong, and that no one order is
+right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.curve import froude_max, resistance_curve, specific_resistance
+from shipdrag_ros.estimation.motion import Motion, sigma
+from shipdrag_ros.estimation.result import Estimate, Track
+from shipdrag_ros.estimation.robust import GROSS, robust_fit
+from shipdrag_ros.estimation.warped_inputs import KINDS, Inputs, gather
+from shipdrag_ros.estimation.warped_model import (
+    CURRENT,
+    OVER_GROUND,
+    POSITION,
+    THROUGH_WATER,
+    THRUST,
+    coast_rows,
+    combine,
+    design,
+    product,
+    quadratic_coast,
+)
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.regression.averaging import average, condense, root
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+NAME = 'warped'
+
+# Priors of the polynomials from the third on: the standard deviation of coefficient j is
+# AMPLITUDE DECAY^(j - 2) / j of the distance run. The priors are averaged over, as orders are
+# elsewhere; more of them gain nothing.
+AMPLITUDES = (0.002, 0.01, 0.05)
+DECAYS = (0.2, 0.4, 0.6)
+_POLYNOMIALS = 12  # as many as any record needs, the priors do the rest
+_FREE = 2  # coefficients of quadratic drag: nothing is held against them
+_FREE_SD = 10.0  # of the distance run
+_WEIGHTS = (0.03, 0.45)  # amplitude and decay in the fit that finds the weights
+CURRENT_SD_M_S = 1.0  # prior
+SCALE_SD = 0.02  # prior of the factor of the log
+_TOLD = 0.5  # what leaves more than this of the prior sd of a column does not tell it
+_THRUST_SD = 0.3  # prior of the thrust at the stop, of the resistance there
+_RUN_DOWN_S = 10.0  # where the ship file does not say
+_SHORTEST_RUN_DOWN_S = 0.1
+
+_POINTS = 65  # of the curve, even in warped time
+_NO_DECELERATION = 3.0  # standard deviations of the loss of speed
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """
+    The average over models.
+
+    Attributes
+    ----------
+    tc_s
+        Time constant of the warp.
+    coefficients : (k,)
+        Polynomials, then current, factor of the log, thrust.
+    error : (k, k)
+        A root of their covariance.
+    fitted : (n,)
+        At the samples.
+    noise_sd : (3,)
+        Of each kind of input.
+    run_down_s
+        Time constant of the thrust.
+    notes
+        A sentence each.
+    """
+
+    tc_s: float
+    coefficients: Float64
+    error: Float64
+    fitted: Float64
+    noise_sd: Float64
+    run_down_s: float
+    notes: tuple[str, ...]
+
+    @property
+    def polynomials(self) -> int:
+        """How many of the coefficients are of polynomials."""
+        return len(self.coefficients) - THRUST - 1
+
+    @property
+    def current(self) -> tuple[float, float] | tuple[None, None]:
+        """Current along the track and its standard deviation, if estimated."""
+        row = self.error[self.polynomials + CURRENT]
+        sd = float(np.sqrt((row * row).sum()))
+        if sd == 0.0:
+            return None, None
+        return float(self.coefficients[self.polynomials + CURRENT]), sd
+
+
+def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    """
+    Estimate r(v) from one window.
+
+    Parameters
+    ----------
+    window
+        Accepted samples.
+    ship
+        For n_r, the Froude number and the run-down of the thrust.
+    parameters
+        `order_max`, `froude_min` and the known standard deviations are used.
+
+    Raises
+    ------
+    EstimationError
+        If the window does not hold a coastdown that can be estimated.
+
+    Notes
+    -----
+    S1 (5)-(7) in warped time: x = sum p_j T_j(u), u = ln(1 + t / tc). While
+    the thrust runs down, r is that of the coast without it, which the ship has
+    joined afterwards. sigma is that of r at a speed, var(r - (dr/dv) v).
+    """
+    inputs = gather(window, parameters)
+    fit = _fit(inputs, ship, parameters)
+    motion = _motion(inputs, fit)
+    _check_deceleration(inputs, motion)
+    at_speed = _at_speed(motion)
+    # with the thrust running down the ship is slower at the start than that coast
+    thrust = float(fit.coefficients[-1])
+    start = float(motion.speed[0]) - fit.run_down_s * thrust
+    curve = resistance_curve(_from(at_speed, start), ship, froude_min=parameters.froude_min)
+    top, by = froude_max(curve)
+    valid = curve.between(curve.froude[0], top)
+    end = at_speed[-1:]
+    r, r_sigma, _ = specific_resistance(end, ship)
+    current, current_sd = fit.current
+    return Estimate(
+        estimator=NAME,
+        start_ns=inputs.scale.first_ns,
+        end_ns=inputs.scale.first_ns + inputs.scale.span_ns,
+        order=None,
+        orders=(),
+        samples={KINDS[kind]: int(inputs.count[kind]) for kind in inputs.used},
+        noise_sd={KINDS[kind]: float(fit.noise_sd[kind]) for kind in inputs.used},
+        curve=curve,
+        froude_valid=(float(curve.froude[0]), top),
+        froude_max_by=by,
+        froude_max_argmax=float(curve.froude[np.argmax(curve.slope)]),
+        w=float(valid.sigma_repeatable_m_s2.max() / valid.resistance_m_s2.max()),
+        last_speed_m_s=float(end.speed[0]),
+        last_speed_sigma_m_s=float(sigma(end.speed_error)[0]),
+        last_resistance_m_s2=float(r[0]),
+        last_sigma_m_s2=float(r_sigma[0]),
+        tracks=_tracks(inputs, fit),
+        current_m_s=current,
+        current_sigma_m_s=current_sd,
+        notes=(*window.notes, *inputs.notes, *fit.notes, *ship.warnings),
+    )
+
+
+def _fit(inputs: Inputs, ship: Ship, parameters: Parameters) -> _Fit:
+    span = inputs.span_s
+    kind = next(k for k in (THROUGH_WATER, OVER_GROUND, POSITION) if inputs.count[k])
+    part = inputs.part(kind)
+    tc, speed = quadratic_coast(
+        inputs.time_s[part], inputs.clean[part], span, 1 if kind == POSITION else 0
+    )
+    polynomials = min(_POLYNOMIALS, parameters.order_max)
+    run_down = _RUN_DOWN_S if ship.propulsion is None else ship.propulsion.run_down_s
+    run_down = max(run_down, _SHORTEST_RUN_DOWN_S)
+    rows = design(inputs.time_s, inputs.count, tc, span, speed, run_down, polynomials)
+    mean = np.zeros(len(rows))
+    mean[-1] = speed / tc
+    sds = _priors(polynomials, speed * tc * float(np.log1p(span / tc)), speed / tc)
+
+    # every column but the thrust: its prior is not about nothing
+    full = np.ones(len(rows), np.bool_)
+    full[-1] = False
+    full[-3:-1] = inputs.tells_water_from_ground
+    start, weight, noise_sd, used_sd = robust_fit(
+        rows,
+        inputs.value,
+        inputs.clean,
+        inputs.count,
+        inputs.known_sd,
+        np.flatnonzero(full),
+        mean,
+        sds[-1],
+    )
+    start[polynomials:] = 0.0
+    products = condense(rows, inputs.value - combine(rows, start), weight)
+    one = np.ones(1)
+    _, covariance, _ = average(products, start, full[None], one, mean, sds[-1:])
+    told, notes = _told(np.sqrt(np.diag(covariance)[-3:-1]), inputs)
+    families = _families(polynomials, *told)
+    chance = np.ones(len(families))
+    coefficients, covariance, share = average(products, start, families, chance, mean, sds[:-1])
+    scaled = float(share[families[:, -2]].sum())
+    if scaled > 0.5:
+        notes.append(
+            f'the log reads {100.0 * coefficients[-2]:+.2g} % (probability {scaled:.2f} that it '
+            'is off at all): taken into account'
+        )
+    return _Fit(
+        tc,
+        coefficients,
+        root(covariance),
+        combine(rows, coefficients),
+        noise_sd,
+        run_down,
+        (*notes, *_about_noise(inputs, weight, noise_sd, used_sd)),
+    )
+
+
+@cache
+def _shapes(polynomials: int) -> Float64:
+    """Return the prior sd of polynomials, for a distance of 1; last, that of the weights."""
+    pairs = [(amplitude, decay) for decay in DECAYS for amplitude in AMPLITUDES]
+    amplitude, decay = np.array([*pairs, _WEIGHTS]).T[:, :, None]
+    j = np.arange(polynomials)
+    held = amplitude * decay ** np.maximum(j - _FREE, 0) / np.maximum(j, 1)
+    return np.where(j < _FREE, _FREE_SD, held)
+
+
+def _priors(polynomials: int, distance: float, deceleration: float) -> Float64:
+    """Return the prior sd of all coefficients, one row a prior."""
+    shapes = _shapes(polynomials)
+    sd = np.empty((len(shapes), polynomials + THRUST + 1))
+    sd[:, :polynomials] = distance * shapes
+    sd[:, polynomials:] = (CURRENT_SD_M_S, SCALE_SD, _THRUST_SD * deceleration)
+    return sd
+
+
+def _told(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
+    """Say whether the data tell current and factor of the log, and why not."""
+    if not inputs.tells_water_from_ground:
+        return (False, False), []
+    current, scale = sd[0] < _TOLD * CURRENT_SD_M_S, sd[1] < _TOLD * SCALE_SD
+    notes = []
+    if not current:
+        notes.append(
+            f'a current was left out: this window tells it to +-{sd[0]:.2g} m/s only, which is no '
+            'better than not knowing'
+        )
+    if not scale:
+        notes.append(
+            f'a factor of the log was left out: this window tells it to +-{100.0 * sd[1]:.2g} % '
+            'only'
+        )
+    return (bool(current), bool(scale)), notes
+
+
+def _families(polynomials: int, current: bool, scale: bool) -> NDArray[np.bool_]:
+    """Return the columns of each family: with and without factor, with and without thrust."""
+    rows = [
+        [True] * polynomials + [current, with_scale, with_thrust]
+        for with_scale in ((False, True) if scale else (False,))
+        for with_thrust in (False, True)
+    ]
+    return np.array(rows)
+
+
+def _about_noise(
+    inputs: Inputs, weight: Float64, noise_sd: Float64, used_sd: Float64
+) -> list[str]:
+    notes = []
+    for kind in inputs.used:
+        gross = int(np.count_nonzero(weight[inputs.part(kind)] == 0.0))
+        if gross:
+            notes.append(
+                f'{KINDS[kind]}: {gross} sample(s) more than {GROSS:g} standard deviations off '
+                'were left out'
+            )
+        known = inputs.known_sd[kind]
+        if known and used_sd[kind] != known:
+            notes.append(
+                f'{KINDS[kind]}: the residuals, {noise_sd[kind]:.3g}, contradict the stated '
+                f'standard deviation {known:.3g}: it was not used'
+            )
+    return notes
+
+
+def _motion(inputs: Inputs, fit: _Fit) -> Motion:
+    """Evaluate the motion from the start to the end."""
+    k = fit.polynomials
+    p, error = fit.coefficients[:k, None].copy(), fit.error[:k].copy()
+    rows = coast_rows(fit.tc_s, inputs.span_s, k, _POINTS)
+    return Motion(
+        *(product(part, p)[:, 0].copy() for part in rows), *(product(part, error) for part in rows)
+    )
+
+
+def _check_deceleration(inputs: Inputs, motion: Motion) -> None:
+    loss = float(motion.speed[0] - motion.speed[-1])
+    sd = float(sigma((motion.speed_error[0] - motion.speed_error[-1])[None])[0])
+    if not abs(loss) > _NO_DECELERATION * sd:
+        raise EstimationError(
+            f'no deceleration above the noise: the speed fell by {loss:.3g} +- {sd:.2g} m/s in '
+            f'{inputs.span_s:.4g} s; give a longer window, or one after the engine stop'
+        )
+
+
+def _at_speed(motion: Motion) -> Motion:
+    """Return the motion with the error of its acceleration at a given speed, not time."""
+    a = np.where(motion.acceleration == 0.0, np.inf, motion.acceleration)
+    shift = (motion.jerk / a)[:, None] * motion.speed_error
+    return replace(motion, acceleration_error=motion.acceleration_error - shift)
+
+
+def _from(motion: Motion, speed: float) -> Motion:
+    """Return the motion from where it has fallen to a speed."""
+    above = np.flatnonzero(motion.speed > speed)
+    if len(above) == 0 or above[-1] == len(motion.speed) - 1:
+        return motion
+    last = int(above[-1])
+    share = (motion.speed[last] - speed) / (motion.speed[last] - motion.speed[last + 1])
+    values = [getattr(motion, field.name) for field in fields(motion)]
+    return Motion(
+        *(
+            np.concatenate(
+                [[(1.0 - share) * value[last] + share * value[last + 1]], value[last + 1 :]]
+            )
+            for value in values
+        )
+    )
+
+
+def _tracks(inputs: Inputs, fit: _Fit) -> dict[str, Track]:
+    return {
+        KINDS[kind]: Track(
+            inputs.stamps[kind], inputs.value[inputs.part(kind)], fit.fitted[inputs.part(kind)]
+        )
+        for kind in inputs.used
+    }

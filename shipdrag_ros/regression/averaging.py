@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Linear models under Gaussian priors, averaged by their marginal likelihood.
+
+The rows are condensed once; then every model, a choice of columns under a
+prior, is a matter of one small triangular factor.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from shipdrag_ros.samples import Float64
+
+_NEGLIGIBLE = 1e-4  # weight of a model against the best; the rest is left out of the spread
+# Sums may be taken in any order, so that they are vectorised; the order is
+# fixed when compiled, not by the data or where they lie.
+_SUMS = {'reassoc', 'contract', 'nsz'}
+
+
+@njit('f8[:, ::1](f8[:, ::1], f8[::1], f8[::1])', cache=True, fastmath=_SUMS)
+def condense(rows: Float64, residual: Float64, weight: Float64) -> Float64:
+    """
+    Return the weighted products of all columns and of the residual.
+
+    Parameters
+    ----------
+    rows : (k, n)
+        The columns of the model.
+    residual, weight : (n,)
+
+    Returns
+    -------
+    (k + 1, k)
+        The last row holds the products with the residual.
+    """
+    k, n = rows.shape
+    products = np.empty((k + 1, k))
+    weighted = np.empty(n)
+    for a in range(k + 1):
+        row = residual if a == k else rows[a]
+        for i in range(n):
+            weighted[i] = weight[i] * row[i]
+        for b in range(min(a + 1, k)):
+            other = rows[b]
+            total = 0.0
+            for i in range(n):
+                total += weighted[i] * other[i]
+            products[a, b] = total
+            if a < k:
+                products[b, a] = total
+    return products
+
+
+@njit('b1(f8[:, ::1])', cache=True)
+def _factor(matrix: Float64) -> bool:
+    """Cholesky in place, lower, row by row; False where it is not positive."""
+    n = len(matrix)
+    for i in range(n):
+        for j in range(i):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = total / matrix[j, j]
+        pivot = matrix[i, i]
+        for k in range(i):
+            pivot -= matrix[i, k] * matrix[i, k]
+        if not pivot > 0.0:
+            return False
+        matrix[i, i] = math.sqrt(pivot)
+    return True
+
+
+@njit('void(f8[:, ::1], f8[::1])', cache=True)
+def _forward(lower: Float64, vector: Float64) -> None:
+    """Solve L x = b in place."""
+    for i in range(len(vector)):
+        total = vector[i]
+        for k in range(i):
+            total -= lower[i, k] * vector[k]
+        vector[i] = total / lower[i, i]
+
+
+@njit('void(f8[:, ::1], f8[::1])', cache=True)
+def _backward(lower: Float64, vector: Float64) -> None:
+    """Solve L' x = b in place."""
+    n = len(vector)
+    for i in range(n - 1, -1, -1):
+        total = vector[i]
+        for k in range(i + 1, n):
+            total -= lower[k, i] * vector[k]
+        vector[i] = total / lower[i, i]
+
+
+@njit(
+    'Tuple((f8, f8[::1], f8[:, ::1]))(f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])', cache=True
+)
+def posterior(
+    products: Float64,
+    start: Float64,
+    columns: NDArray[np.int64],
+    mean: Float64,
+    sd: Float64,
+) -> tuple[float, Float64, Float64]:
+    """
+    Solve one model.
+
+    Parameters
+    ----------
+    products : (k + 1, k)
+        From `condense`, weights being 1 / variance, of the residual at `start`.
+    start : (k,)
+        Coefficients; 0 of columns that the model does not have.
+    columns : (m,) int64
+        Which columns it has.
+    mean, sd : (k,)
+        Prior of the coefficients.
+
+    Returns
+    -------
+    evidence
+        Logarithm of the marginal likelihood, up to a constant of the data.
+    step : (m,)
+        From `start` to the solution.
+    lower : (m, m)
+        Triangular factor of the inverse covariance.
+    """
+    k, m = len(start), len(columns)
+    lower, step = np.empty((m, m)), np.empty(m)
+    evidence = 0.0
+    for a in range(m):
+        column = columns[a]
+        for b in range(m):
+            lower[a, b] = products[column, columns[b]]
+        precision = 1.0 / (sd[column] * sd[column])
+        off = start[column] - mean[column]
+        lower[a, a] += precision
+        step[a] = products[k, column] - precision * off
+        evidence -= 0.5 * precision * off * off + math.log(sd[column])
+    if not _factor(lower):
+        return -np.inf, step, lower
+    _forward(lower, step)
+    for a in range(m):
+        evidence += 0.5 * step[a] * step[a] - math.log(lower[a, a])
+    _backward(lower, step)
+    return evidence, step, lower
+
+
+@njit('Tuple((f8, f8[:, ::1]))(f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])', cache=True)
+def _eliminate(
+    products: Float64,
+    start: Float64,
+    columns: NDArray[np.int64],
+    mean: Float64,
+    sd: Float64,
+) -> tuple[float, Float64]:
+    """Return the evidence of some columns and the products of what they leave."""
+    k, m = len(start), len(columns)
+    evidence, step, lower = posterior(products, start, columns, mean, sd)
+    reduced = products.copy()
+    taken = np.empty((k, m))
+    for a in range(k):
+        for b in range(m):
+            taken[a, b] = products[a, columns[b]]
+        _forward(lower, taken[a])
+    for a in range(m):
+        for b in range(k):
+            reduced[k, b] -= step[a] * products[columns[a], b]
+    for a in range(k):
+        for b in range(k):
+            for c in range(m):
+                reduced[a, b] -= taken[a, c] * taken[b, c]
+    return evidence, reduced
+
+
+@njit(
+    'Tuple((f8[::1], f8[:, ::1], f8[:, ::1]))'
+    '(f8[:, ::1], f8[::1], b1[:, ::1], f8[::1], f8[::1], f8[:, ::1])',
+    cache=True,
+)
+def average(
+    products: Float64,
+    start: Float64,
+    families: NDArray[np.bool_],
+    chance: Float64,
+    mean: Float64,
+    sds: Float64,
+) -> tuple[Float64, Float64, Float64]:
+    """
+    Average all families of columns under all priors.
+
+    Parameters
+    ----------
+    products : (k + 1, k)
+        See `posterior`.
+    start : (k,)
+        0 in every column that some family lacks.
+    families : (f, k) bool
+        Which columns each has; a coefficient that is not in is 0.
+    chance : (f,)
+        Prior probability of each.
+    mean : (k,)
+        Of the priors.
+    sds : (p, k)
+        Standard deviations, one row a prior.
+
+    Returns
+    -------
+    coefficients : (k,)
+    covariance : (k, k)
+        Within the models and between them.
+    weight : (f, p)
+        Of each model, summing to 1.
+
+    Notes
+    -----
+    Mean and variance over models as Buckland, Burnham and Augustin (1997) have
+    them; weights by marginal likelihood in place of an information criterion,
+    because the models differ in how strongly coefficients are held, not in how
+    many there are.
+    """
+    k = len(start)
+    weight = np.empty((len(families), len(sds)))
+    # what all priors hold alike is solved for once
+    alike = np.empty(k, np.bool_)
+    for a in range(k):
+        alike[a] = sds[:, a].min() == sds[:, a].max()
+    for f in range(len(families)):
+        known, reduced = _eliminate(
+            products, start, np.flatnonzero(families[f] & alike), mean, sds[0]
+        )
+        columns = np.flatnonzero(families[f] & ~alike)
+        known += math.log(chance[f])
+        for p in range(len(sds)):
+            weight[f, p] = known + posterior(reduced, start, columns, mean, sds[p])[0]
+    weight = np.exp(weight - weight.max())
+    weight = np.where(weight < _NEGLIGIBLE, 0.0, weight)
+    weight /= weight.sum()
+
+    coefficients, second = np.zeros(k), np.zeros((k, k))
+    for f in range(len(families)):
+        columns = np.flatnonzero(families[f])
+        m = len(columns)
+        inverse = np.empty((m, m))
+        for p in range(len(sds)):
+            share = weight[f, p]
+            if share == 0.0:
+                continue
+            _, step, lower = posterior(products, start, columns, mean, sds[p])
+            for a in range(m):
+                inverse[a] = 0.0
+                inverse[a, a] = 1.0
+                _forward(lower, inverse[a])
+                _backward(lower, inverse[a])
+            for a in range(m):
+                coefficients[columns[a]] += share * step[a]
+                for b in range(m):
+                    # moments about the start, which is near: nothing cancels
+                    second[columns[a], columns[b]] += share * (
+                        0.5 * (inverse[a, b] + inverse[b, a]) + step[a] * step[b]
+                    )
+    for a in range(k):
+        for b in range(k):
+            second[a, b] -= coefficients[a] * coefficients[b]
+    return start + coefficients, second, weight
+
+
+@njit('f8[:, ::1](f8[:, ::1])', cache=True)
+def root(covariance: Float64) -> Float64:
+    """
+    Return a lower root R of a covariance, R R'; it may be singular.
+    """
+    n = len(covariance)
+    lower = np.zeros((n, n))
+    for j in range(n):
+        pivot = covariance[j, j]
+        for k in range(j):
+            pivot -= lower[j, k] * lower[j, k]
+        # a coefficient that follows from others, or is in no model
+        if not pivot > 1e-13 * covariance[j, j]:
+            continue
+        pivot = math.sqrt(pivot)
+        lower[j, j] = pivot
+        for i in range(j + 1, n):
+            total = covariance[i, j]
+            for k in range(j):
+                total -= lower[i, k] * lower[j, k]
+            lower[i, j] = total / pivot
+    return lower
