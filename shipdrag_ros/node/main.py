@@ -15,7 +15,8 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import rclpy
@@ -27,6 +28,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.node.node import CoastdownNode
 
 USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'
+STOPPING = (signal.SIGINT, signal.SIGTERM)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -70,7 +72,6 @@ def run(ship_file: Path, output_directory: Path, *, ros_arguments: Sequence[str]
 def _run(line: list[str]) -> int:
     if 'HOME' not in os.environ:  # as under systemd; ROS refuses to start without a place for logs
         os.environ.setdefault('ROS_LOG_DIR', tempfile.gettempdir())
-    stop = threading.Event()
     context = rclpy.Context()
     try:
         rclpy.init(args=line, context=context, signal_handler_options=SignalHandlerOptions.NO)
@@ -81,41 +82,52 @@ def _run(line: list[str]) -> int:
             print(f'{USAGE}\nunknown: {" ".join(stray)}', file=sys.stderr)
             return 2
         executor = SingleThreadedExecutor(context=context)
-        _on_signal(stop, executor)
-        node = CoastdownNode(context=context, arguments=line)
-        try:
-            executor.add_node(node)
-            node.start()
-            while not stop.is_set():
-                executor.spin_once()
-        except ExternalShutdownException:
-            pass
-        finally:
-            node.close()
+        with _ended_by_signal(executor) as stop:
+            node = CoastdownNode(context=context, arguments=line)
+            try:
+                executor.add_node(node)
+                node.start()
+                while not stop.is_set():
+                    executor.spin_once()
+            except ExternalShutdownException:
+                pass
+            finally:
+                node.close()
     finally:
         rclpy.try_shutdown(context=context)
     return 0
 
 
-def _on_signal(stop: threading.Event, executor: SingleThreadedExecutor) -> None:
+@contextmanager
+def _ended_by_signal(executor: SingleThreadedExecutor) -> Iterator[threading.Event]:
     """
-    Set `stop` on SIGINT and SIGTERM.
+    Give an event that SIGINT and SIGTERM set.
 
     A Python handler has to wait until the executor returns from C; the byte that
     a signal writes at once into a pipe does not.
     """
+    stop = threading.Event()
     read_end, write_end = os.pipe()
     os.set_blocking(write_end, False)
-    signal.set_wakeup_fd(write_end)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: None)
 
     def wait() -> None:
-        os.read(read_end, 1)
-        stop.set()
-        executor.wake()
+        if os.read(read_end, 1):  # nothing where the pipe was closed
+            stop.set()
+            executor.wake()
 
-    threading.Thread(target=wait, name='signals', daemon=True).start()
+    thread = threading.Thread(target=wait, name='signals')
+    thread.start()
+    fd_before = signal.set_wakeup_fd(write_end)
+    before = {number: signal.signal(number, lambda *_: None) for number in STOPPING}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        signal.set_wakeup_fd(fd_before)
+        os.close(write_end)
+        thread.join()
+        os.close(read_end)
 
 
 if __name__ == '__main__':

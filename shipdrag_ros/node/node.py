@@ -28,7 +28,7 @@ from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTo
 from shipdrag_ros.node import diagnostics
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
-from shipdrag_ros.node.recorder import Recorder
+from shipdrag_ros.node.recorder import Recorder, RecordingState
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.ship import Ship
@@ -36,6 +36,7 @@ from shipdrag_ros.ship import Ship
 NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSE_S = 1.0
+INACTIVE = 'the node is not active'
 
 
 class CoastdownNode(LifecycleNode):
@@ -199,7 +200,10 @@ class CoastdownNode(LifecycleNode):
         if self._settings.record:
             self._recorder.start()
         self._session.note_lifecycle('active', self._now_ns())
-        self.get_logger().info(f'active; {self._recorder.status().text}')
+        status = self._recorder.status()
+        if status.state is RecordingState.FAILED:
+            self.get_logger().error(status.text)
+        self.get_logger().info(f'active; {status.text}')
 
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
@@ -281,22 +285,28 @@ class CoastdownNode(LifecycleNode):
     # services
 
     def _start_recording(self, request: Any, response: Any) -> Any:
-        return self._answer(response, lambda session: session.recorder.start())
+        if self._session is not None:
+            self._session.recorder.start()
+        return self._answer_recording(response)
 
     def _stop_recording(self, request: Any, response: Any) -> Any:
-        return self._answer(response, lambda session: session.recorder.stop())
+        if self._session is not None:
+            self._session.recorder.stop()
+        return self._answer_recording(response)
+
+    def _answer_recording(self, response: Any) -> Any:
+        if self._session is None:
+            return _answer(response, False, INACTIVE)
+        status = self._session.recorder.status()
+        return _answer(response, status.state is not RecordingState.FAILED, status.text)
 
     def _reset(self, request: Any, response: Any) -> Any:
-        return self._answer(response, lambda session: session.reset('asked for', self._now_ns()))
-
-    def _answer(self, response: Any, action: Callable[[Session], None]) -> Any:
         if self._session is None:
-            response.success, response.message = False, 'the node is not active'
-            return response
-        try:
-            action(self._session)
-        except ShipdragError as error:
-            response.success, response.message = False, str(error)
-        else:
-            response.success, response.message = True, self._session.recorder.status().text
-        return response
+            return _answer(response, False, INACTIVE)
+        self._session.reset('asked for', self._now_ns())
+        return _answer(response, True, 'all memory is dropped')
+
+
+def _answer(response: Any, success: bool, message: str) -> Any:
+    response.success, response.message = success, message
+    return response

@@ -24,6 +24,7 @@ from shipdrag_ros.node.inputs import message_class
 from shipdrag_ros.samples import Block, Channel
 
 QOS = QoSProfile(depth=1000)
+TIMEOUT_S = 10.0
 STEP_NS = 1_000_000_000  # data and clock advance together by this much
 
 
@@ -50,7 +51,7 @@ class Player:
         self._topics: dict[str, Publisher] = {}
         self._clock: Publisher | None = None
 
-    def connect(self, block: Block, *, timeout_s: float = 10.0) -> None:
+    def connect(self, block: Block, *, timeout_s: float = TIMEOUT_S) -> None:
         """
         Wait until somebody hears every input of a block.
 
@@ -62,15 +63,7 @@ class Player:
         for code in np.unique(block.channel).tolist():
             channel = Channel(code)
             self._publisher(f'{self._namespace}/{channel.input}', input_type(channel))
-        end_s = time.monotonic() + timeout_s
-        while deaf := [
-            name for name, topic in self._topics.items() if not topic.get_subscription_count()
-        ]:
-            if time.monotonic() > end_s:
-                raise ShipdragError(
-                    f'nobody hears {", ".join(deaf)} within {timeout_s:g} s; is the node active?'
-                )
-            self._executor.spin_once(timeout_sec=0.05)
+        self._wait_for_listeners(timeout_s)
 
     def publish(self, block: Block) -> None:
         """
@@ -82,9 +75,17 @@ class Player:
     def set_clock(self, time_ns: int) -> None:
         """
         Publish simulated time [ns].
+
+        Raises
+        ------
+        ShipdragError
+            If nobody hears it.
         """
         if self._clock is None:
-            self._clock = self._node.create_publisher(Clock, '/clock', QOS)
+            self._clock = self._topics['/clock'] = self._node.create_publisher(
+                Clock, '/clock', QOS
+            )
+            self._wait_for_listeners(TIMEOUT_S)
         message = Clock()
         message.clock.sec, message.clock.nanosec = divmod(int(time_ns), 1_000_000_000)
         self._clock.publish(message)
@@ -112,6 +113,17 @@ class Player:
             self.set_clock(first_ns + (int(seconds[i]) + 1) * STEP_NS)
             self.publish(block[i:j])
             progress(j / len(block))
+
+    def _wait_for_listeners(self, timeout_s: float) -> None:
+        end_s = time.monotonic() + timeout_s
+        while deaf := [
+            name for name, topic in self._topics.items() if not topic.get_subscription_count()
+        ]:
+            if time.monotonic() > end_s:
+                raise ShipdragError(
+                    f'nobody hears {", ".join(deaf)} within {timeout_s:g} s; is the node active?'
+                )
+            self._executor.spin_once(timeout_sec=0.05)
 
     def _spin_until(self, due_s: float) -> None:
         while True:  # once at least, to hear the answers also when late

@@ -134,12 +134,12 @@ class Recorder:
         Close the bag; no effect while there is none.
         """
         writer, self._writer = self._writer, None
+        self._error = ''
         if writer is not None:
             try:
                 writer.close()
             except (OSError, BagError) as error:
                 self._fail(error)
-        self._error = ''
 
     def new_part(self) -> None:
         """

@@ -105,8 +105,10 @@ class Session:
         """
         Give the last figures and close the recording; needs no ROS.
         """
-        self._report(self.monitor.finish())
-        self.recorder.stop()
+        try:
+            self._report(self.monitor.finish())
+        finally:  # whatever is wrong, the bag is closed
+            self.recorder.stop()
 
     def _reset(self, reason: str) -> None:
         # first the request, at whose place a replay resets too

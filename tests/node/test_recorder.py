@@ -151,3 +151,19 @@ def test_a_disk_that_fills_up_is_counted_and_may_be_retried(
     it.stop()
     assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [1, 2, 3]
     assert it.status().lost == 0
+
+
+def test_a_bag_that_cannot_be_closed_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    it = recorder(tmp_path)
+    it.start()
+    close = BagWriter.close
+
+    def full(writer: BagWriter) -> None:
+        close(writer)
+        raise BagError('No space left on device')
+
+    monkeypatch.setattr(BagWriter, 'close', full)
+    it.stop()
+    assert it.status().state is RecordingState.FAILED

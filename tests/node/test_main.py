@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The process around the node: user errors, signals, the ways to start it."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+
+rclpy = pytest.importorskip('rclpy')
+
+from shipdrag_ros.node.main import main  # noqa: E402
+from shipdrag_ros.node.node import CoastdownNode  # noqa: E402
+
+START_S = 90.0
+
+
+def attachments(bag: Path) -> dict[str, str]:
+    with bag.open('rb') as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        return {item.name: item.data.decode() for item in reader.iter_attachments()}
+
+
+def test_a_bad_ship_file_ends_the_process(start_node: Any) -> None:
+    node = start_node(up=None, ship_file='/nowhere/ship.yaml')
+    assert node.wait() == 1
+    assert 'ERROR: /nowhere/ship.yaml: 1 problem(s)\n  - cannot be read' in node.log
+    assert 'Traceback' not in node.log
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'said'),
+    [
+        ('windows_s', 600.0, "'windows_s': unknown; known are autostart"),
+        ('window_s', 'long', "window_s: 'long' is of type str, expected float"),
+        ('window_s', 1.0, 'window_s: 1.0, expected 60..21600 s'),
+        ('record', 1, 'record: 1 is of type int, expected bool'),
+        ('depth.type', 'std_msgs/msg/Float64', 'expected one of sensor_msgs/msg/Range'),
+        ('ship_file', '', 'expected the path of a ship file'),
+    ],
+)
+def test_bad_parameters_are_user_errors(
+    capfd: pytest.CaptureFixture[str], name: str, value: object, said: str
+) -> None:
+    line = ['coastdown_node', '--ros-args', '-p', f'{name}:={json.dumps(value)}']
+    assert main(line) == 1
+    error = capfd.readouterr().err
+    assert 'ERROR: ' in error
+    assert said in error
+
+
+def test_parameters_for_another_node_are_an_error(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / 'other.yaml'
+    file.write_text('coastdown:\n  ros__parameters: {window_s: 600.0}\n')
+    assert main(['coastdown_node', '--ros-args', '--params-file', str(file)]) == 1
+    assert "expected one for '/coastdown_node'" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('section', 'namespace'),
+    [
+        ('/**', ''),
+        ('coastdown_node', ''),
+        ('/ship/coastdown_node', '/ship'),
+        ('/*/coastdown_node', '/ship'),
+        ('/**/coastdown_node', '/big/ship'),
+    ],
+)
+def test_parameters_for_this_node_are_read(
+    capfd: pytest.CaptureFixture[str], tmp_path: Path, section: str, namespace: str
+) -> None:
+    file = tmp_path / 'ours.yaml'
+    file.write_text(f'{section}:\n  ros__parameters: {{windows_s: 600.0}}\n')
+    line = ['coastdown_node', '--ros-args', '--params-file', str(file)]
+    line += ['-r', f'__ns:={namespace or "/"}']
+    assert main(line) == 1
+    assert "'windows_s': unknown" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    'arguments', [['--params-file', '/nowhere.yaml'], ['-p', 'window_s'], ['--no-such-flag']]
+)
+def test_bad_ros_arguments_are_user_errors(
+    capfd: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    assert main(['coastdown_node', '--ros-args', *arguments]) == 1
+    assert 'ERROR: ROS does not start' in capfd.readouterr().err
+
+
+def test_stray_arguments_are_a_usage_error(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(['coastdown_node', 'stray']) == 2
+    assert 'usage: coastdown_node' in capfd.readouterr().err
+
+
+def test_signal_handlers_are_given_back() -> None:
+    before = signal.getsignal(signal.SIGTERM)
+    main(['coastdown_node', '--ros-args', '-p', 'ship_file:=/nowhere'])
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_with_a_readable_bag(
+    start_node: Any, tmp_path: Path, number: signal.Signals
+) -> None:
+    node = start_node()
+    assert node.stop(number) == 0
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    assert list(attachments(bag)) == ['ship.yaml', 'parameters.yaml']
+    with bag.open('rb') as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == 2
+
+
+def test_starts_from_a_call_with_any_path(tmp_path: Path, ship_file: Path) -> None:
+    ship = ship_file.rename(tmp_path / "ship: 'no 1' #.yaml")
+    code = (
+        'import sys; from shipdrag_ros.node.main import run\n'
+        f'sys.exit(run({str(ship)!r}, "123", ros_arguments=["-p", "window_s:=600.0"]))'
+    )
+    with subprocess.Popen([sys.executable, '-c', code], cwd=tmp_path) as process:
+        end = time.monotonic() + START_S
+        while not list(tmp_path.glob('123/*.mcap')):
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30.0) == 0
+    (bag,) = tmp_path.glob('123/*.mcap')
+    assert 'window_s: 600.0' in attachments(bag)['parameters.yaml']
+
+
+def test_the_bag_is_closed_also_when_ros_is_gone(tmp_path: Path, ship_file: Path) -> None:
+    context = rclpy.Context()
+    line = ['--ros-args', '-p', f'ship_file:={ship_file}', '-p', f'output_directory:={tmp_path}']
+    rclpy.init(args=line, context=context)
+    node = CoastdownNode(context=context, arguments=line)
+    node.start()
+    rclpy.shutdown(context=context)
+    node.close()
+    (bag,) = tmp_path.glob('*.mcap')
+    assert list(attachments(bag)) == ['ship.yaml', 'parameters.yaml']
