@@ -95,17 +95,6 @@ def smoothing(width: int) -> int:
 
 
 @njit
-def forget_bins(bins: Bins) -> None:
-    """
-    Empty all bins.
-    """
-    bins.filling[:] = NEVER
-    bins.samples[:] = 0
-    bins.sums[:] = 0.0
-    bins.number[:] = NEVER
-
-
-@njit
 def add(bins: Bins, channel: int, number: int, stamp: int, a: float, b: float) -> None:
     """
     Add an accepted sample to the bin being filled.
@@ -152,7 +141,7 @@ def close(bins: Bins, channel: int, width: int) -> int:
     return int(number)
 
 
-@njit
+@njit(cache=True)
 def mean_place(bins: Bins, channel: int, last: int, width: int) -> tuple[float, float, float, int]:
     """
     Average positions (or cosine and sine) over the bins last - width + 1 .. last.
@@ -184,7 +173,7 @@ def mean_place(bins: Bins, channel: int, last: int, width: int) -> tuple[float, 
     return time / count, sum_a / count, sum_b / count, count
 
 
-@njit
+@njit(cache=True)
 def displacement(bins: Bins, channel: int, last: int, width: int) -> tuple[float, float, float]:
     """
     Return time [s] and way east and north [m] between two neighbouring spans.
@@ -217,7 +206,7 @@ def _speed_of_track(bins: Bins, channel: int, number: int, width: int) -> tuple[
     return newest - 0.5 * time, math.sqrt(east * east + north * north) / time
 
 
-@njit
+@njit(cache=True)
 def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, int]:
     """
     Fit a straight line to the speed over the bins last - width + 1 .. last.
@@ -258,7 +247,7 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
     return slope, origin + mean_v + slope * (newest - mean_t), count
 
 
-@njit
+@njit(cache=True)
 def mean_turning(bins: Bins, channel: int, last: int, width: int) -> tuple[float, int]:
     """
     Return the mean of |first column| over the bins last - width + 1 .. last.
@@ -275,7 +264,7 @@ def mean_turning(bins: Bins, channel: int, last: int, width: int) -> tuple[float
     return total / count, count
 
 
-@njit
+@njit(cache=True)
 def newest_bin(bins: Bins, channel: int) -> int:
     """
     Return the number of the last bin that holds anything; NEVER if none does.
@@ -295,3 +284,14 @@ def speeds(bins: Bins, source: int, first: int, last: int) -> tuple[Float64, Flo
     there = (bins.number[source, slots] == numbers) & ~np.isnan(speed)
     time = (numbers - last) + bins.speed_offset[source, slots]
     return time[there], speed[there]
+
+
+def warm(bins: Bins) -> None:
+    """
+    Compile what Python calls, so that no coastdown waits for it.
+    """
+    line(bins, 0, 0, 1)
+    mean_place(bins, 0, 0, 1)
+    displacement(bins, 0, 0, 1)
+    mean_turning(bins, 0, 0, 1)
+    newest_bin(bins, 0)

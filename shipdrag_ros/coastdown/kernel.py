@@ -23,18 +23,16 @@ from shipdrag_ros.coastdown.bins import (
     Bins,
     add,
     close,
-    forget_bins,
     line,
     mean_turning,
     newest_bin,
 )
 from shipdrag_ros.coastdown.compiled import digest
-from shipdrag_ros.coastdown.ring import Store, append
+from shipdrag_ros.coastdown.ring import Store, append, first_store
 from shipdrag_ros.coastdown.steadiness import (
     SCALES,
     Slopes,
     Steadiness,
-    forget_steadiness,
     learn,
 )
 from shipdrag_ros.coastdown.validate import (
@@ -49,7 +47,6 @@ from shipdrag_ros.coastdown.validate import (
     Guard,
     Limits,
     examine,
-    forget,
     remember,
 )
 from shipdrag_ros.parameters import Parameters
@@ -88,7 +85,7 @@ _SHAFT_SLOWED = int(Stop.SHAFT)
 
 class Watch(NamedTuple):
     """
-    What the walk looks out for, and what it saw; each an array of one.
+    What the walk looks out for, and what it saw; arrays of one but for `held`.
 
     Attributes
     ----------
@@ -98,6 +95,9 @@ class Watch(NamedTuple):
         When the next estimate is due; ALWAYS if none is.
     armed : int64
         0 after a candidate or coastdown until the speed has been steady again.
+    held : (SCALES,) float64
+        The limits of that candidate: it is part of the record that later limits are learnt
+        from, and would make a fall that goes on look steady [m/s^2].
     seen_source, seen : int64
         Speed source and number of the bin looked at last.
     level : float64
@@ -109,6 +109,7 @@ class Watch(NamedTuple):
     source: Int64
     update_ns: Int64
     armed: Int64
+    held: Float64
     seen_source: Int64
     seen: Int64
     level: Float64
@@ -123,6 +124,7 @@ class Watch(NamedTuple):
             np.full(1, NEVER),
             np.full(1, ALWAYS),
             np.ones(1, np.int64),
+            np.full(SCALES, np.nan),
             np.full(1, NEVER),
             np.full(1, NEVER),
             np.full(1, np.nan),
@@ -168,6 +170,20 @@ class Memory(NamedTuple):
     tally: Tally
     store: Store
 
+    @classmethod
+    def fresh(cls, slopes: Slopes, *, seconds: int, tally: Tally) -> Memory:
+        """
+        Return the memory before the first sample, with bins for the last `seconds`.
+        """
+        return cls(
+            Guard.fresh(),
+            Bins.fresh(seconds),
+            Steadiness.fresh(slopes),
+            Watch.fresh(),
+            tally,
+            first_store(),
+        )
+
 
 class Tuning(NamedTuple):
     """
@@ -193,22 +209,6 @@ class Tuning(NamedTuple):
 
 
 @njit
-def forget_all(memory: Memory) -> None:
-    """
-    Drop all memory but the tally.
-    """
-    forget(memory.guard)
-    forget_bins(memory.bins)
-    forget_steadiness(memory.steadiness)
-    memory.watch.source[0] = NEVER
-    memory.watch.update_ns[0] = ALWAYS
-    memory.watch.armed[0] = 1
-    memory.watch.seen_source[0] = NEVER
-    memory.watch.seen[0] = NEVER
-    memory.store.end[0] = 0
-
-
-@njit
 def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
     """Say whether no better source has delivered within data_stop_s."""
     oldest = number - tuning.data_stop_ns // SECOND_NS
@@ -230,20 +230,21 @@ def _shaft_tells(bins: Bins, tuning: Tuning, number: int) -> bool:
 
 
 @njit
-def _look_at_speed(memory: Memory, tuning: Tuning, source: int, number: int) -> int:
+def _look_at_speed(
+    bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
+) -> int:
     """Judge a closed bin of a speed source."""
-    watch, bins = memory.watch, memory.bins
     if watch.source[0] != NEVER:
         if watch.source[0] != source:
             return 0
-        learn(memory.steadiness, tuning.slopes, bins, source, number)
+        learn(steadiness, tuning.slopes, bins, source, number)
         return _BIN
     if not _is_primary(bins, tuning, source, number):
         return 0
-    learn(memory.steadiness, tuning.slopes, bins, source, number)
+    learn(steadiness, tuning.slopes, bins, source, number)
     watch.seen_source[0] = source
     watch.seen[0] = number
-    limits = memory.steadiness.limit[source]
+    limits = steadiness.limit[source]
     steady, falls = True, False
     for scale in range(SCALES):
         # a longer window changes more slowly: one look in two, one in four
@@ -252,7 +253,9 @@ def _look_at_speed(memory: Memory, tuning: Tuning, source: int, number: int) -> 
         slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
         if scale == 0:
             watch.level[0] = level
-        steady = steady and not slope < -0.5 * limits[scale]
+        # a limit that was not known then is NaN and does not count
+        falling = slope < -0.5 * limits[scale] or slope < -0.5 * watch.held[scale]
+        steady = steady and not falling
         falls = falls or slope < -limits[scale]
     if steady and number % (1 << (SCALES - 1)) == 0:
         watch.armed[0] = 1
@@ -267,9 +270,8 @@ def _look_at_speed(memory: Memory, tuning: Tuning, source: int, number: int) -> 
 
 
 @njit
-def _look_at_shaft(memory: Memory, tuning: Tuning, number: int) -> int:
+def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int:
     """Judge a closed bin of the shaft speed."""
-    watch, bins = memory.watch, memory.bins
     if (
         watch.source[0] != NEVER
         or watch.seen[0] < number - tuning.data_stop_ns // SECOND_NS
@@ -306,13 +308,7 @@ def _walk(
     sample, stop
         The first sample not taken, and the `Stop` code.
     """
-    guard, bins, watch, tally, store = (
-        memory.guard,
-        memory.bins,
-        memory.watch,
-        memory.tally,
-        memory.store,
-    )
+    guard, bins, steadiness, watch, tally, store = memory
     for i in range(start, len(channel)):
         c, stamp, arrival = int(channel[i]), stamp_ns[i], receive_ns[i]
         a, b = value[i, 0], value[i, 1]
@@ -335,9 +331,9 @@ def _walk(
                     closed = close(bins, c, tuning.slopes.width)
                     stop = 0
                     if c < SOURCES:
-                        stop = _look_at_speed(memory, tuning, c, closed)
+                        stop = _look_at_speed(bins, steadiness, watch, tuning, c, closed)
                     elif c == _SHAFT:
-                        stop = _look_at_shaft(memory, tuning, closed)
+                        stop = _look_at_shaft(bins, watch, tuning, closed)
                     if stop != 0:
                         return i, stop
                 add(bins, c, number, stamp, a, b)
@@ -352,18 +348,8 @@ def _walk(
 
 
 _SLOPES = Slopes.of(Parameters())
-_STEADINESS = Steadiness.fresh(_SLOPES)
 _SIGNATURE = types.UniTuple(types.int64, 2)(
-    typeof(
-        Memory(
-            Guard.fresh(),
-            Bins.fresh(1),
-            _STEADINESS,
-            Watch.fresh(),
-            Tally.fresh(),
-            Store.fresh(1),
-        )
-    ),
+    typeof(Memory.fresh(_SLOPES, seconds=1, tally=Tally.fresh())),
     typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0, 0.0)),
     CHANNEL_CODES,
     STAMPS,

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import Bins, line
+from shipdrag_ros.coastdown.bins import Bins, line, warm
 from shipdrag_ros.coastdown.ending import End, end_of
 from shipdrag_ros.coastdown.events import (
     Coastdown,
@@ -33,15 +33,13 @@ from shipdrag_ros.coastdown.kernel import (
     Stop,
     Tally,
     Tuning,
-    Watch,
-    forget_all,
     walk,
 )
 from shipdrag_ros.coastdown.onset import Candidate, Verdict, judge, propose
-from shipdrag_ros.coastdown.ring import CAPACITY, first_store, make_room, since
-from shipdrag_ros.coastdown.steadiness import Slopes, Steadiness
+from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
+from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
-from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Guard, Limits
+from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.result import Estimate
@@ -88,18 +86,14 @@ class Monitor:
             parameters.shaft_stopped_fraction,
             float(ship.speed(parameters.froude_min)),
         )
-        seconds = round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
-        self._memory = Memory(
-            Guard.fresh(),
-            Bins.fresh(seconds),
-            Steadiness.fresh(slopes),
-            Watch.fresh(),
-            Tally.fresh(),
-            first_store(),
+        self._seconds = (
+            round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
         )
+        self._memory = self._fresh(Tally.fresh())
+        warm(self._memory.bins)
         self._window_ns = round(parameters.window_s * SECOND_NS)
         self._update_ns = round(parameters.update_s * SECOND_NS)
-        self._history_ns = self._window_ns + seconds * SECOND_NS
+        self._history_ns = self._window_ns + self._seconds * SECOND_NS
         self._candidate: Candidate | None = None
         self._onset: Onset | None = None
         self._heading_rad: float | None = None
@@ -186,7 +180,7 @@ class Monitor:
             For whoever reads the events.
         """
         events = self._stop_at_last_sample(EndedBy.RESET)
-        forget_all(self._memory)
+        self._memory = self._fresh(self._memory.tally)
         return [*events, Reset(receive_ns, reason)]
 
     def finish(self) -> list[Event]:
@@ -194,6 +188,9 @@ class Monitor:
         End the record, and a coastdown that runs.
         """
         return self._stop_at_last_sample(EndedBy.RECORD_END)
+
+    def _fresh(self, tally: Tally) -> Memory:
+        return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
 
     # what the walk stopped for
 
@@ -321,7 +318,9 @@ class Monitor:
         watch = self._memory.watch
         watch.source[0] = NEVER
         watch.update_ns[0] = ALWAYS
-        watch.armed[0] = 0
+        if self._candidate is not None:
+            watch.armed[0] = 0
+            watch.held[:] = self._candidate.limits
         self._candidate = self._onset = self._heading_rad = None
 
     def _clock_set(self, stop: int, channel: int, stamp_ns: int, receive_ns: int) -> str:

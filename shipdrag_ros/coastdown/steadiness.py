@@ -131,17 +131,6 @@ class Steadiness(NamedTuple):
 
 
 @njit
-def forget_steadiness(steadiness: Steadiness) -> None:
-    """
-    Return to the state before the first bin.
-    """
-    steadiness.slope[:] = np.nan
-    steadiness.done[:] = NEVER
-    steadiness.limit[:] = np.nan
-    steadiness.spread[:] = np.nan
-
-
-@njit
 def learn(steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int) -> None:
     """
     Bring the spreads up to the last point at or before the closed bin `number`.
