@@ -27,7 +27,7 @@ from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.problem import Problem
 from shipdrag_ros.estimation.motion_fit.record import Record
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
-from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance
+from shipdrag_ros.estimation.motion_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
@@ -171,14 +171,13 @@ def bound(case: Case, ship: Ship) -> tuple[float, float]:
     record = replace(record, white_sd=sds)
     about = Disturbance(gust_m_s2(case, ship), SLOW_S, case.log_m_s, SLOW_S)
     guess = Guess.of(record.coast, float(ship.n_r(1.0)))
-    problem = Problem.of(
-        record,
-        run_down,
-        ship.n_r_polynomial(),
-        guess,
-        about=about if case.log_m_s or case.gust_m_s else CALM,
-    )
-    found, _ = problem.fit(BOUND_FAMILY, problem.start(BOUND_FAMILY, None, guess))
+    problem = Problem.of(record, run_down, ship.n_r_polynomial(), guess)
+    start = problem.start(BOUND_FAMILY, None, guess)
+    plain, _ = problem.fit(BOUND_FAMILY, start)
+    assert plain is not None
+    if case.log_m_s or case.gust_m_s:
+        problem = problem.disturbed(about, plain)
+    found, _ = problem.fit(BOUND_FAMILY, plain.unknowns)
     assert found is not None
     low = max(float(record.coast.value[record.coast.kind == 0][-1]), float(ship.speed(0.05)))
     speeds = np.linspace(low, case.hull.speed_m_s, 200)

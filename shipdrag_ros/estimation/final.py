@@ -13,7 +13,6 @@ from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
-
 Estimator = Callable[[Window, Ship, Parameters], Estimate]
 
 

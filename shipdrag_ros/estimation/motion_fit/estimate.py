@@ -19,18 +19,18 @@ from shipdrag_ros.estimation.motion_fit.coast import (
     V0,
     Rows,
     predict,
-    resistance,
 )
 from shipdrag_ros.estimation.motion_fit.families import Average, FamilyFit
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.problem import (
+    PLAIN,
     Problem,
     average_families,
     fit_robustly,
     with_log_scale,
 )
 from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
-from shipdrag_ros.estimation.motion_fit.run_down import RunDown
+from shipdrag_ros.estimation.motion_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.motion_fit.steady import LEAST_S, learn
 from shipdrag_ros.estimation.motion_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve, Track
@@ -72,8 +72,9 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     alone = record.without_steady()
     first, problem = fit_robustly(Problem.of(alone, run_down, n_r, guess), alone, None, guess)
     if record.steady_s >= LEAST_S:
-        about = _learn(record, first, run_down)
-        problem = Problem.of(record, run_down, n_r, guess, about=about)
+        plain, _ = problem.fit(PLAIN, problem.start(PLAIN, first, guess))
+        about = _learn(record, plain or first, run_down)
+        problem = Problem.of(record, run_down, n_r, guess).disturbed(about, plain or first)
         first, problem = fit_robustly(problem, record, first, guess)
         notes.append(_disturbance_note(about, record.steady_s))
     else:
@@ -93,17 +94,15 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     return _result(average, problem, record, window, ship, parameters, tuple(notes))
 
 
-def _learn(record: Record, first: FamilyFit, run_down: RunDown) -> Disturbance:
-    k = len(first.law.powers)
-    v0 = float(first.unknowns[k + V0])
-    inertia = 1.0 + float(np.polynomial.polynomial.polyval(v0, first.law.n_r))
-    _, slope = resistance(first.law, first.unknowns, v0)
-    quiet = -30.0 if run_down.stop_sd_s > _QUIET_S else 0.0
+def _learn(record: Record, plain: FamilyFit, run_down: RunDown) -> Disturbance:
+    """Learn the disturbances of the steady record, damped as a plain fit has it."""
+    damping, inertia = plain.damping(plain.unknowns[len(plain.law.powers) + V0 :][:1])
+    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else 0.0
     keep = record.steady.time_s < quiet
     steady = record.steady
     rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
     variance = record.variance(rows, record.steady_count[keep])
-    return learn(rows, variance, damping=max(slope / inertia, 1e-6), inertia=inertia)
+    return learn(rows, variance, damping_1_s=float(damping[0]), inertia=float(inertia[0]))
 
 
 def _disturbance_note(about: Disturbance, steady_s: float) -> str:
@@ -162,7 +161,7 @@ def _result(
     for name in record.white_sd:
         chosen = problem.rows.kind == KINDS[name]
         chosen[: len(record.steady.time_s)] = False
-        noise[name] = float(np.sqrt(np.min(problem.variance[chosen])))
+        noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen])))
     current = average.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
     stamps = np.concatenate(list(record.stamps.values()))
     return Estimate(

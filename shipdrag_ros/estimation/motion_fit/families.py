@@ -27,6 +27,7 @@ FAMILIES: tuple[tuple[int, ...], ...] = (
     (1, 2, 4, 6),
     (1, 2, 3, 4, 5),
 )
+_TYPICAL_POWER = 2.5
 LARGEST = 9  # powers of the largest family that many samples may ask for
 GROWTH = 0.3  # weight of the largest family from which a larger one is tried
 
@@ -78,6 +79,20 @@ class FamilyFit:
         powers = self.law.powers
         s = speed_m_s[:, None] / self.law.v_ref_m_s
         return self._linear(powers * s ** (powers - 1) / self.law.v_ref_m_s)
+
+    def damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
+        """
+        Return dr/dv over 1 + n_r [1/s], and 1 + n_r, at (m,) speeds.
+
+        Notes
+        -----
+        From r alone, as if it rose by `_TYPICAL_POWER` of the speed: between
+        friction and wave making, and far steadier than a fitted slope.
+        """
+        inertia = 1.0 + np.polynomial.polynomial.polyval(speed_m_s, self.law.n_r)
+        r, _ = self.resistance(speed_m_s)
+        damping = _TYPICAL_POWER * r / np.maximum(speed_m_s, 1e-3) / inertia
+        return np.maximum(damping, 1e-6), inertia
 
     def _powers(self, speed_m_s: Float64) -> Float64:
         result: Float64 = (speed_m_s[:, None] / self.law.v_ref_m_s) ** self.law.powers

@@ -21,6 +21,7 @@ from shipdrag_ros.estimation.motion_fit.coast import (
     X0,
     Law,
     Rows,
+    predict,
 )
 from shipdrag_ros.estimation.motion_fit.families import (
     FAMILIES,
@@ -33,9 +34,10 @@ from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.motion_fit.solve import fit
-from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance
+from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Noise
 from shipdrag_ros.samples import Float64
 
+PLAIN = (2, 3)  # little noise, and right enough to tell how a force is damped
 _STEPS = 96  # of the integration, longer as the ship slows down
 _HUBER = 2.5  # whitened residuals beyond it count by their size only
 _ROUNDS = 3  # of the weights
@@ -53,12 +55,10 @@ class Problem:
     ----------
     rows
         Of the steady record, then of the coastdown.
-    variance : (n,)
-        Of the white noise of each row, larger for an outlier.
     grid_s
         Times of the integration.
-    about
-        Slow disturbances.
+    noise
+        White noise, larger for an outlier, and slow disturbances.
     run_down
         What is known of the stop.
     n_r
@@ -70,9 +70,8 @@ class Problem:
     """
 
     rows: Rows
-    variance: Float64
     grid_s: Float64
-    about: Disturbance
+    noise: Noise
     run_down: RunDown
     n_r: Float64
     v_ref_m_s: float
@@ -85,11 +84,9 @@ class Problem:
         run_down: RunDown,
         n_r: Float64,
         guess: Guess,
-        *,
-        about: Disturbance = CALM,
     ) -> Problem:
         """
-        Set up the fit of a record.
+        Set up the fit of a record that nothing but sensor noise disturbs.
         """
         steady, coast = record.steady, record.coast
         rows = Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast)))
@@ -109,7 +106,24 @@ class Problem:
         end = float(coast.time_s[-1]) + 3.0 * run_down.stop_sd_s
         typical = max(float(coast.time_s[-1]), 1e-3) / 25.0
         grid = typical * np.expm1(np.linspace(0.0, math.log1p(end / typical), _STEPS + 1))
-        return cls(rows, variance, grid, about, run_down, n_r, guess.speed_m_s, tuple(extras))
+        calm = Noise(variance, CALM, np.ones(len(variance)), np.ones(len(variance)))
+        return cls(rows, grid, calm, run_down, n_r, guess.speed_m_s, tuple(extras))
+
+    def disturbed(self, about: Disturbance, plain: FamilyFit) -> Problem:
+        """
+        Return the problem with slow disturbances, damped as a plain fit has it.
+        """
+        _, speed = predict(
+            plain.law, plain.unknowns, self.grid_s, self.rows, np.zeros(0, np.int64)
+        )
+        damping, inertia = plain.damping(speed)
+        return replace(self, noise=Noise(self.noise.variance, about, damping, inertia))
+
+    def weighted(self, variance: Float64) -> Problem:
+        """
+        Return the problem with another variance of the white noise.
+        """
+        return replace(self, noise=self.noise._replace(variance=variance))
 
     def law(self, powers: tuple[int, ...]) -> Law:
         """
@@ -155,8 +169,7 @@ class Problem:
             start,
             self.grid_s,
             self.rows,
-            self.variance,
-            self.about,
+            self.noise,
             active,
             prior,
             _ITERATIONS,
@@ -195,7 +208,7 @@ def fit_robustly(
     weight = np.ones(len(base))
     first = start
     for _ in range(_ROUNDS):
-        problem = replace(problem, variance=base / weight)
+        problem = problem.weighted(base / weight)
         first, white = problem.fit(FAMILIES[0], problem.start(FAMILIES[0], first, guess))
         if first is None:
             break
@@ -213,7 +226,7 @@ def fit_robustly(
             'the equation of motion could not be fitted to the window: is it one coastdown, '
             'with the engine stopped all the time?'
         )
-    return first, replace(problem, variance=base / weight)
+    return first, problem.weighted(base / weight)
 
 
 def with_log_scale(problem: Problem, first: FamilyFit) -> tuple[FamilyFit, Problem]:

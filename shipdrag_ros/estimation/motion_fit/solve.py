@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from shipdrag_ros.estimation.motion_fit.coast import Law, Rows, predict
-from shipdrag_ros.estimation.motion_fit.whitening import Disturbance, damping_at, whiten
+from shipdrag_ros.estimation.motion_fit.whitening import Noise, whiten
 from shipdrag_ros.samples import Float64, Int64
 
 _RISES = 8  # of the damping, in one iteration
@@ -34,8 +34,7 @@ def normal_equations(
     unknowns: Float64,
     grid_s: Float64,
     rows: Rows,
-    variance: Float64,
-    about: Disturbance,
+    noise: Noise,
     active: Int64,
     prior: Float64,
 ) -> tuple[float, Float64, Float64, Float64]:
@@ -56,17 +55,9 @@ def normal_equations(
     white : (n,)
         Whitened residuals.
     """
-    table, speed = predict(law, unknowns, grid_s, rows, active)
+    table, _ = predict(law, unknowns, grid_s, rows, active)
     p = len(active)
-    n = len(speed)
-    damping = np.empty(n)
-    inertia = np.empty(n)
-    if about.gust_m_s2 > 0.0:
-        for i in range(n):
-            damping[i], inertia[i] = damping_at(law, unknowns, speed[i])
-    else:
-        damping[:], inertia[:] = damping_at(law, unknowns, speed[0])
-    whiten(rows, table, variance, about, damping, inertia)
+    whiten(rows, table, noise)
     # of residual and columns
     products = _products(table)
     matrix = products[1:, 1:].copy()
@@ -129,8 +120,7 @@ def fit(
     start: Float64,
     grid_s: Float64,
     rows: Rows,
-    variance: Float64,
-    about: Disturbance,
+    noise: Noise,
     active: Int64,
     prior: Float64,
     iterations: int,
@@ -145,7 +135,7 @@ def fit(
     """
     unknowns = start.copy()
     chi2, matrix, gradient, white = normal_equations(
-        law, unknowns, grid_s, rows, variance, about, active, prior
+        law, unknowns, grid_s, rows, noise, active, prior
     )
     damping = 0.0
     converged = False
@@ -163,7 +153,7 @@ def fit(
                 trial = unknowns.copy()
                 for a in range(len(active)):
                     trial[active[a]] += step[a, 0]
-                found = normal_equations(law, trial, grid_s, rows, variance, about, active, prior)
+                found = normal_equations(law, trial, grid_s, rows, noise, active, prior)
                 # written so that NaN fails
                 if found[0] <= chi2 + 0.1 * _CONVERGED:
                     better = True

@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 
 from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
 from shipdrag_ros.estimation.motion_fit.solve import cholesky_solve
-from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, whiten
+from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Noise, whiten
 from shipdrag_ros.samples import Float64, Int64
 
 BIN_S = 10.0  # a steady record is condensed to its means over this
@@ -29,6 +29,7 @@ _UNSTEADY = 0.06  # of the speed: a block that differs by more ends the steady r
 _OUTLIER = 5.0  # robust standard deviations
 _MAD_TO_SD = 1.4826
 _TYPICAL_S = 240.0  # correlation time; known from experience within a factor of e
+_OFFSETS = (-1.0, -0.5, 0.0, 0.5, 1.0, 1.5)  # of the logarithms, in averaging
 _SHORTEST_S, _LONGEST_S = 15.0, 3000.0
 
 
@@ -122,7 +123,7 @@ def _medians(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
     )
 
 
-def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> Disturbance:
+def learn(rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float) -> Disturbance:
     """
     Learn the slow disturbances of a steady record.
 
@@ -132,7 +133,7 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
         Of the steady record.
     variance : (n,)
         Of their white noise.
-    damping, inertia
+    damping_1_s, inertia
         dr/dv over 1 + n_r [1/s] and 1 + n_r at the steady speed.
 
     Notes
@@ -157,11 +158,11 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
     if LOG in kinds and len(kinds) > 1:
         used.append(2)
     table = np.vstack([rows.value, design[:, used].T])
-    dampings, inertias = np.full(n, damping), np.full(n, inertia)
+    dampings, inertias = np.full(n, damping_1_s), np.full(n, inertia)
 
     def cost(about: Disturbance) -> float:
         white = table.copy()
-        log_det = whiten(rows, white, variance, about, dampings, inertias)
+        log_det = whiten(rows, white, Noise(variance, about, dampings, inertias))
         columns, z = white[1:], white[0]
         matrix = np.einsum('ji,ki->jk', columns, columns)
         right = np.einsum('ji,i->j', columns, z)[:, None]
@@ -176,7 +177,7 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
         float(np.sqrt(np.median(variance[rows.kind != POSITION]))) if used != [0, 1] else 0.1
     )
     # a force that moves the ship by about as much as its log scatters
-    force = 0.3 * speed_sd * inertia * math.sqrt(damping * (damping + 1.0 / _TYPICAL_S))
+    force = 0.3 * speed_sd * inertia * math.sqrt(damping_1_s * (damping_1_s + 1.0 / _TYPICAL_S))
     best, chosen = cost(CALM), CALM
     for gust, water in ((True, False), (False, True), (True, True)):
         if water and LOG not in kinds:
@@ -211,8 +212,35 @@ def learn(rows: Rows, variance: Float64, *, damping: float, inertia: float) -> D
         )
         criterion = float(found.fun) + 2.0 * len(start)
         if criterion < best:
-            best, chosen = criterion, about(found.x)
+            best, chosen = criterion, about(_mean(penalised, found.x))
     return chosen
+
+
+def _mean(cost: Callable[[Float64], float], top: Float64) -> Float64:
+    """
+    Return the mean over what is likely, instead of the most likely.
+
+    A short record is explained best by too small and too fast a disturbance; the
+    band would be too narrow. Of each disturbance: the mean of its variance and
+    of variance times correlation time, under a flat prior of the sd.
+    """
+    mean = top.copy()
+    least = cost(top)
+    for first in range(0, len(top), 2):
+        weights, variances, times = [], [], []
+        for of_sd in _OFFSETS:
+            for of_time in _OFFSETS:
+                x = top.copy()
+                x[first] += of_sd
+                x[first + 1] += of_time
+                weights.append(math.exp(0.5 * (least - cost(x)) + x[first]))
+                variances.append(math.exp(2.0 * x[first]))
+                times.append(math.exp(2.0 * x[first] + x[first + 1]))
+        weight = np.array(weights) / sum(weights)
+        variance = float((weight * np.array(variances)).sum())
+        mean[first] = 0.5 * math.log(variance)
+        mean[first + 1] = math.log(float((weight * np.array(times)).sum()) / variance)
+    return mean
 
 
 def _bounded(time_s: float) -> float:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Law, Rows, resistance
+from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
 from shipdrag_ros.samples import Float64
 
 _STATES = 4  # speed, distance, gust, water
@@ -83,28 +83,29 @@ def _step(
     cov[3, 3] += about.water_m_s**2 * (1.0 - water_decay**2)
 
 
-@njit(cache=True)
-def damping_at(law: Law, unknowns: Float64, v: float) -> tuple[float, float]:
+class Noise(NamedTuple):
     """
-    Return dr/dv over the inertia [1/s], and the inertia 1 + n_r.
+    What is not motion in rows of measurements.
+
+    Attributes
+    ----------
+    variance : (n,)
+        Of the white noise of each row.
+    about
+        The disturbances, in their stationary state at the first row.
+    damping_1_s, inertia : (n,)
+        dr/dv over 1 + n_r, and 1 + n_r, at each row. Fixed before the fit: the
+        weights must not depend on what is fitted.
     """
-    n_r = 0.0
-    for j in range(len(law.n_r) - 1, -1, -1):
-        n_r = n_r * v + law.n_r[j]
-    _, slope = resistance(law, unknowns, v)
-    # a fit may wiggle; a disturbance never grows by itself
-    return max(slope / (1.0 + n_r), 1e-6), 1.0 + n_r
+
+    variance: Float64
+    about: Disturbance
+    damping_1_s: Float64
+    inertia: Float64
 
 
 @njit(cache=True)
-def whiten(
-    rows: Rows,
-    table: Float64,
-    variance: Float64,
-    about: Disturbance,
-    damping: Float64,
-    inertia: Float64,
-) -> float:
+def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
     """
     Whiten, in place, residual and columns of the design.
 
@@ -114,18 +115,13 @@ def whiten(
         In ascending time.
     table : (c, n)
         Residual and columns of the design.
-    variance : (n,)
-        Of the white noise of each row.
-    about
-        The disturbances, in their stationary state at the first row.
-    damping, inertia : (n,)
-        dr/dv over 1 + n_r [1/s], and 1 + n_r, at each row.
 
     Returns
     -------
     float
         Logarithm of the determinant of the covariance of the rows.
     """
+    variance, about, damping, inertia = noise
     columns, n = table.shape
     log_det = 0.0
     if about.gust_m_s2 == 0.0 and about.water_m_s == 0.0:
