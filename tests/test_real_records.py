@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page on measured records: its commands run, and give the figures that it states."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / 'docs' / 'real_records.md').read_text(encoding='utf-8')
+COMMANDS = re.findall(r'^ +(shipdrag (?:import|replay) .*)$', PAGE, flags=re.MULTILINE)
+ROWS = {
+    cells[0]: cells[1:]
+    for line in PAGE.splitlines()
+    if len(cells := [cell.strip() for cell in line.strip('|').split('|')]) == 5
+    and cells[0] not in ('record', '---')
+}
+needs_data = pytest.mark.skipif(
+    'SHIPDRAG_DATA' not in os.environ, reason='needs the folder of records in SHIPDRAG_DATA'
+)
+
+
+@pytest.fixture(scope='module')
+def script() -> ModuleType:
+    """The script that prints the page's figures."""
+    folder = ROOT / 'benchmarks'
+    spec = importlib.util.spec_from_file_location('real_records', folder / 'real_records.py')
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.path.insert(0, str(folder))
+    sys.modules['real_records'] = module  # where dataclasses look for it
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(folder))
+    return module
+
+
+@pytest.fixture(scope='module')
+def results(script: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What `replay --json` says of each record, with the window and without."""
+    out = tmp_path_factory.mktemp('records')
+    data = Path(os.environ['SHIPDRAG_DATA'])
+    found = {}
+    for record in script.RECORDS:
+        script.run_command(record.import_command(), data=data, out=out)
+        for window in (True, False):
+            line = f'{record.replay_command(window=window)} --json one.json'
+            script.run_command(line, data=data, out=out)
+            found[record.name, window] = json.loads((out / 'one.json').read_text())
+    return found
+
+
+def test_the_page_shows_the_commands_of_the_script(script: ModuleType) -> None:
+    known = {record.import_command() for record in script.RECORDS}
+    known |= {record.replay_command() for record in script.RECORDS}
+    assert len(COMMANDS) == 10
+    assert set(COMMANDS) <= known
+    assert list(ROWS) == [record.name for record in script.RECORDS]
+
+
+def test_without_the_records_the_script_says_so(
+    script: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.delenv('SHIPDRAG_DATA', raising=False)
+    monkeypatch.setattr(sys, 'argv', ['real_records.py', '--out', str(tmp_path / 'out')])
+    script.main()
+    assert 'skipped: SHIPDRAG_DATA is not set' in capsys.readouterr().out
+    assert not (tmp_path / 'out').exists()
+
+
+@needs_data
+@pytest.mark.parametrize('name', ROWS)
+def test_each_record_gives_the_figures_of_the_page(results: dict[str, Any], name: str) -> None:
+    fit, valid, stated, w = ROWS[name]
+    (coastdown,) = results[name, True]['coastdowns']
+    estimator, order = fit.split(', ')
+    assert coastdown['ended_by'] == 'given'
+    assert coastdown['estimator'] == f's1_{estimator}'
+    assert coastdown['order'] == int(order)
+    assert all(not counts['rejected'] for counts in results[name, True]['inputs'].values())
+    speed, r, sigma = (
+        np.array(coastdown[key]) for key in ('speed_m_s', 'resistance_m_s2', 'sigma_m_s2')
+    )
+    limits = [float(limit) for limit in valid.split(' to ')]
+    np.testing.assert_allclose([speed[0], speed[-1]], limits, rtol=0.0, atol=0.0051)
+    np.testing.assert_allclose(100.0 * coastdown['w'], float(w), rtol=0.0, atol=0.51)
+    points = re.findall(r'([\d.]+): ([\d.]+) ± ([\d.]+) \(([\d.]+)\)', stated)
+    assert len(points) >= 2
+    for at, value, two_sigma, _ in (map(float, point) for point in points):
+        # the page has two digits of the band
+        np.testing.assert_allclose(np.interp(at, speed, r), value, rtol=0.0, atol=0.06 * two_sigma)
+        np.testing.assert_allclose(2.0 * np.interp(at, speed, sigma), two_sigma, rtol=0.06)
+
+
+@pytest.mark.parametrize('name', [name for name in ROWS if name.startswith(('ferry', 'car'))])
+def test_the_second_opinion_agrees_where_the_samples_are_many(name: str) -> None:
+    points = re.findall(r'([\d.]+): ([\d.]+) ± ([\d.]+) \(([\d.]+)\)', ROWS[name][2])
+    for _, value, _, other in (map(float, point) for point in points):
+        np.testing.assert_allclose(value, other, rtol=0.045)
+
+
+@needs_data
+@pytest.mark.parametrize('name', [name for name in ROWS if not name.startswith('car')])
+def test_without_steady_sailing_before_no_onset_is_found(
+    results: dict[str, Any], name: str
+) -> None:
+    assert results[name, False]['coastdowns'] == []
+
+
+@needs_data
+def test_the_model_ship_drifts_and_the_joint_fit_shows_it(results: dict[str, Any]) -> None:
+    (alone,) = results['model_ship', True]['coastdowns']
+    (joint,) = results['model_ship_joint', True]['coastdowns']
+    name = 'speed_through_water'
+    np.testing.assert_allclose(alone['noise_sd'][name], 0.0004, rtol=0.2)
+    np.testing.assert_allclose(joint['noise_sd'][name], 0.014, rtol=0.1)
+    assert any('heading swings over 47 degrees' in note for note in alone['notes'])
+
+
+@needs_data
+def test_the_ferry_path_and_the_ship_at_rest(
+    script: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = Path(os.environ['SHIPDRAG_DATA'])
+    for record in (script.FERRY, script.MODEL_SHIP):
+        script.run_command(record.import_command(), data=data, out=tmp_path)
+    script.show_ferry_path(tmp_path)
+    lengths = [float(x) for x in re.findall(r's1_\w+ +([\d.]+)', capsys.readouterr().out)]
+    # integral of the speed, then path of the positions, alone and jointly
+    np.testing.assert_allclose(lengths, [4.41, 4.29, 4.29], rtol=0.0, atol=0.01)
+    (slow,) = script.replayed(script.MODEL_SHIP, tmp_path, froude_min=0.001).coastdowns
+    assert slow.estimate is not None
+    curve = slow.estimate.valid_curve
+    assert curve.speed_m_s[0] < 0.004
+    np.testing.assert_allclose(curve.resistance_m_s2[0], 0.0046, rtol=0.05)
+    fitted = slow.estimate.tracks['speed_through_water'].fitted
+    np.testing.assert_allclose(fitted.min(), -0.016, rtol=0.0, atol=0.001)
