@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
-import yaml
-
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ParameterError
+
+_SECTION = 'ros__parameters'
 
 
 def _parameter(
@@ -131,8 +134,9 @@ class Parameters:
     )
     estimator: str = _parameter(
         'auto',
-        'auto takes the joint fit where both speed and position are there',
-        choices=('auto', 's1_joint', 's1_position', 's1_speed'),
+        'auto is warped: all inputs that are there, in warped time, averaged over models; s1_...: '
+        'the published problems',
+        choices=('auto', 'warped', 's1_joint', 's1_position', 's1_speed'),
     )
     order_max: int = _parameter(
         20, 'largest number of coefficients that the order search tries', low=3, high=40
@@ -201,35 +205,62 @@ class Parameters:
         Build from the text of a `parameters.yaml`.
         """
         try:
-            values = yaml.safe_load(text)
-        except yaml.YAMLError as error:
+            values, problems = strict_yaml.load(text)
+        except ValueError as error:
             raise ParameterError(subject, [f'not YAML: {error}']) from error
         if values is None:
             values = {}
         if not isinstance(values, dict):
-            raise ParameterError(subject, [f'is {values!r}, expected a list of `name: value`'])
+            problems = [f'is {values!r}, expected a list of `name: value`']
+        elif any(isinstance(value, dict) and _SECTION in value for value in values.values()):
+            problems = [
+                f'is a parameter file of the node, with {_SECTION}; '
+                'give the lines `name: value` alone'
+            ]
+        if problems:
+            raise ParameterError(subject, problems)
         return cls.from_mapping(values, subject=subject)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Parameters:
+        """
+        Build from a file as `from_yaml` does.
+
+        Raises
+        ------
+        ParameterError
+            Naming every problem of the file at once.
+        """
+        try:
+            text = Path(path).read_text(encoding='utf-8-sig')
+        except OSError as error:
+            problem = f'cannot be read: {error.strerror}; give the path of a parameter file'
+            raise ParameterError(str(path), [problem]) from error
+        except ValueError as error:
+            problem = f'is not a text file: {error}; save it as UTF-8'
+            raise ParameterError(str(path), [problem]) from error
+        return cls.from_yaml(text, subject=str(path))
 
     def to_yaml(self) -> str:
         """
         Return the text that `from_yaml` reads back.
         """
         values = {item.name: getattr(self, item.name) for item in fields(self)}
-        return yaml.safe_dump(values, sort_keys=False)
+        return strict_yaml.dump(values)
 
 
 def _problem(name: str, value: object, default: object, about: Mapping[str, Any]) -> str | None:
     """Say what is wrong with one value, or None."""
-    kind = type(default)
-    if type(value) is not kind:
-        return f'{name}: {value!r} is of type {type(value).__name__}, expected {kind.__name__}'
-    if about['choices'] and value not in about['choices']:
+    if about['choices']:
+        if value in about['choices']:
+            return None
         return f'{name}: {value!r}, expected one of {", ".join(about["choices"])}'
-    if kind is str:
-        return None
-    assert isinstance(value, int | float)
+    unit = f' {about["unit"]}' if about['unit'] else ''
+    expectation = f'{about["low"]:g}..{about["high"]:g}{unit}'
+    if isinstance(value, bool) or not isinstance(value, type(default)):
+        kind = 'a whole number' if isinstance(default, int) else 'a number'
+        return f'{name}: {value!r}, expected {kind}, {expectation}'
     # written so that NaN fails
     if not (about['low'] <= value <= about['high']):
-        unit = f' {about["unit"]}' if about['unit'] else ''
-        return f'{name}: {value!r}, expected {about["low"]:g}..{about["high"]:g}{unit}'
+        return f'{name}: {value!r}, expected {expectation}'
     return None

@@ -55,7 +55,8 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     parameters
         For the validation, which needs some record before the window.
     window
-        Begin and end [s from the start of the bag].
+        Begin and end [s from the start of the bag]; it ends with the bag at
+        the latest.
 
     Raises
     ------
@@ -76,7 +77,8 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
             f'window {start_s:g} to {end_s:g} s: expected 0 <= start < end inside of '
             f'{run.name!r}, which is {length_s:.3f} s long'
         )
-    start_ns, end_ns = (span[0] + round(edge_s * SECOND_NS) for edge_s in window)
+    start_ns = span[0] + round(start_s * SECOND_NS)
+    end_ns = min(span[0] + round(end_s * SECOND_NS), span[1])  # of what is not there, nothing
     margin_ns = round((parameters.frozen_s + parameters.late_s) * SECOND_NS) + _SET_CLOCK_NS
     inputs = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
     block = concatenate([item for item in inputs if isinstance(item, Block)])

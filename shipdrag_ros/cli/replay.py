@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from shipdrag_ros.report.run import RunResult
 from shipdrag_ros.report.spreadsheet import write_curves
 from shipdrag_ros.ship import Ship
 
+_LATE_S = 10.0
 REPORT, JSON, CURVES = 'report.html', 'result.json', 'curves.csv'
 
 
@@ -95,8 +97,7 @@ def run(options: argparse.Namespace) -> int:
     ship = None if options.ship is None else Ship.load(options.ship)
     parameters = None
     if options.parameters is not None:
-        text = options.parameters.read_text(encoding='utf-8')
-        parameters = Parameters.from_yaml(text, subject=str(options.parameters))
+        parameters = Parameters.load(options.parameters)
     if options.out is not None:
         options.out.mkdir(parents=True, exist_ok=True)
     window = None if options.window is None else tuple(options.window)
@@ -147,7 +148,19 @@ def replay_run(
                     f'{each.name!r}: no estimate from {window[0]:g} to {window[1]:g} s: '
                     f'{coastdown.failure}; give another --window'
                 )
+        beyond = _beyond(each, window[1])
+        if beyond:
+            result = replace(result, warnings=(*result.warnings, beyond))
     return result
+
+
+def _beyond(run: Run, end_s: float) -> str:
+    """Say that a window reaches beyond the bag, by more than a sample may come late."""
+    assert run.span_ns is not None  # an estimate was made
+    length_s = (run.span_ns[1] - run.span_ns[0]) * 1e-9
+    if end_s <= length_s + _LATE_S:
+        return ''
+    return f'--window ends at {end_s:g} s; the bag ends at {length_s:.1f} s, and the window there'
 
 
 def write_results(

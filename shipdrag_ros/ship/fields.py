@@ -176,9 +176,8 @@ def read_keys(cls: type[Any], value: object, path: str, problems: Problems) -> d
     """
     known = {item.name: item for item in fields(cls)}
     if not isinstance(value, dict):
-        problems.append(
-            f'{path or "the file"}: {show(value)}, expected the keys {", ".join(known)}'
-        )
+        found = 'empty' if value is None else show(value)
+        problems.append(f'{path or "the file"}: {found}, expected the keys {", ".join(known)}')
         return {}
     for key in value:
         if key not in known:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import strict_yaml
 from shipdrag_ros.ship.added_mass import AddedMass, MerchantAddedMass, added_mass, n_r_polynomial
 from shipdrag_ros.ship.baseline import Baseline, TableBaseline, baseline
 from shipdrag_ros.ship.consistency import (
@@ -74,10 +74,12 @@ class Ship:
         try:
             content = Path(path).read_text(encoding='utf-8-sig')
         except OSError as error:
-            problem = f'cannot be read: {error.strerror or error}'
+            problem = f'cannot be read: {error.strerror or error}; give the path of a ship file'
             raise ShipFileError(str(path), [problem]) from error
         except ValueError as error:
-            raise ShipFileError(str(path), [f'is not a text file: {error}']) from error
+            raise ShipFileError(
+                str(path), [f'is not a text file: {error}; save it as UTF-8']
+            ) from error
         return cls.from_yaml(content, subject=str(path))
 
     @classmethod

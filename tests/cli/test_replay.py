@@ -221,7 +221,7 @@ def test_wrong_usage_is_explained(
     [
         (['no such.mcap'], "ERROR: 'no such.mcap' does not exist"),
         (['BAG', '--ship', 'no such.yaml'], 'ERROR: no such.yaml: 1 problem(s)'),
-        (['BAG', '--parameters', 'no such.yaml'], "ERROR: 'no such.yaml': No such file"),
+        (['BAG', '--parameters', 'no such.yaml'], 'ERROR: no such.yaml: 1 problem(s)'),
         (['BAG', '--remap', '/a:=position'], "no topic '/a' in the bag"),
         (['BAG', '--out', 'BAG'], 'File exists'),
     ],

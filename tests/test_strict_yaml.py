@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ShipFileError
-from shipdrag_ros.ship import Ship, strict_yaml
+from shipdrag_ros.ship import Ship
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,10 @@ def load(text: str) -> tuple[Any, list[str]]:
     try:
         loader = _Loader(text)
         data = loader.get_single_data()
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = f'line {mark.line + 1}, column {mark.column + 1}: ' if mark else ''
+        raise ValueError(f'{place}{error.problem}') from error
     except (yaml.YAMLError, KeyError, RecursionError) as error:
         # the parser knows KeyError and RecursionError for `!!bool maybe` and `[[[[...`
         raise ValueError(str(error)) from error
