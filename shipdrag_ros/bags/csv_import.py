@@ -33,6 +33,7 @@ BASE_NS = 946_684_800 * SECOND_NS
 _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _LIMIT_NS = 2**31 * SECOND_NS  # of the stamp of a message
 _FIRST_LINES = 3
+_SHOWN = 40  # characters of a cell
 _FEW = 10
 _BATCH_SAMPLES = 4096
 ATTACHMENT = 'import.yaml'
@@ -51,7 +52,8 @@ class Rejected:
         """
         self.count += 1
         if len(self.first) < _FIRST_LINES:
-            self.first.append(f'line {line}: {cell!r}')
+            shown = cell if len(cell) <= _SHOWN else f'{cell[:_SHOWN]}...'
+            self.first.append(f'line {line}: {shown!r}')
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,9 @@ class ImportResult:
     backward
         Rows whose time is before that of an earlier row; a replay rejects
         them and says so.
+    repeated
+        Rows whose time is that of the newest row before; a replay rejects them
+        too.
     delimiter
         That of the table.
     header
@@ -90,6 +95,7 @@ class ImportResult:
     end_ns: int
     base_ns: int | None
     backward: int
+    repeated: int
     delimiter: str
     header: bool
 
@@ -145,6 +151,7 @@ def import_csv(
         [(table.column(name), text) for name, text in where],
         clock,
         None if time is None else table.column(time.name),
+        table.width,
     )
     writer = BagWriter(out)
     try:
@@ -210,16 +217,19 @@ class _Record:
         where: Sequence[tuple[int, str]],
         clock: _Clock,
         time_place: int | None,
+        width: int,
     ) -> None:
         self._inputs = inputs
+        self._width = width
         self._where = where
         self._clock = clock
         self._time_place = time_place
         self._rows = 0
         self._left_out = 0
         self._backward = 0
+        self._repeated = 0
         self._first_ns: int | None = None
-        self._newest_ns = 0
+        self._newest_ns = -1
         self._written: Counter[str] = Counter()
         self._rejected: dict[str, dict[str, Rejected]] = {}
         self._samples: list[tuple[int, int, int, float, float]] = []
@@ -238,6 +248,7 @@ class _Record:
                 self._left_out += 1
                 return
         try:
+            _check_width(row, self._width)
             cell = '' if self._time_place is None else _cell(row, self._time_place)
             time_ns = self._clock.time_ns(self._rows - self._left_out - 1, cell)
         except _BadCell as bad:
@@ -247,6 +258,7 @@ class _Record:
             self._first_ns = time_ns
         # arrival never goes back, so that a replay sees the rows in their order
         self._backward += time_ns < self._newest_ns
+        self._repeated += time_ns == self._newest_ns
         self._newest_ns = max(self._newest_ns, time_ns)
         for columns, places in self._inputs:
             try:
@@ -287,6 +299,7 @@ class _Record:
             end_ns=self._newest_ns,
             base_ns=self._clock.base_ns,
             backward=self._backward,
+            repeated=self._repeated,
             delimiter=table.delimiter,
             header=table.header is not None,
         )
@@ -299,7 +312,12 @@ class _Record:
             for name, by_reason in self._rejected.items()
             for reason, rejected in by_reason.items()
         ]
-        return '; '.join(reasons) or 'give a table with a line a sample'
+        if not reasons:
+            return 'give a table with a line a sample'
+        return (
+            f'{"; ".join(reasons)}; expected numbers with a decimal point and without a unit, '
+            'times in seconds or in the unit given'
+        )
 
     def _values(
         self, row: Row, columns: InputColumns, places: Sequence[int]
@@ -317,6 +335,13 @@ class _Record:
 
 def _cell(row: Row, place: int) -> str:
     return row.cells[place] if place < len(row.cells) else ''
+
+
+def _check_width(row: Row, width: int) -> None:
+    """Refuse a row that does not fit the columns, as decimal commas make it."""
+    beyond = [cell for cell in row.cells[width:] if cell]
+    if beyond:
+        raise _BadCell(f'more than {width} columns', ','.join(row.cells))
 
 
 def _number(cell: str) -> float:

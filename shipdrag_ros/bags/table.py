@@ -41,6 +41,8 @@ class Table:
         One of `DELIMITERS`.
     header
         Names of the columns; None if the first line holds numbers only.
+    width
+        Number of columns.
 
     Raises
     ------
@@ -60,12 +62,16 @@ class Table:
             ) from error
         if not first:
             raise ImportDataError(f'{str(path)!r} is empty; give a table with a line a sample')
+        if '\0' in first or first.startswith('PK'):  # as spreadsheets begin, which are archives
+            raise ImportDataError(
+                f'{str(path)!r} is no text, it begins with {first[:4]!r}; save it as CSV'
+            )
         # a delimiter in quotes is none
         self.delimiter = max(DELIMITERS, key=lambda mark: len(self._cells(first, mark)))
         cells = self._cells(first, self.delimiter)
         numbers = all(NUMBER.fullmatch(cell) for cell in cells if cell)
         self.header: tuple[str, ...] | None = None if numbers else tuple(cells)
-        self._width = len(cells)
+        self.width = len(cells)
 
     def column(self, name: str) -> int:
         """
@@ -85,12 +91,14 @@ class Table:
             )
         if found:
             return found[0]
-        if name.isdecimal() and 1 <= int(name) <= self._width:
+        if name.isdecimal() and 1 <= int(name) <= self.width:
             return int(name) - 1
         listed = ', '.join(repr(each) for each in names) or 'no header'
+        hint = f'and numbers 1 to {self.width} are names too'
+        if self.width == 1:
+            hint = 'and no comma, semicolon or tab that would separate columns'
         raise ImportDataError(
-            f'{str(self.path)!r} has no column {name!r}; it has {listed}, '
-            f'and numbers 1 to {self._width} are names too'
+            f'{str(self.path)!r} has no column {name!r}; it has {listed}, {hint}'
         )
 
     def rows(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Row]:

@@ -111,13 +111,17 @@ def _show(output: Output, bag: Path, result: ImportResult) -> None:
             f'In {result.backward} rows the time is before that of an earlier row; a replay '
             'rejects those.'
         )
+    if result.repeated:
+        output.say(
+            f'In {result.repeated} rows the time is that of an earlier row; a replay rejects those.'
+        )
     output.table(
         Table(('input', 'messages'), tuple((name, f'{n}') for name, n in result.written.items()))
     )
     for name, reasons in result.rejected.items():
         for reason, rejected in reasons.items():
             output.say(
-                f'{name}: {rejected.count} cells rejected, {reason}: {", ".join(rejected.first)}'
+                f'{name}: {rejected.count} cell(s) rejected, {reason}: {", ".join(rejected.first)}'
             )
 
 

@@ -78,7 +78,7 @@ def test_the_words_tell_what_was_left_out(
     assert '1200 messages of 1201 rows' in captured
     assert 'The times count from a start; it was put at 2000-01-01' in captured
     assert '1200 rows were not chosen by --where.' in captured
-    assert "speed_through_water: 1 cells rejected, not a number: line 2402: 'fast'" in captured
+    assert "speed_through_water: 1 cell(s) rejected, not a number: line 2402: 'fast'" in captured
 
 
 def test_times_that_go_back_are_told(
