@@ -102,15 +102,31 @@ def replay(
         If those attached to the bag cannot be used.
     """
     if not any(topic.input for topic in run.topics):
-        found = ', '.join(f'{topic.topic} ({topic.type})' for topic in run.topics)
-        raise BagError(
-            f'{run.name!r} holds none of the inputs {", ".join(TOPICS)}; it has '
-            f'{found or "no topic at all"}: name one with --remap FROM:=TO'
-        )
+        raise BagError(_no_input(run))
     used_ship, used_parameters = _ship(run, ship), _parameters(run, parameters)
     if window is not None:
         return _in_window(run, used_ship, used_parameters, window)
     return _as_on_board(run, used_ship, used_parameters, progress)
+
+
+def _no_input(run: Run) -> str:
+    if not run.topics:
+        why = '; '.join(run.warnings) or 'nothing was recorded'
+        return f'{run.name!r} holds no message: {why}; give another bag'
+    refused = [topic for topic in run.topics if topic.refused]
+    if refused:
+        found = ', '.join(f'{topic.topic} is {topic.type}' for topic in refused)
+        accepted = '; '.join(
+            f'{name}: {", ".join(types)}'
+            for name, types in TOPICS.items()
+            if any(topic.topic.rpartition('/')[2] == name for topic in refused)
+        )
+        return f'{run.name!r} holds no input in a type that is read: {found}; read are {accepted}'
+    found = ', '.join(f'{topic.topic} ({topic.type})' for topic in run.topics)
+    return (
+        f'{run.name!r} holds none of the inputs {", ".join(TOPICS)}; it has {found}: '
+        'name one with --remap FROM:=TO'
+    )
 
 
 def _as_on_board(

@@ -96,7 +96,10 @@ class BagWriter:
         except FileExistsError:
             raise BagError(f'{str(path)!r} exists; choose another name or remove it') from None
         except OSError as error:
-            raise BagError(f'{str(path)!r} cannot be made: {error.strerror}') from error
+            raise BagError(
+                f'{str(path)!r} cannot be made: {error.strerror}; '
+                'give a name in a folder that is there and may be written'
+            ) from error
         self._writer = Writer(
             self._file, chunk_size=chunk_bytes, compression=_MCAP_COMPRESSION[compression]
         )

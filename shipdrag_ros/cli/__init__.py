@@ -84,14 +84,19 @@ def _run(line: list[str]) -> int:
     except ShipdragError as error:
         print(f'ERROR: {error}', file=sys.stderr)
     except OSError as error:
-        if error.filename is None:
-            raise
-        print(
-            f'ERROR: {str(error.filename)!r}: {error.strerror}; '
-            'check the path and that it may be read or written',
-            file=sys.stderr,
-        )
+        print(f'ERROR: {_told(error)}', file=sys.stderr)
     return USER_ERROR
+
+
+def _told(error: OSError) -> str:
+    if error.errno is None:  # raised by a library for a reason of its own
+        raise error
+    if error.filename is None:  # as when a disk is full
+        return f'the result cannot be written: {error.strerror}; make room or write elsewhere'
+    return (
+        f'{str(error.filename)!r}: {error.strerror}; '
+        'check the path and that it may be read or written'
+    )
 
 
 def parser(verb: str) -> argparse.ArgumentParser:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from shipdrag_ros.bags import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.coastdown.events import Coastdown
 from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
+from shipdrag_ros.report.warnings import run_warnings
 from shipdrag_ros.ship import Ship
 
 
@@ -30,7 +31,7 @@ class RunResult:
     recorded
         Comparison with the outputs in the bag.
     warnings
-        What is wrong with the bag, a sentence each.
+        What is wrong with the run, a sentence each.
     truth
         The true curve, where the record is simulated.
     """
@@ -61,6 +62,6 @@ class RunResult:
             coastdowns=result.coastdowns,
             inputs=result.inputs,
             recorded=result.recorded,
-            warnings=run.warnings,
+            warnings=run_warnings(result),
             truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
         )
