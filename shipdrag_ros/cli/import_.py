@@ -113,7 +113,8 @@ def _show(output: Output, bag: Path, result: ImportResult) -> None:
         )
     if result.repeated:
         output.say(
-            f'In {result.repeated} rows the time is that of an earlier row; a replay rejects those.'
+            f'In {result.repeated} rows the time is that of an earlier row; a replay rejects '
+            'those.'
         )
     output.table(
         Table(('input', 'messages'), tuple((name, f'{n}') for name, n in result.written.items()))

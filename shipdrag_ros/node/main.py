@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import sys
 import tempfile
@@ -76,7 +77,8 @@ def _run(line: list[str]) -> int:
     try:
         rclpy.init(args=line, context=context, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
-        raise ShipdragError(f'ROS does not start: {error}') from error
+        why = re.sub(r', at /\S+:\d+|\n', '', str(error))  # places in the source of rcl
+        raise ShipdragError(f'ROS does not start: {why}; check what follows --ros-args') from error
     try:
         if stray := remove_ros_args(line)[1:]:
             print(f'{USAGE}\nunknown: {" ".join(stray)}', file=sys.stderr)

@@ -203,6 +203,8 @@ class Recorder:
     def _fail(self, error: Exception) -> None:
         writer, self._writer = self._writer, None
         self._error = str(error)
+        if isinstance(error, OSError) and error.filename is not None:
+            self._error = f'{str(error.filename)!r}: {error.strerror}; check output_directory'
         if writer is not None:
             with suppress(OSError, BagError):  # what has been written may still be read
                 writer.close()
