@@ -170,13 +170,14 @@ def resistance_picture(
                 label='valid range, Fr {:.3f} to {:.3f}'.format(*estimate.froude_valid),
             )
         whole = estimate.curve
-        axis.plot(
-            whole.speed_m_s,
-            whole.resistance_m_s2,
-            color='#777777',
-            linestyle=':',
-            label='outside: not to be used',
-        )
+        if len(valid) < len(whole):
+            axis.plot(
+                whole.speed_m_s,
+                whole.resistance_m_s2,
+                color='#777777',
+                linestyle=':',
+                label='outside: not to be used',
+            )
         _draw_band(axis, valid, color=BLUE, style='-', label='estimated r')
         if truth is not None:
             axis.plot(

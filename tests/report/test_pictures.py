@@ -65,6 +65,10 @@ def test_the_curve_has_its_band_range_scales_and_truth(
     np.testing.assert_array_equal(line(axis, 'true r of the simulation')[1], truth.resistance_m_s2)
     labels = [text.get_text() for text in axis.get_legend().get_texts()]
     assert 'valid range, Fr 0.050 to 0.180' in labels
+    assert 'outside: not to be used' in labels
+    everywhere = replace(estimate, froude_valid=(0.0, 1.0))
+    legend = pictures.resistance_picture(everywhere).axes[0].get_legend()
+    assert 'outside: not to be used' not in [text.get_text() for text in legend.get_texts()]
     band = next(item for item in axis.collections if '±2' in str(item.get_label()))
     top = band.get_paths()[0].vertices[:, 1].max()
     curve = estimate.valid_curve
