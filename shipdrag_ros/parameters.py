@@ -134,9 +134,10 @@ class Parameters:
     )
     estimator: str = _parameter(
         'auto',
-        'auto is warped: all inputs that are there, in warped time, averaged over models; s1_...: '
-        'the published problems',
-        choices=('auto', 'warped', 's1_joint', 's1_position', 's1_speed'),
+        'auto is warped during a coastdown and motion after it; warped: all inputs that are '
+        'there, in warped time, averaged over models; motion: fit of the equation of motion; '
+        's1_...: the published problems',
+        choices=('auto', 'warped', 'motion', 's1_joint', 's1_position', 's1_speed'),
     )
     order_max: int = _parameter(
         20, 'largest number of coefficients that the order search tries', low=3, high=40

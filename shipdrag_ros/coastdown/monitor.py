@@ -41,7 +41,7 @@ from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
 from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
@@ -66,6 +66,8 @@ class Monitor:
         All of them matter.
     estimate
         The estimator; raises `EstimationError` where none is possible.
+    final
+        The same for a coastdown that has ended, with the record before it.
 
     Notes
     -----
@@ -73,11 +75,17 @@ class Monitor:
     """
 
     def __init__(
-        self, ship: Ship, parameters: Parameters, *, estimate: Estimator = estimate
+        self,
+        ship: Ship,
+        parameters: Parameters,
+        *,
+        estimate: Estimator = estimate,
+        final: Estimator = estimate_final,
     ) -> None:
         self._ship = ship
         self._parameters = parameters
         self._estimator = estimate
+        self._final_estimator = final
         slopes = Slopes.of(parameters)
         self._tuning = Tuning(
             Limits.of(parameters),
@@ -91,6 +99,7 @@ class Monitor:
         )
         self._memory = self._fresh(Tally.fresh())
         warm(self._memory.bins)
+        self._steady_ns = round(parameters.steady_s * SECOND_NS)
         self._window_ns = round(parameters.window_s * SECOND_NS)
         self._update_ns = round(parameters.update_s * SECOND_NS)
         self._history_ns = self._window_ns + self._seconds * SECOND_NS
@@ -257,21 +266,25 @@ class Monitor:
         stamp_ns = int(watch.update_ns[0])
         watch.update_ns[0] = self._grid_ns(next_stamp_ns)
         try:
-            return Update(stamp_ns, self._estimate(stamp_ns))
+            window = self._window(stamp_ns, before_ns=0)
+            return Update(stamp_ns, self._estimator(window, self._ship, self._parameters))
         except EstimationError as error:
             return NoEstimate(stamp_ns, str(error))
 
-    def _estimate(self, end_ns: int) -> Estimate:
+    def _window(self, end_ns: int, *, before_ns: int) -> Window:
+        """Cut the coastdown so far, with the record before it where all of it is there."""
         assert self._onset is not None
         start_ns = max(self._onset.start_ns, end_ns - self._window_ns)
+        first_ns = start_ns - before_ns if start_ns == self._onset.start_ns else start_ns
         kept = since(
             self._memory.store,
-            start_ns,
+            first_ns,
             late_ns=self._tuning.limits.late_ns,
             capacity=CAPACITY,
         )
-        window = Window.from_block(kept, start_ns, end_ns)
-        return self._estimator(window, self._ship, self._parameters)
+        return Window.from_block(
+            kept, start_ns, end_ns, before_ns=first_ns if first_ns < start_ns else None
+        )
 
     # how a coastdown ends
 
@@ -300,7 +313,8 @@ class Monitor:
         final = None
         if failure is None:
             try:
-                final = self._estimate(end_ns)
+                window = self._window(end_ns, before_ns=self._steady_ns)
+                final = self._final_estimator(window, self._ship, self._parameters)
             except EstimationError as error:
                 failure = str(error)
         return Coastdown(

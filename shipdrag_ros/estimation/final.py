@@ -3,22 +3,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import motion_fit
+from shipdrag_ros.estimation.choice import estimate
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
-Estimator = Callable[[Window, Ship, Parameters], Estimate]
 
-
-def estimate_final(
-    window: Window, ship: Ship, parameters: Parameters, *, live: Estimator
-) -> Estimate:
+def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     """
     Estimate r(v) from a whole coastdown, with time to do so.
 
@@ -30,9 +26,8 @@ def estimate_final(
         For n_r, the Froude number and the run-down of the thrust.
     parameters
         `estimator`: `auto` stands for the fit of the equation of motion here;
-        any other is used as during the coastdown.
-    live
-        The estimator during the coastdown; also where the fit fails.
+        any other is used as during the coastdown. Where the fit fails, the
+        estimate during the coastdown is kept, and a note says why.
 
     Raises
     ------
@@ -40,10 +35,10 @@ def estimate_final(
         If the window does not hold a coastdown that can be estimated.
     """
     if parameters.estimator != 'auto':
-        return live(window, ship, parameters)
+        return estimate(window, ship, parameters)
     try:
         return motion_fit.estimate(window, ship, parameters)
     except EstimationError as error:
-        found = live(window, ship, parameters)
+        found = estimate(window, ship, parameters)
         note = f'not fitted as a motion, so as during the coastdown: {error}'
         return replace(found, notes=(*found.notes, note))

@@ -82,7 +82,7 @@ def watch(ship: Ship) -> Callable[..., list[Event]]:
     """Run a whole record through a monitor."""
 
     def run(block: Block, parameters: Parameters | None = None) -> list[Event]:
-        monitor = Monitor(ship, parameters or Parameters(), estimate=refuse)  # type: ignore[arg-type]
+        monitor = Monitor(ship, parameters or Parameters(), estimate=refuse, final=refuse)  # type: ignore[arg-type]
         return monitor.update(block) + monitor.finish()
 
     return run

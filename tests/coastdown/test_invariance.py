@@ -98,7 +98,7 @@ def eventful(record, sensors) -> Block:
 
 
 def run(ship, blocks, estimate=window_only) -> tuple[list, dict]:
-    monitor = Monitor(ship, QUICK, estimate=estimate)
+    monitor = Monitor(ship, QUICK, estimate=estimate, final=estimate)
     events = []
     for block in blocks:
         events += monitor.update(block)

@@ -35,7 +35,7 @@ def refuse(window, ship, parameters):
 
 
 def monitor(ship, *, estimate=window_only, **parameters) -> Monitor:
-    return Monitor(ship, Parameters(**parameters), estimate=estimate)
+    return Monitor(ship, Parameters(**parameters), estimate=estimate, final=estimate)
 
 
 def of(kind, events):
@@ -267,3 +267,16 @@ def test_memory_does_not_grow(ship) -> None:
         watched.update(Block.of(LOG, stamps, 8.0 + 0.05 * rng.standard_normal(3600)))
         sizes.append(size())
     assert len(set(sizes[1:])) == 1
+
+
+def test_nothing_is_compiled_once_it_runs(ship, record, sensors) -> None:
+    from shipdrag_ros.coastdown import bins
+
+    watched = monitor(ship)
+    kernels = (bins.line, bins.mean_place, bins.displacement, bins.mean_turning, bins.newest_bin)
+    compiled = [len(kernel.signatures) for kernel in kernels]
+    block = record(sensors=tuple(sensors.values()))
+    block.value.flags.writeable = False
+    events = watched.update(block[: len(block) // 2]) + watched.update(block[len(block) // 2 :])
+    assert of(Onset, events)
+    assert [len(kernel.signatures) for kernel in kernels] == compiled

@@ -89,10 +89,12 @@ class FamilyFit:
         From r alone, as if it rose by `_TYPICAL_POWER` of the speed: between
         friction and wave making, and far steadier than a fitted slope.
         """
-        inertia = 1.0 + np.polynomial.polynomial.polyval(speed_m_s, self.law.n_r)
+        n_r = np.polynomial.polynomial.polyval(speed_m_s, self.law.n_r)
+        inertia = 1.0 + np.asarray(n_r, np.float64)
         r, _ = self.resistance(speed_m_s)
         damping = _TYPICAL_POWER * r / np.maximum(speed_m_s, 1e-3) / inertia
-        return np.maximum(damping, 1e-6), inertia
+        damped: Float64 = np.maximum(damping, 1e-6)
+        return damped, inertia
 
     def _powers(self, speed_m_s: Float64) -> Float64:
         result: Float64 = (speed_m_s[:, None] / self.law.v_ref_m_s) ** self.law.powers

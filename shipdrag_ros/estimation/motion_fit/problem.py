@@ -96,7 +96,8 @@ class Problem:
         extras = [V0]
         if run_down.run_down_sd_s > 0.0:
             extras.append(RUN_DOWN)
-        if run_down.stop_sd_s > 0.0:
+        # without thrust and steady record a later stop is but a higher speed
+        if run_down.stop_sd_s > 0.0 and (run_down.run_down_s > 0.0 or len(steady.time_s)):
             extras.append(ONSET)
         kinds = set(coast.kind.tolist())
         if POSITION in kinds:

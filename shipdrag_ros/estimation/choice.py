@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which estimator a parameter stands for."""
+
+from __future__ import annotations
+
+from shipdrag_ros.estimation import motion_fit, s1, warped
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
+
+
+def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    """
+    Estimate r(v) from one window, by the estimator that is asked for.
+
+    Parameters
+    ----------
+    window
+        Accepted samples.
+    ship
+        For n_r and the Froude number.
+    parameters
+        `estimator` among them; `auto` is `warped`.
+
+    Raises
+    ------
+    EstimationError
+        If the window does not hold a coastdown that can be estimated.
+    """
+    if parameters.estimator in ('auto', warped.NAME):
+        return warped.estimate(window, ship, parameters)
+    if parameters.estimator == motion_fit.NAME:
+        return motion_fit.estimate(window, ship, parameters)
+    return s1.estimate(window, ship, parameters)
