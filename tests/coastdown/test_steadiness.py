@@ -29,11 +29,11 @@ def noise(seconds: int, seed: int) -> np.ndarray:
 
 
 def test_spread_of_white_noise() -> None:
-    # 12 sigma^2 / W^3 is the variance of a slope; over 40 records the mean of the spread, of
-    # which each is good to 15 %, is within 4 standard errors, 10 %
-    found = np.mean([learnt(noise(2200, seed)).spread[LOG] for seed in range(40)], axis=0)
+    # 12 sigma^2 / W^3 is the variance of a slope; over 16 records the mean of the spread, of
+    # which each is good to 15..35 %, is within 3 standard errors of the longest window, 25 %
+    found = np.mean([learnt(noise(2200, seed)).spread[LOG] for seed in range(16)], axis=0)
     width = 60.0 * 2.0 ** np.arange(SCALES)
-    np.testing.assert_allclose(found, 0.05 * np.sqrt(12.0 / width**3), rtol=0.1)
+    np.testing.assert_allclose(found, 0.05 * np.sqrt(12.0 / width**3), rtol=0.25)
 
 
 def test_a_coastdown_in_the_record_hardly_matters() -> None:
