@@ -93,20 +93,20 @@ def _usv(test: str) -> Record:
     columns = f'{_USV} --where test={test}'
     table = 'awsp_usv_coast_1hz.csv'
     return Record(
-        f'usv_{test.lower()}', table, columns, 'usv', 'few_samples', (1.0, 15.0), (0.5, 0.8, 1.1)
+        f'usv_{test.lower()}', table, columns, 'usv', 'few_positions', (1.0, 15.0), (0.5, 0.8, 1.1)
     )
 
 
 def _car(test: str, end_s: float) -> Record:
     table = f'car/shotgoose_RR-Coastdown-{test}_coast_100hz.csv'
     name = f'car_{test.lower().replace("-", "_")}'
-    return Record(name, table, _CAR, 'car', 'few_samples', (0.0, end_s), (4.0, 7.0, 9.0))
+    return Record(name, table, _CAR, 'car', 'car_speed', (0.0, end_s), (4.0, 7.0, 9.0))
 
 
 def _slow_car(test: str) -> Record:
     speeds = (2.0, 4.0, 6.0)
     table, name = f'car/{test}.csv', f'car_{test.lower()}'
-    return Record(name, table, _ONE_HZ, 'car', 'few_samples', (0.0, 172.0), speeds)
+    return Record(name, table, _ONE_HZ, 'car', 'car_speed', (0.0, 172.0), speeds)
 
 
 MODEL_SHIP = Record(
@@ -114,7 +114,7 @@ MODEL_SHIP = Record(
     _MODEL[0],
     f'{_MODEL[1]} --map heading=psi_rad',
     'model_ship',
-    'small_craft',
+    'small_craft_speed',
     (6.0, 32.0),
     (0.05, 0.1, 0.15),
 )
@@ -122,6 +122,7 @@ MODEL_SHIP_JOINT = replace(
     MODEL_SHIP,
     name='model_ship_joint',
     columns=f'{MODEL_SHIP.columns} --map position=x_m,y_m',
+    parameters='small_craft',
 )
 FERRY = Record(
     'ferry',
