@@ -67,7 +67,7 @@ class Found:
 
 def find(ship: Ship, block: Block) -> Found:
     """Watch one record, second by second from the event on."""
-    monitor = Monitor(ship, Parameters(), estimate=no_estimate)
+    monitor = Monitor(ship, Parameters(), estimate=no_estimate, final=no_estimate)
     event_ns = START_NS + LEAD_IN_S * SECOND_NS
     first = int(np.searchsorted(block.stamp_ns, event_ns))
     monitor.update(block[:first])
@@ -106,7 +106,7 @@ def truths(ship: Ship) -> dict[str, Truth]:
 
 def false_alarms(ship: Ship, sea: str, days: int) -> int:
     """Count how often steady sailing was taken for a candidate."""
-    monitor = Monitor(ship, Parameters(), estimate=no_estimate)
+    monitor = Monitor(ship, Parameters(), estimate=no_estimate, final=no_estimate)
     rng = np.random.default_rng(7)
     seconds = days * 86400
     speed = (

@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.bins import Bins, add, close
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset, State
 from shipdrag_ros.coastdown.onset import bend, change_point, law
+from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Channel
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
     EngineOrder,
@@ -26,6 +28,10 @@ START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
 LOG = int(Channel.SPEED_THROUGH_WATER)
 STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
+
+
+def refuse(window, ship, parameters):
+    raise EstimationError('not asked for')
 
 
 def onsets(events):
@@ -156,8 +162,6 @@ def test_confirm_s_says_how_long_a_deceleration_is_looked_at(watch, record) -> N
 
 
 def test_false_alarms_per_day_sets_what_is_noticed(ship, record) -> None:
-    from shipdrag_ros.coastdown import Monitor
-    from shipdrag_ros.coastdown.events import State
 
     block = record(duration_s=100.0)
 
@@ -183,11 +187,6 @@ def test_a_tanker_is_found_in_a_moderate_sea() -> None:
         '  resistance_n: [0.0, 1.13e5, 4.3e5, 9.4e5, 1.65e6, 2.1e6], relative_sd: 0.05}\n',
         subject='tanker',
     )
-    from shipdrag_ros.coastdown import Monitor
-    from shipdrag_ros.errors import EstimationError
-
-    def refuse(window, ship, parameters):
-        raise EstimationError('not asked for')
 
     found = 0
     for seed in range(10):
@@ -200,20 +199,17 @@ def test_a_tanker_is_found_in_a_moderate_sea() -> None:
         )
         log = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.05)
         block = sense(simulate(tanker, scenario), (log,), seed=seed, start_ns=START_NS)
-        found += len(onsets(Monitor(tanker, Parameters(), estimate=refuse).update(block)))
+        found += len(
+            onsets(Monitor(tanker, Parameters(), estimate=refuse, final=refuse).update(block))
+        )
     # of 10, seeds 0..9; each is found with a chance of more than 0.9: 7 or fewer once in 70
     assert found >= 8
 
 
 def test_a_ship_without_a_baseline_is_judged_by_its_size(record) -> None:
-    from shipdrag_ros.coastdown import Monitor
-    from shipdrag_ros.errors import EstimationError
-
-    def refuse(window, ship, parameters):
-        raise EstimationError('not asked for')
 
     bare = Ship(length_m=150.0, displaced_volume_m3=20200.0)
-    events = Monitor(bare, Parameters(), estimate=refuse).update(record())
+    events = Monitor(bare, Parameters(), estimate=refuse, final=refuse).update(record())
     assert len(onsets(events)) == 1
 
 
@@ -225,11 +221,6 @@ def test_a_small_craft_with_short_windows() -> None:
         'added_mass: {model: constant, value: 0.06, sd: 0.02}\n',
         subject='model',
     )
-    from shipdrag_ros.coastdown import Monitor
-    from shipdrag_ros.errors import EstimationError
-
-    def refuse(window, ship, parameters):
-        raise EstimationError('not asked for')
 
     parameters = Parameters(
         slope_window_s=5.0, confirm_s=10.0, steady_s=60.0, window_s=60.0, data_stop_s=5.0
@@ -237,14 +228,13 @@ def test_a_small_craft_with_short_windows() -> None:
     rng = np.random.default_rng(3)
     time = np.arange(0.0, 87.0, 0.05)
     coasting = np.maximum(0.0, time - 60.0)
-    from shipdrag_ros.samples import Block
 
     block = Block.of(
         Channel.SPEED_THROUGH_WATER,
         START_NS + np.round(time * 1e9).astype(np.int64),
         0.8 / (1 + coasting * 0.045 / 0.8) + 0.01 * rng.standard_normal(len(time)),
     )
-    monitor = Monitor(model, parameters, estimate=refuse)
+    monitor = Monitor(model, parameters, estimate=refuse, final=refuse)
     events = monitor.update(block) + monitor.finish()
     (onset,) = onsets(events)
     assert abs(after_s(onset.start_ns, 60.0)) <= 3.0
