@@ -36,6 +36,8 @@ FROUDE_MAX_BY = {
 }
 _STRAIGHT = {'s1_speed': 2, 's1_position': 3, 's1_joint': 3}  # coefficients of a constant r
 _ESTIMATORS = {
+    'warped': 'all inputs in warped time, averaged over models',
+    'motion': 'fit of the equation of motion',
     's1_joint': 'orthogonal polynomial, speed and position jointly',
     's1_position': 'orthogonal polynomial, position alone',
     's1_speed': 'orthogonal polynomial, speed alone',

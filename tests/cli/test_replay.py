@@ -55,7 +55,7 @@ def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
         'current_m_s',
     } <= set(coastdown)
     assert coastdown['bag'] == str(coastdown_bag)
-    assert coastdown['estimator'] == 's1_joint'
+    assert coastdown['estimator'] == 'motion'
     assert coastdown['start_ns'] < coastdown['onset_detected_ns'] < coastdown['end_ns']
     low, high = coastdown['froude_valid']
     froude = np.array(coastdown['froude'])
@@ -82,7 +82,7 @@ def test_the_words_give_every_figure(
         'start',
         'duration',
         'ended because',
-        's1_joint',
+        'motion',
         'coefficients',
         'samples used',
         'valid range',
