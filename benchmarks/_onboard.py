@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-os.environ.setdefault('ROS_DOMAIN_ID', '71')
+os.environ.setdefault('ROS_DOMAIN_ID', '5')  # the tests and the demonstration are above
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 import psutil
