@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Series, Window
-from shipdrag_ros.estimation.s1 import estimate
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
+from shipdrag_ros.estimation.s1 import estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship

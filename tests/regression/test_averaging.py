@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Posterior, evidence and averages against the textbook, by dense matrices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.regression.averaging import average, condense, posterior, root
+from shipdrag_ros.samples import Float64
+
+K, N = 5, 40
+
+
+@dataclass(frozen=True)
+class Problem:
+    rows: Float64
+    value: Float64
+    weight: Float64
+    mean: Float64
+    sd: Float64
+
+
+@pytest.fixture
+def problem() -> Problem:
+    rng = np.random.default_rng(3)
+    return Problem(
+        rng.normal(size=(K, N)),
+        rng.normal(size=N),
+        rng.uniform(0.5, 2.0, N),
+        np.array([0.0, 0.0, 0.0, 0.3, 0.0]),
+        np.array([10.0, 2.0, 0.3, 0.2, 0.1]),
+    )
+
+
+def dense(given: Problem, columns: list[int], sd: Float64) -> tuple[Float64, Float64, float]:
+    """Mean, covariance and log marginal likelihood, from the covariance of the data."""
+    h, mean = given.rows[columns], given.mean[columns]
+    prior = np.diag(sd[columns] ** 2)
+    data = np.diag(1.0 / given.weight) + h.T @ prior @ h
+    gain = prior @ h @ np.linalg.inv(data)
+    off = given.value - mean @ h
+    log_likelihood = -0.5 * off @ np.linalg.solve(data, off) - 0.5 * np.linalg.slogdet(data)[1]
+    return mean + gain @ off, prior - gain @ h.T @ prior, float(log_likelihood)
+
+
+def test_one_model_is_the_textbook(problem: Problem) -> None:
+    evidences, expected = [], []
+    for columns in ([0, 1, 2, 3, 4], [0, 1, 3], [0]):
+        start = np.zeros(K)
+        start[0] = 0.7  # the choice of the start must not matter
+        products = condense(problem.rows, problem.value - start @ problem.rows, problem.weight)
+        evidence, step, lower = posterior(
+            products, start, np.array(columns), problem.mean, problem.sd
+        )
+        mean, covariance, likelihood = dense(problem, columns, problem.sd)
+        np.testing.assert_allclose(start[columns] + step, mean, rtol=1e-11, atol=1e-13)
+        triangle = np.tril(lower)
+        np.testing.assert_allclose(np.linalg.inv(triangle @ triangle.T), covariance, atol=1e-12)
+        evidences.append(evidence)
+        expected.append(likelihood)
+    np.testing.assert_allclose(np.diff(evidences), np.diff(expected), rtol=1e-10)
+
+
+def test_the_average_is_the_mixture(problem: Problem) -> None:
+    products = condense(problem.rows, problem.value, problem.weight)
+    families = np.array([[True] * 5, [True, True, True, False, False]])
+    sds = np.array([problem.sd, problem.sd])
+    sds[1, 2:4] *= 2.0
+    chance = np.array([1.0, 3.0])
+    coefficients, covariance, weight = average(
+        products, np.zeros(K), families, chance, problem.mean, sds
+    )
+    means, seconds, logs = [], [], []
+    for family, share in zip(families, chance):
+        for sd in sds:
+            columns = np.flatnonzero(family).tolist()
+            mean, inside, likelihood = dense(problem, columns, sd)
+            whole, spread = np.zeros(K), np.zeros((K, K))
+            whole[columns] = mean
+            spread[np.ix_(columns, columns)] = inside
+            means.append(whole)
+            seconds.append(spread + np.outer(whole, whole))
+            logs.append(likelihood + np.log(share))
+    w = np.exp(np.array(logs) - max(logs))
+    w /= w.sum()
+    assert w.min() > 1e-3, 'a model that counts for nothing tests nothing'
+    np.testing.assert_allclose(weight.ravel(), w, rtol=1e-9)
+    np.testing.assert_allclose(coefficients, w @ np.array(means), rtol=1e-9)
+    expected = np.einsum('m,mij->ij', w, np.array(seconds)) - np.outer(coefficients, coefficients)
+    np.testing.assert_allclose(covariance, expected, atol=1e-11)
+
+
+def test_the_root_is_one_also_of_a_singular_covariance() -> None:
+    half = np.random.default_rng(1).normal(size=(4, 2))
+    covariance = half @ half.T
+    covariance[3] = covariance[:, 3] = 0.0
+    lower = root(covariance)
+    np.testing.assert_allclose(lower @ lower.T, covariance, atol=1e-12)
+    assert not lower[3].any()
