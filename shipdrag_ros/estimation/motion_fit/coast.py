@@ -20,6 +20,7 @@ from shipdrag_ros.samples import Float64, Int64
 # Columns of the unknowns behind the k coefficients.
 V0, RUN_DOWN, ONSET, X0, CURRENT, LOG_SCALE = range(6)
 EXTRAS = 6
+_SHORTEST_S = 0.1  # run-down: a shorter one ends at once
 _OF_MOTION = 2  # of these, the ones that change the motion by themselves
 
 LOG, OVER_GROUND, POSITION = range(3)  # kinds of rows
@@ -99,8 +100,10 @@ def _rates(law: Law, unknowns: Float64, t: float, state: Float64, rate: Float64)
     s = v / law.v_ref_m_s
     s0 = unknowns[k + V0] / law.v_ref_m_s
     decay = 0.0
+    run_down = 1.0
     if law.thrust != 0.0:
-        decay = np.exp(-t / unknowns[k + RUN_DOWN])
+        run_down = max(unknowns[k + RUN_DOWN], _SHORTEST_S)
+        decay = np.exp(-t / run_down)
     thrust = law.thrust * decay
     r, r0, slope, slope0 = 0.0, 0.0, 0.0, 0.0
     power, power0 = 1.0, 1.0
@@ -127,7 +130,7 @@ def _rates(law: Law, unknowns: Float64, t: float, state: Float64, rate: Float64)
     rate[1 + k + V0] = thrust * slope0 / inertia
     rate[1 + k + RUN_DOWN] = 0.0
     if thrust != 0.0:
-        rate[1 + k + RUN_DOWN] = thrust * r0 * t / unknowns[k + RUN_DOWN] ** 2 / inertia
+        rate[1 + k + RUN_DOWN] = thrust * r0 * t / run_down**2 / inertia
     for j in range(q):
         rate[1 + j] += by_v * state[1 + j]
     for j in range(q + 1):

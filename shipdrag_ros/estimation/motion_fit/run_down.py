@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,8 +44,13 @@ class RunDown:
     def of(cls, window: Window, ship: Ship) -> RunDown:
         """
         Learn of the stop from the shaft, or else take what the ship file states.
+
+        That the thrust runs down as the shaft does is what `propulsion` in the
+        ship file says. Without it the thrust may end at any time up to then.
         """
         found = _from_shaft(window)
+        if found is not None and ship.propulsion is None and found.run_down_s > 0.0:
+            return found._loosened()
         if found is not None:
             return found
         if window.before is None:
@@ -64,6 +69,15 @@ class RunDown:
             ship.propulsion.run_down_s,
             ship.propulsion.sd,
             'the run-down of the thrust is that of the ship file',
+        )
+
+    def _loosened(self) -> RunDown:
+        half_s = 0.5 * self.run_down_s
+        return replace(
+            self,
+            run_down_s=half_s,
+            run_down_sd_s=half_s,
+            source='the thrust is taken to run down as fast as the shaft or faster',
         )
 
 
