@@ -262,6 +262,7 @@ def _told(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
     return (bool(current), bool(scale)), notes
 
 
+@cache
 def _families(polynomials: int, current: bool, scale: bool) -> NDArray[np.bool_]:
     """Return the columns of each family: with and without factor, with and without thrust."""
     rows = [

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.samples import Float64
 
-_NEGLIGIBLE = 1e-4  # weight of a model against the best; the rest is left out of the spread
+_NEGLIGIBLE = 1e-3  # weight of a model against the best; the rest is left out of the spread
 # Sums may be taken in any order, so that they are vectorised; the order is
 # fixed when compiled, not by the data or where they lie.
 _SUMS = {'reassoc', 'contract', 'nsz'}
@@ -94,6 +94,26 @@ def _backward(lower: Float64, vector: Float64) -> None:
         for k in range(i + 1, n):
             total -= lower[k, i] * vector[k]
         vector[i] = total / lower[i, i]
+
+
+@njit('void(f8[:, ::1], f8[:, ::1])', cache=True, fastmath=_SUMS)
+def _invert(lower: Float64, inverse: Float64) -> None:
+    """Invert L L' into another matrix."""
+    n = len(lower)
+    half = np.zeros((n, n))  # of L: row j is column j of its inverse
+    for j in range(n):
+        half[j, j] = 1.0 / lower[j, j]
+        for i in range(j + 1, n):
+            total = 0.0
+            for k in range(j, i):
+                total -= lower[i, k] * half[j, k]
+            half[j, i] = total / lower[i, i]
+    for a in range(n):
+        for b in range(a + 1):
+            total = 0.0
+            for k in range(a, n):
+                total += half[a, k] * half[b, k]
+            inverse[a, b] = inverse[b, a] = total
 
 
 @njit(
@@ -251,18 +271,12 @@ def average(
             if share == 0.0:
                 continue
             _, step, lower = posterior(products, start, columns, mean, sds[p])
-            for a in range(m):
-                inverse[a] = 0.0
-                inverse[a, a] = 1.0
-                _forward(lower, inverse[a])
-                _backward(lower, inverse[a])
+            _invert(lower, inverse)
             for a in range(m):
                 coefficients[columns[a]] += share * step[a]
                 for b in range(m):
                     # moments about the start, which is near: nothing cancels
-                    second[columns[a], columns[b]] += share * (
-                        0.5 * (inverse[a, b] + inverse[b, a]) + step[a] * step[b]
-                    )
+                    second[columns[a], columns[b]] += share * (inverse[a, b] + step[a] * step[b])
     for a in range(k):
         for b in range(k):
             second[a, b] -= coefficients[a] * coefficients[b]
