@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import MISSING, dataclass, fields
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
@@ -161,7 +162,7 @@ class Ship:
         S1 (2).
         """
         magnitude = np.abs(np.asarray(speed_m_s, np.float64))
-        return np.asarray(polyval(magnitude, self.n_r_polynomial()), np.float64)
+        return np.asarray(polyval(magnitude, self._n_r_coefficients), np.float64)
 
     def n_r_polynomial(self) -> Float64:
         """
@@ -171,6 +172,10 @@ class Ship:
         -----
         The b0, b1, b2 of S1 (2).
         """
+        return self._n_r_coefficients.copy()
+
+    @cached_property
+    def _n_r_coefficients(self) -> Float64:
         in_froude = n_r_polynomial(self.added_mass, self.slenderness)
         return in_froude / self._froude_one ** np.arange(len(in_froude))
 
