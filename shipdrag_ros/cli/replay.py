@@ -19,6 +19,7 @@ from shipdrag_ros.report.hulls import Ranking, rank
 from shipdrag_ros.report.page import write_report
 from shipdrag_ros.report.run import RunResult
 from shipdrag_ros.report.spreadsheet import write_curves
+from shipdrag_ros.report.together import together
 from shipdrag_ros.ship import Ship
 
 _LATE_S = 10.0
@@ -111,6 +112,8 @@ def run(options: argparse.Namespace) -> int:
         replay_text.show_run(output, result)
     if ranking is not None:
         replay_text.show_ranking(output, ranking)
+    else:
+        replay_text.show_together(output, together(results))
     if options.report is not None:
         write_report(options.report, results, ranking=ranking)
         output.log(f'report in {options.report}')

@@ -8,8 +8,10 @@ from typing import Any
 
 from shipdrag_ros.bags import InputCounts, Recorded
 from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.report.hulls import Ranking
 from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.report.together import together
 
 
 def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> dict[str, Any]:
@@ -18,13 +20,15 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
 
     Counts are summed over the bags. A coastdown without an estimate has
     empty arrays and says why under `failure`; `hulls` is there only if they
-    were compared.
+    were compared. `combined` is one r(v) from two or more coastdowns of one
+    ship: `scatter_m_s2` is the standard deviation of one run about it, the
+    current is along the heading of the first run.
     """
     found = {
         'coastdowns': [
             _coastdown(run.bag, coastdown) for run in runs for coastdown in run.coastdowns
         ],
-        'combined': None,
+        'combined': _combined(together(runs).combined),
         'inputs': _inputs([run.inputs for run in runs]),
         'recorded': _recorded(runs),
     }
@@ -39,6 +43,25 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
             for hull in ranking.hulls
         ]
     return found
+
+
+def _combined(combined: Combined | None) -> dict[str, Any] | None:
+    if combined is None:
+        return None
+    current = None
+    if combined.current_m_s is not None:
+        current = {'value': combined.current_m_s, 'sd': combined.current_sigma_m_s}
+    return {
+        'runs': combined.runs,
+        'speed_m_s': combined.speed_m_s,
+        'resistance_m_s2': combined.resistance_m_s2,
+        'sigma_m_s2': combined.sigma_m_s2,
+        'sigma_repeatable_m_s2': combined.sigma_repeatable_m_s2,
+        'scatter_m_s2': combined.scatter_m_s2,
+        'froude': combined.froude,
+        'froude_valid': (float(combined.froude[0]), float(combined.froude[-1])),
+        'current_m_s': current,
+    }
 
 
 def _coastdown(bag: str, coastdown: Coastdown) -> dict[str, Any]:

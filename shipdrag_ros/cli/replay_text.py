@@ -7,6 +7,7 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.report import cells, words
 from shipdrag_ros.report.hulls import Ranking
 from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.report.together import Together
 
 
 def show_run(output: Output, run: RunResult) -> None:
@@ -39,4 +40,18 @@ def show_ranking(output: Output, ranking: Ranking) -> None:
     output.heading('Hulls compared: the higher Fr_max, the later a hull makes wave')
     output.table(cells.ranking_table(ranking))
     for note in ranking.notes:
+        output.say(f'- {note}')
+
+
+def show_together(output: Output, found: Together) -> None:
+    """
+    Print the one r(v) of several coastdowns, or why there is none.
+    """
+    if found.combined is None:
+        if found.why_not:
+            output.say(f'Not combined: {found.why_not}.')
+        return
+    output.heading(f'{found.combined.runs} coastdowns together')
+    output.table(cells.combined_table(found.combined))
+    for note in words.combined_notes(found.combined):
         output.say(f'- {note}')

@@ -10,6 +10,7 @@ import numpy as np
 
 from shipdrag_ros.bags import InputCounts
 from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.report import words
 from shipdrag_ros.report.hulls import Ranking
@@ -128,6 +129,27 @@ def inputs_table(inputs: Mapping[str, InputCounts]) -> Table:
             for name, counts in inputs.items()
         ),
     )
+
+
+def combined_table(combined: Combined, *, count: int = 10) -> Table:
+    """
+    Show about `count` points of the r(v) of several coastdowns.
+    """
+    decimals = max(words.decimals_of(float(np.min(combined.sigma_m_s2))), 0)
+    rows = []
+    for i in np.linspace(0, len(combined.speed_m_s) - 1, count).round().astype(int):
+        speed = float(combined.speed_m_s[i])
+        figures = (combined.resistance_m_s2, combined.sigma_m_s2, combined.scatter_m_s2)
+        rows.append(
+            (
+                f'{speed:.2f}',
+                f'{speed / words.M_S_PER_KNOT:.1f}',
+                f'{combined.froude[i]:.3f}',
+                *(f'{column[i]:.{decimals}f}' for column in figures),
+            )
+        )
+    heads = ('speed [m/s]', '[knots]', 'Fr', 'r [m/s²]', 'sigma [m/s²]', 'run to run [m/s²]')
+    return Table(heads, tuple(rows))
 
 
 def ranking_table(ranking: Ranking) -> Table:

@@ -15,6 +15,8 @@ import numpy as np
 
 from shipdrag_ros.bags import Recorded
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.estimation import motion_fit
+from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.ship import Ship
 
@@ -193,6 +195,27 @@ def notes(coastdown: Coastdown) -> tuple[str, ...]:
     )
 
 
+def combined_notes(combined: Combined) -> tuple[str, ...]:
+    """
+    Say what several coastdowns together can and cannot show, a sentence each.
+    """
+    if combined.current_m_s is None or combined.current_sigma_m_s is None:
+        current = (
+            'These runs do not tell a current: none is taken out. Runs on opposite headings would.'
+        )
+    else:
+        value = plus_minus(combined.current_m_s, 2.0 * combined.current_sigma_m_s)
+        current = (
+            f'The current along the heading of the first run is {value} m/s (two standard '
+            'deviations); it is taken out.'
+        )
+    return (
+        current,
+        'Run to run is the standard deviation of one run about the mean of all; where it is '
+        'larger than the runs themselves state, sigma is widened.',
+    )
+
+
 def _range_notes(estimate: Estimate) -> list[str]:
     curve = estimate.valid_curve
     found = []
@@ -218,6 +241,8 @@ def _range_notes(estimate: Estimate) -> list[str]:
 
 def _residual_notes(estimate: Estimate) -> list[str]:
     """Tell of residuals that are not the independent scatter that the band counts on."""
+    if estimate.estimator == motion_fit.NAME:
+        return []  # slow disturbances are learnt, or a note says that they are not
     found = []
     for name, track in estimate.tracks.items():
         residual = track.measured - track.fitted
