@@ -16,6 +16,7 @@ PACKAGE = ROOT / 'shipdrag_ros'
 FLOORS = {
     'errors': 0,
     'samples': 0,
+    'compiled': 0,
     'strict_yaml': 0,
     'parameters': 1,
     'ship': 1,

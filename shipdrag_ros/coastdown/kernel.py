@@ -27,7 +27,6 @@ from shipdrag_ros.coastdown.bins import (
     mean_turning,
     newest_bin,
 )
-from shipdrag_ros.coastdown.compiled import digest
 from shipdrag_ros.coastdown.ring import Store, append, first_store
 from shipdrag_ros.coastdown.steadiness import (
     SCALES,
@@ -49,6 +48,7 @@ from shipdrag_ros.coastdown.validate import (
     examine,
     remember,
 )
+from shipdrag_ros.compiled import digest
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
 

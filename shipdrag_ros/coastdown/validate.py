@@ -28,7 +28,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numba import njit, typeof, types
 
-from shipdrag_ros.coastdown.compiled import digest
+from shipdrag_ros.compiled import digest
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
     ABSURD_SPEED_M_S,

@@ -18,5 +18,5 @@ def digest(*paths: str) -> str:
 
     A compiled function that closes over it is compiled anew when one changes.
     """
-    package = Path(__file__).parents[1]
+    package = Path(__file__).parent
     return hashlib.sha256(b''.join((package / path).read_bytes() for path in paths)).hexdigest()
