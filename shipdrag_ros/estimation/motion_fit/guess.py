@@ -10,6 +10,7 @@ import numpy as np
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
 
+_LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
 _BLOCKS = 12  # whose medians outliers do not reach
 
 
@@ -73,7 +74,7 @@ class Guess:
         mean_t, mean = np.average(when, weights=weight), np.average(inverse, weights=weight)
         t = when - mean_t
         slope = float((weight * t * (inverse - mean)).sum() / (weight * t * t).sum())
-        if not slope > 0.0:
+        if not slope * float(np.ptp(time_s)) > _LEAST_LOSS * mean:
             raise EstimationError(
                 f'no deceleration in {np.ptp(time_s):.4g} s: give a longer window, or one after '
                 'the engine stop'

@@ -40,6 +40,7 @@ from shipdrag_ros.samples import Float64
 PLAIN = (2, 3)  # little noise, and right enough to tell how a force is damped
 _STEPS = 96  # of the integration, longer as the ship slows down
 _HUBER = 2.5  # whitened residuals beyond it count by their size only
+_HUBER_SQUARE = 0.9775  # mean of min(z, 2.5)^2 of a standard normal z
 _ROUNDS = 3  # of the weights
 _ITERATIONS = 30
 _SCALE_SD = 0.02  # of a log's scale, before the fit
@@ -217,7 +218,7 @@ def fit_robustly(
         size = np.abs(white) / np.sqrt(weight)
         weight = np.minimum(1.0, _HUBER / np.maximum(size, _HUBER))
         freedom = 1.0 - first.parameters / len(base)
-        squares = weight * size**2 / freedom
+        squares = np.minimum(size, _HUBER) ** 2 / (_HUBER_SQUARE * freedom)
         for kind in KINDS.values():
             of_kind = problem.rows.kind == kind
             if of_kind[steady:].any():
