@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs on opposite headings: the current comes out, and what differs is said."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation import Window, motion_fit
+from shipdrag_ros.estimation.reciprocal import combine
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Channel
+
+
+def run(coast, ship, *, current_m_s: float, seed: int, log: bool) -> Estimate:
+    """A coastdown whose positions drift by the current along its track."""
+    block = coast.block(500, position_sigma=1.0, seed=seed)
+    rows = block.channel == Channel.POSITION
+    time_s = (block.stamp_ns - block.stamp_ns[0]) * 1e-9
+    block.value[rows] += current_m_s * time_s[rows, None] * [np.cos(0.7), np.sin(0.7)]
+    if not log:
+        block = block[rows]
+    cut = Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
+    return motion_fit.estimate(cut, ship, Parameters())
+
+
+@pytest.mark.parametrize('log', [True, False])
+def test_the_current_is_taken_out(coast, ship, log: bool) -> None:
+    there = run(coast, ship, current_m_s=0.2, seed=1, log=log)
+    back = run(coast, ship, current_m_s=-0.2, seed=2, log=log)
+    both = combine([there, back], [0.7, 0.7 + math.pi])
+    assert both.runs == 2
+    assert both.current_m_s == pytest.approx(0.2, abs=0.05)
+    truth = coast.resistance(both.speed_m_s, ship)
+    rms = np.sqrt(np.mean((both.resistance_m_s2 - truth) ** 2))
+    assert rms < 0.02 * truth.max()
+    if not log:
+        single = there.valid_curve
+        off = single.resistance_m_s2 - coast.resistance(single.speed_m_s, ship)
+        assert rms < 0.5 * np.sqrt(np.mean(off**2))
+
+
+def test_runs_that_differ_widen_the_band(coast, ship) -> None:
+    one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
+    more = replace(one, curve=replace(one.curve, resistance_m_s2=1.2 * one.curve.resistance_m_s2))
+    alike = combine([one, one], [0.0, 0.0])
+    apart = combine([one, more], [0.0, 0.0])
+    assert np.all(alike.scatter_m_s2 == 0.0)
+    assert np.all(apart.sigma_repeatable_m_s2 > 3.0 * alike.sigma_repeatable_m_s2)
+    np.testing.assert_allclose(
+        apart.scatter_m_s2, 0.2 / math.sqrt(2.0) * alike.resistance_m_s2, rtol=1e-9
+    )
+    # the error of n_r is common to all runs and does not average out
+    of_n_r = alike.sigma_m_s2**2 - alike.sigma_repeatable_m_s2**2
+    expected = one.valid_curve.sigma_m_s2**2 - one.valid_curve.sigma_repeatable_m_s2**2
+    np.testing.assert_allclose(of_n_r.max(), expected.max(), rtol=1e-6)
+
+
+def test_no_heading_no_current(coast, ship) -> None:
+    runs = [run(coast, ship, current_m_s=0.0, seed=seed, log=False) for seed in (1, 2)]
+    assert combine(runs, [None, None]).current_m_s is None
+
+
+def test_refusals_say_why(coast, ship) -> None:
+    one = run(coast, ship, current_m_s=0.0, seed=1, log=True)
+    with pytest.raises(EstimationError, match='two or more'):
+        combine([one], [0.0])
+    low, high = one.froude_valid
+    middle = 0.5 * (low + high)
+    halves = [replace(one, froude_valid=(low, middle)), replace(one, froude_valid=(middle, high))]
+    with pytest.raises(EstimationError, match='do not overlap'):
+        combine(halves, [0.0, 0.0])
