@@ -41,7 +41,7 @@ from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
 from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation import Window, estimate, estimate_final, motion_fit
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
@@ -99,6 +99,7 @@ class Monitor:
         )
         self._memory = self._fresh(Tally.fresh())
         warm(self._memory.bins)
+        motion_fit.warm()
         self._steady_ns = round(parameters.steady_s * SECOND_NS)
         self._window_ns = round(parameters.window_s * SECOND_NS)
         self._update_ns = round(parameters.update_s * SECOND_NS)
