@@ -407,7 +407,7 @@ def test_the_coasting_ferry_gives_a_resistance(tmp_path: Path) -> None:
         displaced_volume_m3=1.8,
         added_mass=ConstantAddedMass(value=0.1, sd=0.05),
     )
-    slow = Parameters(froude_min=0.01)
+    slow = Parameters(froude_min=0.01, estimator='s1_joint')
     (coastdown,) = replay(run, ship=ferry, parameters=slow, window=(9.0, 33.0)).coastdowns
     assert coastdown.estimate is not None, coastdown.failure
     assert coastdown.estimate.estimator == 's1_joint'

@@ -39,7 +39,7 @@ def test_a_bad_ship_file_ends_the_process(start_node: Any) -> None:
     ('name', 'value', 'said'),
     [
         ('windows_s', 600.0, "'windows_s': unknown; known are autostart"),
-        ('window_s', 'long', "window_s: 'long' is of type str, expected float"),
+        ('window_s', 'long', "window_s: 'long', expected a number, 60..21600 s"),
         ('window_s', 1.0, 'window_s: 1.0, expected 60..21600 s'),
         ('record', 1, 'record: 1 is of type int, expected bool'),
         ('depth.type', 'std_msgs/msg/Float64', 'expected one of sensor_msgs/msg/Range'),
