@@ -139,8 +139,12 @@ def read_index(data: Buffer) -> Contents | None:
     contents = Contents()
     for record in found.get(Opcode.SCHEMA, []) + found.get(Opcode.CHANNEL, []):
         contents.add(record)
-    for index in found.get(Opcode.ATTACHMENT_INDEX, []) + found.get(Opcode.METADATA_INDEX, []):
-        contents.add(parse(data, _record_at(data, index.offset, footer_at)))
+    for index_opcode, opcode in _INDEXED.items():
+        for index in found.get(index_opcode, []):
+            place = _record_at(data, index.offset, footer_at)
+            if place.opcode != opcode:
+                raise DamagedRecord(f'record at byte {place.offset} is not what the index says')
+            contents.add(parse(data, place))
     for chunk in found.get(Opcode.CHUNK_INDEX, []):
         start = chunk.chunk_start_offset
         end = _record_at(data, start, footer_at).end
@@ -152,6 +156,10 @@ def read_index(data: Buffer) -> Contents | None:
     return contents
 
 
+_INDEXED = {
+    Opcode.ATTACHMENT_INDEX: Opcode.ATTACHMENT,
+    Opcode.METADATA_INDEX: Opcode.METADATA,
+}
 _SUMMARY = {
     Opcode.SCHEMA,
     Opcode.CHANNEL,

@@ -80,6 +80,18 @@ def test_a_damaged_attachment_is_left_out_and_told(tmp_path: Path, sample_bag: b
     assert any("'ship.yaml' has a wrong checksum" in warning for warning in run.warnings)
 
 
+@pytest.mark.parametrize('opcode', [1, 3, 12, 255])
+def test_a_record_of_another_kind_than_indexed(
+    tmp_path: Path, sample_bag: bytes, opcode: int
+) -> None:
+    at = sample_bag.index(b'ship.yaml') - 4 - 8 - 8 - 9
+    assert sample_bag[at] == 9, 'the place of the attachment'
+    damaged = bytearray(sample_bag)
+    damaged[at] = opcode
+    run, _ = read(tmp_path / 'a.mcap', bytes(damaged))
+    assert any('is not what the index says' in warning for warning in run.warnings)
+
+
 @EXAMPLES
 @given(data=st.data())
 def test_any_cut(tmp_path: Path, sample_bag: bytes, data: st.DataObject) -> None:
