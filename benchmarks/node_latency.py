@@ -27,7 +27,8 @@ LEAD_IN_S = 150.0
 CONFIRMED_S = 120.0  # played fast, after the stop
 MEASURED_S = 60.0  # played in real time
 RATES_HZ = (1.0, 10.0, 100.0)
-MESSAGES_PER_S = 1500.0  # while played fast
+MESSAGES_PER_S = 1000.0  # while played fast, and no more than
+SPEED_UP = 60.0
 IDLE_S = 5.0
 
 
@@ -92,7 +93,7 @@ def measure(rate_hz: float) -> str:
         idle_s = node.cpu_s()
         node.spin_for(IDLE_S)
         idle = (node.cpu_s() - idle_s) / IDLE_S
-        node.player.play(block[fast], speed=MESSAGES_PER_S / (2.0 * rate_hz))
+        node.player.play(block[fast], speed=min(SPEED_UP, MESSAGES_PER_S / (2.0 * rate_hz)))
         node.spin_for(5.0)
         heard.clear()
         sent = live(node, block[~fast])
@@ -106,6 +107,8 @@ def measure(rate_hz: float) -> str:
         i = int(np.searchsorted(sent.stamps_ns, stamp_ns, side='right'))
         if i < len(sent.times):
             latency_ms.append(1e3 * (when - sent.times[i]))
+    if not latency_ms:
+        raise SystemExit('no estimate was heard: is this machine too busy for the node?')
     median, high = np.percentile(latency_ms, [50, 99])
     return (
         f'{rate_hz:8g} {len(latency_ms):10d} {median:10.2f} {high:10.2f} {max(latency_ms):10.2f}'
