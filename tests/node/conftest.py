@@ -19,6 +19,7 @@ import yaml
 
 START_S = 90.0  # the first start of a machine compiles the kernels
 ANSWER_S = 30.0
+DISCOVERY_S = 0.5
 
 
 def _own_domain() -> tuple[int, TextIO]:
@@ -151,6 +152,8 @@ class Peer:
         """
         client = self.node.create_client(kind, service)
         self.spin_until(client.service_is_ready)
+        # the node must have discovered this client too, or its answer is lost
+        self.spin_for(DISCOVERY_S)
         future = client.call_async(request)
         self.spin_until(future.done)
         self.node.destroy_client(client)
