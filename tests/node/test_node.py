@@ -52,8 +52,8 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
 ) -> None:
     node = start_node()
+    peer.player.connect(speeds())
     block = speeds(age_s=1.5)
-    peer.player.connect(block)
     peer.player.publish(block)
     peer.player.publish(block)
     publisher = peer.advertise('/speed_through_water', SPEED_TYPE)
