@@ -18,6 +18,12 @@ def _parameters(kind: str, content: str | bytes, status: int, *says: str) -> Cas
     return Case('Parameters', kind, line, status, says)
 
 
+def _folder(folder: Path) -> str:
+    path = folder / 'ships'
+    path.mkdir()
+    return str(path)
+
+
 def _bag(folder: Path) -> str:
     path = folder / 'bag.mcap'
     return str(path if path.exists() else write(path, steady()))
@@ -144,7 +150,7 @@ COMMANDS = (
     ),
     _use(
         'a directory for a ship file',
-        lambda f: ['replay', _bag(f), '--ship', str(f)],
+        lambda f: ['replay', _bag(f), '--ship', _folder(f)],
         1,
         'cannot be read: Is a directory; give the path of a ship file',
     ),
