@@ -53,7 +53,9 @@ def test_the_truth_adds_its_error(estimate: Estimate, truth: TrueCurve) -> None:
 
 
 def test_facts_leave_out_what_is_not_known(coastdown: Coastdown) -> None:
-    names = [row[0] for row in cells.facts(coastdown).rows]
+    facts = dict(cells.facts(coastdown).rows)
+    assert facts['argmax dr/dFr, as S1 has it'] == 'Fr 0.200'
+    names = list(facts)
     assert {'confirmed after', 'estimator', 'coefficients'} <= set(names)
     given = replace(coastdown, onset_detected_ns=None, estimate=None)
     assert [row[0] for row in cells.facts(given).rows] == ['start', 'duration', 'ended because']
