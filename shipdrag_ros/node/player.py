@@ -25,6 +25,7 @@ from shipdrag_ros.samples import Block, Channel
 
 QOS = QoSProfile(depth=1000)
 TIMEOUT_S = 10.0
+DISCOVERY_S = 0.5  # by which a listener knows its publisher after the publisher knew it
 STEP_NS = 1_000_000_000  # data and clock advance together by this much
 
 
@@ -115,15 +116,19 @@ class Player:
             progress(j / len(block))
 
     def _wait_for_listeners(self, timeout_s: float) -> None:
+        if not self._deaf():
+            return
         end_s = time.monotonic() + timeout_s
-        while deaf := [
-            name for name, topic in self._topics.items() if not topic.get_subscription_count()
-        ]:
+        while deaf := self._deaf():
             if time.monotonic() > end_s:
                 raise ShipdragError(
                     f'nobody hears {", ".join(deaf)} within {timeout_s:g} s; is the node active?'
                 )
             self._executor.spin_once(timeout_sec=0.05)
+        self._spin_until(time.monotonic() + DISCOVERY_S)
+
+    def _deaf(self) -> list[str]:
+        return [name for name, topic in self._topics.items() if not topic.get_subscription_count()]
 
     def _spin_until(self, due_s: float) -> None:
         while True:  # once at least, to hear the answers also when late

@@ -57,7 +57,8 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     peer.player.publish(block)
     peer.player.publish(block)
     publisher = peer.advertise('/speed_through_water', SPEED_TYPE)
-    peer.spin_until(publisher.get_subscription_count)
+    peer.wait_for_listener(publisher)
+    diagnostics.wait_for('input speed_through_water', '2', value='publishers')
     publisher.publish(b'\x00\x01\x00\x00 too short')
     part = 'input speed_through_water'
     diagnostics.wait_for(part, '11', value='messages')
@@ -84,7 +85,8 @@ def test_inputs_are_recorded_by_their_own_name(
 
     node = start_node('-r', 'depth:=/sounder/depth', '-r', '__ns:=/ship')
     publisher = peer.advertise('/sounder/depth', 'sensor_msgs/msg/Range')
-    peer.spin_until(publisher.get_subscription_count)
+    peer.wait_for_listener(publisher)
+    diagnostics.wait_for('input depth', '1', value='publishers')
     publisher.publish(Range())
     diagnostics.wait_for('input depth', '1', value='messages')
     node.stop()
