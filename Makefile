@@ -9,12 +9,13 @@ STAMP := $(VENV)/installed
 # all traffic of demo and tests stays on this machine
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
-.PHONY: help env demo test lint types tests lock clean
+.PHONY: help env demo test lint types tests peers lock clean
 
 help:
 	@echo 'make demo   simulated ship -> ROS topics -> node -> bag -> replay -> report'
 	@echo 'make test   lint, types, tests'
 	@echo 'make env    only the environment, in $(VENV)'
+	@echo 'make peers  what benchmarks compare with, into the same environment'
 	@echo 'make lock   resolve the dependencies anew into requirements.lock (needs uv)'
 
 env: $(STAMP)
@@ -42,9 +43,14 @@ types: env
 tests: env
 	$(BIN)/python -m pytest -n 2
 
+peers: env
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r benchmarks/peers.lock
+
 lock:
 	uv pip compile --quiet --universal --python-version 3.11 --extra ros --extra dev --generate-hashes \
 	    --no-header setup.py -o requirements.lock
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
+	    --constraints requirements.lock benchmarks/peers.in -o benchmarks/peers.lock
 
 clean:
 	rm -rf $(VENV) build install log demo *.egg-info

@@ -55,6 +55,7 @@ setup(
         'PyYAML',  # ship and parameter files
         'mcap',  # bags in and out
         'rosbags',  # message definitions and CDR without ROS; rosbag2 directories
+        'pynmeagps',  # NMEA 0183 sentences, checksums
         'rich',  # tables and progress bars in the terminal
         'matplotlib',  # pictures of a report
         'Jinja2',  # the report's page, with escaping
