@@ -8,6 +8,8 @@ does not fall r(v) has two values: only the branch on which it falls is kept.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
@@ -137,3 +139,52 @@ def froude_max(curve: ResistanceCurve) -> tuple[float, FroudeMax]:
         if np.any(fall[: higher[0] if len(higher) else None] > SIGNIFICANT):
             return float(curve.froude[top]), FroudeMax.INFLECTION
     return float(curve.froude[-1]), FroudeMax.BRANCH_TOP
+
+
+@dataclass(frozen=True)
+class ValidRange:
+    """
+    Where a curve may be used, and what S1 would say of it.
+
+    Attributes
+    ----------
+    froude
+        [Fr_min, Fr_max].
+    by
+        Which rule gave Fr_max.
+    argmax
+        argmax dr/dFr over the whole branch.
+    w
+        max sigma_r / max r over the range, of the repeatable sigma.
+    """
+
+    froude: tuple[float, float]
+    by: FroudeMax
+    argmax: float
+    w: float
+
+    @classmethod
+    def of_branch(cls, curve: ResistanceCurve) -> ValidRange:
+        """
+        Return the whole branch.
+        """
+        return cls._up_to(curve, float(curve.froude[-1]), FroudeMax.BRANCH_TOP)
+
+    @classmethod
+    def of_polynomial(cls, curve: ResistanceCurve) -> ValidRange:
+        """
+        Return the part below the transient of the start, `froude_max`.
+        """
+        return cls._up_to(curve, *froude_max(curve))
+
+    @classmethod
+    def _up_to(cls, curve: ResistanceCurve, top: float, by: FroudeMax) -> ValidRange:
+        inside = slice(0, int(np.searchsorted(curve.froude, top, side='right')))
+        return cls(
+            froude=(float(curve.froude[0]), top),
+            by=by,
+            argmax=float(curve.froude[np.argmax(curve.slope)]),
+            w=float(
+                curve.sigma_repeatable_m_s2[inside].max() / curve.resistance_m_s2[inside].max()
+            ),
+        )

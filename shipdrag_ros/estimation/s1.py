@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import froude_max, resistance_curve, specific_resistance
+from shipdrag_ros.estimation.curve import ValidRange, resistance_curve, specific_resistance
 from shipdrag_ros.estimation.motion import sigma
 from shipdrag_ros.estimation.problems import (
     Measured,
@@ -93,8 +93,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     _check_deceleration(inputs, solution)
     motion = solution.fit.motion(_GRID)
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
-    top, by = froude_max(curve)
-    valid = curve.between(curve.froude[0], top)
+    valid = ValidRange.of_polynomial(curve)
     end = motion[-1:]
     r, r_sigma, _ = specific_resistance(end, ship)
     scale = solution.fit.scale
@@ -107,10 +106,10 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         samples={data.name: len(data.value) for data in inputs.used},
         noise_sd=solution.noise_sd,
         curve=curve,
-        froude_valid=(float(curve.froude[0]), top),
-        froude_max_by=by,
-        froude_max_argmax=float(curve.froude[np.argmax(curve.slope)]),
-        w=float(valid.sigma_repeatable_m_s2.max() / valid.resistance_m_s2.max()),
+        froude_valid=valid.froude,
+        froude_max_by=valid.by,
+        froude_max_argmax=valid.argmax,
+        w=valid.w,
         last_speed_m_s=float(end.speed[0]),
         last_speed_sigma_m_s=float(sigma(end.speed_error)[0]),
         last_resistance_m_s2=float(r[0]),

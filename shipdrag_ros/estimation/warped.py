@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import froude_max, resistance_curve, specific_resistance
+from shipdrag_ros.estimation.curve import ValidRange, resistance_curve, specific_resistance
 from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.robust import GROSS, robust_fit
@@ -141,8 +141,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     thrust = float(fit.coefficients[-1])
     start = float(motion.speed[0]) - fit.run_down_s * thrust
     curve = resistance_curve(_from(at_speed, start), ship, froude_min=parameters.froude_min)
-    top, by = froude_max(curve)
-    valid = curve.between(curve.froude[0], top)
+    valid = ValidRange.of_polynomial(curve)
     end = at_speed[-1:]
     r, r_sigma, _ = specific_resistance(end, ship)
     current, current_sd = fit.current
@@ -155,10 +154,10 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         samples={KINDS[kind]: int(inputs.count[kind]) for kind in inputs.used},
         noise_sd={KINDS[kind]: float(fit.noise_sd[kind]) for kind in inputs.used},
         curve=curve,
-        froude_valid=(float(curve.froude[0]), top),
-        froude_max_by=by,
-        froude_max_argmax=float(curve.froude[np.argmax(curve.slope)]),
-        w=float(valid.sigma_repeatable_m_s2.max() / valid.resistance_m_s2.max()),
+        froude_valid=valid.froude,
+        froude_max_by=valid.by,
+        froude_max_argmax=valid.argmax,
+        w=valid.w,
         last_speed_m_s=float(end.speed[0]),
         last_speed_sigma_m_s=float(sigma(end.speed_error)[0]),
         last_resistance_m_s2=float(r[0]),

@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import froude_max, resistance_curve, specific_resistance
+from shipdrag_ros.estimation.curve import (
+    ValidRange,
+    froude_max,
+    resistance_curve,
+    specific_resistance,
+)
 from shipdrag_ros.estimation.motion import Motion
 from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -143,3 +148,20 @@ def test_upper_end(slope: np.ndarray, slope_sigma: float, expected: float, by: F
     top, rule = froude_max(curve(FROUDE, slope, slope_sigma))
     assert rule is by
     np.testing.assert_allclose(top, expected, rtol=0.0, atol=6e-3)
+
+
+def test_valid_range_and_its_w() -> None:
+    r = 1e-3 * FROUDE**2
+    sigma = np.where(FROUDE > 0.2, 1.0, 1e-6)
+    hump = replace(
+        curve(FROUDE, FROUDE + 0.5 * HUMP, 0.1), resistance_m_s2=r, sigma_repeatable_m_s2=sigma
+    )
+    cut, whole = ValidRange.of_polynomial(hump), ValidRange.of_branch(hump)
+    assert cut.froude == (0.05, froude_max(hump)[0])
+    assert cut.by is FroudeMax.INFLECTION
+    assert whole.froude == (0.05, 0.25)
+    assert whole.by is FroudeMax.BRANCH_TOP
+    assert cut.argmax == whole.argmax == FROUDE[np.argmax(FROUDE + 0.5 * HUMP)]
+    # the wide band above the cut is not in the first one
+    np.testing.assert_allclose(cut.w, 1e-6 / r[cut.froude[1] >= FROUDE].max(), rtol=1e-14)
+    np.testing.assert_allclose(whole.w, 1.0 / r.max(), rtol=1e-14)

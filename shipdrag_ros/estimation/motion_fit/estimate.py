@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.motion_fit.coast import (
     CURRENT,
     EXTRAS,
@@ -33,7 +34,7 @@ from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
 from shipdrag_ros.estimation.motion_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.motion_fit.steady import LEAST_S, learn
 from shipdrag_ros.estimation.motion_fit.whitening import Disturbance
-from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve, Track
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -148,6 +149,7 @@ def _result(
             'froude_min'
         )
     curve = _curve(average, np.linspace(low, high, _CURVE_POINTS), ship)
+    valid = ValidRange.of_branch(curve)
     residual = predict(best.law, best.unknowns, problem.grid_s, coast, every[:1])[0][0]
     tracks = {}
     for name, stamps in record.stamps.items():
@@ -173,10 +175,10 @@ def _result(
         samples={name: len(times) for name, times in record.stamps.items()},
         noise_sd=noise,
         curve=curve,
-        froude_valid=(float(curve.froude[0]), float(curve.froude[-1])),
-        froude_max_by=FroudeMax.BRANCH_TOP,
-        froude_max_argmax=float(curve.froude[np.argmax(curve.slope)]),
-        w=float(curve.sigma_repeatable_m_s2.max() / curve.resistance_m_s2.max()),
+        froude_valid=valid.froude,
+        froude_max_by=valid.by,
+        froude_max_argmax=valid.argmax,
+        w=valid.w,
         last_speed_m_s=float(speed[0]),
         last_speed_sigma_m_s=float(np.sqrt(last_var)),
         last_resistance_m_s2=r_last,
