@@ -14,7 +14,7 @@ from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, rep103_yaw
 from shipdrag_ros.errors import BagError, EstimationError
-from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, Reason, UInt8, concatenate
 from shipdrag_ros.ship import Ship
@@ -92,14 +92,16 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
 
 def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) -> Coastdown:
     """
-    Estimate r(v) from a window.
+    Estimate r(v) from a window, as of a coastdown that has ended.
+
+    What came before is not known to be steady sailing, so it is left out.
     """
     accepted = samples.block[samples.reasons == Reason.ACCEPTED]
     start_ns, end_ns = samples.start_ns, samples.end_ns
     found = None
     failure = None
     try:
-        found = estimate(Window.from_block(accepted, start_ns, end_ns), ship, parameters)
+        found = estimate_final(Window.from_block(accepted, start_ns, end_ns), ship, parameters)
     except EstimationError as error:
         failure = str(error)
     except ValueError:  # accepted stamps ascend but for this
