@@ -7,6 +7,7 @@ Both are read in step, so that little is held however long the bag is.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ import numpy as np
 
 from shipdrag_ros.messages import MalformedMessage, OutputMessage, types
 from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE, SPEED
+from shipdrag_ros.samples import Float64
 
 COMPARED = (SPEED, RESISTANCE, RESISTANCE_CURVE)
 
@@ -32,11 +34,15 @@ class Recorded:
         Of these, those that the replay gave to the last bit.
     first_difference
         Topic, stamp and both contents; None if all are identical.
+    largest_difference
+        Of a figure, in parts of the larger of the two; infinite where a
+        message is missing or of another shape, 0 if all are identical.
     """
 
     compared: int
     identical: int
     first_difference: str | None
+    largest_difference: float = 0.0
 
 
 class Comparison:
@@ -63,6 +69,7 @@ class Comparison:
         self._compared = 0
         self._identical = 0
         self._first_difference: str | None = None
+        self._largest_difference = 0.0
 
     def add(self, replayed: OutputMessage) -> None:
         """
@@ -96,7 +103,9 @@ class Comparison:
             for message in queue:
                 self._differ(message, None)
             queue.clear()
-        return Recorded(self._compared, self._identical, self._first_difference)
+        return Recorded(
+            self._compared, self._identical, self._first_difference, self._largest_difference
+        )
 
     def _read_one(self) -> bool:
         """Put one more recorded message into its queue; False behind the last."""
@@ -116,6 +125,9 @@ class Comparison:
 
     def _differ(self, recorded: OutputMessage | None, replayed: OutputMessage | None) -> None:
         self._compared += 1
+        self._largest_difference = max(
+            self._largest_difference, _relative_difference(recorded, replayed)
+        )
         message = recorded or replayed
         if self._first_difference is None and message is not None:
             self._first_difference = (
@@ -126,6 +138,33 @@ class Comparison:
 
 def _name(message: OutputMessage) -> str:
     return message.topic.rpartition('/')[2]
+
+
+def _relative_difference(one: OutputMessage | None, other: OutputMessage | None) -> float:
+    """Return the largest of all figures of two messages, in parts of the larger figure."""
+    first, second = _figures(one), _figures(other)
+    if len(first) != len(second) or not len(first):
+        return math.inf
+    scale = np.maximum(np.abs(first), np.abs(second))
+    differs = (first != second) & ~(np.isnan(first) & np.isnan(second))
+    return float(np.max(np.abs(first - second)[differs] / scale[differs], initial=0.0))
+
+
+def _figures(message: OutputMessage | None) -> Float64:
+    """Return the figures of a message; none where it cannot be read."""
+    if message is None:
+        return np.empty(0)
+    try:
+        content = types.deserialize(message.type, message.payload)
+    except MalformedMessage:
+        return np.empty(0)
+    match message.type:
+        case SPEED.type:
+            return np.array([content.twist.twist.linear.x, content.twist.covariance[0]])
+        case RESISTANCE.type:
+            return np.array([content.accel.accel.linear.x, content.accel.covariance[0]])
+        case _:
+            return np.frombuffer(content.data.tobytes(), '<f8')
 
 
 def _content(message: OutputMessage | None) -> str:

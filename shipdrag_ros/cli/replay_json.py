@@ -31,6 +31,9 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
         'combined': _combined(together(runs).combined),
         'inputs': _inputs([run.inputs for run in runs]),
         'recorded': _recorded(runs),
+        'warnings': [
+            {'bag': run.bag, 'warning': warning} for run in runs for warning in run.warnings
+        ],
     }
     if ranking is not None:
         found['hulls'] = [
@@ -138,5 +141,6 @@ def _recorded(runs: Sequence[RunResult]) -> dict[str, Any]:
         compared=sum(run.recorded.compared for run in runs),
         identical=sum(run.recorded.identical for run in runs),
         first_difference=differences[0] if differences else None,
+        largest_difference=max((run.recorded.largest_difference for run in runs), default=0.0),
     )
     return vars(total)

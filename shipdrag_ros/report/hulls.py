@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.curve import froude_max
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.report.run import RunResult
 
@@ -79,17 +80,20 @@ def rank(runs: Sequence[RunResult]) -> Ranking:
 
 
 def _hull(label: str, estimates: Sequence[Estimate]) -> Hull:
+    # the rule of S1 whatever the estimator: one that is valid to the top has a steepest rise too
+    tops = [(*froude_max(item.curve), item.valid_curve) for item in estimates]
     # a steepest rise is a property of the hull; a branch top only bounds it from below
-    found = [item for item in estimates if item.froude_max_by is FroudeMax.INFLECTION]
-    candidates = sorted(found or estimates, key=lambda item: item.froude_valid[1])
+    found = [item for item in tops if item[1] is FroudeMax.INFLECTION]
+    candidates = sorted(found or tops, key=lambda item: item[0])
     # of several: the middle one of those found, the best of the bounds
     shown = candidates[len(candidates) // 2] if found else candidates[-1]
+    top, found_by, curve = shown
     return Hull(
         label=label.strip(),
-        froude_max=shown.froude_valid[1],
-        found_by=shown.froude_max_by,
-        others=tuple(item.froude_valid[1] for item in candidates if item is not shown),
-        curve=shown.valid_curve,
+        froude_max=top,
+        found_by=found_by,
+        others=tuple(item[0] for item in candidates if item is not shown),
+        curve=curve,
     )
 
 

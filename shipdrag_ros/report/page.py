@@ -15,6 +15,7 @@ from shipdrag_ros.report import cells, pictures, words
 from shipdrag_ros.report.cells import Table
 from shipdrag_ros.report.hulls import Ranking
 from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.report.together import together
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,9 @@ class _Run:
 
 
 @dataclass(frozen=True)
-class _Hulls:
+class _Together:
+    """Hulls compared, or several coastdowns of one ship."""
+
     table: Table
     picture: _Picture
     notes: tuple[str, ...]
@@ -76,6 +79,7 @@ def write_report(path: Path, runs: Sequence[RunResult], *, ranking: Ranking | No
         version=__version__,
         runs=[_run(run) for run in runs],
         hulls=None if ranking is None else _hulls(ranking),
+        combined=_combined(runs) if ranking is None else None,
     )
     path.write_text(text.lstrip(), encoding='utf-8')
 
@@ -131,13 +135,32 @@ def _coastdown(number: int, coastdown: Coastdown, run: RunResult) -> _Coastdown:
     )
 
 
-def _hulls(ranking: Ranking) -> _Hulls:
-    return _Hulls(
+def _combined(runs: Sequence[RunResult]) -> _Together | None:
+    combined = together(runs).combined
+    if combined is None:
+        return None
+    curves = [
+        part.estimate.valid_curve
+        for run in runs
+        for part in run.coastdowns
+        if part.estimate is not None
+    ]
+    return _Together(
+        table=cells.combined_table(combined),
+        picture=_Picture(
+            pictures.data_uri(pictures.combined_picture(combined, curves)),
+            'Specific resistance of all coastdowns together, with its band of two standard '
+            'deviations.',
+        ),
+        notes=words.combined_notes(combined),
+    )
+
+
+def _hulls(ranking: Ranking) -> _Together:
+    return _Together(
         table=cells.ranking_table(ranking),
         picture=_Picture(
-            pictures.data_uri(
-                pictures.comparison_picture([(hull.label, hull.curve) for hull in ranking.hulls])
-            ),
+            pictures.data_uri(pictures.comparison_picture(ranking.hulls)),
             'Specific resistance against Froude number, each hull inside its valid range.',
         ),
         notes=ranking.notes,

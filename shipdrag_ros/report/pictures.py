@@ -19,7 +19,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
+from shipdrag_ros.report.hulls import Hull
 from shipdrag_ros.report.truth import TrueCurve
 from shipdrag_ros.report.words import M_S_PER_KNOT, force_unit, speed_name
 
@@ -200,22 +202,47 @@ def resistance_picture(
     return figure
 
 
-def comparison_picture(curves: Sequence[tuple[str, ResistanceCurve]]) -> Figure:
+def comparison_picture(hulls: Sequence[Hull]) -> Figure:
     """
     Draw r(Fr) of several hulls, each inside its valid range.
     """
     with matplotlib.rc_context(_STYLE):
         figure = Figure(figsize=(9.0, 4.6), layout='constrained')
         axis = figure.subplots()
-        for number, (name, curve) in enumerate(curves):
+        for number, hull in enumerate(hulls):
             color, style = _HULLS[number % len(_HULLS)]
+            curve = hull.curve
             axis.fill_between(curve.froude, *_band(curve), color=color, alpha=0.15, linewidth=0)
             axis.plot(
-                curve.froude, curve.resistance_m_s2, color=color, linestyle=style, label=name
+                curve.froude, curve.resistance_m_s2, color=color, linestyle=style, label=hull.label
             )
-            axis.plot(curve.froude[-1:], curve.resistance_m_s2[-1:], 'o', color=color)
+            at_top = np.interp(hull.froude_max, curve.froude, curve.resistance_m_s2)
+            axis.plot([hull.froude_max], [at_top], 'o', color=color)
         axis.set_xlabel('Froude number [-]; the dot is Fr_max')
         axis.set_ylabel('specific resistance r [m/s² = N/kg]')
+        axis.legend(loc='upper left')
+    return figure
+
+
+def combined_picture(combined: Combined, runs: Sequence[ResistanceCurve]) -> Figure:
+    """
+    Draw the one r(v) of several coastdowns over what each gave by itself.
+    """
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(9.0, 4.2), layout='constrained')
+        axis = figure.subplots()
+        for number, curve in enumerate(runs):
+            axis.plot(
+                curve.speed_m_s,
+                curve.resistance_m_s2,
+                color='#888888',
+                linewidth=0.8,
+                label='' if number else 'each coastdown by itself',
+            )
+        _draw_band(axis, combined, color=BLUE, style='-', label='all together')
+        axis.set_xlabel('speed through water [m/s]')
+        axis.set_ylabel('specific resistance r [m/s² = N/kg]')
+        axis.set_ylim(0.0, 1.25 * float(np.max(_band(combined)[1])))
         axis.legend(loc='upper left')
     return figure
 
@@ -239,7 +266,9 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(path, dpi=_PIXELS_PER_INCH)
 
 
-def _draw_band(axis: Axes, curve: ResistanceCurve, *, color: str, style: Any, label: str) -> None:
+def _draw_band(
+    axis: Axes, curve: ResistanceCurve | Combined, *, color: str, style: Any, label: str
+) -> None:
     axis.fill_between(
         curve.speed_m_s,
         *_band(curve),
@@ -255,7 +284,7 @@ def _scaled_by(factor: float) -> tuple[Callable[[Any], Any], Callable[[Any], Any
     return (lambda value: value * factor, lambda value: value / factor)
 
 
-def _band(curve: ResistanceCurve) -> tuple[Any, Any]:
+def _band(curve: ResistanceCurve | Combined) -> tuple[Any, Any]:
     return (
         curve.resistance_m_s2 - 2.0 * curve.sigma_m_s2,
         curve.resistance_m_s2 + 2.0 * curve.sigma_m_s2,

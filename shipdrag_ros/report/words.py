@@ -21,6 +21,7 @@ from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.ship import Ship
 
 M_S_PER_KNOT = 1852.0 / 3600.0
+_ROUNDING = 1e-6  # of a figure; what is larger has another cause
 _LIGHT_KG = 1e4
 
 ENDED_BY = {
@@ -139,9 +140,16 @@ def recorded_sentence(recorded: Recorded) -> str:
         return 'The bag holds no outputs of its own to compare with.'
     if recorded.identical == recorded.compared:
         return f'All {recorded.compared} outputs in the bag are identical to the replayed ones.'
+    if recorded.largest_difference < _ROUNDING:
+        size = (
+            f'no figure differs by more than {recorded.largest_difference:.1g} of its value, '
+            'which is the rounding of another machine or library'
+        )
+    else:
+        size = f'first difference: {recorded.first_difference}'
     return (
         f'{recorded.identical} of {recorded.compared} outputs in the bag are identical to the '
-        f'replayed ones; first difference: {recorded.first_difference}.'
+        f'replayed ones; {size}.'
     )
 
 

@@ -453,6 +453,27 @@ def test_a_figure_that_differs_is_shown(recording: tuple[Path, list[Event]]) -> 
             comparison.add(each)
     found = comparison.finish()
     assert found.compared - found.identical == 2  # and the final curve, which was not given
+    assert found.largest_difference == np.inf  # of that curve
     assert found.first_difference is not None
     assert 'replayed 0.125 m/s^2' in found.first_difference
     assert f'/coastdown_node/resistance at {changed.stamp_ns} ns' in found.first_difference
+
+
+def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) -> None:
+    updates = [event for event in recording[1] if isinstance(event, Update)]
+    last = updates[3].estimate.last_resistance_m_s2
+    curve = updates[3].estimate.curve
+    for changed, difference in (
+        (replace(updates[3].estimate, last_resistance_m_s2=last * (1.0 - 1e-13)), 1e-13),
+        (
+            replace(
+                updates[3].estimate,
+                curve=replace(curve, resistance_m_s2=curve.resistance_m_s2 * 1.01),
+            ),
+            0.01 / 1.01,
+        ),
+    ):
+        comparison = Comparison(iter(outputs(updates[3])))
+        for each in outputs(replace(updates[3], estimate=changed)):
+            comparison.add(each)
+        assert comparison.finish().largest_difference == pytest.approx(difference, rel=0.01)

@@ -31,9 +31,15 @@ def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
     coastdown_bag: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = replay(capsys, coastdown_bag)
-    assert set(found) == {'coastdowns', 'combined', 'inputs', 'recorded'}
+    assert set(found) == {'coastdowns', 'combined', 'inputs', 'recorded', 'warnings'}
     assert found['combined'] is None
-    assert found['recorded'] == {'compared': 0, 'identical': 0, 'first_difference': None}
+    assert found['warnings'] == []
+    assert found['recorded'] == {
+        'compared': 0,
+        'identical': 0,
+        'first_difference': None,
+        'largest_difference': 0.0,
+    }
     assert found['inputs']['position'] == {'messages': 1801, 'used': 1801, 'rejected': {}}
     (coastdown,) = found['coastdowns']
     assert {

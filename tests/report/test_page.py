@@ -108,6 +108,16 @@ def test_hulls_compared_come_first(run: RunResult, tmp_path: Path) -> None:
     assert len(page.images) == 7
 
 
+def test_coastdowns_of_one_ship_are_shown_together(run: RunResult, tmp_path: Path) -> None:
+    write_report(tmp_path / 'report.html', [run, replace(run, bag='again.mcap')])
+    page = Page(tmp_path / 'report.html')
+    assert page.text.index('All coastdowns together') < page.text.index('sea trial.mcap')
+    assert 'run to run' in page.text
+    assert len(page.images) == 7
+    write_report(tmp_path / 'one.html', [run])
+    assert 'All coastdowns together' not in Page(tmp_path / 'one.html').text
+
+
 def test_a_warning_about_the_bag_is_shown(run: RunResult, tmp_path: Path) -> None:
     write_report(tmp_path / 'report.html', [replace(run, warnings=('part 2 is missing',))])
     assert 'Warning: part 2 is missing' in Page(tmp_path / 'report.html').text

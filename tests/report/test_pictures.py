@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.report import pictures
+from shipdrag_ros.report.hulls import Hull
 from shipdrag_ros.report.truth import TrueCurve
 
 
@@ -89,11 +90,15 @@ def test_an_empty_valid_range_is_drawn_without_one(estimate: Estimate) -> None:
 
 
 def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
-    curves = [(f'hull {n}', estimate.valid_curve) for n in range(8)]
-    axis = pictures.comparison_picture(curves).axes[0]
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        name for name, _ in curves
+    hulls = [
+        Hull(f'hull {n}', 0.1, FroudeMax.INFLECTION, (), estimate.valid_curve) for n in range(8)
     ]
+    axis = pictures.comparison_picture(hulls).axes[0]
+    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
+        hull.label for hull in hulls
+    ]
+    (dot,) = [line for line in axis.get_lines() if line.get_marker() == 'o'][:1]
+    assert dot.get_xdata() == [0.1]
 
 
 @pytest.mark.parametrize('name', ['picture.svg', 'picture.png'])

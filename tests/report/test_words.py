@@ -173,9 +173,11 @@ def test_a_ship_is_one_line(ship: Ship) -> None:
 def test_the_comparison_with_the_bag_is_said() -> None:
     assert 'no outputs' in words.recorded_sentence(Recorded(0, 0, None))
     assert 'All 7 outputs' in words.recorded_sentence(Recorded(7, 7, None))
-    differs = words.recorded_sentence(Recorded(7, 6, '/coastdown_node/speed at 12 ns'))
+    differs = words.recorded_sentence(Recorded(7, 6, '/coastdown_node/speed at 12 ns', 0.1))
     assert '6 of 7' in differs
     assert 'first difference: /coastdown_node/speed at 12 ns' in differs
+    rounding = words.recorded_sentence(Recorded(7, 6, 'x', 3e-14))
+    assert 'more than 3e-14 of its value' in rounding
 
 
 def test_an_estimator_is_named_and_explained() -> None:
