@@ -15,13 +15,13 @@ from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli.arguments import add_json, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.messages import encode
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship, TableBaseline
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 
+_AT_ONCE = 1000  # messages between two looks at the progress
 _TRUE_POINTS = 201
 _TRUE_MARGIN = 1.05
 _SPEED_FRACTION = 0.8  # of what the baseline reaches
@@ -189,16 +189,9 @@ def write_bag(path: Path, block: Block, ship: Ship, truth: TrueCurve, output: Ou
             writer.attach('ship.yaml', ship.to_yaml())
             writer.attach('parameters.yaml', Parameters().to_yaml())
             writer.attach(ATTACHMENT, truth.to_yaml())
-            for done, message in enumerate(encode(block)):
-                writer.write(
-                    message.topic,
-                    message.type,
-                    message.payload,
-                    log_ns=message.log_ns,
-                    publish_ns=message.publish_ns,
-                )
-                if done % 1000 == 0:
-                    progress(done, len(block))
+            for done in range(0, len(block), _AT_ONCE):
+                writer.write_samples(block[done : done + _AT_ONCE])
+                progress(done, len(block))
     except BaseException:
         path.unlink(missing_ok=True)
         raise

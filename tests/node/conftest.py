@@ -138,13 +138,13 @@ class Peer:
         self.node.create_subscription(message_class(type_name), topic, heard.append, qos, raw=raw)
         return heard
 
-    def advertise(self, topic: str, type_name: str) -> Any:
+    def advertise(self, topic: str, type_name: str, qos: Any = 10) -> Any:
         """
         Return a publisher that is none of the player's.
         """
         from shipdrag_ros.node.inputs import message_class
 
-        return self.node.create_publisher(message_class(type_name), topic, 10)
+        return self.node.create_publisher(message_class(type_name), topic, qos)
 
     def wait_for_listener(self, publisher: Any) -> None:
         """

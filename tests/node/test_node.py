@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from shipdrag_ros.messages import EventKind, read_event
+from shipdrag_ros.messages import EventKind, encode, read_event
 from shipdrag_ros.samples import Block, Channel
 
 pytest.importorskip('rclpy')
@@ -91,6 +91,28 @@ def test_inputs_are_recorded_by_their_own_name(
     diagnostics.wait_for('input depth', '1', value='messages')
     node.stop()
     assert topics_in(the_bag(tmp_path))['/ship/depth'] == 1
+
+
+def test_hears_a_publisher_of_any_quality_of_service(
+    start_node: Any, peer: Any, diagnostics: Any
+) -> None:
+    from rclpy.duration import Duration
+    from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
+
+    start_node()
+    offered = (
+        QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+        QoSProfile(depth=1, deadline=Duration(seconds=1.0), lifespan=Duration(seconds=9.0)),
+        QoSProfile(depth=1, liveliness=LivelinessPolicy.MANUAL_BY_TOPIC),
+    )
+    publishers = [peer.advertise('/speed_through_water', SPEED_TYPE, qos) for qos in offered]
+    part = 'input speed_through_water'
+    diagnostics.wait_for(part, '4', value='publishers')
+    for publisher, message in zip(publishers, encode(speeds(count=4))):
+        peer.wait_for_listener(publisher)
+        publisher.publish(message.payload)
+    diagnostics.wait_for(part, '4', value='used')
 
 
 def test_reports_why_an_input_is_silent(start_node: Any, peer: Any, diagnostics: Any) -> None:
