@@ -4,6 +4,8 @@
 from shipdrag_ros.bags.columns import parse_input, parse_time
 from shipdrag_ros.bags.comparison import Recorded
 from shipdrag_ros.bags.csv_import import ImportResult, import_csv
+from shipdrag_ros.bags.nmea_import import NmeaResult, import_nmea
+from shipdrag_ros.bags.nmea_log import Checksum
 from shipdrag_ros.bags.playback import InputCounts, ReplayResult, replay
 from shipdrag_ros.bags.reader import open_runs
 from shipdrag_ros.bags.run import Inputs, ResetMark, Run, TopicInfo
@@ -13,16 +15,19 @@ from shipdrag_ros.bags.writer import BagWriter, Compression
 __all__ = [
     'BagInfo',
     'BagWriter',
+    'Checksum',
     'Compression',
     'ImportResult',
     'InputCounts',
     'Inputs',
+    'NmeaResult',
     'Recorded',
     'ReplayResult',
     'ResetMark',
     'Run',
     'TopicInfo',
     'import_csv',
+    'import_nmea',
     'info',
     'open_runs',
     'parse_input',

@@ -103,7 +103,13 @@ def test_times_that_go_back_are_told(
         (('--map', 'depth=v', '--time', 't', '--rate', '1'), 2, 'not allowed with'),
         (('--map', 'depth=v', '--rate', '0'), 2, 'above 0 [Hz]'),
         (('--map', 'depth=v', '--time', 't', '--where', 'run'), 2, 'expected COLUMN=VALUE'),
-        (('--time', 't'), 2, 'required: --map'),
+        (('--time', 't'), 2, 'argument --time: of a CSV file, which requires --map'),
+        (('--where', 'run=a'), 2, 'argument --where: of a CSV file'),
+        (('--map', 'depth=v', '--rate', '1', '--transducer', '2'), 2, 'of an NMEA 0183 log'),
+        (('--map', 'depth=v', '--rate', '1', '--no-checksum'), 2, 'of an NMEA 0183 log'),
+        (('--map', 'depth=v', '--rate', '1', '--date', '2026-01-01'), 2, 'of an NMEA 0183 log'),
+        (('--date', '1.1.2026'), 2, 'expected YYYY-MM-DD'),
+        ((), 1, 'holds no sentence of NMEA 0183 in 2401 line(s)'),
     ],
 )
 def test_a_mistake_is_told_and_leaves_no_bag(
