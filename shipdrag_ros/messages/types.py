@@ -10,8 +10,10 @@ older bags are read.
 from __future__ import annotations
 
 import struct
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
+from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -30,23 +32,35 @@ RANGE = 'sensor_msgs/msg/Range'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 TWIST_WITH_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 
-_ENCAPSULATION_BYTES = 4
+ENCAPSULATION_BYTES = 4
 _BIG_ENDIAN = b'\x00\x00'
 _LITTLE_ENDIAN = b'\x00\x01'
-# Fast DDS aligns to 8 after an empty sequence of doubles (JointState.effort), and then to 4;
-# rosbags' own check allows 3 and would refuse what rclpy sends
-_PADDING_BYTES = 7
+# Fast DDS counts an alignment to 8 behind each empty sequence of doubles and then writes none, so
+# that up to 15 bytes follow a JointState; rosbags' own check would refuse what rclpy sends
+PADDING_BYTES = 15
 
-_RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
+RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
 
 _store = get_typestore(Stores.ROS2_JAZZY)
 _store.register(
     get_types_from_msg(
         'std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n'
         'float32 min_range\nfloat32 max_range\nfloat32 range\n',
-        _RANGE_BEFORE_IRON,
+        RANGE_BEFORE_IRON,
     )
 )
+
+
+class Leaf(NamedTuple):
+    """
+    A number, text, array or sequence at the end of a path through a type.
+
+    `kind` is `float64` or `string` for instance; `length` is None for a sequence.
+    """
+
+    path: str
+    kind: str
+    length: int | None
 
 
 class MalformedMessage(Exception):
@@ -105,23 +119,38 @@ def deserialize(type_name: str, payload: bytes) -> Any:
     except MalformedMessage:
         if type_name != RANGE:
             raise
-        return _deserialize(_RANGE_BEFORE_IRON, payload)
+        return _deserialize(RANGE_BEFORE_IRON, payload)
 
 
 def _deserialize(type_name: str, payload: bytes) -> Any:
-    if payload[:2] not in (_BIG_ENDIAN, _LITTLE_ENDIAN) or len(payload) < _ENCAPSULATION_BYTES:
+    if payload[:2] not in (_BIG_ENDIAN, _LITTLE_ENDIAN) or len(payload) < ENCAPSULATION_BYTES:
         raise MalformedMessage(f'unknown encapsulation {payload[:2]!r}')
     definition = _store.get_msgdef(type_name)
     little = payload[:2] == _LITTLE_ENDIAN
     read = definition.deserialize_cdr_le if little else definition.deserialize_cdr_be
-    body = payload[_ENCAPSULATION_BYTES:]
+    body = payload[ENCAPSULATION_BYTES:]
     try:
         message, end = read(body, 0, definition.cls, _store)
     except (SerdeError, struct.error, ValueError) as error:
         raise MalformedMessage(f'not a {type_name}: {error}') from error
-    if len(body) - end > _PADDING_BYTES:
+    if len(body) - end > PADDING_BYTES:
         raise MalformedMessage(f'not a {type_name}: {len(body) - end} bytes too long')
     return message
+
+
+def leaves(type_name: str, path: str = '') -> Iterator[Leaf]:
+    """
+    Yield the fields of a type in their order, those of its fields in their place.
+    """
+    for name, (node, about) in _store.fielddefs[type_name][1]:
+        match node:
+            case Nodetype.NAME:
+                yield from leaves(about, f'{path}{name}.')
+            case Nodetype.BASE:
+                yield Leaf(path + name, about[0], 1)
+            case _:  # the element, a number or text in all types here, and how many
+                (_, (kind, _)), length = about
+                yield Leaf(path + name, kind, length if node is Nodetype.ARRAY else None)
 
 
 def definition(type_name: str) -> str:

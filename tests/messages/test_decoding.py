@@ -166,7 +166,7 @@ def test_short_and_wrongly_encapsulated_messages_are_malformed(reference: Any) -
     good = reference.serialize(source.type, reference.message(source.type, 1, '', [1.0] * 8))
     parameter_list = b'\x00\x03' + good[2:]
     unreadable = decode(
-        source, [good[:-8], parameter_list, b'', good + bytes(8)], [0, 0, 0, 0]
+        source, [good[:-8], parameter_list, b'', good + bytes(16)], [0, 0, 0, 0]
     ).unreadable
     assert unreadable == {Unreadable.MALFORMED: 4}
 

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The numbers wanted out of the CDR bytes of many messages, compiled.
+
+One message or thousands, either byte order, strings and sequences of any
+length; bytes that are no message of the type are told and never read beyond.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba import types as nb
+
+from shipdrag_ros.messages.layout import Step
+from shipdrag_ros.messages.types import ENCAPSULATION_BYTES, PADDING_BYTES
+
+
+class Found(IntEnum):
+    """What became of a message."""
+
+    READ = 0
+    MALFORMED = 1
+    NO_JOINT = 2
+
+
+_READ = int(Found.READ)
+_MALFORMED = int(Found.MALFORMED)
+_NO_JOINT = int(Found.NO_JOINT)
+_SECTION = int(Step.SECTION)
+_FLOAT64 = int(Step.FLOAT64)
+_FLOAT32 = int(Step.FLOAT32)
+_UINT8 = int(Step.UINT8)
+_INT8 = int(Step.INT8)
+_STRING = int(Step.STRING)
+_NAMES = int(Step.NAMES)
+_BODY = ENCAPSULATION_BYTES
+_PADDING = PADDING_BYTES
+_TIME_BYTES = 8
+_SHORTEST_STRING = 5  # its length, and its zero
+_BAD = -1
+
+# an unsigned index spares the test for a negative one, and the eight bytes become one load
+_U = np.uint64
+
+
+@njit
+def _word(data: Any, place: int, big: bool) -> Any:
+    at = _U(place)
+    if big:
+        return (
+            _U(data[at]) << _U(24)
+            | _U(data[at + _U(1)]) << _U(16)
+            | _U(data[at + _U(2)]) << _U(8)
+            | _U(data[at + _U(3)])
+        )
+    return (
+        _U(data[at])
+        | _U(data[at + _U(1)]) << _U(8)
+        | _U(data[at + _U(2)]) << _U(16)
+        | _U(data[at + _U(3)]) << _U(24)
+    )
+
+
+@njit
+def _as_float64(bits: Any) -> Any:
+    return _U(bits).view(np.float64)
+
+
+@njit
+def _as_float32(bits: Any) -> Any:
+    return np.uint32(bits).view(np.float32)
+
+
+@njit
+def _float64(data: Any, place: int, big: bool) -> Any:
+    first = _word(data, place, big)
+    second = _word(data, place + 4, big)
+    if big:
+        return _as_float64(first << _U(32) | second)
+    return _as_float64(second << _U(32) | first)
+
+
+@njit
+def _float32(data: Any, place: int, big: bool) -> Any:
+    return np.float64(_as_float32(_word(data, place, big)))
+
+
+@njit
+def _is_utf8(data: Any, start: int, end: int) -> bool:
+    """Say whether bytes are UTF-8, as Python decodes it."""
+    at = start
+    while at < end:
+        lead = data[_U(at)]
+        at += 1
+        if lead < 0x80:
+            continue
+        if lead < 0xC2 or lead > 0xF4:
+            return False
+        more = 1 if lead < 0xE0 else 2 if lead < 0xF0 else 3
+        if at + more > end:
+            return False
+        # neither longer than need be, nor a surrogate, nor above U+10FFFF
+        low = 0xA0 if lead == 0xE0 else 0x90 if lead == 0xF0 else 0x80
+        high = 0x9F if lead == 0xED else 0x8F if lead == 0xF4 else 0xBF
+        for _ in range(more):
+            byte = data[_U(at)]
+            if byte < low or byte > high:
+                return False
+            low, high = 0x80, 0xBF
+            at += 1
+    return True
+
+
+@njit
+def _aligned(at: int, size: int) -> int:
+    return (at + size - 1) & -size
+
+
+@njit
+def _string_end(data: Any, body: int, at: int, size: int, big: bool) -> Any:
+    """Return the end of the string at a place, `_BAD` if there is none."""
+    if at + 4 > size:
+        return _BAD
+    length = np.int64(_word(data, body + at, big))
+    end = at + 4 + length
+    if length < 1 or end > size or data[_U(body + end - 1)] != 0:
+        return _BAD
+    return end if _is_utf8(data, body + at + 4, body + end - 1) else _BAD
+
+
+@njit
+def _is_name(data: Any, start: int, end: int, name: Any) -> bool:
+    if end - start != len(name):
+        return False
+    same = True
+    for i in range(len(name)):
+        same &= data[_U(start + i)] == name[i]
+    return same
+
+
+@njit
+def _read(
+    data: Any, start: int, end: int, steps: Any, name: Any, i: int, stamp_ns: Any, rows: Any
+) -> int:
+    body = start + _BODY
+    size = end - body
+    if size < _TIME_BYTES or data[_U(start)] != 0 or data[_U(start + 1)] > 1:
+        return _MALFORMED
+    big = data[_U(start + 1)] == 0
+    seconds = np.int64(np.int32(_word(data, body, big)))
+    stamp_ns[i] = seconds * 1_000_000_000 + np.int64(_word(data, body + 4, big))
+    at = _string_end(data, body, _TIME_BYTES, size, big)
+    if at == _BAD:
+        return _MALFORMED
+    base = at
+    joint = -1
+    found = _READ
+    for k in range(len(steps)):
+        step, first, second = steps[k, 0], steps[k, 1], steps[k, 2]
+        if step == _SECTION:
+            base = _aligned(at, first)
+            at = base + second
+            if at > size:
+                return _MALFORMED
+            base += body
+        elif step == _FLOAT64:
+            rows[i, second] = _float64(data, base + first, big)
+        elif step == _FLOAT32:
+            rows[i, second] = _float32(data, base + first, big)
+        elif step == _UINT8:
+            rows[i, second] = np.float64(data[_U(base + first)])
+        elif step == _INT8:
+            rows[i, second] = np.float64(np.int8(data[_U(base + first)]))
+        elif step == _STRING:
+            at = _string_end(data, body, _aligned(at, 4), size, big)
+            if at == _BAD:
+                return _MALFORMED
+        else:
+            at = _aligned(at, 4)
+            if at + 4 > size:
+                return _MALFORMED
+            count = np.int64(_word(data, body + at, big))
+            at += 4
+            if step == _NAMES:
+                if at + count * _SHORTEST_STRING > size:
+                    return _MALFORMED
+                for each in range(count):
+                    at = _aligned(at, 4)
+                    first = body + at + 4
+                    at = _string_end(data, body, at, size, big)
+                    if at == _BAD:
+                        return _MALFORMED
+                    if joint < 0 and _is_name(data, first, body + at - 1, name):
+                        joint = each
+                continue
+            if count > 0:
+                at = _aligned(at, 8)
+            if at + 8 * count > size:
+                return _MALFORMED
+            if second >= 0:
+                if joint < 0 or joint >= count:
+                    found = _NO_JOINT
+                else:
+                    rows[i, second] = _float64(data, body + at + 8 * joint, big)
+            at += 8 * count
+    return _MALFORMED if size - at > _PADDING else found
+
+
+_BUFFER = nb.Array(nb.uint8, 1, 'C', readonly=True)
+_PLACES = nb.Array(nb.int64, 1, 'C', readonly=True)
+
+
+@njit(
+    nb.void(
+        _BUFFER,
+        _PLACES,
+        _PLACES,
+        nb.Array(nb.int64, 2, 'C', readonly=True),
+        _BUFFER,
+        nb.int64[::1],
+        nb.float64[:, ::1],
+        nb.uint8[::1],
+    ),
+    cache=True,
+)
+def gather(data, start, end, steps, name, stamp_ns, rows, found):  # type: ignore[no-untyped-def]
+    """
+    Read the stamp and the wanted numbers of messages.
+
+    Parameters
+    ----------
+    data : (b,) uint8
+        The bytes they lie in.
+    start, end : (n,) int64
+        Where each begins and ends.
+    steps : (k, 3) int64
+        From `layout.steps`.
+    name : uint8
+        Of the joint, where the type has joints.
+    stamp_ns : (n,) int64
+        Filled with the stamps [ns].
+    rows : (n, m) float64
+        Filled with the fields; a column that no step names is left as it is.
+    found : (n,) uint8
+        Filled with a `Found` each.
+    """
+    for i in range(len(start)):
+        found[i] = _read(data, start[i], end[i], steps, name, i, stamp_ns, rows)

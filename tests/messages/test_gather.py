@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled reading of CDR against two other readers, on random messages and bytes."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, decode, types
+from shipdrag_ros.messages.decoding import decode_at
+from shipdrag_ros.messages.layout import steps
+
+SOURCES = [Source(name, type_name) for name, accepted in TOPICS.items() for type_name in accepted]
+IDS = [f'{source.input}-{source.type.split("/")[2]}' for source in SOURCES]
+EXAMPLES = settings(max_examples=25, deadline=None)
+
+frames = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size=12)
+stamps = st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9 + 999_999_999)
+eight = st.lists(st.floats(width=32), min_size=8, max_size=8)
+numbers = st.lists(st.floats(), max_size=3)
+names = st.lists(st.sampled_from(['shaft', 'rudder', 'shaf', 'shaft ', '', 'ü']), max_size=4)
+
+
+def fields(source: Source, message: Any) -> list[float] | None:
+    """Take value and variance from a message of any library; None without the joint."""
+    nan = math.nan
+    match source.type.split('/')[2]:
+        case 'TwistWithCovarianceStamped':
+            linear, covariance = message.twist.twist.linear, message.twist.covariance
+            taken = [linear.x, linear.y, covariance[0], covariance[7], covariance[1]]
+        case 'TwistStamped':
+            taken = [message.twist.linear.x, message.twist.linear.y, nan, nan, nan]
+        case 'PoseWithCovarianceStamped' | 'Odometry':
+            at, covariance = message.pose.pose.position, message.pose.covariance
+            taken = [at.x, at.y, covariance[0], covariance[7]]
+        case 'PoseStamped':
+            taken = [message.pose.position.x, message.pose.position.y, nan, nan]
+        case 'PointStamped':
+            taken = [message.point.x, message.point.y, nan, nan]
+        case 'NavSatFix':
+            covariance = message.position_covariance
+            taken = [message.latitude, message.longitude, covariance[4], covariance[0]]
+        case 'QuaternionStamped' | 'Imu' as name:
+            q = message.quaternion if name == 'QuaternionStamped' else message.orientation
+            yaw = nan
+            with np.errstate(all='ignore'):
+                x, y, z, w = (np.float64(c) for c in (q.x, q.y, q.z, q.w))
+                if abs(x * x + y * y + z * z + w * w - 1) <= 0.1:
+                    yaw = math.atan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+            variance = nan
+            if name == 'Imu':
+                variance = message.orientation_covariance[8]
+                if message.orientation_covariance[0] == -1:
+                    yaw = variance = nan
+            taken = [yaw, 0.0, variance, nan]
+        case 'JointState':
+            values = message.velocity if source.input == 'shaft' else message.position
+            if source.input not in message.name or message.name.index(source.input) >= len(values):
+                return None
+            taken = [values[message.name.index(source.input)], 0.0, nan, nan]
+        case 'Range':
+            taken = [message.range, 0.0, message.variance, nan]
+    if source.input == 'speed_through_water':
+        taken = [taken[0], 0.0, taken[2], nan]
+    if source.input == 'speed_over_ground':
+        x, y, xx, yy, xy = taken
+        taken = [math.hypot(x, y), 0.0, nan, nan]
+        if not (xx < 0 or yy < 0 or math.isnan(xx) or math.isnan(yy)) and taken[0] == 0:
+            taken[2] = max(xx, yy)
+        elif not (xx < 0 or yy < 0):
+            with np.errstate(all='ignore'):
+                c, s = np.float64(x) / taken[0], np.float64(y) / taken[0]
+                taken[2] = float(c * c * xx + s * s * yy + 2 * c * s * xy)
+    return taken[:2] + [v if 0 < v < math.inf else nan for v in taken[2:4]]
+
+
+def agree(source: Source, payload: bytes, message: Any) -> None:
+    decoded = decode(source, [payload], [5])
+    expected = fields(source, message)
+    if expected is None:
+        assert decoded.unreadable == {Unreadable.NO_JOINT: 1}
+        return
+    assert not decoded.unreadable
+    block = decoded.block
+    stamp = message.header.stamp
+    nanoseconds = stamp.nanosec
+    assert block.stamp_ns.tolist() == [stamp.sec * 10**9 + nanoseconds]
+    found = [*block.value[0].tolist(), *block.variance[0].tolist()]
+    if source.input in ('heading', 'speed_over_ground'):  # numpy's functions against libm's
+        np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
+    else:
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize('source', SOURCES, ids=IDS)
+@EXAMPLES
+@given(data=st.data(), stamp_ns=stamps, frame=frames, values=eight, little=st.booleans())
+def test_fields_agree_with_rosbags_and_rclpy(
+    reference: Any,
+    source: Source,
+    data: st.DataObject,
+    stamp_ns: int,
+    frame: str,
+    values: list[float],
+    little: bool,
+) -> None:
+    message = reference.message(source.type, stamp_ns, frame, values)
+    if 'JointState' in source.type:
+        message = reference.make(
+            source.type,
+            header=message.header,
+            name=data.draw(names),
+            **{name: np.array(data.draw(numbers)) for name in ('position', 'velocity', 'effort')},
+        )
+    payload = reference.serialize(source.type, message, little_endian=little)
+    agree(source, payload, reference.deserialize(source.type, payload) if little else message)
+
+    serialization = pytest.importorskip('rclpy.serialization')
+    package, _, name = source.type.split('/')
+    kind = getattr(importlib.import_module(f'{package}.msg'), name)
+    theirs = serialization.deserialize_message(payload, kind)
+    agree(source, payload, theirs)
+    agree(source, serialization.serialize_message(theirs), theirs)  # with its padding
+
+
+@pytest.mark.parametrize('source', SOURCES, ids=IDS)
+@EXAMPLES
+@given(data=st.data())
+def test_what_is_malformed_is_malformed_to_the_other_reader(
+    reference: Any, source: Source, data: st.DataObject
+) -> None:
+    frame = data.draw(frames)
+    little = data.draw(st.booleans())
+    good = reference.serialize(
+        source.type,
+        reference.message(source.type, 1, frame, [0.5] * 8),
+        little_endian=little,
+    )
+    payloads = []
+    for _ in range(8):
+        changed = bytearray(good[: data.draw(st.integers(0, len(good) + 20))])
+        changed += data.draw(st.binary(max_size=24))
+        if changed:
+            for place in data.draw(st.lists(st.integers(0, 90), max_size=4)):
+                changed[place % len(changed)] = data.draw(st.integers(0, 255))
+        payloads.append(bytes(changed))
+    for payload in payloads:
+        decoded = decode(source, [payload], [0])
+        try:
+            types.deserialize(source.type, payload)
+        except MalformedMessage:
+            assert decoded.unreadable == {Unreadable.MALFORMED: 1}
+        else:
+            assert Unreadable.MALFORMED not in decoded.unreadable
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    name=st.one_of(
+        st.binary(max_size=6),
+        st.lists(
+            st.sampled_from([0x41, 0x80, 0x8F, 0x90, 0x9F, 0xA0, 0xBF, 0xC1, 0xC2, 0xDF, 0xE0])
+            | st.sampled_from([0xED, 0xEF, 0xF0, 0xF4, 0xF5]),
+            max_size=5,
+        ).map(bytes),
+    )
+)
+def test_a_frame_id_is_utf8_or_the_message_is_malformed(name: bytes) -> None:
+    source = Source('position', types.POINT)
+    text = len(name) + 1
+    body = bytes(8) + text.to_bytes(4, 'little') + name + b'\0'
+    body += bytes(-len(body) % 8) + np.array([1.0, 2.0, 3.0]).tobytes()
+    decoded = decode(source, [b'\0\1\0\0' + body], [0])
+    try:
+        name.decode()
+    except UnicodeDecodeError:
+        assert decoded.unreadable == {Unreadable.MALFORMED: 1}
+    else:
+        assert decoded.block.value.tolist() == [[1.0, 2.0]]
+
+
+def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(reference: Any) -> None:
+    for little in (True, False):
+        order = 'little' if little else 'big'
+        message = reference.message(types.JOINT_STATE, 1, '', [0.5] * 8)
+        good = reference.serialize(types.JOINT_STATE, message, little_endian=little)
+        for at in range(12, len(good) - 3, 4):
+            giant = good[:at] + (2**32 - 1).to_bytes(4, order) + good[at + 4 :]
+            decode(Source('shaft', types.JOINT_STATE), [giant], [0])
+        giant = good[:12] + (2**32 - 1).to_bytes(4, order) + good[16:]
+        decoded = decode(Source('shaft', types.JOINT_STATE), [giant], [0])
+        assert decoded.unreadable == {Unreadable.MALFORMED: 1}
+
+
+def test_messages_may_lie_anywhere_in_a_buffer_and_at_any_alignment(reference: Any) -> None:
+    source = Source('position', types.POINT)
+    payloads = [
+        reference.serialize(
+            types.POINT, reference.message(types.POINT, i, 'f' * i, [float(i)] * 8)
+        )
+        for i in range(9)
+    ]
+    data = bytearray()
+    start, end = [], []
+    for i, payload in enumerate(payloads):
+        data += b'\xff' * (i % 3)
+        start.append(len(data))
+        data += payload
+        end.append(len(data))
+    order = [3, 1, 8, 0]
+    decoded = decode_at(
+        source,
+        np.frombuffer(bytes(data), np.uint8),
+        np.array(start)[order],
+        np.array(end)[order],
+        np.arange(4),
+    )
+    assert decoded.block.stamp_ns.tolist() == order
+    assert decoded.block.value[:, 0].tolist() == order
+
+
+def test_a_field_that_the_type_lacks_is_a_defect() -> None:
+    with pytest.raises(ValueError, match=r'PointStamped has no point\.w'):
+        steps(types.POINT, ['point.x', 'point.w'])
