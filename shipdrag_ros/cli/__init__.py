@@ -35,6 +35,8 @@ VERBS = (
     Verb('simulate', 'simulate', 'simulated coastdown with sensors, as a bag'),
     Verb('import', 'import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
     Verb('info', 'info', 'what is in a bag'),
+    Verb('check', 'check', 'is a bag sound'),
+    Verb('recover', 'recover', 'save what is whole in a damaged bag'),
 )
 
 USER_ERROR = 1

@@ -1,0 +1,281 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A walk over damaged records that does not end at the first damage.
+
+Where the bytes are no record, the next place is sought at which a record is
+plausible by itself: its fields fill it, its channel is known, its time is near.
+A record is held back until something plausible follows, for a length that was
+damaged shows only there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from mcap.opcode import Opcode
+
+from shipdrag_ros.bags.damage import DamageKind
+from shipdrag_ros.bags.layout import KNOWN, MESSAGE_HEAD, fields_end, fills, fits, name
+from shipdrag_ros.bags.records import HEAD, MAGIC, Buffer
+
+MAGIC_PLACE = -1
+"""Stands for an opcode where the magic bytes are."""
+GARBAGE = 0
+"""Stands for an opcode where nothing is a record."""
+
+# a head: a known opcode, and a length below 2^32, as all but giants have
+_HEAD = re.compile(rb'[\x01-\x0f](?=.{4}\0{4})', re.DOTALL)
+_PRIVATE = 0x80
+_POSSIBLE_BYTES = 1 << 40
+_NEAR_NS = 3600 * 10**9
+_CHAIN = 3
+# these carry a name, which no chance makes
+_NAMED = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.CHUNK))
+_IN_CHUNK = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
+
+
+class Found(NamedTuple):
+    """
+    A record, or what is left of one.
+
+    Without `damage` it is as it should be, by its lengths. With it, the content
+    is what can be told: of kind OPCODE or LENGTH it is whole, and what
+    it is was inferred from its neighbours.
+    """
+
+    opcode: int
+    offset: int
+    start: int
+    end: int
+    damage: DamageKind | None = None
+
+
+def found_name(data: Buffer, found: Found) -> str:
+    """
+    Name the kind of a record, by its opcode where that may be right.
+    """
+    if found.opcode == GARBAGE and found.damage is not DamageKind.GARBAGE:
+        return name(data[found.offset])
+    return name(found.opcode)
+
+
+@dataclass
+class Scanner:
+    """
+    Walks over a file, and over the unpacked chunks in it.
+
+    Attributes
+    ----------
+    channels
+        Numbers of the channels met; to be filled with what is known before.
+    """
+
+    channels: set[int] = field(default_factory=set)
+    _log_ns: int | None = None
+
+    def walk(
+        self, data: Buffer, start: int, end: int, *, in_chunk: bool = False
+    ) -> Iterator[Found]:
+        """
+        Yield what is found between two offsets, without a gap.
+
+        Parameters
+        ----------
+        data
+            A file, or an unpacked chunk.
+        start, end
+            Span to walk over [bytes].
+        in_chunk
+            Only kinds that may stand in a chunk are taken for records.
+        """
+        kinds = _IN_CHUNK if in_chunk else KNOWN
+        at = start
+        held: Found | None = None
+        while at < end:
+            here = self._at(data, at, end, kinds)
+            if here is None:
+                held, here = self._damaged(data, at, end, kinds, held)
+            if held is not None:
+                yield self._noted(data, held)
+            held, at = here, here.end
+        if held is not None:
+            yield self._noted(data, held)
+
+    def _noted(self, data: Buffer, found: Found) -> Found:
+        """Remember what tells a later record from chance."""
+        if found.damage is None:
+            if found.opcode == Opcode.MESSAGE:
+                self._log_ns = MESSAGE_HEAD.unpack_from(data, found.start)[2]
+            elif found.opcode == Opcode.CHANNEL:
+                self.channels.add(int.from_bytes(data[found.start : found.start + 2], 'little'))
+        return found
+
+    def _at(self, data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Found | None:
+        """Return the record at an offset, if one begins there and fits."""
+        if end - at < HEAD.size:
+            return _magic(data, at, end)
+        opcode, length = HEAD.unpack_from(data, at)
+        start = at + HEAD.size
+        if length > end - start:
+            return _magic(data, at, end)
+        if opcode in kinds:
+            fitting = fits(data, opcode, start, start + length)
+        else:
+            fitting = opcode >= _PRIVATE and not self._mended_opcodes(
+                data, opcode, start, start + length, kinds
+            )
+        if fitting:
+            return Found(opcode, at, start, start + length)
+        return _magic(data, at, end)
+
+    def _damaged(
+        self, data: Buffer, at: int, end: int, kinds: frozenset[int], held: Found | None
+    ) -> tuple[Found | None, Found]:
+        """
+        Tell what is at an offset where no record fits.
+
+        Returns the record before, None where that one is the damaged one, and what the
+        damaged bytes are.
+        """
+        bounded = self._within_bounds(data, at, end, kinds)
+        if bounded is not None:
+            return held, bounded
+        if held is not None and held.opcode == Opcode.MESSAGE and held.damage is None:
+            # its length may lead too far, or not far enough
+            after = self._resync(data, held.offset + 1, at, end, kinds)
+            if after is not None:
+                return None, self._span(data, held.offset, after, end, kinds)
+            after = self._resync(data, at + 1, end, end, kinds)
+            if after is not None and _one_bit(held.end - held.start ^ after - held.start):
+                return None, self._span(data, held.offset, after, end, kinds)
+        else:
+            after = self._resync(data, at + 1, end, end, kinds)
+        return held, self._span(data, at, end if after is None else after, end, kinds)
+
+    def _within_bounds(
+        self, data: Buffer, at: int, end: int, kinds: frozenset[int]
+    ) -> Found | None:
+        """Return the record whose length is right while something else is not."""
+        if end - at < HEAD.size:
+            return None
+        opcode, length = HEAD.unpack_from(data, at)
+        start = at + HEAD.size
+        stop = start + length
+        if opcode == 0 or stop > end:
+            return None
+        if stop < end and self._at(data, stop, end, kinds) is None:
+            return None
+        mended = self._mended_opcodes(data, opcode, start, stop, kinds)
+        if mended:
+            return Found(mended[0], at, start, stop, DamageKind.OPCODE)
+        kind = DamageKind.CONTENT if opcode in kinds else DamageKind.OPCODE
+        return Found(opcode if opcode in kinds else GARBAGE, at, start, stop, kind)
+
+    def _span(self, data: Buffer, at: int, after: int, end: int, kinds: frozenset[int]) -> Found:
+        """Tell what the bytes up to the next record are."""
+        start = at + HEAD.size
+        if start > after:
+            return Found(GARBAGE, at, at, after, _end_or(DamageKind.GARBAGE, after == end))
+        opcode, length = HEAD.unpack_from(data, at)
+        cut = length > end - start
+        if opcode in kinds:
+            if _one_bit(after - start ^ length) and fills(data, opcode, start, after):
+                return Found(opcode, at, start, after, DamageKind.LENGTH)
+            stop = fields_end(data, opcode, start, min(start + length, end))
+            if opcode in _NAMED and stop is not None and stop - start == length and cut:
+                return Found(opcode, at, start, after, DamageKind.TRUNCATED)
+            if opcode != Opcode.MESSAGE and stop is not None and start < stop <= after:
+                # the record ends where its fields do; what follows is looked at next
+                return Found(opcode, at, start, stop, DamageKind.LENGTH)
+            if cut:
+                kind = _end_or(DamageKind.LENGTH, after == end and length < _POSSIBLE_BYTES)
+                return Found(GARBAGE if opcode != Opcode.CHUNK else opcode, at, start, after, kind)
+            return Found(GARBAGE, at, start, after, DamageKind.CONTENT)
+        return Found(GARBAGE, at, at, after, DamageKind.GARBAGE)
+
+    def _mended_opcodes(
+        self, data: Buffer, opcode: int, start: int, stop: int, kinds: frozenset[int]
+    ) -> list[int]:
+        """Return the kinds, one bit away, that fill the span."""
+        near = [opcode ^ 1 << bit for bit in range(8)]
+        return [
+            each
+            for each in near
+            if each in kinds
+            and fills(data, each, start, stop)
+            and (each != Opcode.MESSAGE or self._is_expected(data, start))
+        ]
+
+    def _resync(
+        self, data: Buffer, begin: int, limit: int, end: int, kinds: frozenset[int]
+    ) -> int | None:
+        """Return the first place where a record is plausible by itself."""
+        for match in _HEAD.finditer(data, begin, min(limit + HEAD.size, end)):
+            at = match.start()
+            if at >= limit:
+                break
+            if data[at] in kinds and self._is_plausible(data, at, end, kinds):
+                return at
+        ending = data.find(MAGIC, max(begin, end - len(MAGIC)), end)
+        return ending if begin <= ending < limit else None
+
+    def _is_plausible(self, data: Buffer, at: int, end: int, kinds: frozenset[int]) -> bool:
+        opcode, length = HEAD.unpack_from(data, at)
+        start = at + HEAD.size
+        stop = start + length
+        if stop > end:  # a chunk that is cut off still has its two lengths
+            return (
+                opcode == Opcode.CHUNK
+                and self._has_compression(data, start, end)
+                and fields_end(data, opcode, start, end) == stop
+            )
+        if not fills(data, opcode, start, stop):
+            return False
+        if opcode == Opcode.MESSAGE:
+            if self._is_expected(data, start):
+                return True
+            known = not self.channels or self._channel(data, start) in self.channels
+            return known and self._is_followed(data, stop, end, kinds)
+        if opcode == Opcode.CHUNK:
+            return self._has_compression(data, start, end)
+        return opcode in _NAMED or self._is_followed(data, stop, end, kinds)
+
+    def _is_followed(self, data: Buffer, at: int, end: int, kinds: frozenset[int]) -> bool:
+        for _ in range(_CHAIN):
+            if at >= end:
+                return True
+            following = self._at(data, at, end, kinds)
+            if following is None:
+                return False
+            at = following.end
+        return True
+
+    def _is_expected(self, data: Buffer, start: int) -> bool:
+        """Say whether a message is on a known channel and near the last one."""
+        channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, start)
+        near = self._log_ns is not None and abs(log_ns - self._log_ns) < _NEAR_NS
+        return near and channel in self.channels
+
+    def _channel(self, data: Buffer, start: int) -> int:
+        return int(MESSAGE_HEAD.unpack_from(data, start)[0])
+
+    def _has_compression(self, data: Buffer, start: int, end: int) -> bool:
+        name = data[start + 28 : min(start + 36, end)]
+        return name in (b'\x04\0\0\0zstd', b'\x03\0\0\0lz4' + name[7:]) or name[:4] == bytes(4)
+
+
+def _magic(data: Buffer, at: int, end: int) -> Found | None:
+    if data[at : min(at + len(MAGIC), end)] == MAGIC:
+        return Found(MAGIC_PLACE, at, at, at + len(MAGIC))
+    return None
+
+
+def _one_bit(difference: int) -> bool:
+    return difference.bit_count() == 1
+
+
+def _end_or(kind: DamageKind, at_end: bool) -> DamageKind:
+    return DamageKind.TRUNCATED if at_end else kind

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag recover`: save what is whole in a damaged bag."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from shipdrag_ros.bags import Recovery, recover
+from shipdrag_ros.cli.arguments import add_json, bag, new_file
+from shipdrag_ros.cli.damage import damage_table
+from shipdrag_ros.cli.output import Output
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Save every whole message of a damaged bag into a sound one, and say what was lost. '
+        'Messages of chunks that are cut off or have a wrong checksum, and of unknown topics, '
+        'go into a bag of their own beside it, NAME.quarantine.mcap. The source is not touched.'
+    )
+    parser.add_argument(
+        'source', type=bag, metavar='SOURCE', help='MCAP file, or rosbag2 directory of one file'
+    )
+    parser.add_argument(
+        '-o',
+        '--out',
+        required=True,
+        type=new_file('.mcap'),
+        metavar='BAG',
+        help='MCAP file to make; an existing one is not overwritten',
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Save what is whole.
+    """
+    output = Output(options.json)
+    with output.progress(f'reading {options.source}') as progress:
+        result = recover(options.source, options.out, progress=progress)
+    _show(output, options.source, result)
+    output.json(_document(result))
+    return 0
+
+
+def _show(output: Output, source: Path, result: Recovery) -> None:
+    output.say(f'{result.output}: {result.messages_recovered} messages of {source}')
+    if result.quarantine is not None:
+        output.say(
+            f'{result.quarantine}: {result.messages_crc_suspect} messages that cannot be vouched '
+            'for, cut off or with a wrong checksum'
+        )
+    output.say(f'{result.bytes_lost} of {result.bytes_read} bytes gave nothing.')
+    if not result.damage:
+        output.say('No damage was met.')
+        return
+    output.heading(f'{result.damage_count} damage(s)')
+    damage_table(output, result.damage, result.damage_count)
+
+
+def _document(result: Recovery) -> dict[str, Any]:
+    return {
+        'messages_recovered': result.messages_recovered,
+        'messages_crc_suspect': result.messages_crc_suspect,
+        'bytes_read': result.bytes_read,
+        'bytes_lost': result.bytes_lost,
+        'damage': [
+            {'offset': each.offset, 'record': each.record, 'kind': each.kind.value}
+            for each in result.damage
+        ],
+        'output': str(result.output),
+        'quarantine': None if result.quarantine is None else str(result.quarantine),
+    }
