@@ -23,6 +23,7 @@ from rich.table import Table
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, motion_fit
+from shipdrag_ros.estimation.motion_fit.families import Family
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.problem import Problem
 from shipdrag_ros.estimation.motion_fit.record import Record
@@ -39,7 +40,7 @@ CONFIG = Path(__file__).parents[1] / 'config'
 COURSE_RAD = 0.7
 STEADY_S = 1800.0
 SLOW_S = 300.0
-BOUND_FAMILY = (1, 2, 3, 4)
+BOUND_FAMILY = Family((1, 2, 3, 4))
 
 
 @dataclass(frozen=True)
@@ -171,7 +172,7 @@ def bound(case: Case, ship: Ship) -> tuple[float, float]:
     record = replace(record, white_sd=sds)
     about = Disturbance(gust_m_s2(case, ship), SLOW_S, case.log_m_s, SLOW_S)
     guess = Guess.of(record.coast, float(ship.n_r(1.0)))
-    problem = Problem.of(record, run_down, ship.n_r_polynomial(), guess)
+    problem = Problem.of(record, run_down, ship, guess)
     start = problem.start(BOUND_FAMILY, None, guess)
     plain, _ = problem.fit(BOUND_FAMILY, start)
     assert plain is not None

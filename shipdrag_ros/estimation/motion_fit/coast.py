@@ -59,35 +59,122 @@ class Law(NamedTuple):
         The a above: 1 or 0.
     n_r : (j,)
         Polynomial of n_r in v, lowest power first.
+    humps
+        How many B-splines multiply v^2 besides the powers; they add humps and
+        hollows of wave making.
+    first_hump, spacing
+        Middle of the first, and distance of one from the next, over `v_ref_m_s`.
     """
 
     powers: Int64
     v_ref_m_s: float
     thrust: float
     n_r: Float64
+    humps: int = 0
+    first_hump: float = 0.0
+    spacing: float = 1.0
+
+    @property
+    def size(self) -> int:
+        """Number of coefficients."""
+        return len(self.powers) + self.humps
 
 
 @njit(cache=True)
-def resistance(law: Law, unknowns: Float64, v: float) -> tuple[float, float]:
+def shapes(law: Law, s: float, value: Float64, slope: Float64) -> None:
     """
-    Return r and dr/dv at one speed.
-    """
-    s = v / law.v_ref_m_s
-    r = 0.0
-    slope = 0.0
-    for j in range(len(law.powers)):
-        power = s ** (law.powers[j] - 1)
-        r += unknowns[j] * power * s
-        slope += unknowns[j] * law.powers[j] * power
-    return r, slope / law.v_ref_m_s
+    Fill in what each coefficient is multiplied by at a relative speed.
 
-
-@njit(cache=True)
-def _rates(law: Law, unknowns: Float64, t: float, state: Float64, rate: Float64) -> None:
-    """
-    Fill in the rates of (v, dv/du, x, dx/du), u the unknowns of the motion.
+    Parameters
+    ----------
+    s
+        v / v_ref.
+    value, slope : (k,)
+        Of r, and of its derivative by s.
     """
     k = len(law.powers)
+    # the powers by one chain of products; what is between the powers is skipped
+    power = 1.0
+    exponent = 0
+    for j in range(k):
+        while exponent < law.powers[j] - 1:
+            power *= s
+            exponent += 1
+        slope[j] = law.powers[j] * power
+        power *= s
+        exponent += 1
+        value[j] = power
+    for j in range(law.humps):
+        # cubic B-spline, of r / s^2
+        d = (s - law.first_hump) / law.spacing - j
+        side = 1.0 if d > 0.0 else -1.0
+        d = abs(d)
+        b, by_d = 0.0, 0.0
+        if d < 1.0:
+            b = 2.0 / 3.0 - d * d + 0.5 * d * d * d
+            by_d = side * (1.5 * d * d - 2.0 * d)
+        elif d < 2.0:
+            b = (2.0 - d) ** 3 / 6.0
+            by_d = -side * 0.5 * (2.0 - d) ** 2
+        value[k + j] = s * s * b
+        slope[k + j] = 2.0 * s * b + s * s * by_d / law.spacing
+
+
+@njit(cache=True)
+def shape_table(law: Law, speed_m_s: Float64) -> tuple[Float64, Float64]:
+    """
+    Return the shapes of r and of dr/dv at (m,) speeds, each (m, k).
+    """
+    m, k = len(speed_m_s), len(law.powers) + law.humps
+    value, slope = np.empty((m, k)), np.empty((m, k))
+    for i in range(m):
+        shapes(law, speed_m_s[i] / law.v_ref_m_s, value[i], slope[i])
+    return value, slope / law.v_ref_m_s
+
+
+@njit(cache=True)
+def spread(shape: Float64, unknowns: Float64, covariance: Float64) -> tuple[Float64, Float64]:
+    """
+    Return sums of the coefficients, and their standard deviations.
+
+    Parameters
+    ----------
+    shape : (m, k)
+        What the coefficients are multiplied by.
+    unknowns, covariance : (k + 6,), (k + 6, k + 6)
+    """
+    m, k = shape.shape
+    value, sd = np.empty(m), np.empty(m)
+    for i in range(m):
+        total, variance = 0.0, 0.0
+        for a in range(k):
+            total += shape[i, a] * unknowns[a]
+            half = 0.5 * covariance[a, a] * shape[i, a]
+            for b in range(a):
+                half += covariance[a, b] * shape[i, b]
+            variance += 2.0 * shape[i, a] * half
+        value[i] = total
+        sd[i] = np.sqrt(max(variance, 0.0))
+    return value, sd
+
+
+@njit(cache=True)
+def _rates(
+    law: Law,
+    unknowns: Float64,
+    at_start: Float64,
+    t: float,
+    state: Float64,
+    rate: Float64,
+    work: Float64,
+) -> None:
+    """
+    Fill in the rates of (v, dv/du, x, dx/du), u the unknowns of the motion.
+
+    `at_start` holds the shapes at v0, then r(v0) and dr/dv(v0); `work` (2, k) is
+    written over.
+    """
+    k = len(law.powers) + law.humps
     q = k + _OF_MOTION
     v = state[0]
     n_r = 0.0
@@ -96,41 +183,25 @@ def _rates(law: Law, unknowns: Float64, t: float, state: Float64, rate: Float64)
         n_r_slope = n_r_slope * v + n_r
         n_r = n_r * v + law.n_r[j]
     inertia = 1.0 + n_r
-    # the powers by one chain of products; what is between the powers is skipped
-    s = v / law.v_ref_m_s
-    s0 = unknowns[k + V0] / law.v_ref_m_s
-    decay = 0.0
-    run_down = 1.0
+    shapes(law, v / law.v_ref_m_s, work[0], work[1])
+    r, slope = 0.0, 0.0
+    for j in range(k):
+        r += unknowns[j] * work[0, j]
+        slope += unknowns[j] * work[1, j]
+    slope /= law.v_ref_m_s
+    thrust = 0.0
     if law.thrust != 0.0:
         run_down = max(unknowns[k + RUN_DOWN], _SHORTEST_S)
-        decay = np.exp(-t / run_down)
-    thrust = law.thrust * decay
-    r, r0, slope, slope0 = 0.0, 0.0, 0.0, 0.0
-    power, power0 = 1.0, 1.0
-    exponent = 0
-    for j in range(k):
-        while exponent < law.powers[j] - 1:
-            power *= s
-            power0 *= s0
-            exponent += 1
-        c = unknowns[j]
-        slope += c * law.powers[j] * power
-        slope0 += c * law.powers[j] * power0
-        power *= s
-        power0 *= s0
-        exponent += 1
-        r += c * power
-        r0 += c * power0
-        rate[1 + j] = (thrust * power0 - power) / inertia
-    slope /= law.v_ref_m_s
-    slope0 /= law.v_ref_m_s
-    acceleration = (thrust * r0 - r) / inertia
+        thrust = law.thrust * np.exp(-t / run_down)
+        rate[1 + k + RUN_DOWN] = thrust * at_start[k] * t / run_down**2 / inertia
+    else:
+        rate[1 + k + RUN_DOWN] = 0.0
+    acceleration = (thrust * at_start[k] - r) / inertia
     by_v = (-slope - n_r_slope * acceleration) / inertia
     rate[0] = acceleration
-    rate[1 + k + V0] = thrust * slope0 / inertia
-    rate[1 + k + RUN_DOWN] = 0.0
-    if thrust != 0.0:
-        rate[1 + k + RUN_DOWN] = thrust * r0 * t / run_down**2 / inertia
+    for j in range(k):
+        rate[1 + j] = (thrust * at_start[j] - work[0, j]) / inertia
+    rate[1 + k + V0] = thrust * at_start[k + 1] / inertia
     for j in range(q):
         rate[1 + j] += by_v * state[1 + j]
     for j in range(q + 1):
@@ -151,18 +222,24 @@ def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Fl
     -----
     Runge-Kutta of fourth order, with fixed steps.
     """
-    k = len(law.powers)
+    k = len(law.powers) + law.humps
     size = 2 * (k + _OF_MOTION + 1)
     m = len(grid_s)
     state = np.zeros((m, size))
     rate = np.zeros((m, size))
     state[0, 0] = unknowns[k + V0]
     state[0, 1 + k + V0] = 1.0
+    work = np.empty((2, k))
+    at_start = np.zeros(k + 2)
+    shapes(law, unknowns[k + V0] / law.v_ref_m_s, at_start, work[1])
+    for j in range(k):
+        at_start[k] += unknowns[j] * at_start[j]
+        at_start[k + 1] += unknowns[j] * work[1, j] / law.v_ref_m_s
     k2 = np.empty(size)
     k3 = np.empty(size)
     k4 = np.empty(size)
     trial = np.empty(size)
-    _rates(law, unknowns, grid_s[0], state[0], rate[0])
+    _rates(law, unknowns, at_start, grid_s[0], state[0], rate[0], work)
     for i in range(m - 1):
         t = grid_s[i]
         h = grid_s[i + 1] - t
@@ -170,16 +247,16 @@ def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Fl
         k1 = rate[i]
         for j in range(size):
             trial[j] = now[j] + 0.5 * h * k1[j]
-        _rates(law, unknowns, t + 0.5 * h, trial, k2)
+        _rates(law, unknowns, at_start, t + 0.5 * h, trial, k2, work)
         for j in range(size):
             trial[j] = now[j] + 0.5 * h * k2[j]
-        _rates(law, unknowns, t + 0.5 * h, trial, k3)
+        _rates(law, unknowns, at_start, t + 0.5 * h, trial, k3, work)
         for j in range(size):
             trial[j] = now[j] + h * k3[j]
-        _rates(law, unknowns, t + h, trial, k4)
+        _rates(law, unknowns, at_start, t + h, trial, k4, work)
         for j in range(size):
             state[i + 1, j] = now[j] + h * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]) / 6.0
-        _rates(law, unknowns, t + h, state[i + 1], rate[i + 1])
+        _rates(law, unknowns, at_start, t + h, state[i + 1], rate[i + 1], work)
     return state, rate
 
 
@@ -197,7 +274,7 @@ def predict(
     speed : (n,)
         Speed through water at the rows.
     """
-    k = len(law.powers)
+    k = len(law.powers) + law.humps
     q = k + _OF_MOTION
     state, rate = integrate(law, unknowns, grid_s)
     n = len(rows.time_s)

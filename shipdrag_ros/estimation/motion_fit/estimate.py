@@ -28,6 +28,7 @@ from shipdrag_ros.estimation.motion_fit.problem import (
     Problem,
     average_families,
     fit_robustly,
+    weigh_disturbed,
     with_log_scale,
 )
 from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
@@ -66,17 +67,17 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     """
     run_down = RunDown.of(window, ship)
     record = Record.of(window, run_down, parameters)
-    n_r = ship.n_r_polynomial()
     guess = Guess.of(record.coast, float(ship.n_r(1.0)))
     notes = [*window.notes, *ship.warnings, f'{run_down.source}']
     # first the coastdown alone, as if nothing but sensor noise disturbed
     alone = record.without_steady()
-    first, problem = fit_robustly(Problem.of(alone, run_down, n_r, guess), alone, None, guess)
+    first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess), guess)
     if record.steady_s >= LEAST_S:
-        plain, _ = problem.fit(PLAIN, problem.start(PLAIN, first, guess))
+        brief = problem.condensed(first)
+        plain, _ = brief.fit(PLAIN, brief.start(PLAIN, first, guess))
         about = _learn(record, plain or first, run_down)
-        problem = Problem.of(record, run_down, n_r, guess).disturbed(about, plain or first)
-        first, problem = fit_robustly(problem, record, first, guess)
+        problem = Problem.of(record, run_down, ship, guess).disturbed(about, plain or first)
+        problem = weigh_disturbed(problem, first)
         notes.append(_disturbance_note(about, record.steady_s))
     else:
         record = alone
@@ -84,7 +85,8 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
             'there is no steady record before the onset to learn slow disturbances from: the '
             'band holds the noise of the sensors alone'
         )
-    first, problem = with_log_scale(problem, first)
+    full = problem
+    first, problem = with_log_scale(problem.condensed(first), first)
     if LOG_SCALE in problem.extras:
         scale, sd = Average.of((first,)).unknown(LOG_SCALE)
         notes.append(
@@ -92,12 +94,12 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
             'deviations), taken out'
         )
     average = average_families(problem, first, guess)
-    return _result(average, problem, record, window, ship, parameters, tuple(notes))
+    return _result(average, full, record, window, ship, parameters, tuple(notes))
 
 
 def _learn(record: Record, plain: FamilyFit, run_down: RunDown) -> Disturbance:
     """Learn the disturbances of the steady record, damped as a plain fit has it."""
-    damping, inertia = plain.damping(plain.unknowns[len(plain.law.powers) + V0 :][:1])
+    damping, inertia = plain.damping(plain.unknowns[plain.law.size + V0 :][:1])
     quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else 0.0
     keep = record.steady.time_s < quiet
     steady = record.steady
@@ -128,7 +130,7 @@ def _result(
     notes: tuple[str, ...],
 ) -> Estimate:
     best = average.best
-    k = len(best.law.powers)
+    k = best.law.size
     coast = record.coast
     end_s = float(coast.time_s[-1])
     ends = Rows(np.array([end_s, end_s]), np.array([LOG, LOG]), np.zeros(2))

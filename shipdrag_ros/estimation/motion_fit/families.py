@@ -1,35 +1,101 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Families of r(v): sums of powers of the speed, averaged by AICc.
+Families of r(v): powers of the speed, with or without humps of wave making.
 
 No single family is right: friction is nearly quadratic, wave making rises by
-the fourth to the sixth power. Too small a family is biased, too large a one
-noisy; how well each explains the samples decides its weight.
+the fourth to the sixth power, with humps and hollows where the waves of bow and
+stern meet. Humps are B-splines whose sizes are known beforehand, before any
+measurement, to be small at low Froude numbers; how many of them count grows
+with what the samples tell. How well each family explains the samples decides
+its weight.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.estimation.motion_fit.coast import Law
+from shipdrag_ros.estimation.motion_fit.coast import Law, shape_table, spread
 from shipdrag_ros.samples import Float64
 
-# In the order of fitting; the first is fitted first and finds the outliers.
-FAMILIES: tuple[tuple[int, ...], ...] = (
-    (1, 2, 3, 4),
-    (2, 3, 4),
-    (2, 3, 5),
-    (2, 3, 6),
-    (2, 4, 6),
-    (1, 2, 3, 5),
-    (1, 2, 4, 6),
-    (1, 2, 3, 4, 5),
-)
 _TYPICAL_POWER = 2.5
-LARGEST = 9  # powers of the largest family that many samples may ask for
-GROWTH = 0.3  # weight of the largest family from which a larger one is tried
+_SPACING_FROUDE = 0.02  # of the humps: about a quarter wave of the pattern at Fr 0.2
+_MOST = 14  # humps
+_HUMP_SD = 0.2  # of r, at _HUMP_FROUDE
+_HUMP_FROUDE, _LARGEST_FROUDE = 0.25, 0.3
+_HUMP_POWER = 5  # by which they grow with the Froude number
+_LEAST_SD = 1e-4  # of r
+_ABOVE, _BELOW = 1.05, 0.9  # of the speeds of the coastdown, where humps still matter
+
+
+class Family(NamedTuple):
+    """
+    One family of r(v).
+
+    Attributes
+    ----------
+    powers
+        Of the speed.
+    humpy
+        Whether humps are added.
+    """
+
+    powers: tuple[int, ...]
+    humpy: bool = False
+
+
+FIRST = Family((1, 2, 3, 4))  # fitted first, finds the outliers
+FAMILIES = tuple(
+    Family(powers, humpy)
+    for powers in ((2, 3, 4), (2, 4, 6), (1, 2, 4, 6))
+    for humpy in (False, True)
+)
+
+
+@dataclass(frozen=True)
+class Humps:
+    """
+    Where humps may be, and how large they are before any measurement.
+
+    Attributes
+    ----------
+    first, spacing
+        Of their middles, over the reference speed.
+    sd : (h,)
+        Standard deviation of each, over r / v^2.
+    """
+
+    first: float
+    spacing: float
+    sd: Float64
+
+    @classmethod
+    def between(cls, lowest: float, froude: float) -> Humps:
+        """
+        Return those of a coastdown.
+
+        Parameters
+        ----------
+        lowest
+            Speed at the end over the reference speed.
+        froude
+            Froude number of the reference speed.
+
+        Notes
+        -----
+        What waves of bow and stern do to each other is a part of the wave
+        resistance, whose coefficient grows by about the fifth power.
+        """
+        low = _BELOW * lowest
+        spacing = max(_SPACING_FROUDE / froude, (_ABOVE - low) / (_MOST - 1))
+        count = math.ceil((_ABOVE - low) / spacing) + 1
+        first = _ABOVE - (count - 1) * spacing
+        at = np.minimum(froude * (first + spacing * np.arange(count)), _LARGEST_FROUDE)
+        sd = _HUMP_SD * np.maximum(at / _HUMP_FROUDE, 0.0) ** _HUMP_POWER
+        return cls(first, spacing, np.maximum(sd, _LEAST_SD))
 
 
 @dataclass(frozen=True)
@@ -40,45 +106,47 @@ class FamilyFit:
     Attributes
     ----------
     law
-        Its powers.
+        Its powers and humps.
     unknowns
         See `coast`.
     covariance : (k + 6, k + 6)
         Of all unknowns; rows of what was not fitted are 0.
     chi2
         Sum of the squares of the whitened residuals.
-    rows
-        Number of rows.
+    samples
+        How many were fitted.
     parameters
-        Number of unknowns fitted.
+        Number of unknowns, a hump by how much of it the samples tell.
     """
 
     law: Law
     unknowns: Float64
     covariance: Float64
     chi2: float
-    rows: int
-    parameters: int
+    samples: int
+    parameters: float
 
     @property
     def aicc(self) -> float:
         """Akaike's criterion with the correction for few samples."""
         p = self.parameters
-        return self.chi2 + 2.0 * p * self.rows / max(self.rows - p - 1, 1)
+        return self.chi2 + 2.0 * p * self.samples / max(self.samples - p - 1.0, 1.0)
 
     def resistance(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
         """
         Return r and its standard deviation at (m,) speeds.
         """
-        return self._linear(self._powers(speed_m_s))
+        value, _ = shape_table(self.law, speed_m_s)
+        result: tuple[Float64, Float64] = spread(value, self.unknowns, self.covariance)
+        return result
 
     def slope(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
         """
         Return dr/dv and its standard deviation at (m,) speeds.
         """
-        powers = self.law.powers
-        s = speed_m_s[:, None] / self.law.v_ref_m_s
-        return self._linear(powers * s ** (powers - 1) / self.law.v_ref_m_s)
+        _, slope = shape_table(self.law, speed_m_s)
+        result: tuple[Float64, Float64] = spread(slope, self.unknowns, self.covariance)
+        return result
 
     def damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
         """
@@ -95,16 +163,6 @@ class FamilyFit:
         damping = _TYPICAL_POWER * r / np.maximum(speed_m_s, 1e-3) / inertia
         damped: Float64 = np.maximum(damping, 1e-6)
         return damped, inertia
-
-    def _powers(self, speed_m_s: Float64) -> Float64:
-        result: Float64 = (speed_m_s[:, None] / self.law.v_ref_m_s) ** self.law.powers
-        return result
-
-    def _linear(self, columns: Float64) -> tuple[Float64, Float64]:
-        k = columns.shape[1]
-        value = np.einsum('mk,k->m', columns, self.unknowns[:k])
-        variance = np.einsum('mj,jk,mk->m', columns, self.covariance[:k, :k], columns)
-        return value, np.sqrt(np.maximum(variance, 0.0))
 
 
 @dataclass(frozen=True)
@@ -153,7 +211,7 @@ class Average:
         """
         pairs = []
         for fit in self.fits:
-            at = len(fit.law.powers) + which
+            at = fit.law.size + which
             value, variance = fit.unknowns[at], fit.covariance[at, at]
             pairs.append((np.array([value]), np.array([np.sqrt(variance)])))
         value, sigma = self._mix(pairs)
