@@ -23,6 +23,7 @@ from shipdrag_ros.estimation.motion_fit.coast import (
 )
 from shipdrag_ros.estimation.motion_fit.families import Average, FamilyFit
 from shipdrag_ros.estimation.motion_fit.guess import Guess
+from shipdrag_ros.estimation.motion_fit.learning import learn
 from shipdrag_ros.estimation.motion_fit.problem import (
     PLAIN,
     Problem,
@@ -33,7 +34,7 @@ from shipdrag_ros.estimation.motion_fit.problem import (
 )
 from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
 from shipdrag_ros.estimation.motion_fit.run_down import ONSET_SD_S, RunDown
-from shipdrag_ros.estimation.motion_fit.steady import LEAST_S, learn
+from shipdrag_ros.estimation.motion_fit.steady import LEAST_S
 from shipdrag_ros.estimation.motion_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.window import Window

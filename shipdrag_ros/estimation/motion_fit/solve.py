@@ -73,17 +73,22 @@ def normal_equations(
 
 
 @njit(cache=True)
-def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[bool, Float64]:
+def cholesky(matrix: Float64, damping: float) -> tuple[bool, Float64, Float64]:
     """
-    Solve (M + damping diag M) x = b for columns of b, M scaled to unit diagonal.
+    Return the lower factor of M + damping diag M, M scaled to unit diagonal.
+
+    Returns
+    -------
+    solved, lower, scale
+        The scale of each unknown.
     """
     p = len(matrix)
     scale = np.empty(p)
+    lower = np.zeros((p, p))
     for a in range(p):
         if not matrix[a, a] > 0.0:
-            return False, right
+            return False, lower, scale
         scale[a] = 1.0 / np.sqrt(matrix[a, a])
-    lower = np.zeros((p, p))
     for a in range(p):
         for b in range(a + 1):
             total = matrix[a, b] * scale[a] * scale[b]
@@ -93,10 +98,22 @@ def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[boo
                 total -= lower[a, c] * lower[b, c]
             if a == b:
                 if not total > 1e-14:
-                    return False, right
+                    return False, lower, scale
                 lower[a, a] = np.sqrt(total)
             else:
                 lower[a, b] = total / lower[b, b]
+    return True, lower, scale
+
+
+@njit(cache=True)
+def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[bool, Float64]:
+    """
+    Solve (M + damping diag M) x = b for columns of b, M scaled to unit diagonal.
+    """
+    solved, lower, scale = cholesky(matrix, damping)
+    if not solved:
+        return False, right
+    p = len(matrix)
     x = right.copy()
     for j in range(right.shape[1]):
         for a in range(p):

@@ -45,42 +45,48 @@ CALM = Disturbance(0.0, 60.0, 0.0, 60.0)
 
 
 @njit(cache=True)
-def _step(
-    cov: Float64,
-    mean: Float64,
-    about: Disturbance,
-    damping: float,
-    inertia: float,
-    dt: float,
-) -> None:
-    """Carry covariance and means over a step."""
+def _carry(about: Disturbance, damping: float, inertia: float, dt: float, carry: Float64) -> None:
+    """Fill in what a step does to the states."""
     gust_decay = np.exp(-dt / about.gust_s)
-    water_decay = np.exp(-dt / about.water_s)
-    decay = np.exp(-damping * dt)
-    by_gust = dt * np.exp(-0.5 * damping * dt) * 0.5 * (1.0 + gust_decay) / inertia
-    way = 0.5 * dt * (1.0 + decay)
-    way_by_gust = 0.5 * dt * by_gust
-    for c in range(mean.shape[1]):
-        u, g = mean[0, c], mean[2, c]
-        mean[1, c] += way * u + way_by_gust * g
-        mean[0, c] = decay * u + by_gust * g
-        mean[2, c] = gust_decay * g
-        mean[3, c] *= water_decay
-    # F P, then (F P) F'
-    for c in range(_STATES):
-        u, g = cov[0, c], cov[2, c]
-        cov[1, c] += way * u + way_by_gust * g
-        cov[0, c] = decay * u + by_gust * g
-        cov[2, c] = gust_decay * g
-        cov[3, c] *= water_decay
-    for r in range(_STATES):
-        u, g = cov[r, 0], cov[r, 2]
-        cov[r, 1] += way * u + way_by_gust * g
-        cov[r, 0] = decay * u + by_gust * g
-        cov[r, 2] = gust_decay * g
-        cov[r, 3] *= water_decay
-    cov[2, 2] += about.gust_m_s2**2 * (1.0 - gust_decay**2)
-    cov[3, 3] += about.water_m_s**2 * (1.0 - water_decay**2)
+    carry[0] = np.exp(-damping * dt)
+    carry[1] = dt * np.exp(-0.5 * damping * dt) * 0.5 * (1.0 + gust_decay) / inertia
+    carry[2] = 0.5 * dt * (1.0 + carry[0])
+    carry[3] = 0.5 * dt * carry[1]
+    carry[4] = gust_decay
+    carry[5] = about.gust_m_s2**2 * (1.0 - gust_decay**2)
+    carry[6] = np.exp(-dt / about.water_s)
+    carry[7] = about.water_m_s**2 * (1.0 - carry[6] ** 2)
+
+
+@njit(cache=True)
+def _step(cov: Float64, mean: Float64, carry: Float64, low: int, high: int) -> None:
+    """Carry covariance and means, of the states low .. high - 1, over a step."""
+    decay, by_gust, way, way_by_gust, gust_decay, gust, water_decay, water = carry
+    if low == 0:
+        for c in range(mean.shape[1]):
+            u, g = mean[0, c], mean[2, c]
+            mean[1, c] += way * u + way_by_gust * g
+            mean[0, c] = decay * u + by_gust * g
+            mean[2, c] = gust_decay * g
+        # F P, then (F P) F'
+        for c in range(high):
+            u, g = cov[0, c], cov[2, c]
+            cov[1, c] += way * u + way_by_gust * g
+            cov[0, c] = decay * u + by_gust * g
+            cov[2, c] = gust_decay * g
+        for r in range(high):
+            u, g = cov[r, 0], cov[r, 2]
+            cov[r, 1] += way * u + way_by_gust * g
+            cov[r, 0] = decay * u + by_gust * g
+            cov[r, 2] = gust_decay * g
+        cov[2, 2] += gust
+    if high == _STATES:
+        for c in range(mean.shape[1]):
+            mean[3, c] *= water_decay
+        for s in range(low, high):
+            cov[3, s] *= water_decay
+            cov[s, 3] *= water_decay
+        cov[3, 3] += water
 
 
 class Noise(NamedTuple):
@@ -132,38 +138,46 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
         for i in range(n):
             log_det += np.log(variance[i])
         return log_det
+    # only the states that are disturbed
+    low = 0 if about.gust_m_s2 > 0.0 else 3
+    high = _STATES if about.water_m_s > 0.0 else 3
     cov = np.zeros((_STATES, _STATES))
     mean = np.zeros((_STATES, columns))
-    gain = np.empty(_STATES)
-    seen = np.empty(_STATES)
+    gain = np.zeros(_STATES)
+    seen = np.zeros(_STATES)
     rate = damping[0] + 1.0 / about.gust_s
     cov[2, 2] = about.gust_m_s2**2
     cov[0, 2] = cov[2, 0] = cov[2, 2] / inertia[0] / rate
     cov[0, 0] = cov[0, 2] / inertia[0] / damping[0]
     cov[3, 3] = about.water_m_s**2
+    carry = np.empty(8)
+    last_dt, last_mid, last_inertia = -1.0, -1.0, -1.0
     for i in range(n):
         if i:
             dt = rows.time_s[i] - rows.time_s[i - 1]
             if dt > 0.0:
-                parts = int(np.ceil(dt / _LONGEST_STEP_S))
+                parts = int(np.ceil(dt / _LONGEST_STEP_S)) if low == 0 else 1
                 mid = 0.5 * (damping[i] + damping[i - 1])
+                if dt != last_dt or mid != last_mid or inertia[i] != last_inertia:
+                    _carry(about, mid, inertia[i], dt / parts, carry)
+                    last_dt, last_mid, last_inertia = dt, mid, inertia[i]
                 for _ in range(parts):
-                    _step(cov, mean, about, mid, inertia[i], dt / parts)
+                    _step(cov, mean, carry, low, high)
         first = 1 if rows.kind[i] == POSITION else 0
         of_water = 1.0 if rows.kind[i] == LOG else 0.0
-        for s in range(_STATES):
+        for s in range(low, high):
             seen[s] = cov[s, first] + of_water * cov[s, 3]
         total = seen[first] + of_water * seen[3] + variance[i]
         weight = 1.0 / np.sqrt(total)
         log_det += np.log(total)
-        for s in range(_STATES):
+        for s in range(low, high):
             gain[s] = seen[s] / total
         for c in range(columns):
             innovation = table[c, i] - mean[first, c] - of_water * mean[3, c]
-            for s in range(_STATES):
+            for s in range(low, high):
                 mean[s, c] += gain[s] * innovation
             table[c, i] = innovation * weight
-        for a in range(_STATES):
-            for b in range(_STATES):
+        for a in range(low, high):
+            for b in range(low, high):
                 cov[a, b] -= gain[a] * seen[b]
     return log_det

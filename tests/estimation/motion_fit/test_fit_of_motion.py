@@ -11,8 +11,9 @@ import pytest
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final, motion_fit
 from shipdrag_ros.estimation.motion_fit.coast import LOG, Law, Rows, integrate, predict
+from shipdrag_ros.estimation.motion_fit.learning import learn
 from shipdrag_ros.estimation.motion_fit.solve import cholesky_solve
-from shipdrag_ros.estimation.motion_fit.steady import learn, white_sd
+from shipdrag_ros.estimation.motion_fit.steady import white_sd
 from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Noise, whiten
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
