@@ -14,9 +14,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
+from shipdrag_ros.bags.message_index import index_messages
 from shipdrag_ros.bags.records import (
     FOOTER_BYTES,
     MAGIC,
@@ -45,13 +47,15 @@ class Segment(NamedTuple):
     """
     A chunk, or consecutive messages outside chunks.
 
-    Sorts by the earliest log time [ns], then by place [bytes].
+    Sorts by the earliest log time [ns], then by place [bytes]. `channels` are those
+    in it, empty where that is not known.
     """
 
     start_ns: int
     offset: int
     end: int
     end_ns: int
+    channels: frozenset[int] = frozenset()
 
 
 @dataclass
@@ -150,7 +154,13 @@ def read_index(data: Buffer) -> Contents | None:
         end = _record_at(data, start, footer_at).end
         contents.compressions.add(chunk.compression)
         contents.segments.append(
-            Segment(chunk.message_start_time, start, end, chunk.message_end_time)
+            Segment(
+                chunk.message_start_time,
+                start,
+                end,
+                chunk.message_end_time,
+                frozenset(chunk.message_index_offsets),
+            )
         )
     contents.counts.update(found[Opcode.STATISTICS][0].channel_message_counts)
     return contents
@@ -236,16 +246,20 @@ _DECLARATIONS = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADA
 def _scan_chunk(data: Buffer, chunk: Place, contents: Contents) -> None:
     compression, unpacked = unpack_chunk(data, chunk)
     contents.compressions.add(compression)
-    times: list[int] = []
-    for place in walk(unpacked, 0, len(unpacked)):
-        if place.opcode == Opcode.MESSAGE:
-            channel, log_ns = message_head(unpacked, place)
-            contents.counts[channel] += 1
-            times.append(log_ns)
-        elif place.opcode in _DECLARATIONS:
+    messages, others, damage = index_messages([unpacked], [chunk.offset])
+    for offset in others:
+        place = next(walk(unpacked, offset, len(unpacked)))
+        if place.opcode in _DECLARATIONS:
             contents.add(parse(unpacked, place))
-    if times:
-        contents.segments.append(Segment(min(times), chunk.offset, chunk.end, max(times)))
+    counts = np.bincount(messages.channel)
+    channels = np.flatnonzero(counts)
+    contents.counts.update(dict(zip(channels.tolist(), counts[channels].tolist(), strict=True)))
+    if len(messages):
+        first, last = int(messages.log_ns.min()), int(messages.log_ns.max())
+        contents.segments.append(
+            Segment(first, chunk.offset, chunk.end, last, frozenset(channels.tolist()))
+        )
+    contents.warnings += damage
 
 
 class _LooseMessages:

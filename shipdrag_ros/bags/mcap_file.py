@@ -9,7 +9,7 @@ whole in it is read; the damage is told, not mended.
 from __future__ import annotations
 
 import sys
-from bisect import bisect_left
+from collections import deque
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from mmap import ACCESS_READ, mmap
@@ -17,22 +17,18 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO
 
+import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.contents import Contents, Segment, read_index, scan
-from shipdrag_ros.bags.records import (
-    MAGIC,
-    DamagedRecord,
-    RawMessage,
-    message_head,
-    message_payload,
-    unpack_chunk,
-    walk,
-)
+from shipdrag_ros.bags.message_index import Messages, index_messages
+from shipdrag_ros.bags.records import MAGIC, DamagedRecord, unpack_chunk, walk
 from shipdrag_ros.errors import BagError
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
+# smaller chunks are read together: what a chunk costs beside its bytes is then small
+_WORTHWHILE_BYTES = 1 << 18
 _FOREIGN = {
     b'SQLite format 3\0': 'is a bag in sqlite3 storage',
     b'#ROSBAG V2.0': 'is a bag of ROS 1',
@@ -81,9 +77,9 @@ class McapFile:
 
     def messages(
         self, channels: Collection[int], *, start_ns: int = 0, end_ns: int = sys.maxsize
-    ) -> Iterator[list[RawMessage]]:
+    ) -> Iterator[Messages]:
         """
-        Yield messages in order of log time, then of place, some at a time.
+        Yield messages in order of log time, then of place, a chunk at a time.
 
         Parameters
         ----------
@@ -92,48 +88,53 @@ class McapFile:
         start_ns, end_ns
             First and last log time to read [ns].
         """
-        wanted = set(channels)
-        segments = [
+        wanted = frozenset(channels)
+        in_time = [
             s for s in self.contents.segments if s.end_ns >= start_ns and s.start_ns <= end_ns
         ]
+        segments = deque(s for s in in_time if not s.channels or s.channels & wanted)
         found = 0
-        waiting: list[RawMessage] = []
+        waiting: Messages | None = None
         with self._data() as data:
-            for index, segment in enumerate(segments):
-                loaded = self._load(data, segment, wanted)
+            while segments:
+                loaded = self._load(data, segments, wanted)
                 found += len(loaded)
-                waiting += (m for m in loaded if start_ns <= m.log_ns <= end_ns)
-                waiting.sort()
-                ready = len(waiting)
-                if index + 1 < len(segments):  # which may begin before this one ends
-                    ready = bisect_left(waiting, segments[index + 1].start_ns, key=_log_ns)
+                if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
+                    loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
+                if waiting is not None:
+                    loaded = waiting.followed_by(loaded)
+                    waiting = None
+                loaded = loaded.in_arrival_order()
+                ready = len(loaded)
+                if segments:  # the next may begin before this one ends
+                    ready = int(np.searchsorted(loaded.log_ns, segments[0].start_ns))
+                if ready < len(loaded):
+                    waiting = loaded[ready:].packed()
                 if ready:
-                    yield waiting[:ready]
-                    del waiting[:ready]
+                    yield loaded[:ready]
         expected = sum(self.contents.counts[channel] for channel in wanted)
-        if len(segments) == len(self.contents.segments) and found != expected:
+        if len(in_time) == len(self.contents.segments) and found != expected:
             self._warn(f'{found} messages are there where the index tells of {expected}')
 
-    def _load(self, data: mmap, segment: Segment, wanted: set[int]) -> list[RawMessage]:
-        loaded: list[RawMessage] = []
-        source: bytes | mmap = data
-        start, end = segment.offset, segment.end
-        try:
-            first = next(walk(data, start, end))
-            if first.opcode == Opcode.CHUNK:
-                _, source = unpack_chunk(data, first)
-                start, end = 0, len(source)
-            for place in walk(source, start, end):
-                if place.opcode == Opcode.MESSAGE:
-                    channel, log_ns = message_head(source, place)
-                    if channel in wanted:
-                        payload = message_payload(source, place)
-                        loaded.append(
-                            RawMessage(log_ns, segment.offset, place.offset, channel, payload)
-                        )
-        except DamagedRecord as damage:
-            self._warn(f'{damage}: {len(loaded)} messages before the damage are used')
-        return loaded
+    def _load(self, data: mmap, segments: deque[Segment], wanted: frozenset[int]) -> Messages:
+        """Take segments off the queue, one or as many small ones as are worth it."""
+        unpacked: list[bytes] = []
+        offsets: list[int] = []
+        size = 0
+        while segments and size < _WORTHWHILE_BYTES:
+            segment = segments.popleft()
+            try:
+                records = _records(data, segment)
+            except DamagedRecord as damage:
+                self._warn(f'{damage}: left out')
+                continue
+            unpacked.append(records)
+            offsets.append(segment.offset)
+            size += len(records)
+        found = index_messages(unpacked, offsets, wanted)
+        for text in found.damage:
+            self._warn(text)
+        return found.messages
 
     def _read_contents(self, data: mmap) -> Contents:
         head = data[:16]
@@ -174,8 +175,11 @@ class McapFile:
             yield data
 
 
-def _log_ns(message: RawMessage) -> int:
-    return message.log_ns
+def _records(data: mmap, segment: Segment) -> bytes:
+    first = next(walk(data, segment.offset, segment.end))
+    if first.opcode == Opcode.CHUNK:
+        return unpack_chunk(data, first)[1]
+    return data[segment.offset : segment.end]
 
 
 def _unpack(path: Path) -> IO[bytes]:

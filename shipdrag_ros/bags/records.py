@@ -44,7 +44,7 @@ _UINT32 = struct.Struct('<I')
 _UINT64 = struct.Struct('<Q')
 _TIME_LIMIT_NS = 1 << 63
 # far above what any writer makes, far below what would take the memory away
-_CHUNK_LIMIT_BYTES = 1 << 30
+_CHUNK_LIMIT_BYTES = 1 << 28
 
 _PARSERS: dict[int, Any] = {
     Opcode.FOOTER: Footer,
@@ -70,20 +70,6 @@ class Place(NamedTuple):
     offset: int
     start: int
     end: int
-
-
-class RawMessage(NamedTuple):
-    """
-    A message as it lies in a file; sorts in order of arrival.
-
-    `segment` and `offset` are its place: of the chunk in the file, and inside.
-    """
-
-    log_ns: int
-    segment: int
-    offset: int
-    channel: int
-    payload: bytes
 
 
 def walk(data: Buffer, start: int, end: int) -> Iterator[Place]:
@@ -139,17 +125,16 @@ def unpack_chunk(data: Buffer, place: Place) -> tuple[str, bytes]:
     DamagedRecord
         If the chunk is not as it was written.
     """
-    content = data[place.start : place.end]
     try:
-        _, _, size, checksum = _CHUNK_HEAD.unpack_from(content, 0)
-        at = _CHUNK_HEAD.size
-        (length,) = _UINT32.unpack_from(content, at)
+        _, _, size, checksum = _CHUNK_HEAD.unpack_from(data, place.start)
+        at = place.start + _CHUNK_HEAD.size
+        (length,) = _UINT32.unpack_from(data, at)
         at += _UINT32.size
-        compression = content[at : at + length].decode()
-        at += length
-        (length,) = _UINT64.unpack_from(content, at)
-        at += _UINT64.size
-        records = _decompress(compression, content[at : at + length], size)
+        name_end = min(at + length, place.end)
+        compression = data[at:name_end].decode()
+        (length,) = _UINT64.unpack_from(data, name_end)
+        at = name_end + _UINT64.size
+        records = _decompress(compression, data[at : min(at + length, place.end)], size)
     except (struct.error, ValueError, RuntimeError, MemoryError, zstandard.ZstdError) as error:
         raise DamagedRecord(f'the chunk at byte {place.offset} is damaged: {error}') from error
     if checksum and zlib.crc32(records) != checksum:
@@ -163,9 +148,7 @@ def _decompress(compression: str, packed: bytes, size: int) -> bytes:
     if compression == '':
         records = packed
     elif compression == 'zstd':
-        if zstandard.frame_content_size(packed) not in (-1, size):
-            raise ValueError('sizes disagree')
-        records = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
+        records = unpack_zstd(packed, size)
     elif compression == 'lz4':
         records = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size)
     else:
@@ -192,8 +175,16 @@ def message_head(data: Buffer, place: Place) -> tuple[int, int]:
     return channel, log_ns
 
 
-def message_payload(data: Buffer, place: Place) -> bytes:
+def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:
     """
-    Return the content of the message at a place.
+    Unpack one zstd frame of at most so many bytes.
+
+    Raises
+    ------
+    zstandard.ZstdError, ValueError
+        If it is damaged or unpacks to more.
     """
-    return bytes(data[place.start + _MESSAGE_HEAD.size : place.end])
+    # the library trusts the size that a frame states, and asks for that memory
+    if zstandard.frame_content_size(packed) > limit_bytes:
+        raise ValueError(f'it unpacks to more than {limit_bytes} bytes')
+    return zstandard.ZstdDecompressor().decompress(packed, max_output_size=limit_bytes)

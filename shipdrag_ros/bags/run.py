@@ -5,17 +5,20 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
 import zstandard
+from numpy.typing import NDArray
 
 from shipdrag_ros.bags.contents import FileChannel
 from shipdrag_ros.bags.locate import BagFiles
 from shipdrag_ros.bags.mcap_file import McapFile
-from shipdrag_ros.bags.records import RawMessage
+from shipdrag_ros.bags.message_index import CHANNELS, Messages
+from shipdrag_ros.bags.records import unpack_zstd
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import (
     OUTPUT_TOPICS,
@@ -24,15 +27,18 @@ from shipdrag_ros.messages import (
     MatchedTopics,
     OutputMessage,
     Source,
-    decode,
     match_inputs,
     read_event,
     types,
 )
+from shipdrag_ros.messages.decoding import decode_at
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
 from shipdrag_ros.samples import Block, concatenate
 
-BATCH = 4096
+# messages decoded at once: a chunk as writers make them, and of a giant one a part
+BATCH = 1 << 14
+# of one message that rosbag2 has packed for itself; inputs have some hundred bytes
+_MESSAGE_LIMIT_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -150,43 +156,36 @@ class Run:
         """
         if self.node is None:
             return
-        wanted = {(topic.under(self.node), topic.type) for topic in OUTPUT_TOPICS}
+        wanted = [(topic.under(self.node), topic.type) for topic in OUTPUT_TOPICS]
         for batch in self.messages(wanted):
-            for (topic, type_name), message in batch:
+            for number, place in enumerate(batch.channel.tolist()):
+                topic, type_name = wanted[place]
+                payload = batch.payload(number)
                 try:
-                    stamp_ns = types.stamp_ns(types.deserialize(type_name, message.payload))
+                    stamp_ns = types.stamp_ns(types.deserialize(type_name, payload))
                 except MalformedMessage:
                     stamp_ns = 0
-                yield OutputMessage(topic, type_name, message.payload, stamp_ns)
+                yield OutputMessage(topic, type_name, payload, stamp_ns)
 
     def messages(
-        self, keys: Iterable[tuple[str, str]], *, start_ns: int = 0, end_ns: int = sys.maxsize
-    ) -> Iterator[list[tuple[tuple[str, str], RawMessage]]]:
+        self, keys: Sequence[tuple[str, str]], *, start_ns: int = 0, end_ns: int = sys.maxsize
+    ) -> Iterator[Messages]:
         """
         Yield messages of some (topic, type) in order of arrival, some at a time.
 
         Parts follow each other; inside a part the log time counts, then the place.
+        The channel of each is its place among the keys.
         """
-        wanted = set(keys)
         for part in self.parts:
-            channels = {
-                number: _key(channel)
-                for number, channel in part.contents.channels.items()
-                if _key(channel) in wanted
-            }
-            for batch in part.messages(channels, start_ns=start_ns, end_ns=end_ns):
-                yield [
-                    (channels[m.channel], m._replace(payload=self._unpack(m.payload)))
-                    if self._message_compression
-                    else (channels[m.channel], m)
-                    for m in batch
-                ]
-
-    def _unpack(self, payload: bytes) -> bytes:
-        try:
-            return zstandard.decompress(payload)
-        except zstandard.ZstdError:
-            return b''  # counted as malformed by whoever decodes it
+            place_of = np.zeros(CHANNELS, np.uint16)
+            wanted = []
+            for number, channel in part.contents.channels.items():
+                if _key(channel) in keys:
+                    place_of[number] = keys.index(_key(channel))
+                    wanted.append(number)
+            for batch in part.messages(wanted, start_ns=start_ns, end_ns=end_ns):
+                found = replace(batch, channel=place_of[batch.channel])
+                yield _unpacked(found) if self._message_compression else found
 
     def _find_node(self, keys: set[tuple[str, str]]) -> str | None:
         nodes = sorted(
@@ -237,47 +236,59 @@ class Inputs:
     def __iter__(self) -> Iterator[Block | ResetMark]:
         """Yield blocks of at most `BATCH` samples, and resets at their place."""
         heard = self._run._matched.heard
-        keys = set(heard)
+        keys = list(heard)
         if self._run.node is not None:
-            keys.add((EVENTS.under(self._run.node), EVENTS.type))
+            keys.append((EVENTS.under(self._run.node), EVENTS.type))
+        sources = tuple(heard.values())
         start_ns, end_ns = self._span
-        waiting: list[tuple[Source, RawMessage]] = []
-        for batch in self._run.messages(keys, start_ns=start_ns, end_ns=end_ns):
-            for key, message in batch:
-                source = heard.get(key)
-                if source is not None:
-                    waiting.append((source, message))
-                    if len(waiting) == BATCH:
-                        yield self._block(waiting)
-                        waiting = []
-                    continue
-                mark = _reset_mark(message.payload)
-                if mark is not None:
-                    if waiting:
-                        yield self._block(waiting)
-                        waiting = []
-                    yield mark
-        if waiting:
-            yield self._block(waiting)
+        for messages in self._run.messages(keys, start_ns=start_ns, end_ns=end_ns):
+            for first in range(0, len(messages), BATCH):
+                yield from self._items(messages[first : first + BATCH], sources)
 
-    def _block(self, messages: list[tuple[Source, RawMessage]]) -> Block:
-        places: dict[Source, list[int]] = {}
-        for place, (source, _) in enumerate(messages):
-            places.setdefault(source, []).append(place)
+    def _items(
+        self, messages: Messages, sources: tuple[Source, ...]
+    ) -> Iterator[Block | ResetMark]:
+        """Cut at the resets."""
+        block, places = self._decode(messages, sources)
+        done = 0
+        for number in np.flatnonzero(messages.channel == len(sources)).tolist():
+            mark = _reset_mark(messages.payload(number))
+            if mark is not None:
+                before = int(np.searchsorted(places, number))
+                if before > done:
+                    yield block[done:before]
+                yield mark
+                done = before
+        if len(block) > done:
+            yield block[done:]
+
+    def _decode(
+        self, messages: Messages, sources: tuple[Source, ...]
+    ) -> tuple[Block, NDArray[np.intp]]:
+        """Return the samples and which message each came from."""
         blocks: list[Block] = []
-        order: list[np.ndarray[tuple[int], np.dtype[np.intp]]] = []
-        for source, mine in places.items():
-            decoded = decode(
+        places: list[NDArray[np.intp]] = []
+        for number, source in enumerate(sources):
+            mine = np.flatnonzero(messages.channel == number)
+            if not len(mine):
+                continue
+            decoded = decode_at(
                 source,
-                [messages[place][1].payload for place in mine],
-                [messages[place][1].log_ns for place in mine],
+                messages.data,
+                messages.start[mine],
+                messages.end[mine],
+                messages.log_ns[mine],
             )
             self.messages[source.input] += len(mine)
             for reason, count in decoded.unreadable.items():
                 self.unreadable.setdefault(source.input, Counter())[reason.value] += count
             blocks.append(decoded.block)
-            order.append(np.array(mine, np.intp)[decoded.kept])
-        return concatenate(blocks)[np.argsort(np.concatenate(order))]
+            places.append(mine[decoded.kept])
+        if len(blocks) < 2:
+            return concatenate(blocks), places[0] if places else np.empty(0, np.intp)
+        joined = np.concatenate(places)
+        order = np.argsort(joined)
+        return concatenate(blocks)[order], joined[order]
 
 
 def _key(channel: FileChannel) -> tuple[str, str]:
@@ -306,3 +317,18 @@ def _reset_mark(payload: bytes) -> ResetMark | None:
     if note.kind is not EventKind.RESET_REQUEST:
         return None
     return ResetMark(note.stamp_ns, note.text)
+
+
+def _unpacked(messages: Messages) -> Messages:
+    """Unpack each message for itself; one that cannot be is empty, and so malformed."""
+    payloads = [_unpack(messages.payload(number)) for number in range(len(messages))]
+    ends = np.fromiter(accumulate(map(len, payloads), initial=0), np.int64)
+    data = np.frombuffer(b''.join(payloads), np.uint8)
+    return replace(messages, data=data, start=ends[:-1], end=ends[1:])
+
+
+def _unpack(payload: bytes) -> bytes:
+    try:
+        return unpack_zstd(payload, _MESSAGE_LIMIT_BYTES)
+    except (ValueError, zstandard.ZstdError):
+        return b''

@@ -170,7 +170,7 @@ def test_memory_does_not_grow_with_the_bag(
 ) -> None:
     monkeypatch.setattr(run_module, 'BATCH', 256)
     peaks = []
-    for n in (2000, 20_000):
+    for n in (8000, 40_000):
         block = Block.of(Channel.SHAFT, START_NS + np.arange(n) * 10**8, 1.0)
         (run,) = open_runs([write_bag(f'{n}.mcap', block, chunk_bytes=20_000)])
         tracemalloc.start()
@@ -178,8 +178,8 @@ def test_memory_does_not_grow_with_the_bag(
             pass
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    # the samples alone would be 10 times as many bytes
-    assert peaks[1] < 1.5 * peaks[0]
+    # the samples alone would be 5 times as many bytes
+    assert peaks[1] < 1.2 * peaks[0]
 
 
 def test_a_range_of_time(write_bag: WriteBag, block: Block, assert_same: AssertSame) -> None:
