@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -129,3 +130,66 @@ def test_a_mistake_is_told_and_leaves_no_bag(
         assert main(line) == status
     assert said in capsys.readouterr().err
     assert not (tmp_path / 'a.mcap').exists()
+
+
+LOG = (
+    '$GPRMC,235959,A,5430.00,N,01000.00,E,10.0,090.0,311223,,,A*4A',
+    '$VWVHW,,,095.0,M,09.5,N,,*7B',
+    '$HCHDG,095.0,,,,*4E',
+    '$SDDBT,,f,12.0,M,,F*35',
+    '$XXMTW,10.0,C*12',
+    '$GPRMC,000000,A,5430.00,N,01000.01,E,10.0,090.0,010124,,,A*4C',
+    '$VWVHW,,,095.0,M,09.4,N,,*00',
+)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    """A log over New Year; one checksum in it is wrong."""
+    path = tmp_path / 'log.nmea'
+    path.write_text('\n'.join(LOG))
+    return path
+
+
+def test_a_log_becomes_a_bag(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, said = convert(capsys, log, '--transducer', '1.5')
+    assert said['written'] == {
+        'speed_through_water': 1,
+        'speed_over_ground': 2,
+        'position': 2,
+        'heading': 1,
+        'depth': 1,
+    }
+    assert said['end_ns'] - said['start_ns'] == 10**9
+    assert said['rejected'] == {
+        'line': {'wrong checksum': {'count': 1, 'first': [f'line 7: {LOG[-1][1:]!r}']}}
+    }
+    assert said['not_used'] == {'XXMTW': 1}
+    assert said['unknown_talkers'] == {'XX': 1}
+    assert (said['magnetic_heading'], said['log_attached']) == (True, True)
+
+
+def test_the_words_tell_what_of_a_log_was_not_used(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['import', str(log), '-o', str(tmp_path / 'a.mcap')]) == 0
+    said = capsys.readouterr().out
+    assert '6 messages of 6 sentences in 7 lines, 1 s' in said
+    assert 'from 2023-12-31 23:59:59 UTC' in said
+    assert 'The heading is MAGNETIC' in said
+    assert 'The log is attached to the bag.' in said
+    assert re.search(r'speed_over_ground +GPRMC +2\n', said)
+    assert 'depth: 1 rejected, SDDBT: depth of the transducer not told: line 4' in said
+    assert 'line: 1 rejected, wrong checksum: line 7' in said
+    assert 'Sentences not used: XXMTW 1' in said
+    assert 'Talkers that NMEA 0183 does not know: XX 1' in said
+
+
+def test_dates_and_checksums_that_a_log_lacks_are_given(
+    log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log.write_text('$GPGLL,5430.00,N,01000.00,E,120000,A\n')
+    _, said = convert(capsys, log, '--date', '2024-02-29', '--no-checksum')
+    assert said['start_ns'] == 1_709_208_000 * 10**9
+    assert main(['import', str(log), '-o', str(log.with_name('b.mcap')), '--no-checksum']) == 1
+    assert '--date YYYY-MM-DD' in capsys.readouterr().err
