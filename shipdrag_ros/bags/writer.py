@@ -19,27 +19,21 @@ from uuid import uuid4
 
 from mcap.writer import CompressionType, Writer
 
-from shipdrag_ros import __version__
+from shipdrag_ros.bags.declarations import (
+    LIBRARY,
+    PROFILE,
+    as_bytes,
+    channel,
+    media_type,
+    metadata,
+    schema,
+)
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import OUTPUT_TOPICS, encode, types
+from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block
 
 METADATA = 'shipdrag_ros'
 """Name of the metadata record that tells which recording a file is part of."""
-
-# as rosbag2 writes it; a player needs it to latch the topic again
-_LATCHED_QOS = """\
-- history: keep_last
-  depth: 1
-  reliability: reliable
-  durability: transient_local
-  deadline: {sec: 9223372036, nsec: 854775807}
-  lifespan: {sec: 9223372036, nsec: 854775807}
-  liveliness: automatic
-  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
-  avoid_ros_namespace_conventions: false
-"""
-_LATCHED = {(topic.name, topic.type) for topic in OUTPUT_TOPICS if topic.latched}
 
 
 class Compression(Enum):
@@ -103,15 +97,8 @@ class BagWriter:
         self._writer = Writer(
             self._file, chunk_size=chunk_bytes, compression=_MCAP_COMPRESSION[compression]
         )
-        self._writer.start(profile='ros2', library=f'shipdrag_ros {__version__}')
-        self._writer.add_metadata(
-            METADATA,
-            {
-                'version': __version__,
-                'recording_id': recording_id or uuid4().hex,
-                'part': str(part),
-            },
-        )
+        self._writer.start(profile=PROFILE, library=LIBRARY)
+        self._writer.add_metadata(METADATA, metadata(recording_id or uuid4().hex, part))
 
     def attach(self, name: str, text: str) -> None:
         """
@@ -122,7 +109,7 @@ class BagWriter:
                 create_time=0,
                 log_time=0,
                 name=name,
-                media_type='application/yaml' if name.endswith('.yaml') else 'text/plain',
+                media_type=media_type(name),
                 data=text.encode(),
             )
 
@@ -228,24 +215,20 @@ class BagWriter:
     def _channel(self, topic: str, type_name: str) -> int:
         key = (topic, type_name)
         if key not in self._channels:
-            schema = self._schema(type_name)
-            latched = (topic.rpartition('/')[2], type_name) in _LATCHED
+            schema_id = self._schema(type_name)
+            made = channel(len(self._channels) + 1, topic, type_name, schema_id=schema_id)
+            # outside of chunks too: the first chunk may be damaged and the others sound
+            self._file.write(as_bytes(made))
             self._channels[key] = self._writer.register_channel(
-                topic,
-                'cdr',
-                schema,
-                {
-                    'offered_qos_profiles': _LATCHED_QOS if latched else '',
-                    'topic_type_hash': types.type_hash(type_name),
-                },
+                made.topic, made.message_encoding, made.schema_id, made.metadata
             )
         return self._channels[key]
 
     def _schema(self, type_name: str) -> int:
         if type_name not in self._schemas:
-            if not types.is_known(type_name):
-                raise BagError(f'{type_name!r} is no message type of ROS 2 Jazzy that is known')
+            made = schema(len(self._schemas) + 1, type_name)
+            self._file.write(as_bytes(made))
             self._schemas[type_name] = self._writer.register_schema(
-                type_name, 'ros2msg', types.definition(type_name).encode()
+                made.name, made.encoding, made.data
             )
         return self._schemas[type_name]

@@ -108,19 +108,26 @@ def recording_status(status: RecordingStatus) -> DiagnosticStatus:
     """
     Say how the recording stands.
     """
-    return _status(
-        'recording',
-        ERROR if status.state is RecordingState.FAILED else OK,
-        status.text,
-        {
-            'state': status.state.value,
-            'file': status.path or 'none',
-            'size [B]': status.size_bytes,
-            'messages': status.messages,
-            'messages not written': status.lost,
-            'memory for a later start': 'too small' if status.ring_cut else 'sufficient',
-        },
-    )
+    progress = status.progress
+    level = OK
+    if status.state is RecordingState.FAILED:
+        level = ERROR
+    elif progress is not None and (progress.lost or status.slow):
+        level = WARN
+    values: dict[str, object] = {'state': status.state.value}
+    if progress is not None:
+        values |= {
+            'file': progress.path or 'none',
+            'part [1]': progress.part,
+            'size [B]': progress.size_bytes,
+            'messages': progress.messages,
+            'messages in memory only': progress.waiting,
+            'longest in memory only [s]': progress.oldest_s,
+            'messages lost': progress.lost,
+            'parts left uncompacted': progress.uncompacted,
+        }
+    values['memory for a later start'] = 'too small' if status.ring_cut else 'sufficient'
+    return _status('recording', level, status.text, values)
 
 
 def estimate_status(estimate: Estimate | None) -> DiagnosticStatus:

@@ -22,6 +22,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
+from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
@@ -190,6 +191,7 @@ class CoastdownNode(LifecycleNode):
             ship=self._ship,
             parameters=self._settings.parameters,
             history_ns=monitor.history_ns,
+            limits=PartLimits(self._settings.part_size_bytes, self._settings.part_duration_s),
         )
         self._session = Session(
             monitor,

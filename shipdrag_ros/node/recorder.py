@@ -2,28 +2,30 @@
 """
 Recording while the node runs: what came in, what went out, in that order.
 
-A disk that fills up must not stop the estimates: it is reported, and what was
-not written is counted.
+A thread writes; here nothing waits for a disk, so that one that is slow, full
+or gone stops no estimate. What was not written is counted.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import Enum
-from itertools import chain, count
 from pathlib import Path
+from time import monotonic
 
-from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.errors import BagError
-from shipdrag_ros.messages import OutputMessage
+from shipdrag_ros.bags.durable import DurableRecording, PartLimits, RecordingProgress
+from shipdrag_ros.messages import EncodedMessage, OutputMessage
 from shipdrag_ros.node.ring import RawMessage, RawRing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
 # the ring is cut by arrival, the monitor's memory by stamps
 MARGIN_NS = 600_000_000_000
+BEGIN_S = 0.5  # an answer to a start waits so long for the disk
+CLOSE_S = 5.0
+SLOW_S = 2.0
+DEFAULT_LIMITS = PartLimits()
 
 
 class RecordingState(Enum):
@@ -41,37 +43,40 @@ class RecordingStatus:
 
     Attributes
     ----------
-    path
-        File of this or of the last recording, None before the first.
-    messages, size_bytes
-        Written to it; bytes as on the disk now.
-    lost
-        Messages not written since it failed.
-    error
-        Why it failed, '' if it did not.
+    progress
+        Of this or of the last recording, None before the first.
     ring_cut
         Whether memory was too small to keep all that a recording started now should
         begin with; its replay may then differ from the live figures at first.
     """
 
     state: RecordingState
-    path: Path | None
-    messages: int
-    size_bytes: int
-    lost: int
-    error: str
+    progress: RecordingProgress | None
     ring_cut: bool
 
     @property
     def text(self) -> str:
         """One line for a log or for an operator."""
-        match self.state:
-            case RecordingState.OFF:
-                return 'not recording'
-            case RecordingState.RECORDING:
-                return f'recording to {self.path}'
-            case RecordingState.FAILED:
-                return f'recording failed, {self.lost} message(s) not written: {self.error}'
+        if self.progress is None:
+            return 'not recording'
+        lost = f'{self.progress.lost} message(s) lost'
+        if self.state is RecordingState.FAILED:
+            return (
+                f'recording failed, {lost}, {self.progress.waiting} kept in memory: '
+                f'{self.progress.error}; check output_directory'
+            )
+        if self.state is RecordingState.OFF:
+            text = 'not recording'
+        elif self.slow:
+            text = f'the disk is slow, {self.progress.oldest_s:.0f} s are in memory only'
+        else:
+            text = f'recording to {self.progress.path or "no file yet"}'
+        return f'{text}, {lost}' if self.progress.lost else text
+
+    @property
+    def slow(self) -> bool:
+        """Whether a loss of power would now cost more than it should."""
+        return self.progress is not None and self.progress.oldest_s > SLOW_S
 
 
 class Recorder:
@@ -88,6 +93,8 @@ class Recorder:
     history_ns
         Length of record that the monitor's words depend on [ns]; a bag begun later
         begins with it.
+    limits
+        When a recording goes on in a new file.
     """
 
     def __init__(
@@ -98,56 +105,52 @@ class Recorder:
         ship: Ship,
         parameters: Parameters,
         history_ns: int,
+        limits: PartLimits = DEFAULT_LIMITS,
     ) -> None:
         self._directory = directory
         self._namespace = namespace
-        self._ship = ship
-        self._parameters = parameters
+        self._attachments = {
+            'ship.yaml': ship.to_yaml(),
+            'parameters.yaml': parameters.to_yaml(),
+        }
+        self._limits = limits
         self._ring = RawRing(history_ns + MARGIN_NS)
-        self._writer: BagWriter | None = None
-        self._path: Path | None = None
-        self._messages = 0
-        self._lost = 0
-        self._error = ''
+        self._recording: DurableRecording | None = None
+        self._ended: list[DurableRecording] = []
 
     def start(self) -> None:
         """
-        Begin a bag with the latest messages before now; no effect while recording.
+        Begin a recording with the latest messages before now; no effect during one.
         """
-        if self._writer is not None:
-            return
-        self._messages = self._lost = 0
-        self._error = ''
-        try:
-            self._directory.mkdir(parents=True, exist_ok=True)
-            self._path = self._free_path()
-            self._writer = BagWriter(self._path)
-            self._writer.attach('ship.yaml', self._ship.to_yaml())
-            self._writer.attach('parameters.yaml', self._parameters.to_yaml())
-        except (OSError, BagError) as error:
-            self._fail(error)
-        for message in self._ring:
-            self._write_input(message)
+        if self._recording is None:
+            self._begin().wait_begun(BEGIN_S)
 
     def stop(self) -> None:
         """
-        Close the bag; no effect while there is none.
+        End the recording without waiting for it; no effect while there is none.
         """
-        writer, self._writer = self._writer, None
-        self._error = ''
-        if writer is not None:
-            try:
-                writer.close()
-            except (OSError, BagError) as error:
-                self._fail(error)
+        if self._recording is not None:
+            self._recording.stop()
+            self._ended = [it for it in self._ended if not it.wait_ended(0)]
+            self._ended.append(self._recording)
+            self._recording = None
+
+    def close(self) -> None:
+        """
+        End the recording and wait for the disk, a few seconds at most.
+        """
+        self.stop()
+        end_s = monotonic() + CLOSE_S
+        for recording in self._ended:
+            recording.wait_ended(max(end_s - monotonic(), 0.0))
 
     def new_part(self) -> None:
         """
         Go on in a new bag, if recording.
         """
-        if self._writer is not None:
+        if self._recording is not None:
             self.stop()
-            self.start()
+            self._begin()
 
     def forget(self) -> None:
         """
@@ -160,60 +163,45 @@ class Recorder:
         Take a message as received.
         """
         self._ring.add(message)
-        self._write_input(message)
+        if self._recording is not None:
+            self._recording.put(self._encoded(message))
 
     def output(self, message: OutputMessage, receive_ns: int) -> None:
         """
         Take a message of the node, caused by what arrived at `receive_ns`.
         """
-        self._write(message.topic, message.type, message.payload, receive_ns, message.stamp_ns)
+        if self._recording is not None:
+            self._recording.put(
+                EncodedMessage(
+                    message.topic, message.type, message.payload, receive_ns, message.stamp_ns
+                )
+            )
 
     def status(self) -> RecordingStatus:
         """
         Return how the recording stands.
         """
-        if self._error:
+        recording = self._recording or next(reversed(self._ended), None)
+        progress = None if recording is None else recording.progress()
+        if progress is not None and progress.error:
             state = RecordingState.FAILED
         else:
-            state = RecordingState.OFF if self._writer is None else RecordingState.RECORDING
-        size = 0
-        if self._path is not None and self._path.exists():
-            size = self._path.stat().st_size
-        return RecordingStatus(
-            state, self._path, self._messages, size, self._lost, self._error, self._ring.cut
-        )
+            state = RecordingState.OFF if self._recording is None else RecordingState.RECORDING
+        return RecordingStatus(state, progress, self._ring.cut)
 
-    def _write_input(self, message: RawMessage) -> None:
-        topic = f'{self._namespace}/{message.input}'
-        self._write(topic, message.type, message.data, message.receive_ns, message.stamp_ns)
-
-    def _write(self, topic: str, type_name: str, data: bytes, log_ns: int, stamp_ns: int) -> None:
-        if self._error:
-            self._lost += 1
-        if self._writer is None:
-            return
-        try:
-            self._writer.write(topic, type_name, data, log_ns=log_ns, publish_ns=stamp_ns)
-        except (OSError, BagError) as error:
-            self._fail(error)
-            self._lost += 1
-        else:
-            self._messages += 1
-
-    def _fail(self, error: Exception) -> None:
-        writer, self._writer = self._writer, None
-        self._error = str(error)
-        if isinstance(error, OSError) and error.filename is not None:
-            self._error = f'{str(error.filename)!r}: {error.strerror}; check output_directory'
-        if writer is not None:
-            with suppress(OSError, BagError):  # what has been written may still be read
-                writer.close()
-
-    def _free_path(self) -> Path:
+    def _begin(self) -> DurableRecording:
         stamp = datetime.now(UTC).strftime('%Y%m%dT%H%M%SZ')
-        names = chain([f'coastdown_{stamp}'], (f'coastdown_{stamp}_{i}' for i in count(2)))
-        return next(
-            path
-            for path in (self._directory / f'{name}.mcap' for name in names)
-            if not path.exists()
+        self._recording = DurableRecording(
+            self._directory,
+            stem=f'coastdown_{stamp}',
+            attachments=self._attachments,
+            limits=self._limits,
+            earlier=map(self._encoded, self._ring),
+        )
+        return self._recording
+
+    def _encoded(self, message: RawMessage) -> EncodedMessage:
+        topic = f'{self._namespace}/{message.input}'
+        return EncodedMessage(
+            topic, message.type, message.data, message.receive_ns, message.stamp_ns
         )

@@ -10,7 +10,7 @@ from __future__ import annotations
 import pickle
 import zlib
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 SEGMENT_BYTES = 64 * 1024  # packed at once: a millisecond or two
@@ -82,9 +82,8 @@ class RawRing:
         self.cut = False
 
     def __iter__(self) -> Iterator[RawMessage]:
-        for segment in self._segments:
-            yield from map(RawMessage._make, pickle.loads(zlib.decompress(segment.packed)))
-        yield from self._open
+        """Give the messages of this moment, whatever is added while they are read."""
+        return _unpack(tuple(self._segments), tuple(self._open))
 
     def _pack(self) -> None:
         plain = [tuple(message) for message in self._open]
@@ -101,3 +100,9 @@ class RawRing:
                 return
             self.cut = self.cut or too_many
             self._packed_bytes -= len(self._segments.popleft().packed)
+
+
+def _unpack(segments: Iterable[_Segment], behind: Iterable[RawMessage]) -> Iterator[RawMessage]:
+    for segment in segments:
+        yield from map(RawMessage._make, pickle.loads(zlib.decompress(segment.packed)))
+    yield from behind

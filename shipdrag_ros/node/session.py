@@ -108,7 +108,7 @@ class Session:
         try:
             self._report(self.monitor.finish())
         finally:  # whatever is wrong, the bag is closed
-            self.recorder.stop()
+            self.recorder.close()
 
     def _reset(self, reason: str) -> None:
         # first the request, at whose place a replay resets too

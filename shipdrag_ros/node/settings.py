@@ -13,6 +13,7 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
+from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.errors import ParameterError
 from shipdrag_ros.messages import TOPICS
 from shipdrag_ros.parameters import Parameters
@@ -40,6 +41,23 @@ OWN: tuple[Setting, ...] = (
         'output_directory',
         '.',
         'where recordings are written; made if missing, nothing there is ever overwritten',
+    ),
+    Setting(
+        'part_size_bytes',
+        PartLimits().size_bytes,
+        'a recording goes on in a new file when one has grown to this; it is then rewritten '
+        'several times smaller',
+        unit='B',
+        low=1e5,
+        high=1e10,
+    ),
+    Setting(
+        'part_duration_s',
+        PartLimits().duration_s,
+        'a recording goes on in a new file when one covers this time',
+        unit='s',
+        low=1.0,
+        high=604800.0,
     ),
     Setting('autostart', True, 'configure and activate without being asked to'),
 )
@@ -84,6 +102,8 @@ class NodeSettings:
     ship_file: str
     record: bool
     output_directory: str
+    part_size_bytes: int
+    part_duration_s: float
     autostart: bool
     types: Mapping[str, str]
     parameters: Parameters
@@ -107,8 +127,11 @@ class NodeSettings:
         ]
         merged = {name: values.get(name, setting.default) for name, setting in here.items()}
         for name, value in merged.items():
-            kind = type(here[name].default)
-            choices = here[name].choices
+            setting = here[name]
+            kind = type(setting.default)
+            choices = setting.choices
+            if kind is float and type(value) is int:
+                merged[name] = value = float(value)
             if type(value) is not kind:
                 problems.append(
                     f'{name}: {value!r} is of type {type(value).__name__}, '
@@ -116,6 +139,13 @@ class NodeSettings:
                 )
             elif choices and value not in choices:
                 problems.append(f'{name}: {value!r}, expected one of {", ".join(choices[1:])}')
+            elif (
+                isinstance(value, int | float)
+                and setting.low is not None
+                and setting.high is not None
+                and not setting.low <= value <= setting.high
+            ):
+                problems.append(f'{name}: {value!r}, expected {setting.low:g} to {setting.high:g}')
         parameters = Parameters()
         try:
             parameters = Parameters.from_mapping(
@@ -127,14 +157,8 @@ class NodeSettings:
         if problems:
             raise ParameterError(subject, problems)
         types = {name: str(merged[f'{name}.type']) for name in TOPICS if merged[f'{name}.type']}
-        return cls(
-            str(merged['ship_file']),
-            bool(merged['record']),
-            str(merged['output_directory']),
-            bool(merged['autostart']),
-            types,
-            parameters,
-        )
+        own = {setting.name: merged[setting.name] for setting in OWN}
+        return cls(**own, types=types, parameters=parameters)  # type: ignore[arg-type]
 
     def to_mapping(self) -> dict[str, Value]:
         """

@@ -138,7 +138,7 @@ def test_a_type_that_nobody_knows_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path('/dev/full').exists(), reason='no /dev/full here')
 def test_a_full_disk_is_told(monkeypatch: pytest.MonkeyPatch, block: Block) -> None:
-    monkeypatch.setattr(Path, 'open', lambda *_: io.FileIO('/dev/full', 'w'))
+    monkeypatch.setattr(Path, 'open', lambda *_: io.BufferedWriter(io.FileIO('/dev/full', 'w')))
     bag = BagWriter(Path('a.mcap'), chunk_bytes=1024)
     with pytest.raises(BagError, match=r'a\.mcap.* cannot be written: No space'):  # noqa: PT012
         for message in encode(block):

@@ -159,7 +159,7 @@ def test_estimates_on_when_the_disk_does_not_take_it(
     peer.player.connect(block)
     peer.player.publish(block)
     diagnostics.wait_for('input speed_through_water', '5', value='used')
-    diagnostics.wait_for('recording', '6', value='messages not written')
+    diagnostics.wait_for('recording', '6', value='messages in memory only')
     assert diagnostics.wait_for('recording', 'recording failed').level == b'\x02'
     answer = peer.trigger('start_recording')
     assert not answer.success

@@ -1,29 +1,38 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is written, in which order, and what happens when it cannot be."""
+"""What is recorded, in which order, and what is said when it cannot be."""
 
 from __future__ import annotations
 
+import re
+import time
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from mcap.reader import make_reader
 
-from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.bags.durable import PartLimits
+from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EventKind, EventNote, OutputMessage, event_message
-from shipdrag_ros.node.recorder import Recorder, RecordingState
+from shipdrag_ros.node.recorder import DEFAULT_LIMITS, SLOW_S, Recorder, RecordingState
 from shipdrag_ros.node.ring import RawMessage
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
 SHIP = Ship.from_yaml('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n', subject='test')
 PARAMETERS = Parameters(window_s=60.0, steady_s=60.0)
+WITHIN_S = 20.0
 
 
-def recorder(directory: Path) -> Recorder:
+def recorder(directory: Path, *, limits: PartLimits = DEFAULT_LIMITS) -> Recorder:
     return Recorder(
-        directory, namespace='/ship', ship=SHIP, parameters=PARAMETERS, history_ns=10**9
+        directory,
+        namespace='/ship',
+        ship=SHIP,
+        parameters=PARAMETERS,
+        history_ns=10**9,
+        limits=limits,
     )
 
 
@@ -47,20 +56,32 @@ def attachments(path: Path) -> dict[str, str]:
 
 
 def path_of(recorder: Recorder) -> Path:
-    path = recorder.status().path
-    assert path is not None
-    return path
+    progress = recorder.status().progress
+    assert progress is not None
+    assert progress.path is not None
+    return progress.path
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + WITHIN_S
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def test_writes_inputs_and_outputs_in_order(tmp_path: Path) -> None:
     it = recorder(tmp_path / 'made' / 'here')
+    assert it.status().text == 'not recording'
     it.start()
     it.input(received(100))
     it.output(sent(7), 100)
     assert it.status().state is RecordingState.RECORDING
-    assert it.status().messages == 2
-    it.stop()
+    assert it.status().text == f'recording to {path_of(it)}'
+    it.close()
     assert it.status().state is RecordingState.OFF
+    progress = it.status().progress
+    assert progress is not None
+    assert (progress.messages, progress.waiting, progress.lost) == (2, 0, 0)
     path = path_of(it)
     assert rows(path) == [('/ship/depth', 100, 5), ('/coastdown_node/events', 100, 7)]
     assert Ship.from_yaml(attachments(path)['ship.yaml'], subject='bag') == SHIP
@@ -75,7 +96,7 @@ def test_begins_with_what_came_before(tmp_path: Path) -> None:
     it.input(received(2))
     it.start()
     it.input(received(3))
-    it.stop()
+    it.close()
     assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [1, 2, 3]
 
 
@@ -84,7 +105,7 @@ def test_forgets_on_a_reset(tmp_path: Path) -> None:
     it.input(received(1))
     it.forget()
     it.start()
-    it.stop()
+    it.close()
     assert rows(path_of(it)) == []
 
 
@@ -95,7 +116,9 @@ def test_never_overwrites(tmp_path: Path) -> None:
         it.input(received(arrival_ns))
         it.stop()
         it.forget()
-    assert len(list(tmp_path.glob('coastdown_*.mcap'))) == 3
+    it.close()
+    bags = sorted(tmp_path.glob('coastdown_*.mcap'))
+    assert sorted(log_ns for bag in bags for _, log_ns, _ in rows(bag)) == [0, 1, 2]
 
 
 def test_start_while_recording_and_stop_while_not_change_nothing(tmp_path: Path) -> None:
@@ -105,8 +128,9 @@ def test_start_while_recording_and_stop_while_not_change_nothing(tmp_path: Path)
     first = path_of(it)
     it.start()
     assert path_of(it) == first
-    it.stop()
-    it.stop()
+    it.close()
+    it.close()
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_new_part_only_while_recording(tmp_path: Path) -> None:
@@ -115,11 +139,21 @@ def test_a_new_part_only_while_recording(tmp_path: Path) -> None:
     assert it.status().state is RecordingState.OFF
     it.start()
     it.new_part()
-    it.stop()
+    it.close()
     assert len(list(tmp_path.glob('*.mcap'))) == 2
 
 
-def test_a_place_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
+def test_the_limits_of_a_part_are_those_given(tmp_path: Path) -> None:
+    it = recorder(tmp_path, limits=PartLimits(size_bytes=10**9, duration_s=10.0))
+    it.start()
+    for second in range(30):
+        it.input(received(second * 10**9))
+    it.close()
+    parts = sorted(tmp_path.glob('*.mcap'))
+    assert [len(rows(part)) for part in parts] == [11, 11, 8]
+
+
+def test_a_place_that_cannot_be_written_is_reported_until_it_can(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('')
     it = recorder(tmp_path / 'file')
     it.start()
@@ -127,43 +161,66 @@ def test_a_place_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     it.output(sent(1), 1)
     status = it.status()
     assert status.state is RecordingState.FAILED
-    assert status.lost == 2
-    assert 'recording failed, 2 message(s) not written' in status.text
+    assert 'recording failed, 0 message(s) lost, 2 kept in memory: ' in status.text
+    assert status.text.endswith("file': File exists; check output_directory")
+    (tmp_path / 'file').unlink()
+    wait_until(lambda: it.status().state is RecordingState.RECORDING)
+    it.close()
+    assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [1, 1]
 
 
-def test_a_disk_that_fills_up_is_counted_and_may_be_retried(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    it = recorder(tmp_path)
+def test_a_disk_that_fails_to_the_end_is_reported_after_it(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    it = recorder(tmp_path / 'file')
     it.start()
     it.input(received(1))
-
-    def full(*_: Any, **__: Any) -> None:
-        raise BagError('No space left on device')
-
-    with monkeypatch.context() as disk:
-        disk.setattr(BagWriter, 'write', full)
-        it.input(received(2))
-    it.input(received(3))
-    assert it.status().lost == 2
-    assert 'No space left on device' in it.status().text
-    it.start()
-    it.stop()
-    assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [1, 2, 3]
-    assert it.status().lost == 0
+    it.close()
+    status = it.status()
+    assert status.state is RecordingState.FAILED
+    assert 'recording failed, 1 message(s) lost, 0 kept' in status.text
 
 
-def test_a_bag_that_cannot_be_closed_is_reported(
+def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     it = recorder(tmp_path)
     it.start()
-    close = BagWriter.close
+    sync = LiveFile.sync
 
-    def full(writer: BagWriter) -> None:
-        close(writer)
-        raise BagError('No space left on device')
+    def hang(file: LiveFile) -> None:
+        time.sleep(SLOW_S + 1.0)
+        sync(file)
 
-    monkeypatch.setattr(BagWriter, 'close', full)
-    it.stop()
-    assert it.status().state is RecordingState.FAILED
+    with monkeypatch.context() as disk:
+        disk.setattr(LiveFile, 'sync', hang)
+        took_s = []
+        end = time.monotonic() + SLOW_S + 0.7
+        while time.monotonic() < end:
+            before = time.monotonic()
+            it.input(received(1))
+            took_s.append(time.monotonic() - before)
+            time.sleep(0.01)
+        assert it.status().slow
+        assert re.search('the disk is slow, [23] s are in memory only', it.status().text)
+    assert max(took_s) < 1.0
+    it.close()
+    assert len(rows(path_of(it))) == len(took_s)
+    assert not it.status().slow
+
+
+def test_a_full_disk_is_told_with_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    it = recorder(tmp_path)
+    it.start()
+    path = path_of(it)
+
+    def full(*_: object) -> None:
+        raise BagError(f'{str(path)!r} cannot be written: No space left on device')
+
+    monkeypatch.setattr(LiveFile, 'append', full)
+    it.input(received(1))
+    wait_until(lambda: it.status().state is RecordingState.FAILED)
+    assert f'{path.name}' in it.status().text
+    assert 'No space left on device' in it.status().text
+    it.close()

@@ -1,0 +1,338 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Recording beside the work: a thread that writes, and a queue that never blocks.
+
+What was handed over is held in memory until the disk has it, so that a disk
+that fails for a while loses nothing that memory can hold.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import chain, count, islice
+from pathlib import Path
+from time import monotonic
+from uuid import uuid4
+
+from shipdrag_ros.bags.compaction import compact
+from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import EncodedMessage
+
+WRITE_S = 0.1  # to the system: survives the end of the process
+SYNC_S = 0.5  # to the disk: survives the end of the power
+RETRY_S = 1.0
+CHUNK_BYTES = 1 << 20
+EARLIER_AT_ONCE = 4096
+QUEUE_BYTES = 64 * 1024 * 1024
+_MESSAGE_BYTES = 400  # of Python, around the content
+
+
+@dataclass(frozen=True)
+class PartLimits:
+    """
+    When a recording goes on in a new file.
+
+    Attributes
+    ----------
+    size_bytes
+        Of the file while it grows; it shrinks when it is finished.
+    duration_s
+        From the arrival of its first message to that of its last.
+    """
+
+    size_bytes: int = 64 * 1024 * 1024
+    duration_s: float = 21_600.0
+
+
+@dataclass(frozen=True)
+class RecordingProgress:
+    """
+    How a recording stands.
+
+    Attributes
+    ----------
+    path
+        File of the part being written, or of the last.
+    part
+        Its number, from 0.
+    messages, size_bytes
+        On the disk; of the whole recording, and of this part.
+    waiting
+        Messages in memory only.
+    lost
+        Messages that found no room in memory, or no disk until the end.
+    oldest_s
+        How long the oldest of those in memory has been waiting [s].
+    error
+        Why nothing is written now, '' if it is.
+    uncompacted
+        Finished parts that could not be made compact; they are whole.
+    """
+
+    path: Path | None
+    part: int
+    messages: int
+    size_bytes: int
+    waiting: int
+    lost: int
+    oldest_s: float
+    error: str
+    uncompacted: int
+
+
+class DurableRecording:
+    """
+    A recording in one part or several, safe at every moment but the last.
+
+    Parameters
+    ----------
+    directory
+        Where the parts are written; made if missing, also when it has vanished.
+    stem
+        Parts are named `STEM_000.mcap` and so on; no file is ever overwritten.
+    attachments
+        Text by name, at the beginning of each part.
+    limits
+        When a new part is begun.
+    earlier
+        Messages to begin with; read in the thread that writes.
+    queue_bytes
+        Memory for what waits for the disk; what finds no room is counted.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        *,
+        stem: str,
+        attachments: Mapping[str, str],
+        limits: PartLimits,
+        earlier: Iterable[EncodedMessage] = (),
+        queue_bytes: int = QUEUE_BYTES,
+    ) -> None:
+        self._directory = directory
+        self._stem = stem
+        self._attachments = attachments
+        self._limits = limits
+        self._earlier: Iterator[EncodedMessage] | None = iter(earlier)
+        self._queue_bytes = queue_bytes
+        self._recording_id = uuid4().hex
+        self._part = 0
+        self._file: LiveFile | None = None
+        self._path: Path | None = None
+        # handed over -> queue -> due to be written -> written, not yet safe -> safe
+        self._lock = threading.Lock()
+        self._queue: list[EncodedMessage] = []
+        self._due: list[EncodedMessage] = []
+        self._unsynced: list[EncodedMessage] = []
+        self._held_bytes = 0
+        self._accepted = self._safe = self._lost = 0
+        self._size_bytes = 0
+        self._oldest_s = self._taken_s = self._synced_s = monotonic()
+        self._retry_s = 0.0
+        self._error = ''
+        self._uncompacted: list[tuple[Path, int]] = []
+        self._compactor: threading.Thread | None = None
+        self._ending = threading.Event()
+        self._tried = threading.Event()
+        # a disk that hangs for ever must not keep the process: what is on it is whole
+        self._thread = threading.Thread(target=self._run, name='recording', daemon=True)
+        self._thread.start()
+
+    def put(self, message: EncodedMessage) -> None:
+        """
+        Hand a message over; returns at once, whatever the disk does.
+        """
+        size = _held_bytes([message])
+        with self._lock:
+            if self._held_bytes + size > self._queue_bytes:
+                self._lost += 1
+                return
+            if self._accepted == self._safe:
+                self._oldest_s = monotonic()
+            self._queue.append(message)
+            self._held_bytes += size
+            self._accepted += 1
+
+    def stop(self) -> None:
+        """
+        Ask for the end; returns at once.
+        """
+        self._ending.set()
+
+    def wait_begun(self, timeout_s: float) -> None:
+        """
+        Wait until the first file is there, or has been refused.
+        """
+        self._tried.wait(timeout_s)
+
+    def wait_ended(self, timeout_s: float) -> bool:
+        """
+        Wait after `stop`; return whether all that can be written is.
+        """
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def progress(self) -> RecordingProgress:
+        """
+        Return how the recording stands; asks no disk.
+        """
+        with self._lock:
+            waiting = self._accepted - self._safe
+            return RecordingProgress(
+                path=self._path,
+                part=self._part,
+                messages=self._safe,
+                size_bytes=self._size_bytes,
+                waiting=waiting,
+                lost=self._lost,
+                oldest_s=monotonic() - self._oldest_s if waiting else 0.0,
+                error=self._error,
+                uncompacted=len(self._uncompacted),
+            )
+
+    def _run(self) -> None:
+        while True:
+            hurry = self._earlier is not None and not self._error
+            ending = self._ending.wait(0.0 if hurry else WRITE_S)
+            self._take()
+            if ending or monotonic() >= self._retry_s:
+                try:
+                    self._write()
+                    if ending or hurry or monotonic() - self._synced_s >= SYNC_S:
+                        self._sync()
+                except Exception as error:  # a thread that ends unseen would lose all
+                    self._fail(error)
+            if ending and (self._error or self._earlier is None):
+                break
+        self._finish()
+
+    def _take(self) -> None:
+        """Take over what was handed over, the earlier messages before all others."""
+        if self._earlier is not None and not self._due:
+            self._due = list(islice(self._earlier, EARLIER_AT_ONCE))
+            with self._lock:
+                self._accepted += len(self._due)
+                self._held_bytes += _held_bytes(self._due)
+            if not self._due:
+                self._earlier = None
+        if self._earlier is None:
+            with self._lock:
+                self._due += self._queue
+                self._queue = []
+                self._taken_s = monotonic()
+
+    def _write(self) -> None:
+        file = self._file or self._open()
+        while self._due:
+            fitting = self._fitting(file)
+            if not fitting:
+                self._end_part(file)
+                file = self._open()
+                continue
+            file.append(self._due[:fitting])
+            self._unsynced += self._due[:fitting]
+            del self._due[:fitting]
+
+    def _fitting(self, file: LiveFile) -> int:
+        """Return how many of the messages that are due the part takes as one chunk."""
+        room = min(CHUNK_BYTES, self._limits.size_bytes - file.size_bytes)
+        begin_ns = self._due[0].log_ns if file.first_log_ns is None else file.first_log_ns
+        end_ns = begin_ns + round(self._limits.duration_s * 1e9)
+        fitting = 0
+        for message in self._due:
+            empty = file.first_log_ns is None and not fitting  # takes one, whatever its size
+            if not empty and (room <= 0 or message.log_ns > end_ns):
+                break
+            room -= len(message.payload)
+            fitting += 1
+        return fitting
+
+    def _sync(self) -> None:
+        if self._file is not None and self._unsynced:
+            self._file.sync()
+            with self._lock:
+                self._safe += len(self._unsynced)
+                self._held_bytes -= _held_bytes(self._unsynced)
+                self._oldest_s = self._taken_s
+            self._unsynced = []
+            self._size_bytes = self._file.synced_bytes
+        self._synced_s = monotonic()
+        self._error = ''
+
+    def _open(self) -> LiveFile:
+        try:
+            self._directory.mkdir(parents=True, exist_ok=True)
+            self._path = self._free_path()
+        except OSError as error:
+            raise BagError(f'{str(error.filename)!r}: {error.strerror}') from error
+        self._file = LiveFile(
+            self._path,
+            recording_id=self._recording_id,
+            part=self._part,
+            attachments=self._attachments,
+        )
+        self._tried.set()
+        return self._file
+
+    def _free_path(self) -> Path:
+        name = f'{self._stem}_{self._part:03d}'
+        names = chain([name], (f'{name}_{i}' for i in count(2)))
+        paths = (self._directory / f'{name}.mcap' for name in names)
+        return next(path for path in paths if not path.exists())
+
+    def _end_part(self, file: LiveFile) -> None:
+        self._sync()
+        file.close()
+        self._leave(file)
+        if self._compactor is None or not self._compactor.is_alive():
+            self._compactor = threading.Thread(
+                target=self._compact, name='compaction', daemon=True
+            )
+            self._compactor.start()
+
+    def _leave(self, file: LiveFile) -> None:
+        self._uncompacted.append((file.path, file.synced_messages))
+        self._file = None
+        self._part += 1
+
+    def _fail(self, error: Exception) -> None:
+        """Let the file be as it was when last safe; what came behind goes to the next."""
+        file, self._file = self._file, None
+        if file is not None:
+            file.abandon()
+            if file.synced_messages:
+                self._leave(file)
+        self._due = self._unsynced + self._due
+        self._unsynced = []
+        self._error = str(error)
+        self._retry_s = monotonic() + RETRY_S
+        self._tried.set()
+
+    def _finish(self) -> None:
+        if self._file is not None:
+            try:
+                self._file.close()
+                self._leave(self._file)
+            except BagError as error:
+                self._fail(error)
+        with self._lock:
+            self._lost += self._accepted - self._safe
+            self._accepted = self._safe
+        if self._compactor is not None:
+            self._compactor.join()
+        self._compact()
+
+    def _compact(self) -> None:
+        for part in tuple(self._uncompacted):
+            with suppress(BagError):  # it is tried again with the next part, and counted
+                compact(part[0], messages=part[1])
+                self._uncompacted.remove(part)
+
+
+def _held_bytes(messages: Iterable[EncodedMessage]) -> int:
+    return sum(len(message.payload) + _MESSAGE_BYTES for message in messages)

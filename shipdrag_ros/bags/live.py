@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A recording while it grows: nothing in it depends on how it ends.
+
+What tells the messages apart comes first and comes again; each write is a chunk
+of its own with a checksum; no index is kept, so that it takes no memory.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from zlib import crc32
+
+from mcap.data_stream import RecordBuilder
+from mcap.records import (
+    Attachment,
+    Channel,
+    Chunk,
+    DataEnd,
+    Footer,
+    Header,
+    Message,
+    Metadata,
+    Schema,
+)
+
+from shipdrag_ros.bags import declarations
+from shipdrag_ros.bags.declarations import LIBRARY, PROFILE, as_bytes
+from shipdrag_ros.bags.records import MAGIC
+from shipdrag_ros.bags.writer import METADATA
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import EncodedMessage
+
+DECLARE_BYTES = 1 << 20  # topics are declared anew behind so much
+
+
+class LiveFile:
+    """
+    An MCAP file that is safe up to its last `sync`.
+
+    Parameters
+    ----------
+    path
+        File to make; one that exists is never overwritten.
+    recording_id, part
+        Files of one recording carry the same id and are numbered from 0.
+    attachments
+        Text by name.
+
+    Attributes
+    ----------
+    size_bytes
+        Written so far.
+    synced_bytes, synced_messages
+        Of these, safe when the power goes.
+
+    Raises
+    ------
+    BagError
+        If the file exists or cannot be made.
+    """
+
+    def __init__(
+        self, path: Path, *, recording_id: str, part: int, attachments: Mapping[str, str]
+    ) -> None:
+        self.path = path
+        self.size_bytes = self.synced_bytes = self.synced_messages = 0
+        self.first_log_ns: int | None = None
+        self._messages = 0
+        self._schemas: dict[str, Schema] = {}
+        self._channels: dict[tuple[str, str], Channel] = {}
+        self._declared_at = 0
+        try:
+            # unbuffered: what could not be written must not be tried again on closing
+            self._file = path.open('xb', buffering=0)
+        except FileExistsError:
+            raise BagError(f'{str(path)!r} exists') from None
+        except OSError as error:
+            raise BagError(f'{str(path)!r} cannot be made: {error.strerror}') from error
+        try:
+            self._write(
+                MAGIC
+                + as_bytes(
+                    Header(PROFILE, LIBRARY),
+                    Metadata(METADATA, declarations.metadata(recording_id, part)),
+                )
+                + b''.join(_attachment(name, text) for name, text in attachments.items())
+            )
+            self.sync()
+            sync_directory(path.parent)
+        except (OSError, BagError) as error:
+            self.abandon()
+            raise BagError(f'{str(path)!r} cannot be made: {_reason(error)}') from error
+
+    def append(self, messages: Sequence[EncodedMessage]) -> None:
+        """
+        Write messages as one chunk.
+
+        Raises
+        ------
+        BagError
+            If a type is not known or the disk does not take it.
+        """
+        new = [record for message in messages for record in self._declare(message)]
+        if new:
+            self._write(as_bytes(*new))
+        if self.size_bytes - self._declared_at > DECLARE_BYTES:
+            self._write(as_bytes(*self._schemas.values(), *self._channels.values()))
+            self._declared_at = self.size_bytes
+        self._write(as_bytes(self._chunk(messages)))
+        self._messages += len(messages)
+        if self.first_log_ns is None:
+            self.first_log_ns = messages[0].log_ns
+
+    def sync(self) -> None:
+        """
+        Bring what is written to the disk.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it, or the file is no longer in its place.
+        """
+        try:
+            os.fsync(self._file.fileno())
+            here, there = os.fstat(self._file.fileno()), self.path.stat()
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r}: {error.strerror}') from error
+        if (here.st_ino, here.st_dev) != (there.st_ino, there.st_dev):
+            raise BagError(f'{str(self.path)!r} was replaced by another file')
+        self.synced_bytes, self.synced_messages = self.size_bytes, self._messages
+
+    def close(self) -> None:
+        """
+        Write the end, without an index, and bring everything to the disk.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        self._write(as_bytes(DataEnd(0), Footer(0, 0, 0)) + MAGIC)
+        self.sync()
+        self._file.close()
+
+    def abandon(self) -> None:
+        """
+        Leave the file as the last `sync` did; without messages, remove it.
+        """
+        with suppress(OSError):
+            self._file.truncate(self.synced_bytes)
+        with suppress(OSError):
+            self._file.close()
+        if not self.synced_messages:
+            with suppress(OSError):
+                self.path.unlink()
+
+    def _declare(self, message: EncodedMessage) -> list[Schema | Channel]:
+        """Return what must be said before this message can be understood."""
+        new: list[Schema | Channel] = []
+        key = (message.topic, message.type)
+        if key not in self._channels:
+            if message.type not in self._schemas:
+                number = len(self._schemas) + 1
+                self._schemas[message.type] = declarations.schema(number, message.type)
+                new.append(self._schemas[message.type])
+            self._channels[key] = declarations.channel(
+                len(self._channels) + 1, *key, schema_id=self._schemas[message.type].id
+            )
+            new.append(self._channels[key])
+        return new
+
+    def _chunk(self, messages: Sequence[EncodedMessage]) -> Chunk:
+        builder = RecordBuilder()
+        for message in messages:
+            Message(
+                channel_id=self._channels[message.topic, message.type].id,
+                sequence=0,
+                log_time=message.log_ns,
+                # a stamp before 1970 has no place here; the message itself keeps it
+                publish_time=max(message.publish_ns, 0),
+                data=message.payload,
+            ).write(builder)
+        data = builder.end()
+        return Chunk(
+            compression='',
+            data=data,
+            message_start_time=min(message.log_ns for message in messages),
+            message_end_time=max(message.log_ns for message in messages),
+            uncompressed_crc=crc32(data),
+            uncompressed_size=len(data),
+        )
+
+    def _write(self, data: bytes) -> None:
+        left = memoryview(data)
+        try:
+            while left:
+                left = left[self._file.write(left) :]
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
+        self.size_bytes += len(data)
+
+
+def sync_directory(path: Path) -> None:
+    """
+    Bring the names in a directory to the disk.
+    """
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _attachment(name: str, text: str) -> bytes:
+    return as_bytes(
+        Attachment(
+            create_time=0,
+            log_time=0,
+            name=name,
+            media_type=declarations.media_type(name),
+            data=text.encode(),
+        )
+    )
+
+
+def _reason(error: OSError | BagError) -> str:
+    return str(error) if isinstance(error, BagError) else str(error.strerror)

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nothing handed over is lost while memory can hold it, whatever the disk does."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from shipdrag_ros.bags import durable as module
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.bags.compaction import compact
+from shipdrag_ros.bags.durable import DurableRecording, PartLimits, RecordingProgress
+from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import EncodedMessage
+
+WITHIN_S = 20.0
+SECOND_NS = 10**9
+FULL = BagError('No space left on device')
+
+
+def message(number: int, *, size: int = 40) -> EncodedMessage:
+    payload = number.to_bytes(8, 'little') + bytes(size - 8)
+    return EncodedMessage(
+        '/depth', 'sensor_msgs/msg/Range', payload, number * SECOND_NS, number * SECOND_NS
+    )
+
+
+def recording(
+    directory: Path,
+    *,
+    limits: PartLimits | None = None,
+    earlier: Iterable[EncodedMessage] = (),
+    queue_bytes: int = 10**7,
+) -> DurableRecording:
+    it = DurableRecording(
+        directory,
+        stem='a',
+        attachments={'ship.yaml': 'name: x\n'},
+        limits=limits or PartLimits(),
+        earlier=earlier,
+        queue_bytes=queue_bytes,
+    )
+    it.wait_begun(WITHIN_S)
+    return it
+
+
+def numbers(path: Path) -> list[int]:
+    with path.open('rb') as stream:
+        messages = make_reader(stream, validate_crcs=True).iter_messages(log_time_order=False)
+        return [m.log_time // SECOND_NS for _, _, m in messages]
+
+
+def all_numbers(directory: Path) -> list[int]:
+    """Return what is in the parts, in their order."""
+    return [n for path in sorted(directory.glob('*.mcap')) for n in numbers(path)]
+
+
+def end(it: DurableRecording) -> RecordingProgress:
+    it.stop()
+    assert it.wait_ended(WITHIN_S)
+    return it.progress()
+
+
+def wait_until(condition: Callable[[], object]) -> None:
+    deadline = time.monotonic() + WITHIN_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Try a failed disk again soon."""
+    monkeypatch.setattr(module, 'RETRY_S', 0.05)
+
+
+def test_all_that_was_handed_over_is_there_in_order(tmp_path: Path) -> None:
+    it = recording(tmp_path, earlier=map(message, range(10_000)))
+    for number in range(10_000, 10_500):
+        it.put(message(number))
+    progress = end(it)
+    assert (progress.messages, progress.waiting, progress.lost) == (10_500, 0, 0)
+    assert all_numbers(tmp_path) == list(range(10_500))
+
+
+def test_it_is_on_the_disk_within_a_second(tmp_path: Path) -> None:
+    it = recording(tmp_path)
+    oldest_s = 0.0
+    for number in range(100):
+        it.put(message(number))
+        oldest_s = max(oldest_s, it.progress().oldest_s)
+        time.sleep(0.02)
+    assert 0.0 < oldest_s < 1.0
+    wait_until(lambda: it.progress().messages == 100)
+    assert it.progress().oldest_s == 0.0
+    end(it)
+
+
+def test_a_new_part_by_size(tmp_path: Path) -> None:
+    it = recording(
+        tmp_path,
+        limits=PartLimits(size_bytes=50_000, duration_s=1e6),
+        earlier=[message(n, size=1000) for n in range(200)],
+    )
+    end(it)
+    parts = sorted(tmp_path.glob('*.mcap'))
+    assert [part.name for part in parts[:2]] == ['a_000.mcap', 'a_001.mcap']
+    assert len(parts) >= 4
+    assert all_numbers(tmp_path) == list(range(200))
+
+
+def test_a_new_part_by_time_and_readers_join_them(tmp_path: Path) -> None:
+    it = recording(
+        tmp_path,
+        limits=PartLimits(size_bytes=10**9, duration_s=60.0),
+        earlier=map(message, range(200)),
+    )
+    end(it)
+    parts = sorted(tmp_path.glob('*.mcap'))
+    assert [len(numbers(part)) for part in parts] == [61, 61, 61, 17]
+    (run,) = open_runs(reversed(parts))
+    assert run.warnings == ()
+    assert run.attachments == {'ship.yaml': 'name: x\n'}
+    assert run.paths == tuple(parts)
+    (alone,) = open_runs([parts[2]])
+    assert alone.attachments == run.attachments
+
+
+@pytest.mark.usefixtures('quick')
+def test_a_disk_that_is_full_for_a_while_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    it = recording(tmp_path)
+    it.put(message(0))
+    wait_until(lambda: it.progress().messages == 1)
+    write = LiveFile._write
+
+    def half(file: LiveFile, data: bytes) -> None:
+        file._file.write(data[: len(data) // 2])
+        raise FULL
+
+    with monkeypatch.context() as disk:
+        disk.setattr(LiveFile, '_write', half)
+        it.put(message(1))
+        wait_until(lambda: it.progress().error)
+        it.put(message(2))
+        time.sleep(0.5)
+        assert it.progress().waiting == 2
+    assert LiveFile._write is write
+    wait_until(lambda: it.progress().messages == 3)
+    assert it.progress().error == ''
+    it.put(message(3))
+    assert end(it).lost == 0
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ['a_000.mcap', 'a_001.mcap']
+    assert all_numbers(tmp_path) == [0, 1, 2, 3]
+
+
+@pytest.mark.usefixtures('quick')
+def test_what_was_written_but_not_safe_is_written_again_and_not_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    it = recording(tmp_path)
+    it.put(message(0))
+    wait_until(lambda: it.progress().messages == 1)
+
+    def fail(file: LiveFile) -> None:
+        raise FULL
+
+    with monkeypatch.context() as disk:
+        disk.setattr(LiveFile, 'sync', fail)
+        it.put(message(1))
+        wait_until(lambda: it.progress().error)
+    assert end(it).lost == 0
+    assert all_numbers(tmp_path) == [0, 1]
+
+
+@pytest.mark.usefixtures('quick')
+def test_a_directory_that_vanishes_is_made_again(tmp_path: Path) -> None:
+    it = recording(tmp_path / 'bags')
+    it.put(message(0))
+    wait_until(lambda: it.progress().messages == 1)
+    shutil.rmtree(tmp_path / 'bags')
+    it.put(message(1))
+    wait_until(lambda: it.progress().messages == 2)
+    progress = end(it)
+    assert (progress.part, progress.lost, progress.uncompacted) == (2, 0, 1)
+    assert all_numbers(tmp_path / 'bags') == [1]
+
+
+def test_memory_is_bounded_and_what_finds_no_room_is_counted(tmp_path: Path) -> None:
+    (tmp_path / 'taken').write_text('')
+    it = recording(tmp_path / 'taken', queue_bytes=100_000)
+    for number in range(1000):
+        it.put(message(number, size=600))
+    progress = it.progress()
+    assert progress.waiting == 100
+    assert progress.lost == 900
+    progress = end(it)
+    assert (progress.waiting, progress.lost) == (0, 1000)
+    assert 'File exists' in progress.error
+
+
+def test_a_part_that_cannot_be_compacted_is_whole_and_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(path: Path, *, messages: int) -> None:
+        raise FULL
+
+    monkeypatch.setattr(module, 'compact', full)
+    it = recording(tmp_path, earlier=map(message, range(10)))
+    progress = end(it)
+    assert (progress.lost, progress.uncompacted, progress.error) == (0, 1, '')
+    assert all_numbers(tmp_path) == list(range(10))
+
+
+def test_it_goes_on_while_a_part_is_compacted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def slow(path: Path, *, messages: int) -> None:
+        time.sleep(1.5)
+        compact(path, messages=messages)
+
+    monkeypatch.setattr(module, 'compact', slow)
+    it = recording(tmp_path, limits=PartLimits(size_bytes=10**9, duration_s=5.0))
+    oldest_s = 0.0
+    for number in range(60):
+        it.put(message(number // 5))
+        oldest_s = max(oldest_s, it.progress().oldest_s)
+        time.sleep(0.02)
+    assert it.progress().part > 0
+    assert oldest_s < 1.0
+    end(it)
+    assert len(all_numbers(tmp_path)) == 60
+
+
+def test_no_file_is_ever_overwritten(tmp_path: Path) -> None:
+    for _ in range(3):
+        end(recording(tmp_path, earlier=[message(1)]))
+    names = [path.name for path in sorted(tmp_path.iterdir())]
+    assert names == ['a_000.mcap', 'a_000_2.mcap', 'a_000_3.mcap']
