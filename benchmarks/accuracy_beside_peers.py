@@ -50,6 +50,7 @@ ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'docs' / 'accuracy.md'
 README = ROOT / 'README.md'
 BEGIN, END = '<!-- beside peers -->', '<!-- end beside peers -->'
+HULLS = (CARGO, TANKER, YACHT)
 COUNTS = (100, 500, 2000)
 SHORT = 500  # samples, in the short table
 
@@ -406,13 +407,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
     parser.add_argument('--n', type=int, choices=COUNTS, nargs='+', default=list(COUNTS))
+    parser.add_argument('--hull', choices=[hull.name for hull in HULLS], help='this one alone')
     parser.add_argument('--write', action='store_true', help='docs/accuracy.md and README.md')
     parser.add_argument('--jobs', type=int, default=1, help='processes')
     options = parser.parse_args()
     runs, counts = options.runs, options.n
-    if options.write and SHORT not in counts:
-        parser.error(f'--write needs n = {SHORT} for the short table')
-    hulls = (CARGO, TANKER, YACHT)
+    hulls = [hull for hull in HULLS if options.hull in (None, hull.name)]
+    has_short = SHORT in counts and CARGO in hulls
+    if runs < 2:
+        parser.error('--runs must be 2 or more: the spread is shown')
+    if options.write and not has_short:
+        parser.error(f'--write needs n = {SHORT} and the {CARGO.name} for the short table')
     with ProcessPoolExecutor(options.jobs) as pool:
         # the long ones first
         given = sorted(product(hulls, CASES, counts), key=lambda each: -each[2])
@@ -438,7 +443,7 @@ def main() -> None:
         *efficient,
     ]
     lines = [*preface(runs), *body]
-    if SHORT in counts:
+    if has_short:
         short = short_table({case: found[CARGO, case, SHORT] for case in CASES})
         lines += ['', f'## In short: cargo ship, n = {SHORT}', '', *short]
     print('\n'.join(lines))
