@@ -3,9 +3,11 @@
 Averages over whole seconds, the record that onset and end are judged on.
 
 A bin is one second of one channel, numbered by floor(stamp / 1 s), so that a
-monitor that starts later has the same bins. Every statistic is computed from
-the last N bins alone, in ascending order: running sums would remember rounding
-errors from before.
+monitor that starts later has the same bins. What is kept is not the bins but
+their running totals, in whole milliseconds and millionths: the difference of
+two totals is the sum over the bins between them, so that a mean or a line fit
+costs the same over any length. Integers make it exact; running sums in floating
+point would remember rounding errors from before.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS
+from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.compiled import INLINED, UNCOUNTED
 from shipdrag_ros.samples import Channel, Float64, Int64
 
 BINNED = int(Channel.SHAFT) + 1  # this many first channels are averaged
@@ -25,12 +28,21 @@ EARTH_RADIUS_M = 6_371_008.8  # mean; the third digit of a speed does not matter
 
 FIRST_TRACK = int(Channel.POSITION)  # this source and those after it are positions
 _GEODETIC = int(Channel.POSITION_GEODETIC)
-_HEADING = int(Channel.HEADING)
+
+# Far finer than any sensor, and coarse enough that the centred sums of a line over an hour and
+# a half fit into 63 bits.
+PER_SECOND = 1000
+PER_UNIT = 1e6  # m/s, m, rad/s, cosine and sine
+PER_DEGREE = 1e11
+UNIT = np.array([PER_DEGREE if c == _GEODETIC else PER_UNIT for c in range(BINNED)])
+
+COUNT, TIME, A, B = range(4)
+SPEED, TIME_TIME, TIME_SPEED = range(2, 5)
 
 
 class Bins(NamedTuple):
     """
-    The bins of the last seconds, a ring of `size` slots a channel.
+    The bins of the last seconds, as running totals in a ring of slots.
 
     Attributes
     ----------
@@ -42,49 +54,47 @@ class Bins(NamedTuple):
         Their sums: time within the second [s] and the two columns.
     first : (channels,)
         Second column of its first sample, the branch of a longitude.
-    number : (channels, size) int64
-        Which bin is in a slot.
-    offset : (channels, size)
-        Mean time of its samples, from the beginning of its second [s].
-    a, b : (channels, size)
-        Mean of the two columns; cosine and sine for a heading.
-    speed : (sources, size)
-        Speed [m/s]; from positions by differences, NaN where there are too few.
-    speed_offset : (sources, size)
-        Its time, from the beginning of the bin's second [s].
+    closed : (channels,) int64
+        The newest bin that is in the totals; NEVER where none is.
+    places : (channels, slots, 4) int64
+        Totals up to a bin: bins, time [ms] and the two columns; cosine and sine for a heading,
+        the size of a shaft speed. Not of the speeds as read.
+    speeds : (sources, slots, 5) int64
+        Totals up to a bin: bins, time [ms], speed, time^2, time x speed. The speed from
+        positions is by differences, left out where there are too few.
+
+    Notes
+    -----
+    A total is modulo 2^64: it may overflow, the difference of two does not.
+    A bin in which nothing came repeats the total before it.
     """
 
     filling: Int64
     samples: Int64
     sums: Float64
     first: Float64
-    number: Int64
-    offset: Float64
-    a: Float64
-    b: Float64
-    speed: Float64
-    speed_offset: Float64
+    closed: Int64
+    places: Int64
+    speeds: Int64
 
     @classmethod
     def fresh(cls, size: int) -> Bins:
         """
-        Return empty bins for the last `size` seconds.
+        Return empty bins for at least the last `size` seconds.
         """
+        slots = 1 << size.bit_length()  # the total before the oldest bin is needed too
         return cls(
             np.full(BINNED, NEVER),
             np.zeros(BINNED, np.int64),
             np.zeros((BINNED, 3)),
             np.zeros(BINNED),
-            np.full((BINNED, size), NEVER),
-            np.zeros((BINNED, size)),
-            np.zeros((BINNED, size)),
-            np.zeros((BINNED, size)),
-            np.full((SOURCES, size), np.nan),
-            np.zeros((SOURCES, size)),
+            np.full(BINNED, NEVER),
+            np.zeros((BINNED, slots, 4), np.int64),
+            np.zeros((SOURCES, slots, 5), np.int64),
         )
 
 
-@njit
+@njit(**UNCOUNTED)
 def smoothing(width: int) -> int:
     """
     Return over how many bins positions are averaged before they make a speed.
@@ -94,86 +104,56 @@ def smoothing(width: int) -> int:
     return int(max(1, width // 6))
 
 
-@njit
-def add(bins: Bins, channel: int, number: int, stamp: int, a: float, b: float) -> None:
+@njit(**INLINED)
+def _span(bins: Bins, channel: int, last: int, width: int) -> tuple[int, int]:
     """
-    Add an accepted sample to the bin being filled.
+    Say whose totals differ by the bins last - width + 1 .. last, as far as these are kept.
+
+    Returns
+    -------
+    before, last
+        Bins; the first is the last one before the span.
     """
-    if bins.samples[channel] == 0:
-        bins.filling[channel] = number
-        bins.first[channel] = b
-    if channel == _GEODETIC:
-        b -= 360.0 * np.round((b - bins.first[channel]) / 360.0)
-    elif channel == _HEADING:
-        a, b = math.cos(a), math.sin(a)
-    bins.samples[channel] += 1
-    bins.sums[channel, 0] += (stamp - number * SECOND_NS) * 1e-9
-    bins.sums[channel, 1] += a
-    bins.sums[channel, 2] += b
+    newest = bins.closed[channel]
+    before = max(last - width, newest - bins.places.shape[1] + 1)
+    return before, max(before, min(last, newest))
 
 
-@njit
-def close(bins: Bins, channel: int, width: int) -> int:
-    """
-    Close the bin being filled and return its number.
-
-    Parameters
-    ----------
-    width
-        Length of a slope window in bins; `smoothing` follows from it.
-    """
-    number = bins.filling[channel]
-    slot = number % bins.number.shape[1]
-    count = bins.samples[channel]
-    bins.number[channel, slot] = number
-    bins.offset[channel, slot] = bins.sums[channel, 0] / count
-    bins.a[channel, slot] = bins.sums[channel, 1] / count
-    bins.b[channel, slot] = bins.sums[channel, 2] / count
-    bins.samples[channel] = 0
-    bins.sums[channel] = 0.0
-    if channel < FIRST_TRACK:
-        bins.speed[channel, slot] = bins.a[channel, slot]
-        bins.speed_offset[channel, slot] = bins.offset[channel, slot]
-    elif channel < SOURCES:
-        bins.speed_offset[channel, slot], bins.speed[channel, slot] = _speed_of_track(
-            bins, channel, number, smoothing(width)
-        )
-    return int(number)
+@njit(**INLINED)
+def _mean(
+    bins: Bins, channel: int, last: int, width: int, a: int, b: int
+) -> tuple[float, float, float, int]:
+    """Average as `mean_place`, from the integers `a` and `b` on, in seconds and integers."""
+    places = bins.places[channel]
+    mask = len(places) - 1
+    before, newest = _span(bins, channel, last, width)
+    low, high = places[before & mask], places[newest & mask]
+    count = high[COUNT] - low[COUNT]
+    if count == 0:
+        return np.nan, np.nan, np.nan, 0
+    return (
+        (high[TIME] - low[TIME] - count * last * PER_SECOND) / (count * PER_SECOND),
+        (high[A] - low[A] - count * a) / count,
+        (high[B] - low[B] - count * b) / count,
+        count,
+    )
 
 
-@njit(cache=True)
+@njit(**INLINED, cache=True)
 def mean_place(bins: Bins, channel: int, last: int, width: int) -> tuple[float, float, float, int]:
     """
-    Average positions (or cosine and sine) over the bins last - width + 1 .. last.
+    Average two columns over the bins last - width + 1 .. last.
 
     Returns
     -------
     time, a, b, count
-        The time [s] from the beginning of bin `last`; a longitude is on the
-        branch of the newest bin.
+        The time [s] from the beginning of bin `last`; cosine and sine of a heading.
     """
-    size = bins.number.shape[1]
-    time, sum_a, sum_b, count = 0.0, 0.0, 0.0, 0
-    newest = np.nan
-    for number in range(last, last - width, -1):
-        slot = number % size
-        if bins.number[channel, slot] != number:
-            continue
-        b = bins.b[channel, slot]
-        if count == 0:
-            newest = b
-        if channel == _GEODETIC:
-            b -= 360.0 * np.round((b - newest) / 360.0)
-        time += number - last + bins.offset[channel, slot]
-        sum_a += bins.a[channel, slot]
-        sum_b += b
-        count += 1
-    if count == 0:
-        return np.nan, np.nan, np.nan, 0
-    return time / count, sum_a / count, sum_b / count, count
+    time, a, b, count = _mean(bins, channel, last, width, 0, 0)
+    return time, a / UNIT[channel], b / UNIT[channel], count
 
 
-@njit(cache=True)
+@njit(**INLINED, cache=True)
 def displacement(bins: Bins, channel: int, last: int, width: int) -> tuple[float, float, float]:
     """
     Return time [s] and way east and north [m] between two neighbouring spans.
@@ -183,30 +163,29 @@ def displacement(bins: Bins, channel: int, last: int, width: int) -> tuple[float
     last, width
         The spans are the `width` bins up to `last` and as many before them.
     """
-    t1, a1, b1, n1 = mean_place(bins, channel, last, width)
-    t0, a0, b0, n0 = mean_place(bins, channel, last - width, width)
+    places = bins.places[channel]
+    mask = len(places) - 1
+    # from the newest place on: the branch of a longitude counts the turns since the start
+    newest = min(last, bins.closed[channel])
+    oldest = newest - width
+    while newest > oldest and places[newest & mask, COUNT] == places[(newest - 1) & mask, COUNT]:
+        newest -= 1
+    a = places[newest & mask, A] - places[(newest - 1) & mask, A]
+    b = places[newest & mask, B] - places[(newest - 1) & mask, B]
+    t1, a1, b1, n1 = _mean(bins, channel, last, width, a, b)
+    t0, a0, b0, n0 = _mean(bins, channel, last - width, width, a, b)
     if n0 == 0 or n1 == 0:
         return np.nan, np.nan, np.nan
     time = t1 - t0 + width
     if channel == _GEODETIC:
-        turn = (b1 - b0) - 360.0 * np.round((b1 - b0) / 360.0)
-        north = math.radians(a1 - a0) * EARTH_RADIUS_M
-        east = math.radians(turn) * math.cos(math.radians(a1)) * EARTH_RADIUS_M
+        north = math.radians((a1 - a0) / PER_DEGREE) * EARTH_RADIUS_M
+        latitude = math.radians((a + a1) / PER_DEGREE)
+        east = math.radians((b1 - b0) / PER_DEGREE) * math.cos(latitude) * EARTH_RADIUS_M
         return time, east, north
-    return time, a1 - a0, b1 - b0
+    return time, (a1 - a0) / PER_UNIT, (b1 - b0) / PER_UNIT
 
 
-@njit
-def _speed_of_track(bins: Bins, channel: int, number: int, width: int) -> tuple[float, float]:
-    """Return offset [s] and speed [m/s] from the means of 2 x `width` bins."""
-    time, east, north = displacement(bins, channel, number, width)
-    if not time > 0.0:
-        return 0.0, np.nan
-    newest = mean_place(bins, channel, number, width)[0]
-    return newest - 0.5 * time, math.sqrt(east * east + north * north) / time
-
-
-@njit(cache=True)
+@njit(**INLINED, cache=True)
 def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, int]:
     """
     Fit a straight line to the speed over the bins last - width + 1 .. last.
@@ -217,54 +196,49 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
         Slope [m/s^2], speed at the newest bin [m/s] and bins used; NaN where
         fewer than four bins, or bins from less than 2/3 of the width, are there.
     """
-    size = bins.number.shape[1]
-    numbers, speeds, offsets = bins.number[source], bins.speed[source], bins.speed_offset[source]
-    count = 0
-    sum_t, sum_v, sum_tt, sum_tv = 0.0, 0.0, 0.0, 0.0
-    origin, oldest, newest = 0.0, 0.0, 0.0
-    first = last - width + 1
-    slot = first % size
-    for number in range(first, last + 1):
-        v = speeds[slot]
-        if numbers[slot] == number and not np.isnan(v):
-            newest = number - last + offsets[slot]
-            if count == 0:
-                # differences from one of the speeds: the sums keep their digits
-                oldest, origin = newest, v
-            v -= origin
-            count += 1
-            sum_t += newest
-            sum_v += v
-            sum_tt += newest * newest
-            sum_tv += newest * v
-        slot += 1
-        if slot == size:
-            slot = 0
-    if count < 4 or 1.5 * (newest - oldest) < width - 1:
+    speeds = bins.speeds[source]
+    mask = len(speeds) - 1
+    before, newest = _span(bins, source, last, width)
+    low, high = speeds[before & mask], speeds[newest & mask]
+    count = high[COUNT] - low[COUNT]
+    if count < 4:
         return np.nan, np.nan, count
-    mean_t, mean_v = sum_t / count, sum_v / count
-    slope = (sum_tv - sum_t * mean_v) / (sum_tt - sum_t * mean_t)
-    return slope, origin + mean_v + slope * (newest - mean_t), count
+    while speeds[(newest - 1) & mask, COUNT] == high[COUNT]:
+        newest -= 1
+    oldest = before + 1
+    while speeds[oldest & mask, COUNT] == low[COUNT]:
+        oldest += 1
+    # from the middle of the window and the newest speed on: the sums keep their digits
+    middle = (last - width // 2) * PER_SECOND
+    below = speeds[(newest - 1) & mask]
+    latest, origin = high[TIME] - below[TIME], high[SPEED] - below[SPEED]
+    earliest = speeds[oldest & mask, TIME] - low[TIME]
+    if 3 * (latest - earliest) < 2 * (width - 1) * PER_SECOND:
+        return np.nan, np.nan, count
+    time, speed = high[TIME] - low[TIME], high[SPEED] - low[SPEED]
+    time_time = high[TIME_TIME] - low[TIME_TIME] - middle * (2 * time - count * middle)
+    time_speed = (
+        high[TIME_SPEED] - low[TIME_SPEED]
+        - middle * speed - origin * (time - count * middle)
+    )  # fmt: skip
+    time -= count * middle
+    speed -= count * origin
+    mean_time, mean_speed = time / count, speed / count
+    slope = (time_speed - time * mean_speed) / (time_time - time * mean_time)
+    level = origin + mean_speed + slope * (latest - middle - mean_time)
+    return slope * (PER_SECOND / PER_UNIT), level / PER_UNIT, count
 
 
-@njit(cache=True)
+@njit(**INLINED, cache=True)
 def mean_turning(bins: Bins, channel: int, last: int, width: int) -> tuple[float, int]:
     """
-    Return the mean of |first column| over the bins last - width + 1 .. last.
+    Return the mean size of a shaft speed over the bins last - width + 1 .. last.
     """
-    size = bins.number.shape[1]
-    total, count = 0.0, 0
-    for number in range(last - width + 1, last + 1):
-        slot = number % size
-        if bins.number[channel, slot] == number:
-            total += abs(bins.a[channel, slot])
-            count += 1
-    if count == 0:
-        return np.nan, 0
-    return total / count, count
+    _, turning, _, count = mean_place(bins, channel, last, width)
+    return turning, count
 
 
-@njit(cache=True)
+@njit(**INLINED, cache=True)
 def newest_bin(bins: Bins, channel: int) -> int:
     """
     Return the number of the last bin that holds anything; NEVER if none does.
@@ -274,16 +248,38 @@ def newest_bin(bins: Bins, channel: int) -> int:
     return int(bins.filling[channel])
 
 
+@njit(**UNCOUNTED)
+def speeds_kept(bins: Bins, source: int, last: int, width: int, speeds: Float64) -> int:
+    """
+    Put the speeds [m/s] of the bins last - width + 1 .. last in an array.
+
+    Returns
+    -------
+    int
+        How many there are.
+    """
+    totals = bins.speeds[source]
+    mask = len(totals) - 1
+    before, newest = _span(bins, source, last, width)
+    count = 0
+    for number in range(before + 1, newest + 1):
+        low, high = totals[(number - 1) & mask], totals[number & mask]
+        if high[COUNT] != low[COUNT]:
+            speeds[count] = (high[SPEED] - low[SPEED]) / PER_UNIT
+            count += 1
+    return count
+
+
 def speeds(bins: Bins, source: int, first: int, last: int) -> tuple[Float64, Float64]:
     """
     Return times [s], from the beginning of bin `last`, and speeds [m/s].
     """
-    numbers = np.arange(first, last + 1)
-    slots = numbers % bins.number.shape[1]
-    speed = bins.speed[source, slots]
-    there = (bins.number[source, slots] == numbers) & ~np.isnan(speed)
-    time = (numbers - last) + bins.speed_offset[source, slots]
-    return time[there], speed[there]
+    totals = bins.speeds[source]
+    before, newest = _span(bins, source, last, last - first + 1)
+    each = np.diff(totals[np.arange(before, newest + 1) & (len(totals) - 1)], axis=0)
+    there = each[:, COUNT] != 0
+    time = (each[there, TIME] - last * PER_SECOND) / PER_SECOND
+    return time, each[there, SPEED] / PER_UNIT
 
 
 def warm(bins: Bins) -> None:

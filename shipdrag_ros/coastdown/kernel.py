@@ -21,12 +21,11 @@ from shipdrag_ros.coastdown.bins import (
     BINNED,
     SOURCES,
     Bins,
-    add,
-    close,
     line,
     mean_turning,
     newest_bin,
 )
+from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.ring import Store, append, first_store
 from shipdrag_ros.coastdown.steadiness import (
     SCALES,
@@ -48,7 +47,7 @@ from shipdrag_ros.coastdown.validate import (
     examine,
     remember,
 )
-from shipdrag_ros.compiled import digest
+from shipdrag_ros.compiled import INLINED, UNCOUNTED, digest
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
 
@@ -208,7 +207,7 @@ class Tuning(NamedTuple):
     speed_min: float
 
 
-@njit
+@njit(**INLINED)
 def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
     """Say whether no better source has delivered within data_stop_s."""
     oldest = number - tuning.data_stop_ns // SECOND_NS
@@ -219,7 +218,7 @@ def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
     return best == source
 
 
-@njit
+@njit(**UNCOUNTED)
 def _shaft_tells(bins: Bins, tuning: Tuning, number: int) -> bool:
     """Say whether a stop of the engine would show in the shaft speed."""
     last = newest_bin(bins, _SHAFT)
@@ -229,7 +228,7 @@ def _shaft_tells(bins: Bins, tuning: Tuning, number: int) -> bool:
     return bool(count > 0 and turning >= SHAFT_TURNING_RAD_S)
 
 
-@njit
+@njit(**INLINED)
 def _look_at_speed(
     bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
 ) -> int:
@@ -269,7 +268,7 @@ def _look_at_speed(
     return 0
 
 
-@njit
+@njit(**INLINED)
 def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int:
     """Judge a closed bin of the shaft speed."""
     if (
@@ -289,7 +288,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int
     return 0
 
 
-@njit
+@njit(**UNCOUNTED)
 def _walk(
     memory: Memory,
     tuning: Tuning,
@@ -309,42 +308,53 @@ def _walk(
         The first sample not taken, and the `Stop` code.
     """
     guard, bins, steadiness, watch, tally, store = memory
-    for i in range(start, len(channel)):
+    i, stop = start, 0
+    # accepted samples go into the ring a run at a time, from the first one not yet there
+    kept, room = start, len(store.stamp_ns) - store.end[0]
+    while i < len(channel):
         c, stamp, arrival = int(channel[i]), stamp_ns[i], receive_ns[i]
         a, b = value[i, 0], value[i, 1]
         code = examine(guard, tuning.limits, c, stamp, arrival, a, b)
         if code < 0:
-            return i, code
+            stop = code
+            break
         if code == _ACCEPTED:
-            if store.end[0] == len(store.stamp_ns):
-                return i, _FULL
+            if i - kept == room:
+                stop = _FULL
+                break
             if stamp > watch.update_ns[0]:
-                return i, _UPDATE
+                stop = _UPDATE
+                break
             if (
                 watch.source[0] != NEVER
                 and stamp > guard.last_ns[watch.source[0]] + tuning.data_stop_ns
             ):
-                return i, _SILENCE
+                stop = _SILENCE
+                break
             if c < BINNED:
                 number = stamp // SECOND_NS
                 if bins.samples[c] > 0 and number > bins.filling[c]:
                     closed = close(bins, c, tuning.slopes.width)
-                    stop = 0
                     if c < SOURCES:
                         stop = _look_at_speed(bins, steadiness, watch, tuning, c, closed)
                     elif c == _SHAFT:
                         stop = _look_at_shaft(bins, watch, tuning, closed)
                     if stop != 0:
-                        return i, stop
+                        break
                 add(bins, c, number, stamp, a, b)
-            append(store, c, stamp, arrival, a, b, variance[i, 0], variance[i, 1])
             remember(guard, c, stamp, a, b)
             recent = tally.reasons[c, _ACCEPTED] % RECENT
             tally.stamp_ns[c, recent] = stamp
             tally.arrival_ns[c, recent] = arrival
+        else:
+            append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)
+            room -= i - kept
+            kept = i + 1
         tally.reasons[c, code] += 1
         guard.arrival_ns[0] = arrival
-    return len(channel), 0
+        i += 1
+    append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)
+    return i, stop
 
 
 _SLOPES = Slopes.of(Parameters())
@@ -361,7 +371,7 @@ _SIGNATURE = types.UniTuple(types.int64, 2)(
 
 
 def _compile(sources: str) -> Callable[..., tuple[int, int]]:
-    @njit(_SIGNATURE, cache=True)
+    @njit(_SIGNATURE, **UNCOUNTED, cache=True)
     def compiled(memory, tuning, channel, stamp_ns, receive_ns, value, variance, start):  # type: ignore[no-untyped-def]
         _ = sources  # part of the key of the cache
         return _walk(memory, tuning, channel, stamp_ns, receive_ns, value, variance, start)
@@ -369,7 +379,7 @@ def _compile(sources: str) -> Callable[..., tuple[int, int]]:
     return cast(Callable[..., tuple[int, int]], compiled)
 
 
-_SOURCES = ('validate', 'bins', 'ring', 'steadiness', 'kernel')
+_SOURCES = ('validate', 'bins', 'filling', 'ring', 'steadiness', 'kernel')
 
 # compiled on import, so that no coastdown waits for it
 walk = _compile(digest('samples.py', *(f'coastdown/{name}.py' for name in _SOURCES)))

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from shipdrag_ros.compiled import UNCOUNTED
 from shipdrag_ros.samples import Block, Float64, Int64, UInt8
 
 CAPACITY = 1 << 21  # samples kept at most, 100 MB: 5400 s of 390 samples a second
@@ -49,29 +50,35 @@ class Store(NamedTuple):
         )
 
 
-@njit
+@njit(**UNCOUNTED)
 def append(
     store: Store,
-    channel: int,
-    stamp: int,
-    arrival: int,
-    a: float,
-    b: float,
-    variance_a: float,
-    variance_b: float,
+    channel: UInt8,
+    stamp_ns: Int64,
+    receive_ns: Int64,
+    value: Float64,
+    variance: Float64,
+    first: int,
+    last: int,
 ) -> None:
     """
-    Keep one sample; there must be room.
+    Keep the samples first .. last - 1 of a block; there must be room.
     """
-    end = store.end[0]
-    store.channel[end] = channel
-    store.stamp_ns[end] = stamp
-    store.receive_ns[end] = arrival
-    store.value[end, 0] = a
-    store.value[end, 1] = b
-    store.variance[end, 0] = variance_a
-    store.variance[end, 1] = variance_b
-    store.end[0] = end + 1
+    end, count = store.end[0], last - first
+    # one array after the other: each is then one move of memory
+    for i in range(count):
+        store.channel[end + i] = channel[first + i]
+    for i in range(count):
+        store.stamp_ns[end + i] = stamp_ns[first + i]
+    for i in range(count):
+        store.receive_ns[end + i] = receive_ns[first + i]
+    for i in range(count):
+        store.value[end + i, 0] = value[first + i, 0]
+        store.value[end + i, 1] = value[first + i, 1]
+    for i in range(count):
+        store.variance[end + i, 0] = variance[first + i, 0]
+        store.variance[end + i, 1] = variance[first + i, 1]
+    store.end[0] = end + count
 
 
 def make_room(store: Store, *, keep_ns: int, late_ns: int, capacity: int) -> Store:

@@ -19,8 +19,9 @@ import numpy as np
 from numba import njit
 from scipy import stats
 
-from shipdrag_ros.coastdown.bins import FIRST_TRACK, SOURCES, Bins, line, smoothing
+from shipdrag_ros.coastdown.bins import FIRST_TRACK, SOURCES, Bins, line, smoothing, speeds_kept
 from shipdrag_ros.coastdown.validate import NEVER
+from shipdrag_ros.compiled import INLINED, UNCOUNTED
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 
@@ -102,10 +103,12 @@ class Steadiness(NamedTuple):
 
     Attributes
     ----------
-    slope : (sources, SCALES, points + lag)
+    slope : (sources, SCALES, points + lag + 1)
         Slopes at the points [m/s^2]; NaN where there were too few bins.
-    done : (sources, SCALES) int64
-        Newest point taken.
+    changes : (sources, SCALES, points)
+        Sizes of the changes between the last of them, ascending; inf for those unknown.
+    due : (sources, SCALES) int64
+        The bin that completes the next point.
     limit : (sources, SCALES)
         Size of a slope that chance does not explain [m/s^2]; NaN while unknown.
     spread : (sources, SCALES)
@@ -113,9 +116,11 @@ class Steadiness(NamedTuple):
     """
 
     slope: Float64
-    done: Int64
+    changes: Float64
+    due: Int64
     limit: Float64
     spread: Float64
+    scratch: Float64
 
     @classmethod
     def fresh(cls, slopes: Slopes) -> Steadiness:
@@ -123,14 +128,16 @@ class Steadiness(NamedTuple):
         Return the state before the first bin.
         """
         return cls(
-            np.full((SOURCES, SCALES, slopes.points + slopes.lag), np.nan),
+            np.full((SOURCES, SCALES, slopes.points + slopes.lag + 1), np.nan),
+            np.full((SOURCES, SCALES, slopes.points), np.inf),
             np.full((SOURCES, SCALES), NEVER),
             np.full((SOURCES, SCALES), np.nan),
             np.full((SOURCES, SCALES), np.nan),
+            np.empty(4 * slopes.width),
         )
 
 
-@njit
+@njit(**INLINED)
 def learn(steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int) -> None:
     """
     Bring the spreads up to the last point at or before the closed bin `number`.
@@ -138,78 +145,94 @@ def learn(steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, numbe
     The result depends on the bins of the last steady_s and two windows alone.
     """
     for scale in range(SCALES):
-        stride = slopes.stride << scale
-        if (number + 1) // stride != steadiness.done[source, scale]:
+        if number >= steadiness.due[source, scale]:
             _learn_scale(steadiness, slopes, bins, source, number, scale)
 
 
-@njit
+@njit(**UNCOUNTED)
 def _learn_scale(
     steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int, scale: int
 ) -> None:
     width, stride, points = slopes.width << scale, slopes.stride << scale, slopes.points >> scale
     slope = steadiness.slope[source, scale]
-    kept = points + slopes.lag
+    changes = steadiness.changes[source, scale, :points]
     newest = (number + 1) // stride
-    for point in range(max(steadiness.done[source, scale] + 1, newest - kept + 1), newest + 1):
-        slope[point % kept] = line(bins, source, point * stride - 1, width)[0]
-    steadiness.done[source, scale] = newest
+    first = (steadiness.due[source, scale] + 1) // stride
+    if newest - first >= len(slope) - 1:
+        # none of those before is still needed
+        first = newest - len(slope) + 1
+        slope[:] = np.nan
+        changes[:] = np.inf
+    for point in range(first, newest + 1):
+        gone = _change(slope, slopes.lag, point - points)
+        slope[point % len(slope)] = line(bins, source, point * stride - 1, width)[0]
+        _replace(changes, gone, _change(slope, slopes.lag, point))
+    steadiness.due[source, scale] = (newest + 1) * stride - 1
 
-    changes = np.empty(points)
-    count = 0
-    for point in range(newest - points + 1, newest + 1):
-        change = abs(slope[point % kept] - slope[(point - slopes.lag) % kept])
-        if not np.isnan(change):
-            changes[count] = change
-            count += 1
-    spread = _spread(changes[:count])
+    count = np.searchsorted(changes, np.inf)
+    spread = _spread(changes, count)
     threshold = slopes.quantile[scale, count]
     if threshold == np.inf:
         # a longer window would need a longer guess
         guess = np.nan
         if scale == 0:
-            guess = _COLOUR * white_spread(bins, source, number, width)
+            guess = _COLOUR * white_spread(bins, source, number, width, steadiness.scratch)
         spread = guess if np.isnan(guess) else max(guess, _FEW * spread)
         threshold = slopes.white
     steadiness.spread[source, scale] = spread + SLOPE_FLOOR_M_S2
     steadiness.limit[source, scale] = threshold * spread + SLOPE_FLOOR_M_S2
 
 
-@njit
-def _spread(changes: Float64) -> float:
-    """Return the sd of a slope from sizes of changes of slope; sorts them."""
-    count = int(_KEPT * len(changes))
+@njit(**UNCOUNTED)
+def _change(slope: Float64, lag: int, point: int) -> float:
+    """Return the size of the change of slope at a point; inf where it is not known."""
+    change = abs(slope[point % len(slope)] - slope[(point - lag) % len(slope)])
+    return np.inf if np.isnan(change) else change
+
+
+@njit(**UNCOUNTED)
+def _replace(ascending: Float64, gone: float, come: float) -> None:
+    """Replace one number by another in an ascending array."""
+    i = np.searchsorted(ascending, gone)
+    while i + 1 < len(ascending) and ascending[i + 1] < come:
+        ascending[i] = ascending[i + 1]
+        i += 1
+    while i > 0 and ascending[i - 1] > come:
+        ascending[i] = ascending[i - 1]
+        i -= 1
+    ascending[i] = come
+
+
+@njit(**UNCOUNTED)
+def _spread(changes: Float64, known: int) -> float:
+    """Return the sd of a slope from the first `known`, ascending sizes of changes of slope."""
+    count = int(_KEPT * known)
     if count == 0:
         return 0.0
-    changes.sort()
     total = 0.0
-    for change in changes[:count]:
-        total += change * change
+    for i in range(count):
+        total += changes[i] * changes[i]
     return _TRIMMED * math.sqrt(0.5 * total / count)
 
 
-@njit
-def white_spread(bins: Bins, source: int, last: int, width: int) -> float:
+@njit(**UNCOUNTED)
+def white_spread(bins: Bins, source: int, last: int, width: int, scratch: Float64) -> float:
     """
     Return the sd of a slope over `width` bins if successive bins differ by white noise.
 
     NaN while fewer than half a window's changes from bin to bin are known.
     """
-    size = bins.number.shape[1]
     # speeds from positions are averages over this many bins, and so are their errors
     apart = 2 * smoothing(width) if source >= FIRST_TRACK else 1
-    speed = np.full(4 * width, np.nan)
-    known = 0
-    for i in range(4 * width):
-        number = last - 4 * width + 1 + i
-        slot = number % size
-        if bins.number[source, slot] == number and not np.isnan(bins.speed[source, slot]):
-            speed[known] = bins.speed[source, slot]
-            known += 1
-    count = known - apart
+    count = speeds_kept(bins, source, last, 4 * width, scratch) - apart
     if 2 * count < width or count < 4:
         return np.nan
-    changes = np.abs(speed[apart:known] - speed[:count])
-    reading = _spread(changes)
+    for i in range(count):
+        change, at = abs(scratch[i + apart] - scratch[i]), i
+        while at > 0 and scratch[at - 1] > change:
+            scratch[at] = scratch[at - 1]
+            at -= 1
+        scratch[at] = change
+    reading = _spread(scratch, count)
     used = line(bins, source, last, width)[2] / apart
     return float(reading * math.sqrt(12.0 / max(used, 1.0)) / width)

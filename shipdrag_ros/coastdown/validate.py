@@ -28,7 +28,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numba import njit, typeof, types
 
-from shipdrag_ros.compiled import digest
+from shipdrag_ros.compiled import INLINED, UNCOUNTED, digest
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
     ABSURD_SPEED_M_S,
@@ -134,7 +134,7 @@ class Limits(NamedTuple):
         )
 
 
-@njit
+@njit(**INLINED)
 def examine(
     guard: Guard, limits: Limits, channel: int, stamp: int, arrival: int, a: float, b: float
 ) -> int:
@@ -175,7 +175,7 @@ def examine(
     return _ACCEPTED
 
 
-@njit
+@njit(**INLINED)
 def remember(guard: Guard, channel: int, stamp: int, a: float, b: float) -> None:
     """
     Take an accepted sample into the memory of the tests.
@@ -191,7 +191,7 @@ def remember(guard: Guard, channel: int, stamp: int, a: float, b: float) -> None
         guard.held_since_ns[channel] = stamp
 
 
-@njit
+@njit(**UNCOUNTED)
 def forget(guard: Guard) -> None:
     """
     Return to the state before the first sample.
@@ -236,7 +236,7 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
     return reasons
 
 
-@njit
+@njit(**UNCOUNTED)
 def _walk(
     guard: Guard,
     limits: Limits,
@@ -270,7 +270,7 @@ _SIGNATURE = types.void(
 
 
 def _compile(sources: str) -> Callable[..., None]:
-    @njit(_SIGNATURE, cache=True)
+    @njit(_SIGNATURE, **UNCOUNTED, cache=True)
     def compiled(guard, limits, channel, stamp_ns, receive_ns, value, reasons):  # type: ignore[no-untyped-def]
         _ = sources  # part of the key of the cache
         _walk(guard, limits, channel, stamp_ns, receive_ns, value, reasons)

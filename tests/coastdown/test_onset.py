@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.bins import Bins, add, close
+from shipdrag_ros.coastdown.bins import Bins
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset, State
+from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.onset import bend, change_point, law
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters

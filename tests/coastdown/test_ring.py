@@ -6,20 +6,44 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.coastdown.ring import Store, append, make_room, since
-from shipdrag_ros.samples import Channel
+from shipdrag_ros.samples import Block, Channel
 
 LATE_NS = 5
 
 
-def fill(stamps, *, capacity: int, keep_ns: int, first: int = 4) -> tuple[Store, int]:
-    """Append one sample a stamp; return the store and the longest it ever was."""
+def block_of(stamps) -> Block:
+    stamps = np.asarray(list(stamps), np.int64)
+    i = np.arange(len(stamps))
+    value = np.column_stack([i, -i]).astype(float)
+    variance = np.column_stack([np.full(len(i), 0.5), np.full(len(i), np.nan)])
+    return Block((i % 9).astype(np.uint8), stamps, stamps + 1, value, variance)
+
+
+def fill(
+    stamps, *, capacity: int, keep_ns: int, first: int = 4, run: int = 1
+) -> tuple[Store, int]:
+    """Append samples in runs; return the store and the longest it ever was."""
+    block = block_of(stamps)
     store = Store.fresh(first)
-    longest = first
-    for i, stamp in enumerate(stamps):
-        if store.end[0] == len(store.stamp_ns):
+    longest, at = first, 0
+    while at < len(block):
+        room = len(store.stamp_ns) - int(store.end[0])
+        if room == 0:
             store = make_room(store, keep_ns=keep_ns, late_ns=LATE_NS, capacity=capacity)
             longest = max(longest, len(store.stamp_ns))
-        append(store, i % 9, stamp, stamp + 1, float(i), -float(i), 0.5, np.nan)
+            continue
+        end = min(at + min(run, room), len(block))
+        append(
+            store,
+            block.channel,
+            block.stamp_ns,
+            block.receive_ns,
+            block.value,
+            block.variance,
+            at,
+            end,
+        )
+        at = end
     return store, longest
 
 
@@ -28,11 +52,12 @@ def fill(stamps, *, capacity: int, keep_ns: int, first: int = 4) -> tuple[Store,
     delays=st.lists(st.integers(0, LATE_NS), min_size=1, max_size=200),
     start=st.integers(0, 200),
     capacity=st.integers(4, 40),
+    run=st.integers(1, 50),
 )
-def test_what_is_kept_is_what_came(delays, start: int, capacity: int) -> None:
+def test_what_is_kept_is_what_came(delays, start: int, capacity: int, run: int) -> None:
     stamps = [i - delay for i, delay in enumerate(delays)]
     keep_ns = 50
-    store, _ = fill(stamps, capacity=capacity, keep_ns=keep_ns)
+    store, _ = fill(stamps, capacity=capacity, keep_ns=keep_ns, run=run)
     start_ns = max(start, max(stamps) - keep_ns)
     kept = since(store, start_ns, late_ns=LATE_NS, capacity=capacity)
     wanted = [i for i in range(len(stamps)) if stamps[i] >= start_ns][-capacity:]
@@ -42,6 +67,7 @@ def test_what_is_kept_is_what_came(delays, start: int, capacity: int) -> None:
     assert there.value[:, 0].tolist() == [float(i) for i in wanted]
     assert there.stamp_ns.tolist() == [stamps[i] for i in wanted]
     assert there.receive_ns.tolist() == [stamps[i] + 1 for i in wanted]
+    np.testing.assert_array_equal(there.variance, np.tile([0.5, np.nan], (len(wanted), 1)))
     assert there.channel.tolist() == [Channel(i % 9) for i in wanted]
 
 
