@@ -298,11 +298,18 @@ def predict(
                 cell += 1
             h = grid_s[cell + 1] - grid_s[cell]
             s = (t - grid_s[cell]) / h
-            # cubic Hermite
+            # cubic Hermite; of the distance only where it is measured
             a = (1.0 + 2.0 * s) * (1.0 - s) * (1.0 - s)
             b = s * (1.0 - s) * (1.0 - s) * h
             c = s * s * (s - 1.0) * h
-            for j in range(2 * (q + 1)):
+            low, high = (q + 1, 2 * (q + 1)) if rows.kind[i] == POSITION else (1, q + 1)
+            here[0] = (
+                a * state[cell, 0]
+                + (1.0 - a) * state[cell + 1, 0]
+                + b * rate[cell, 0]
+                + c * rate[cell + 1, 0]
+            )
+            for j in range(low, high):
                 here[j] = (
                     a * state[cell, j]
                     + (1.0 - a) * state[cell + 1, j]

@@ -25,7 +25,6 @@ from shipdrag_ros.estimation.motion_fit.families import Average, FamilyFit
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.learning import learn
 from shipdrag_ros.estimation.motion_fit.problem import (
-    PLAIN,
     Problem,
     average_families,
     fit_robustly,
@@ -74,10 +73,9 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     alone = record.without_steady()
     first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess), guess)
     if record.steady_s >= LEAST_S:
-        brief = problem.condensed(first)
-        plain, _ = brief.fit(PLAIN, brief.start(PLAIN, first, guess))
-        about = _learn(record, plain or first, run_down)
-        problem = Problem.of(record, run_down, ship, guess).disturbed(about, plain or first)
+        plain = problem.plain(first, guess)
+        about = _learn(record, plain, run_down)
+        problem = Problem.of(record, run_down, ship, guess).disturbed(about, plain)
         problem = weigh_disturbed(problem, first)
         notes.append(_disturbance_note(about, record.steady_s))
     else:

@@ -9,6 +9,7 @@ import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.estimation.motion_fit.steady import block_medians
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
 _BLOCKS = 12  # whose medians outliers do not reach
@@ -53,15 +54,12 @@ class Guess:
                 break
         chosen = coast.kind == kind
         time_s, value = coast.time_s[chosen], coast.value[chosen]
-        blocks = np.array_split(np.arange(len(time_s)), min(_BLOCKS, len(time_s) // 4))
+        count = min(_BLOCKS, len(time_s) // 4)
+        edges = np.linspace(0.0, len(time_s), count + 1).astype(np.int64)
+        when, speed = block_medians(time_s, edges), block_medians(value, edges)
         if kind == POSITION:
-            middle = np.array([time_s[block].mean() for block in blocks])
-            where = np.array([np.median(value[block]) for block in blocks])
-            when = 0.5 * (middle[1:] + middle[:-1])
-            speed = np.diff(where) / np.diff(middle)
-        else:
-            when = np.array([np.median(time_s[block]) for block in blocks])
-            speed = np.array([np.median(value[block]) for block in blocks])
+            speed = np.diff(speed) / np.diff(when)
+            when = 0.5 * (when[1:] + when[:-1])
         top = float(speed.max())
         if not top > 0.0:
             raise EstimationError(

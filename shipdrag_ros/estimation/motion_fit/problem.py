@@ -39,11 +39,11 @@ from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Nois
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-PLAIN = Family((2, 3))  # little noise, and right enough to tell how a force is damped
-_STEPS = 96  # of the integration, longer as the ship slows down
+_PLAIN = Family((2, 3))  # never negative, and right enough to tell how a force is damped
+_STEPS = 72  # of the integration, longer as the ship slows down
 _HUBER = 2.5  # whitened residuals beyond it count by their size only
 _HUBER_SQUARE = 0.9775  # mean of min(z, 2.5)^2 of a standard normal z
-_ROUNDS = 3  # of the weights
+_ROUNDS, _ROUNDS_DISTURBED = 3, 2  # of the weights
 _ITERATIONS = 30
 _SCALE_SD = 0.02  # of a log's scale, before the fit
 _SCALE_SIGNIFICANT = 3.0  # standard deviations
@@ -132,9 +132,17 @@ class Problem:
             tuple(extras),
         )
 
+    def plain(self, found: FamilyFit, guess: Guess) -> FamilyFit:
+        """
+        Return a fit as the plainest of families has it, without its covariance.
+        """
+        unknowns = self.start(_PLAIN, found, guess)
+        nothing = np.zeros((len(unknowns), len(unknowns)))
+        return FamilyFit(self.law(_PLAIN), unknowns, nothing, 0.0, self.samples, 0.0)
+
     def disturbed(self, about: Disturbance, plain: FamilyFit) -> Problem:
         """
-        Return the problem with slow disturbances, damped as a plain fit has it.
+        Return the problem with slow disturbances, damped as a fit has it.
         """
         _, speed = predict(
             plain.law, plain.unknowns, self.grid_s, self.rows, np.zeros(0, np.int64)
@@ -188,11 +196,12 @@ class Problem:
         rows = Rows(time_s[order], kinds[order], np.zeros(len(order)))
         found = replace(self, rows=rows)
         value = np.concatenate(mean_residual)[order] - found.residual(near)
-        filled = replace(self, rows=rows._replace(value=value)).weighted(variance[order])
-        if self.noise.about == CALM:
-            ones = np.ones(len(order))
-            return replace(filled, noise=Noise(variance[order], CALM, ones, ones))
-        return filled.disturbed(self.noise.about, near)
+        damping, inertia = (
+            np.interp(time_s[order], self.rows.time_s, of_row)
+            for of_row in (self.noise.damping_1_s, self.noise.inertia)
+        )
+        noise = Noise(variance[order], self.noise.about, damping, inertia)
+        return replace(self, rows=rows._replace(value=value), noise=noise)
 
     def law(self, family: Family) -> Law:
         """
@@ -262,13 +271,11 @@ class Problem:
         )
         if not converged:
             return None, white
-        full = np.zeros((k + EXTRAS, k + EXTRAS))
-        full[np.ix_(active, active)] = covariance
         # what the samples tell of the humps: one less what the prior knows of each
         told = 1.0 - prior[1, plain:k] * np.diag(covariance)[plain:k]
         of_prior = float((prior[1, plain:k] * unknowns[plain:k] ** 2).sum())
         parameters = len(active) - law.humps + float(told.sum())
-        found = FamilyFit(law, unknowns, full, chi2 - of_prior, self.samples, parameters)
+        found = FamilyFit(law, unknowns, covariance, chi2 - of_prior, self.samples, parameters)
         return found, white
 
 
@@ -310,7 +317,7 @@ def weigh_disturbed(problem: Problem, near: FamilyFit) -> Problem:
     base = problem.noise.variance
     weight = np.ones(len(base))
     residual = problem.residual(near)
-    for _ in range(_ROUNDS):
+    for _ in range(_ROUNDS_DISTURBED):
         problem = problem.weighted(base / weight)
         white = residual.reshape(1, -1).copy()
         whiten(problem.rows, white, problem.noise)

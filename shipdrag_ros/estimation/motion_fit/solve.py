@@ -11,7 +11,8 @@ from shipdrag_ros.estimation.motion_fit.whitening import Noise, whiten
 from shipdrag_ros.samples import Float64, Int64
 
 _RISES = 8  # of the damping, in one iteration
-_CONVERGED = 1e-3  # fall of chi^2 still to come: far below what tells families apart
+_CONVERGED = 1e-3  # fall of chi^2: far below what tells families apart
+_LAST_FALL = 0.03  # of chi^2, by a step so small that what it leads to need not be computed
 
 
 @njit(cache=True, fastmath={'reassoc', 'contract'})
@@ -148,7 +149,7 @@ def fit(
     Returns
     -------
     converged, chi2, unknowns, covariance, white
-        The covariance (p, p) is of the active unknowns.
+        The covariance (K, K) is 0 but for the active unknowns.
     """
     unknowns = start.copy()
     chi2, matrix, gradient, white = normal_equations(
@@ -161,7 +162,11 @@ def fit(
         better = False
         if damping == 0.0:
             solved, step = cholesky_solve(matrix, gradient.reshape(-1, 1), 0.0)
-            if solved and np.sum(step[:, 0] * gradient) < _CONVERGED:
+            fall = np.sum(step[:, 0] * gradient)
+            if solved and fall < _LAST_FALL:
+                for a in range(len(active)):
+                    unknowns[active[a]] += step[a, 0]
+                chi2 -= fall
                 converged = True
                 break
         for _ in range(_RISES):
@@ -189,5 +194,9 @@ def fit(
         if idle == 2:
             converged = True
             break
-    solved, covariance = cholesky_solve(matrix, np.eye(len(active)), 0.0)
+    solved, of_active = cholesky_solve(matrix, np.eye(len(active)), 0.0)
+    covariance = np.zeros((len(unknowns), len(unknowns)))
+    for a in range(len(active)):
+        for b in range(len(active)):
+            covariance[active[a], active[b]] = of_active[a, b]
     return converged and solved, chi2, unknowns, covariance, white

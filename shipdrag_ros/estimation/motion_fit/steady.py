@@ -9,9 +9,9 @@ means, for `learning`.
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
+from numba import njit
 
 from shipdrag_ros.samples import Float64, Int64
 
@@ -19,6 +19,7 @@ BIN_S = 30.0  # a steady record is condensed to its means over this
 LEAST_S = 300.0  # of record from which a disturbance can be learnt
 _BLOCK_S = 60.0
 _UNSTEADY = 0.06  # of the speed: a block that differs by more ends the steady record
+_TURNED_RAD = 0.15  # a block on another course does too
 _OUTLIER = 5.0  # robust standard deviations
 _MAD_TO_SD = 1.4826
 
@@ -45,6 +46,28 @@ def white_sd(value: Float64) -> float:
     return float(np.sqrt(np.mean(second**2) / 6.0))
 
 
+@njit(cache=True)
+def block_medians(value: Float64, edges: Int64) -> Float64:
+    """
+    Return the medians of parts of a record.
+
+    Parameters
+    ----------
+    value : (n,)
+    edges : (b + 1,)
+        Where each part begins, and the end of the last; none is empty.
+
+    Returns
+    -------
+    (b,)
+    """
+    result = np.empty(len(edges) - 1)
+    for i in range(len(result)):
+        result[i] = np.median(value[edges[i] : edges[i + 1]])
+    return result
+
+
+@njit(cache=True)
 def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: Float64) -> float:
     """
     Return the time from which a record has been steady to its end.
@@ -57,22 +80,28 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
         Yaw [rad]; may be empty.
     """
     if len(time_s) == 0:
-        return math.inf
-    end = float(time_s[-1])
-    level = float(np.median(speed[time_s > end - 2.0 * _BLOCK_S]))
-    edges = np.arange(end, time_s[0] - _BLOCK_S, -_BLOCK_S)
-    course: float | None = None
-    for late, early in pairwise(edges):
-        block = speed[(time_s > early) & (time_s <= late)]
-        if len(block) and abs(float(np.median(block)) - level) > _UNSTEADY * level:
-            return float(late)
-        yaw = heading[(heading_s > early) & (heading_s <= late)]
-        if len(yaw):
-            mean = math.atan2(float(np.sin(yaw).mean()), float(np.cos(yaw).mean()))
-            course = mean if course is None else course
-            if abs(math.remainder(mean - course, 2.0 * math.pi)) > 0.15:
-                return float(late)
-    return float(time_s[0])
+        return np.inf
+    late = time_s[-1]
+    last = np.searchsorted(time_s, late - 2.0 * _BLOCK_S, side='right')
+    level = np.median(speed[last:])
+    course = np.nan
+    while late - _BLOCK_S > time_s[0]:
+        early = late - _BLOCK_S
+        first = np.searchsorted(time_s, early, side='right')
+        end = np.searchsorted(time_s, late, side='right')
+        if end > first and abs(np.median(speed[first:end]) - level) > _UNSTEADY * level:
+            return late
+        first = np.searchsorted(heading_s, early, side='right')
+        end = np.searchsorted(heading_s, late, side='right')
+        if end > first:
+            yaw = heading[first:end]
+            mean = math.atan2(np.sin(yaw).mean(), np.cos(yaw).mean())
+            if math.isnan(course):
+                course = mean
+            if abs(math.atan2(math.sin(mean - course), math.cos(mean - course))) > _TURNED_RAD:
+                return late
+        late = early
+    return time_s[0]
 
 
 def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
@@ -105,9 +134,5 @@ def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
 
 def _medians(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
     number = np.floor((time_s - time_s[0]) / (2.0 * _BLOCK_S))
-    first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(time_s)]])
-    parts = [slice(a, b) for a, b in pairwise(first)]
-    return (
-        np.array([np.median(time_s[part]) for part in parts]),
-        np.array([np.median(value[part]) for part in parts]),
-    )
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(time_s)]])
+    return block_medians(time_s, edges), block_medians(value, edges)

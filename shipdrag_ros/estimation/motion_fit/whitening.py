@@ -20,7 +20,7 @@ from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
 from shipdrag_ros.samples import Float64
 
 _STATES = 4  # speed, distance, gust, water
-_LONGEST_STEP_S = 15.0  # of the prediction through a gap
+_LONGEST_STEP_S = 30.0  # of the prediction through a gap
 
 
 class Disturbance(NamedTuple):
