@@ -126,7 +126,7 @@ def _criterion(x: Float64, which: Int64, steady: _Steady) -> float:
     for i in which:
         if i % 2:
             total += x[i] * x[i]
-    return total
+    return float(total)
 
 
 @njit(cache=True)
@@ -223,4 +223,5 @@ def _learn(steady: _Steady, logged: bool) -> Disturbance:
             best, least, chosen, which = cost + 2.0 * len(_BOTH), cost, found, _BOTH
     if len(which):
         chosen = _mean(chosen, least, which, steady)
-    return _about(chosen, which, steady.units)
+    disturbance: Disturbance = _about(chosen, which, steady.units)
+    return disturbance

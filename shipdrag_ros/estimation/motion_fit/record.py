@@ -160,7 +160,7 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
         if name in inputs:
             series: Series = getattr(window.before, name)
             time_s = _seconds(series.time_ns, zero_ns)
-            return steady_since(time_s, series.value, heading_s, heading.value)
+            return float(steady_since(time_s, series.value, heading_s, heading.value))
     # positions alone do not tell from sample to sample: by their means
     series = window.before.position
     if len(series) < LEAST_STAMPS:
@@ -176,7 +176,7 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
     when = np.array([row[0] for row in rows])
     where = np.array([row[1] for row in rows])
     speed = np.hypot(*(np.diff(where, axis=0) / np.diff(when)[:, None]).T)
-    return steady_since(0.5 * (when[1:] + when[:-1]), speed, heading_s, heading.value)
+    return float(steady_since(0.5 * (when[1:] + when[:-1]), speed, heading_s, heading.value))
 
 
 def _distance(time_s: Float64, position: Float64) -> Float64:

@@ -81,7 +81,7 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
     """
     if len(time_s) == 0:
         return np.inf
-    late = time_s[-1]
+    late = float(time_s[-1])
     last = np.searchsorted(time_s, late - 2.0 * _BLOCK_S, side='right')
     level = np.median(speed[last:])
     course = np.nan
@@ -101,7 +101,7 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
             if abs(math.atan2(math.sin(mean - course), math.cos(mean - course))) > _TURNED_RAD:
                 return late
         late = early
-    return time_s[0]
+    return float(time_s[0])
 
 
 def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
