@@ -130,6 +130,8 @@ class Clock:
     ----------
     shift_days
         As given.
+    dates_put_right
+        Number of times whose date was a day off at midnight.
     now_ns
         Last time told [ns since the epoch]; None before the first.
     """
@@ -138,6 +140,7 @@ class Clock:
         self._near_ns = near_ns
         self.shift_days = shift_days
         self._received_ns: int | None = None
+        self.dates_put_right = 0
         self.now_ns: int | None = None
 
     def resolve(self, moment: Moment, receive_ns: int | None) -> int:
@@ -160,6 +163,7 @@ class Clock:
             if self.now_ns is not None and abs(abs(time_ns - self.now_ns) - DAY_NS) < GAP_NS:
                 # some receivers change the date a sentence too late or too early
                 time_ns = self._nearest(moment.of_day_ns, receive_ns)
+                self.dates_put_right += 1
         if not moment.trusted and (
             self.now_ns is None or not 0 <= time_ns - self.now_ns <= GAP_NS
         ):

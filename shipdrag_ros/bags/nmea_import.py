@@ -61,6 +61,8 @@ class NmeaResult:
     backward, repeated
         Samples whose time is before that, or is that, of an earlier one of
         the same input; a replay rejects them and says so.
+    dates_put_right
+        Times whose date was a day off at midnight.
     magnetic_heading
         Whether the heading is magnetic, for want of a variation.
     shift_days
@@ -83,6 +85,7 @@ class NmeaResult:
     end_ns: int
     backward: int
     repeated: int
+    dates_put_right: int
     magnetic_heading: bool
     shift_days: int
     log_attached: bool
@@ -200,7 +203,7 @@ def _result(
     for (talker, kind), count in survey.addresses.items():
         if kind not in READERS and kind not in TIMED:
             not_used[talker + kind] += count
-        if talker not in NMEA_TALKERS:
+        if kind and talker not in NMEA_TALKERS:
             unknown[talker] += count
     heading = record.chosen.get(Channel.HEADING)
     return NmeaResult(
@@ -224,6 +227,7 @@ def _result(
         end_ns=record.newest_ns,
         backward=record.backward,
         repeated=record.repeated,
+        dates_put_right=clock.dates_put_right,
         magnetic_heading=heading is not None and heading.detail == MAGNETIC,
         shift_days=clock.shift_days,
         log_attached=attached,

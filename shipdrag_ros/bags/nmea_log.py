@@ -61,7 +61,8 @@ class Sentence(NamedTuple):
     text
         As it stands there.
     talker, kind
-        Parts of its address, `GP` and `RMC` for instance.
+        Parts of its address, `GP` and `RMC` for instance; a proprietary
+        sentence is all talker.
     fields
         What follows the address.
     receive_ns
@@ -204,6 +205,8 @@ class NmeaLog:
             raise ValueError('wrong checksum')
         if not _ADDRESS.fullmatch(talker + kind):
             raise ValueError('no address')
+        if talker == 'P':
+            talker, kind = talker + kind, ''
         return Sentence(number, text, talker, kind, fields, receive_ns)
 
     def _reject(self, reason: str, number: int, text: str) -> None:

@@ -93,7 +93,8 @@ class Fields:
         Refuse a status that is not allowed; NMEA 0183 before 2.3 has some empty.
         """
         if self[name] and self[name] not in allowed:
-            raise NoValue(f'status {self[name]}', self[name])
+            status = self[name] if len(self[name]) == 1 else 'not known'
+            raise NoValue(f'status {status}', self[name])
 
 
 @dataclass(frozen=True)

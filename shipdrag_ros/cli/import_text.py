@@ -26,6 +26,8 @@ def show(output: Output, bag: Path, result: NmeaResult) -> None:
         output.say(
             f'All dates were shifted by {result.shift_days} days, whole cycles of the GPS week.'
         )
+    if result.dates_put_right:
+        output.say(f'{result.dates_put_right} date(s) were a day off at midnight and put right.')
     if result.magnetic_heading:
         output.say(
             'The heading is MAGNETIC, as the log states no variation: good for finding turns, '
