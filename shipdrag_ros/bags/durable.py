@@ -259,25 +259,28 @@ class DurableRecording:
                 self._safe += len(self._unsynced)
                 self._held_bytes -= _held_bytes(self._unsynced)
                 self._oldest_s = self._taken_s
+                self._size_bytes = self._file.synced_bytes
             self._unsynced = []
-            self._size_bytes = self._file.synced_bytes
         self._synced_s = monotonic()
         self._error = ''
 
     def _open(self) -> LiveFile:
         try:
             self._directory.mkdir(parents=True, exist_ok=True)
-            self._path = self._free_path()
+            path = self._free_path()
         except OSError as error:
             raise BagError(f'{str(error.filename)!r}: {error.strerror}') from error
-        self._file = LiveFile(
-            self._path,
+        file = LiveFile(
+            path,
             recording_id=self._recording_id,
             part=self._part,
             attachments=self._attachments,
         )
+        with self._lock:
+            self._path, self._size_bytes = path, file.synced_bytes
+        self._file = file
         self._tried.set()
-        return self._file
+        return file
 
     def _free_path(self) -> Path:
         name = f'{self._stem}_{self._part:03d}'
