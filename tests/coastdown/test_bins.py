@@ -3,6 +3,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from shipdrag_ros.coastdown.bins import (
     Bins,
@@ -55,6 +57,47 @@ def test_a_line_is_least_squares(rate_hz: float) -> None:
     np.testing.assert_allclose(level, np.polyval(expected, t[-1]), rtol=1e-12)
 
 
+@settings(max_examples=40, deadline=None)
+@given(
+    before=st.lists(st.floats(-40.0, 40.0), max_size=300),
+    gap=st.integers(1, 400),
+    after=st.lists(st.floats(-40.0, 40.0), min_size=WIDTH, max_size=2 * WIDTH),
+)
+def test_a_line_knows_nothing_of_what_was_before_it(before, gap: int, after) -> None:
+    time = np.concatenate([np.arange(len(before)), len(before) + gap + np.arange(len(after) + 1)])
+    speed = np.array([*before, *after, 0.0])
+    whole = binned(LOG, time, speed, size=150)
+    part = binned(LOG, time[len(before) :], speed[len(before) :], size=150)
+    last = FIRST + len(before) + gap + len(after) - 1
+    assert line(whole, LOG, last, WIDTH) == line(part, LOG, last, WIDTH)
+
+
+@settings(max_examples=40, deadline=None)
+@given(there=st.sets(st.integers(0, WIDTH - 1), min_size=4), seed=st.integers(0, 1000))
+def test_a_line_through_what_is_there(there, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    time = np.array([*sorted(there), WIDTH]) + rng.uniform(0.0, 0.99, len(there) + 1)
+    bins = binned(LOG, time, rng.uniform(0.0, 20.0, len(time)))
+    last = FIRST + WIDTH - 1
+    slope, level, count = line(bins, LOG, last, WIDTH)
+    t, v = speeds(bins, LOG, FIRST, last)
+    assert count == len(t) == len(there)
+    assert np.isnan(slope) == (1.5 * (t[-1] - t[0]) < WIDTH - 1)
+    if not np.isnan(slope):
+        expected = np.polyfit(t, v, 1)
+        np.testing.assert_allclose(slope, expected[0], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(level, np.polyval(expected, t[-1]), rtol=1e-9, atol=1e-9)
+
+
+def test_the_longest_line_does_not_overflow() -> None:
+    # 4 x confirm_s at its upper bound, the speed from one end of its range to the other
+    time = np.arange(4802.0)
+    bins = binned(LOG, time, np.linspace(-40.0, 40.0, len(time)), size=6000)
+    slope, level, _ = line(bins, LOG, FIRST + 4800, 4800)
+    np.testing.assert_allclose(slope, 80.0 / 4801.0, rtol=1e-6)
+    np.testing.assert_allclose(level, 40.0 - 80.0 / 4801.0, rtol=1e-6)
+
+
 def test_a_line_needs_points_over_the_window() -> None:
     bins = binned(LOG, np.arange(100.0), 0.1 * np.arange(100.0))
     assert np.isnan(line(bins, LOG, FIRST + 140, WIDTH)[0])
@@ -87,6 +130,15 @@ def test_speed_of_a_track(channel: Channel) -> None:
     np.testing.assert_allclose(t[-1], 0.25 - 9.5, atol=1e-9)
     _, way_east, way_north = displacement(bins, int(channel), FIRST + 150, 10)
     np.testing.assert_allclose([way_east, way_north], [30.0, 40.0], rtol=1e-3)
+
+
+def test_a_track_faster_than_any_ship_has_no_speed() -> None:
+    time = np.arange(0.0, 200.0)
+    east = 5.0 * time + np.where(time >= 100.0, 1000.0, 0.0)
+    bins = binned(int(Channel.POSITION), time, east, 0.0 * time)
+    _, v = speeds(bins, int(Channel.POSITION), FIRST + 50, FIRST + 150)
+    assert v.max() < 40.0
+    assert 80 <= len(v) < 101
 
 
 def test_headings_are_averaged_on_the_circle() -> None:

@@ -20,6 +20,7 @@ from shipdrag_ros.simulation import EngineOrder, Sensor, Turn
 START_NS = 1_700_000_000_000_000_000
 S = 1_000_000_000
 LOG = Channel.SPEED_THROUGH_WATER
+INPUTS = (LOG, Channel.SPEED_OVER_GROUND, Channel.POSITION, Channel.HEADING, Channel.SHAFT)
 
 QUICK = Parameters(
     steady_s=300.0,
@@ -81,7 +82,7 @@ def eventful(record, sensors) -> Block:
             sensors=(
                 replace(sensors['log'], rate_hz=1.0),
                 Sensor(channel=Channel.SPEED_OVER_GROUND, rate_hz=0.7, sd=0.1),
-                replace(sensors['radar'], rate_hz=0.5),
+                replace(sensors['radar'], rate_hz=0.5, sd=0.3),
                 replace(sensors['compass'], rate_hz=2.0),
                 sensors['shaft'],
             ),
@@ -110,10 +111,32 @@ def cut(block: Block, places) -> list[Block]:
     return [block[a:b] for a, b in pairwise(edges)]
 
 
-@settings(max_examples=25, deadline=None)
-@given(data=st.data(), seed=st.integers(0, 1000))
-def test_where_the_record_is_cut_changes_no_bit(ship, eventful, bits, data, seed: int) -> None:
-    block = spoil(eventful, seed)
+def on_the_globe(block: Block) -> Block:
+    """Put the positions where the ship crosses the date line."""
+    track = block.channel == Channel.POSITION
+    value = block.value.copy()
+    east, north = block.value[track].T
+    longitude = 179.98 + east / 111_195.0
+    value[track] = np.column_stack([-17.0 + north / 111_195.0, (longitude + 180) % 360 - 180])
+    channel = np.where(track, np.uint8(Channel.POSITION_GEODETIC), block.channel)
+    return replace(block, channel=channel, value=value)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    data=st.data(),
+    seed=st.integers(0, 1000),
+    inputs=st.sets(st.sampled_from(INPUTS), min_size=1),
+    globe=st.booleans(),
+    silence=st.tuples(st.integers(0, 1700), st.integers(0, 300)),
+)
+def test_where_the_record_is_cut_changes_no_bit(
+    ship, eventful, bits, data, seed: int, inputs, globe: bool, silence
+) -> None:
+    second = (eventful.stamp_ns - START_NS) // S
+    silent = (second >= silence[0]) & (second < sum(silence))
+    block = eventful[np.isin(eventful.channel, list(inputs)) & ~silent]
+    block = spoil(on_the_globe(block) if globe else block, seed)
     places = data.draw(st.lists(st.integers(0, len(block)), max_size=60))
     events, health = run(ship, [block])
     assert len(events) > 0
@@ -158,7 +181,7 @@ def long_record(record, sensors) -> Block:
         ]
     orders.insert(4, EngineOrder(1900.0, shaft=0.7, thrust=0.5))
     return record(
-        sensors=(sensors['log'], sensors['radar'], sensors['compass']),
+        sensors=(sensors['log'], replace(sensors['radar'], sd=0.3), sensors['compass']),
         orders=tuple(orders),
         turns=(Turn(1300.0, 60.0, 0.02), Turn(3900.0, 100.0, 0.01)),
         lead_in_s=600.0,
@@ -166,9 +189,14 @@ def long_record(record, sensors) -> Block:
     )
 
 
-@settings(max_examples=15, deadline=None)
-@given(start_s=st.integers(1, 2800))
-def test_a_monitor_that_starts_later_says_the_same(ship, long_record, bits, start_s: int) -> None:
+@settings(max_examples=25, deadline=None)
+@given(start_s=st.integers(1, 2800), globe=st.booleans())
+def test_a_monitor_that_starts_later_says_the_same(
+    ship, long_record, bits, start_s: int, globe: bool
+) -> None:
+    if globe:  # and nothing else
+        there = long_record.channel == Channel.POSITION
+        long_record = on_the_globe(long_record[there])
     whole, _ = run(ship, [long_record])
     later = long_record[long_record.stamp_ns >= START_NS + start_s * S]
     part, _ = run(ship, [later])

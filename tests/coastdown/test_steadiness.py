@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.steadiness import SCALES, Steadiness
+from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
@@ -41,6 +41,25 @@ def test_a_coastdown_in_the_record_hardly_matters() -> None:
     time = np.maximum(0.0, np.arange(2200) - 1000.0)
     after = learnt(speed * 410.0 / (410.0 + time)).spread[LOG, 0]
     assert before < after < 1.6 * before
+
+
+@pytest.mark.parametrize('gap', [0, 40, 500, 100_000])
+def test_the_changes_kept_are_those_of_the_slopes_kept(gap: int) -> None:
+    speed = noise(4000, 12)
+    seconds = FIRST + np.arange(4000) + np.where(np.arange(4000) >= 3000, gap, 0)
+    ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
+    monitor = Monitor(ship, Parameters())
+    monitor.update(Block.of(Channel.SPEED_THROUGH_WATER, seconds * SECOND_NS, speed))
+    kept, slopes = monitor._memory.steadiness, Slopes.of(Parameters())
+    for scale in range(SCALES):
+        points = slopes.points >> scale
+        newest = (int(kept.due[LOG, scale]) + 1) // (slopes.stride << scale) - 1
+        slope = kept.slope[LOG, scale]
+        at = np.arange(newest - points + 1, newest + 1)
+        change = np.abs(slope[at % len(slope)] - slope[(at - slopes.lag) % len(slope)])
+        change[np.isnan(change)] = np.inf
+        assert np.array_equal(np.sort(change), kept.changes[LOG, scale, :points])
+        assert np.isfinite(change).any()
 
 
 def test_only_the_last_steady_s_matters() -> None:
