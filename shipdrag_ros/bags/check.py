@@ -8,7 +8,6 @@ held against it.
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,16 +17,21 @@ from mcap.opcode import Opcode
 from mcap.records import MessageIndex
 
 from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
-from shipdrag_ros.bags.layout import MESSAGE_HEAD, chunk_fields, name
-from shipdrag_ros.bags.learnt import checksum, read_record
+from shipdrag_ros.bags.layout import (
+    KNOWN,
+    MESSAGE_HEAD,
+    attachment_agrees,
+    checksum,
+    chunk_fields,
+    name,
+)
+from shipdrag_ros.bags.learnt import read_record
 from shipdrag_ros.bags.locate import locate
 from shipdrag_ros.bags.records import MAGIC, Buffer
 from shipdrag_ros.bags.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
 from shipdrag_ros.bags.statements import ChunkFacts, Facts, hold_against
 from shipdrag_ros.bags.unpack import opened, unpack_chunk_partly
 from shipdrag_ros.errors import BagError
-
-_CHECKSUM_BYTES = 4
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,7 @@ def _check_file(path: Path, progress: Callable[[int, int], None]) -> FileCheck:
     with opened(path, damages) as data:
         walk = _Check(data, damages)
         walk.run(progress)
-        if not walk.records:
+        if not walk.records and data[: len(MAGIC)] != MAGIC:
             raise BagError(
                 f'{str(path)!r} is no MCAP file, it begins with {data[:8]!r}; '
                 'give a .mcap file or a rosbag2 directory'
@@ -160,13 +164,11 @@ class _Check:
                 self._message(data, found, offset)
             case Opcode.MESSAGE_INDEX:
                 self._message_index(found)
-            case Opcode.SCHEMA | Opcode.CHANNEL if not facts.ended:
+            case Opcode.SCHEMA | Opcode.CHANNEL if data is not self._data or not facts.ended:
                 self._declaration(read_record(data, found), found.opcode, offset)
             case Opcode.ATTACHMENT:
                 facts.attachments[offset] = found.end - found.offset
-                stated = data[found.end - _CHECKSUM_BYTES : found.end]
-                content = data[found.start : found.end - _CHECKSUM_BYTES]
-                if any(stated) and int.from_bytes(stated, 'little') != zlib.crc32(content):
+                if not attachment_agrees(data, found.start, found.end):
                     self._damages.add(offset, 'attachment', DamageKind.CHECKSUM)
             case Opcode.METADATA:
                 facts.metadata[offset] = found.end - found.offset
@@ -179,7 +181,7 @@ class _Check:
             case Opcode.HEADER | Opcode.FOOTER | Opcode.STATISTICS:
                 self._once(found)
                 facts.summary.append(found)
-            case _:
+            case _ if found.opcode in KNOWN:
                 facts.summary.append(found)
 
     def _once(self, found: Found) -> None:
@@ -228,7 +230,8 @@ class _Check:
                 self._in_chunk.setdefault(channel, []).append((log_ns, inner.offset))
                 times.append(log_ns)
         if unpacked.damage is not None or found.damage is not None:
-            return  # what is stated of it would only repeat that
+            self.facts.chunks[found.offset] = ChunkFacts(0, (0, 0), '', 0, 0, sound=False)
+            return
         span = (min(times), max(times)) if times else (0, 0)
         head = data[found.start : found.start + 16]
         stated = int.from_bytes(head[:8], 'little'), int.from_bytes(head[8:], 'little')

@@ -13,6 +13,7 @@ MCAP specification 0, section Records.
 from __future__ import annotations
 
 import struct
+import zlib
 from typing import Any
 
 from mcap.opcode import Opcode
@@ -48,6 +49,7 @@ _ENTRY_BYTES = {'i': 16, 'c': 10}
 _UINT32 = struct.Struct('<I')
 _UINT64 = struct.Struct('<Q')
 _TIME_LIMIT_NS = 1 << 63
+_PIECE_BYTES = 1 << 20
 
 
 def name(opcode: int) -> str:
@@ -124,6 +126,24 @@ def _inside(stop: int, end: int, *, cut: bool = False) -> int:
     if stop > end and not cut:
         raise _DoesNotFit
     return stop
+
+
+def attachment_agrees(data: Buffer, start: int, end: int) -> bool:
+    """
+    Say whether the content of an attachment has the checksum that it states, if any.
+    """
+    stated = int.from_bytes(data[end - _UINT32.size : end], 'little')
+    return stated in (0, checksum(data, start, end - _UINT32.size))
+
+
+def checksum(data: Buffer, start: int, end: int) -> int:
+    """
+    Return the CRC-32 of a span of any size.
+    """
+    value = 0
+    for at in range(start, end, _PIECE_BYTES):
+        value = zlib.crc32(data[at : min(at + _PIECE_BYTES, end)], value)
+    return value
 
 
 def chunk_fields(content: Any) -> tuple[int, int, str, int, int]:

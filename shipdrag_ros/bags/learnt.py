@@ -8,7 +8,6 @@ before what none does.
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass, field
 from enum import IntEnum
 from io import BytesIO
@@ -32,7 +31,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from shipdrag_ros.bags.layout import fits
+from shipdrag_ros.bags.layout import checksum, fits
 from shipdrag_ros.bags.records import FOOTER_BYTES, HEAD, MAGIC, Buffer
 from shipdrag_ros.bags.scan import Found, Scanner
 
@@ -51,7 +50,6 @@ _RECORDS: dict[int, Any] = {
     Opcode.SUMMARY_OFFSET: SummaryOffset,
     Opcode.DATA_END: DataEnd,
 }
-_PIECE_BYTES = 1 << 20
 _CHECKSUM_BYTES = 4
 
 
@@ -61,16 +59,6 @@ def read_record(data: Buffer, found: Found) -> Any:
     """
     stream = ReadDataStream(BytesIO(data[found.start : found.end]))
     return _RECORDS[found.opcode].read(stream)
-
-
-def checksum(data: Buffer, start: int, end: int) -> int:
-    """
-    Return the CRC-32 of a span of any size.
-    """
-    value = 0
-    for at in range(start, end, _PIECE_BYTES):
-        value = zlib.crc32(data[at : min(at + _PIECE_BYTES, end)], value)
-    return value
 
 
 def read_footer(data: Buffer) -> Footer | None:

@@ -9,7 +9,6 @@ data.
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
-from shipdrag_ros.bags.layout import MESSAGE_HEAD, name
+from shipdrag_ros.bags.layout import KNOWN, MESSAGE_HEAD, attachment_agrees, name
 from shipdrag_ros.bags.learnt import Learnt, Trust, read_footer, read_record
 from shipdrag_ros.bags.locate import locate
 from shipdrag_ros.bags.records import MAGIC, Buffer
@@ -28,7 +27,6 @@ from shipdrag_ros.errors import BagError
 
 # with one of these, or none, the record itself is whole
 _WHOLE = (None, DamageKind.OPCODE, DamageKind.LENGTH)
-_CHECKSUM_BYTES = 4
 
 
 @dataclass(frozen=True)
@@ -111,7 +109,8 @@ def recover(
                     continue  # messages came before their channel: once more, with what is known
                 if not salvage.records:
                     raise BagError(
-                        f'{str(file)!r} is no MCAP file, no record is in it; give a .mcap file'
+                        f'{str(file)!r} holds no record of MCAP, nothing can be saved; '
+                        'give a .mcap file'
                     )
                 salvage.sound.publish()
                 if salvage.doubtful.used:
@@ -229,11 +228,11 @@ class _Salvage:
             case Opcode.HEADER:
                 self.sound.profile = self.doubtful.profile = read_record(data, found).profile
             case Opcode.ATTACHMENT:
-                checksum = data[found.end - _CHECKSUM_BYTES : found.end]
-                content = data[found.start : found.end - _CHECKSUM_BYTES]
-                if any(checksum) and int.from_bytes(checksum, 'little') != zlib.crc32(content):
+                if not attachment_agrees(data, found.start, found.end):
                     self._damages.add(offset, 'attachment', DamageKind.CHECKSUM)
                     bag = self.doubtful
                 bag.attach(read_record(data, found))
             case Opcode.METADATA:
                 bag.describe(read_record(data, found))
+            case kind if kind not in KNOWN:
+                self.lost += found.end - found.offset

@@ -18,7 +18,15 @@ from typing import NamedTuple
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.damage import DamageKind
-from shipdrag_ros.bags.layout import KNOWN, MESSAGE_HEAD, fields_end, fills, fits, name
+from shipdrag_ros.bags.layout import (
+    KNOWN,
+    MESSAGE_HEAD,
+    attachment_agrees,
+    fields_end,
+    fills,
+    fits,
+    name,
+)
 from shipdrag_ros.bags.records import HEAD, MAGIC, Buffer
 
 MAGIC_PLACE = -1
@@ -121,14 +129,14 @@ class Scanner:
         start = at + HEAD.size
         if length > end - start:
             return _magic(data, at, end)
-        if opcode in kinds:
-            fitting = fits(data, opcode, start, start + length)
-        else:
-            fitting = opcode >= _PRIVATE and not self._mended_opcodes(
-                data, opcode, start, start + length, kinds
-            )
-        if fitting:
-            return Found(opcode, at, start, start + length)
+        stop = start + length
+        fitting = fits(data, opcode, start, stop) if opcode in kinds else opcode >= _PRIVATE
+        if fitting and (
+            opcode == Opcode.MESSAGE
+            or fills(data, opcode, start, stop)
+            or not self._mended_opcodes(data, opcode, start, stop, kinds)
+        ):
+            return Found(opcode, at, start, stop)
         return _magic(data, at, end)
 
     def _damaged(
@@ -140,20 +148,40 @@ class Scanner:
         Returns the record before, None where that one is the damaged one, and what the
         damaged bytes are.
         """
-        bounded = self._within_bounds(data, at, end, kinds)
-        if bounded is not None:
-            return held, bounded
-        if held is not None and held.opcode == Opcode.MESSAGE and held.damage is None:
+        for tell in self._within_bounds, self._by_own_fields:
+            here = tell(data, at, end, kinds)
+            if here is not None:
+                return held, here
+        if held is not None and self._is_unwitnessed(data, held):
             # its length may lead too far, or not far enough
-            after = self._resync(data, held.offset + 1, at, end, kinds)
+            sought = self._sought_in(data, held.offset, end, kinds)
+            after = self._resync(data, held.offset + 1, at, end, sought)
             if after is not None:
                 return None, self._span(data, held.offset, after, end, kinds)
-            after = self._resync(data, at + 1, end, end, kinds)
-            if after is not None and _one_bit(held.end - held.start ^ after - held.start):
-                return None, self._span(data, held.offset, after, end, kinds)
-        else:
-            after = self._resync(data, at + 1, end, end, kinds)
+        after = self._resync(data, at + 1, end, end, self._sought_in(data, at, end, kinds))
+        if (
+            held is not None
+            and after is not None
+            and _one_bit(held.end - held.start ^ after - held.start)
+            and self._is_unwitnessed(data, held)
+            and not self._is_chunk(data, at, end)
+        ):
+            return None, self._span(data, held.offset, after, end, kinds)
         return held, self._span(data, at, end if after is None else after, end, kinds)
+
+    def _is_unwitnessed(self, data: Buffer, held: Found) -> bool:
+        """Say whether nothing vouches for the length of a record that nothing follows."""
+        vouched = held.opcode == Opcode.ATTACHMENT and attachment_agrees(
+            data, held.start, held.end
+        )
+        return held.damage is None and not vouched
+
+    def _sought_in(self, data: Buffer, at: int, end: int, kinds: frozenset[int]) -> frozenset[int]:
+        """Return the kinds that may follow a record; what is in a chunk does not."""
+        return kinds - _IN_CHUNK if self._is_chunk(data, at, end) else kinds
+
+    def _is_chunk(self, data: Buffer, at: int, end: int) -> bool:
+        return data[at] == Opcode.CHUNK and self._has_compression(data, at + HEAD.size, end)
 
     def _within_bounds(
         self, data: Buffer, at: int, end: int, kinds: frozenset[int]
@@ -174,6 +202,21 @@ class Scanner:
         kind = DamageKind.CONTENT if opcode in kinds else DamageKind.OPCODE
         return Found(opcode if opcode in kinds else GARBAGE, at, start, stop, kind)
 
+    def _by_own_fields(
+        self, data: Buffer, at: int, end: int, kinds: frozenset[int]
+    ) -> Found | None:
+        """Return the record whose length is wrong, and whose fields tell where it ends."""
+        opcode = data[at]
+        if opcode not in kinds & _NAMED or (
+            opcode == Opcode.CHUNK and not self._is_chunk(data, at, end)
+        ):
+            return None
+        start = at + HEAD.size
+        stop = fields_end(data, opcode, start, end)
+        if stop is None or stop > end or not self._is_followed(data, stop, end, kinds):
+            return None
+        return Found(opcode, at, start, stop, DamageKind.LENGTH)
+
     def _span(self, data: Buffer, at: int, after: int, end: int, kinds: frozenset[int]) -> Found:
         """Tell what the bytes up to the next record are."""
         start = at + HEAD.size
@@ -184,15 +227,15 @@ class Scanner:
         if opcode in kinds:
             if _one_bit(after - start ^ length) and fills(data, opcode, start, after):
                 return Found(opcode, at, start, after, DamageKind.LENGTH)
-            stop = fields_end(data, opcode, start, min(start + length, end))
-            if opcode in _NAMED and stop is not None and stop - start == length and cut:
+            if self._is_chunk(data, at, end):
                 return Found(opcode, at, start, after, DamageKind.TRUNCATED)
+            stop = fields_end(data, opcode, start, min(start + length, end))
             if opcode != Opcode.MESSAGE and stop is not None and start < stop <= after:
                 # the record ends where its fields do; what follows is looked at next
                 return Found(opcode, at, start, stop, DamageKind.LENGTH)
             if cut:
                 kind = _end_or(DamageKind.LENGTH, after == end and length < _POSSIBLE_BYTES)
-                return Found(GARBAGE if opcode != Opcode.CHUNK else opcode, at, start, after, kind)
+                return Found(GARBAGE, at, start, after, kind)
             return Found(GARBAGE, at, start, after, DamageKind.CONTENT)
         return Found(GARBAGE, at, at, after, DamageKind.GARBAGE)
 

@@ -41,6 +41,8 @@ class ChunkFacts:
         First and last log time [ns].
     compression, packed, size
         How it is packed, and bytes packed and unpacked.
+    sound
+        Whether it is as it was written.
     indexes
         Channels of the message indexes behind it, by offset.
     index_bytes
@@ -52,6 +54,7 @@ class ChunkFacts:
     compression: str
     packed: int
     size: int
+    sound: bool = True
     indexes: dict[int, int] = field(default_factory=dict)
     index_bytes: int = 0
 
@@ -191,9 +194,9 @@ class _Statements:
         self._once(found, index.chunk_start_offset)
         facts = self._facts.chunks.get(index.chunk_start_offset)
         if facts is None:
-            self._wrong(
-                found, DamageKind.MISPLACED, f'no sound chunk at {index.chunk_start_offset}'
-            )
+            self._wrong(found, DamageKind.MISPLACED, f'no chunk at {index.chunk_start_offset}')
+            return
+        if not facts.sound:  # what is stated of it would only repeat that
             return
         stated = (
             index.chunk_length,
