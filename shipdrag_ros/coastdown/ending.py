@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.bins import Bins, line
 from shipdrag_ros.coastdown.events import EndedBy
-from shipdrag_ros.coastdown.kernel import Tuning
+from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.onset import Candidate, bend
 from shipdrag_ros.coastdown.tracking import shaft_rose_at, shaft_speed, turned_at
 from shipdrag_ros.parameters import Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.coastdown.kernel import RECENT, Tally
+from shipdrag_ros.coastdown.memory import RECENT, Tally
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.samples import INPUTS, Channel, Reason
 

@@ -12,37 +12,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
-from typing import NamedTuple, cast
+from typing import cast
 
-import numpy as np
 from numba import njit, typeof, types
 
-from shipdrag_ros.coastdown.bins import (
-    BINNED,
-    SOURCES,
-    Bins,
-    line,
-    mean_turning,
-    newest_bin,
-)
+from shipdrag_ros.coastdown.bins import BINNED, SOURCES, Bins, line, mean_turning, newest_bin
 from shipdrag_ros.coastdown.filling import add, close
-from shipdrag_ros.coastdown.ring import Store, append, first_store
-from shipdrag_ros.coastdown.steadiness import (
-    SCALES,
-    Slopes,
-    Steadiness,
-    learn,
-)
+from shipdrag_ros.coastdown.memory import RECENT, Memory, Tally, Tuning, Watch
+from shipdrag_ros.coastdown.ring import append
+from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, learn
 from shipdrag_ros.coastdown.validate import (
     ARRIVAL_JUMPED_BACK,
     CHANNEL_CODES,
-    CHANNELS,
     NEVER,
     SECOND_NS,
     STAMP_JUMPED_BACK,
     STAMPS,
     VALUES,
-    Guard,
     Limits,
     examine,
     remember,
@@ -51,8 +37,6 @@ from shipdrag_ros.compiled import INLINED, UNCOUNTED, digest
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
 
-ALWAYS = 2**62  # a stamp after all stamps
-RECENT = 16  # samples of each channel that its rate and clock offset are taken from
 # A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
 SHAFT_TURNING_RAD_S = 0.5
 
@@ -82,131 +66,6 @@ _SLOPE = int(Stop.SLOPE)
 _SHAFT_SLOWED = int(Stop.SHAFT)
 
 
-class Watch(NamedTuple):
-    """
-    What the walk looks out for, and what it saw; arrays of one but for `held`.
-
-    Attributes
-    ----------
-    source : int64
-        The speed source of a candidate or coastdown; NEVER while there is none.
-    update_ns : int64
-        When the next estimate is due; ALWAYS if none is.
-    armed : int64
-        0 after a candidate or coastdown until the speed has been steady again.
-    held : (SCALES,) float64
-        The limits of that candidate: it is part of the record that later limits are learnt
-        from, and would make a fall that goes on look steady [m/s^2].
-    seen_source, seen : int64
-        Speed source and number of the bin looked at last.
-    level : float64
-        Speed there [m/s].
-    shaft : float64
-        Steady rate of turn before the shaft slowed down [rad/s].
-    """
-
-    source: Int64
-    update_ns: Int64
-    armed: Int64
-    held: Float64
-    seen_source: Int64
-    seen: Int64
-    level: Float64
-    shaft: Float64
-
-    @classmethod
-    def fresh(cls) -> Watch:
-        """
-        Return the watch of a monitor that knows nothing.
-        """
-        return cls(
-            np.full(1, NEVER),
-            np.full(1, ALWAYS),
-            np.ones(1, np.int64),
-            np.full(SCALES, np.nan),
-            np.full(1, NEVER),
-            np.full(1, NEVER),
-            np.full(1, np.nan),
-            np.full(1, np.nan),
-        )
-
-
-class Tally(NamedTuple):
-    """
-    What the health of the inputs is told from; a reset of the clock spares it.
-
-    Attributes
-    ----------
-    reasons : (channels, reasons) int64
-        Samples by `Reason`.
-    stamp_ns, arrival_ns : (channels, RECENT) int64
-        Of the last accepted samples.
-    """
-
-    reasons: Int64
-    stamp_ns: Int64
-    arrival_ns: Int64
-
-    @classmethod
-    def fresh(cls) -> Tally:
-        """
-        Return the counts before the first sample.
-        """
-        return cls(
-            np.zeros((CHANNELS, len(Reason)), np.int64),
-            np.full((CHANNELS, RECENT), NEVER),
-            np.full((CHANNELS, RECENT), NEVER),
-        )
-
-
-class Memory(NamedTuple):
-    """All that a monitor remembers, besides a coastdown that runs."""
-
-    guard: Guard
-    bins: Bins
-    steadiness: Steadiness
-    watch: Watch
-    tally: Tally
-    store: Store
-
-    @classmethod
-    def fresh(cls, slopes: Slopes, *, seconds: int, tally: Tally) -> Memory:
-        """
-        Return the memory before the first sample, with bins for the last `seconds`.
-        """
-        return cls(
-            Guard.fresh(),
-            Bins.fresh(seconds),
-            Steadiness.fresh(slopes),
-            Watch.fresh(),
-            tally,
-            first_store(),
-        )
-
-
-class Tuning(NamedTuple):
-    """
-    What the walk needs of ship and parameters.
-
-    Attributes
-    ----------
-    limits, slopes
-        Of the tests and of the slopes.
-    data_stop_ns
-        Silence that stops a source [ns].
-    shaft_stopped
-        Fraction of the steady shaft speed.
-    speed_min
-        Speed below which nothing starts [m/s].
-    """
-
-    limits: Limits
-    slopes: Slopes
-    data_stop_ns: int
-    shaft_stopped: float
-    speed_min: float
-
-
 @njit(**INLINED)
 def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
     """Say whether no better source has delivered within data_stop_s."""
@@ -232,15 +91,16 @@ def _shaft_tells(bins: Bins, tuning: Tuning, number: int) -> bool:
 def _look_at_speed(
     bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
 ) -> int:
-    """Judge a closed bin of a speed source."""
-    if watch.source[0] != NEVER:
-        if watch.source[0] != source:
+    """Judge a closed bin of a speed source; return a `Stop` code, 0 to go on."""
+    watched = watch.source[0]
+    if watched == NEVER:
+        if not _is_primary(bins, tuning, source, number):
             return 0
-        learn(steadiness, tuning.slopes, bins, source, number)
-        return _BIN
-    if not _is_primary(bins, tuning, source, number):
+    elif watched != source:
         return 0
     learn(steadiness, tuning.slopes, bins, source, number)
+    if watched == source:
+        return _BIN
     watch.seen_source[0] = source
     watch.seen[0] = number
     limits = steadiness.limit[source]
@@ -252,11 +112,12 @@ def _look_at_speed(
         slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
         if scale == 0:
             watch.level[0] = level
-        # a limit that was not known then is NaN and does not count
-        falling = slope < -0.5 * limits[scale] or slope < -0.5 * watch.held[scale]
-        steady = steady and not falling
+        # comparisons with NaN are False: neither an unknown limit nor a slope of too few bins
+        # says anything
         falls = falls or slope < -limits[scale]
-    if steady and number % (1 << (SCALES - 1)) == 0:
+        if slope < -0.5 * limits[scale] or slope < -0.5 * watch.held[scale]:
+            steady = False
+    if steady and number % (1 << (SCALES - 1)) == 0:  # all windows were looked at
         watch.armed[0] = 1
     if (
         falls
@@ -270,7 +131,7 @@ def _look_at_speed(
 
 @njit(**INLINED)
 def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int:
-    """Judge a closed bin of the shaft speed."""
+    """Judge a closed bin of the shaft speed; return a `Stop` code, 0 to go on."""
     if (
         watch.source[0] != NEVER
         or watch.seen[0] < number - tuning.data_stop_ns // SECOND_NS
@@ -379,7 +240,7 @@ def _compile(sources: str) -> Callable[..., tuple[int, int]]:
     return cast(Callable[..., tuple[int, int]], compiled)
 
 
-_SOURCES = ('validate', 'bins', 'filling', 'ring', 'steadiness', 'kernel')
+_SOURCES = ('validate', 'bins', 'filling', 'ring', 'steadiness', 'memory', 'kernel')
 
 # compiled on import, so that no coastdown waits for it
 walk = _compile(digest('samples.py', *(f'coastdown/{name}.py' for name in _SOURCES)))

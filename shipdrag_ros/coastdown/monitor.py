@@ -27,14 +27,8 @@ from shipdrag_ros.coastdown.events import (
     Update,
 )
 from shipdrag_ros.coastdown.health import InputHealth, input_health
-from shipdrag_ros.coastdown.kernel import (
-    ALWAYS,
-    Memory,
-    Stop,
-    Tally,
-    Tuning,
-    walk,
-)
+from shipdrag_ros.coastdown.kernel import Stop, walk
+from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
 from shipdrag_ros.coastdown.onset import Candidate, Verdict, judge, propose
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.steadiness import Slopes

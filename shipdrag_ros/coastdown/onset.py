@@ -19,7 +19,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, line, speeds
 from shipdrag_ros.coastdown.expectation import expect
-from shipdrag_ros.coastdown.kernel import Tuning
+from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.tracking import shaft_fell_at, shaft_speed, turned_at
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64

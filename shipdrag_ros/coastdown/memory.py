@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+All that a monitor remembers, in arrays that compiled code writes to.
+
+One tuple, so that a reset is a new one; apart from the walk, so that what only
+reads it need not compile the walk.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.coastdown.bins import Bins
+from shipdrag_ros.coastdown.ring import Store, first_store
+from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness
+from shipdrag_ros.coastdown.validate import CHANNELS, NEVER, Guard, Limits
+from shipdrag_ros.samples import Float64, Int64, Reason
+
+ALWAYS = 2**62  # a stamp after all stamps
+RECENT = 16  # samples of each channel that its rate and clock offset are taken from
+
+
+class Watch(NamedTuple):
+    """
+    What the walk looks out for, and what it saw; arrays of one but for `held`.
+
+    Attributes
+    ----------
+    source : int64
+        The speed source of a candidate or coastdown; NEVER while there is none.
+    update_ns : int64
+        When the next estimate is due; ALWAYS if none is.
+    armed : int64
+        0 after a candidate or coastdown until the speed has been steady again.
+    held : (SCALES,) float64
+        The limits of that candidate: it is part of the record that later limits are learnt
+        from, and would make a fall that goes on look steady [m/s^2].
+    seen_source, seen : int64
+        Speed source and number of the bin looked at last.
+    level : float64
+        Speed there [m/s].
+    shaft : float64
+        Steady rate of turn before the shaft slowed down [rad/s].
+    """
+
+    source: Int64
+    update_ns: Int64
+    armed: Int64
+    held: Float64
+    seen_source: Int64
+    seen: Int64
+    level: Float64
+    shaft: Float64
+
+    @classmethod
+    def fresh(cls) -> Watch:
+        """
+        Return the watch of a monitor that knows nothing.
+        """
+        return cls(
+            np.full(1, NEVER),
+            np.full(1, ALWAYS),
+            np.ones(1, np.int64),
+            np.full(SCALES, np.nan),
+            np.full(1, NEVER),
+            np.full(1, NEVER),
+            np.full(1, np.nan),
+            np.full(1, np.nan),
+        )
+
+
+class Tally(NamedTuple):
+    """
+    What the health of the inputs is told from; a reset of the clock spares it.
+
+    Attributes
+    ----------
+    reasons : (channels, reasons) int64
+        Samples by `Reason`.
+    stamp_ns, arrival_ns : (channels, RECENT) int64
+        Of the last accepted samples.
+    """
+
+    reasons: Int64
+    stamp_ns: Int64
+    arrival_ns: Int64
+
+    @classmethod
+    def fresh(cls) -> Tally:
+        """
+        Return the counts before the first sample.
+        """
+        return cls(
+            np.zeros((CHANNELS, len(Reason)), np.int64),
+            np.full((CHANNELS, RECENT), NEVER),
+            np.full((CHANNELS, RECENT), NEVER),
+        )
+
+
+class Memory(NamedTuple):
+    """All that a monitor remembers, besides a coastdown that runs."""
+
+    guard: Guard
+    bins: Bins
+    steadiness: Steadiness
+    watch: Watch
+    tally: Tally
+    store: Store
+
+    @classmethod
+    def fresh(cls, slopes: Slopes, *, seconds: int, tally: Tally) -> Memory:
+        """
+        Return the memory before the first sample, with bins for the last `seconds`.
+        """
+        return cls(
+            Guard.fresh(),
+            Bins.fresh(seconds),
+            Steadiness.fresh(slopes),
+            Watch.fresh(),
+            tally,
+            first_store(),
+        )
+
+
+class Tuning(NamedTuple):
+    """
+    What the walk needs of ship and parameters.
+
+    Attributes
+    ----------
+    limits, slopes
+        Of the tests and of the slopes.
+    data_stop_ns
+        Silence that stops a source [ns].
+    shaft_stopped
+        Fraction of the steady shaft speed.
+    speed_min
+        Speed below which nothing starts [m/s].
+    """
+
+    limits: Limits
+    slopes: Slopes
+    data_stop_ns: int
+    shaft_stopped: float
+    speed_min: float
