@@ -1,0 +1,265 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Scoreboard of a diagnosis, on coastdowns in which the effect is hidden.
+
+    python benchmarks/diagnosis_score.py --by oracle --count 40
+    python benchmarks/diagnosis_score.py --by command
+    python benchmarks/diagnosis_score.py --by MODULE:FUNCTION --as blocks
+
+Every answer is kept in a file before the truth of its case is asked for; a run
+that was broken off goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from hidden import cases, scoring
+from hidden.recording import Recording
+
+from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+
+OUT = Path(__file__).parent / 'out'
+Found = dict[str, Any]
+Diagnose = Callable[[cases.Observation], Found]
+
+
+def as_block(recording: Recording) -> Block:
+    """
+    Return the readings of a run as the samples that the monitor is given.
+    """
+    return in_arrival_order(
+        [
+            Block.of(
+                Channel[name.upper()],
+                series.stamp_ns,
+                series.value,
+                receive_ns=series.receive_ns,
+            )
+            for name, series in recording.items()
+        ]
+    )
+
+
+def write_bags(observation: cases.Observation, folder: Path) -> tuple[Path, list[Path]]:
+    """
+    Write the ship file and one bag a run; return where they are.
+    """
+    ship = folder / 'ship.yaml'
+    ship.write_text(observation.ship_file, encoding='utf-8')
+    bags = []
+    for number, recording in enumerate(observation.runs):
+        bags.append(folder / f'run_{number}.mcap')
+        with BagWriter(bags[-1]) as writer:
+            writer.attach('ship.yaml', observation.ship_file)
+            writer.write_samples(as_block(recording))
+    return ship, bags
+
+
+def by_blocks(diagnose: Callable[[str, list[Block]], Found]) -> Diagnose:
+    """
+    Adapt a function of the ship file's text and one block a run.
+    """
+    return lambda seen: diagnose(seen.ship_file, [as_block(run) for run in seen.runs])
+
+
+def by_bags(diagnose: Callable[[Path, list[Path]], Found]) -> Diagnose:
+    """
+    Adapt a function of the paths of the ship file and the bags.
+    """
+
+    def adapted(seen: cases.Observation) -> Found:
+        with TemporaryDirectory() as folder:
+            return diagnose(*write_bags(seen, Path(folder)))
+
+    return adapted
+
+
+def command(ship: Path, bags: list[Path]) -> Found:
+    """
+    Diagnose with the verb `shipdrag diagnose`, in this process.
+    """
+    main = import_module('shipdrag_ros.cli.__main__').main
+    written = io.StringIO()
+    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(io.StringIO()) as told:
+        status = main(['diagnose', *map(str, bags), '--ship', str(ship), '--json'])
+    if status:
+        raise RuntimeError(f'shipdrag diagnose ended with {status}: {told.getvalue()}')
+    found: Found = json.loads(written.getvalue())
+    return found
+
+
+def diagnosis(by: str, form: str, number: int) -> Diagnose:
+    """
+    Return the diagnosis that is asked for; the oracle alone knows the case's noise.
+    """
+    if by == 'oracle':
+        from hidden.oracle import diagnose
+
+        return lambda seen: diagnose(seen, cases.noise(number))
+    if by == 'command':
+        return by_bags(command)
+    module, _, function = by.partition(':')
+    found = getattr(import_module(module), function)
+    return by_blocks(found) if form == 'blocks' else by_bags(found)
+
+
+def answer(by: str, form: str, number: int) -> dict[str, Any]:
+    """
+    Diagnose one case, and again with what the answer recommends.
+    """
+    diagnose = diagnosis(by, form, number)
+    seen = cases.observe(number)
+    start = time.process_time()
+    found = diagnose(seen)
+    row: dict[str, Any] = {
+        'case': number,
+        'cpu_s': time.process_time() - start,
+        'found': found,
+        'followed': None,
+        'everything': None,
+    }
+    if found['verdict'] == 'one_of':
+        recommended = scoring.parse(found).recommended
+        if recommended and recommended[0].test is not None:
+            row['followed'] = diagnose(cases.observe(number, added=(recommended[0].test,)))
+        row['everything'] = diagnose(cases.observe(number, added=cases.TESTS))
+    return row
+
+
+def _answer(task: tuple[str, str, int]) -> dict[str, Any]:
+    try:
+        return answer(*task)
+    except Exception as error:
+        return {'case': task[2], 'error': f'{type(error).__name__}: {error}'}
+
+
+def trials(rows: Sequence[dict[str, Any]]) -> list[scoring.Trial]:
+    """
+    Reveal the truth of the cases that were answered.
+    """
+
+    def parsed(found: Found | None) -> scoring.Answer | None:
+        return None if found is None else scoring.parse(found)
+
+    return [
+        scoring.Trial(
+            cases.reveal(row['case']),
+            scoring.parse(row['found']),
+            row['cpu_s'],
+            parsed(row['followed']),
+            parsed(row['everything']),
+        )
+        for row in rows
+        if 'error' not in row
+    ]
+
+
+def table(done: Sequence[scoring.Trial]) -> Iterator[str]:
+    """
+    Yield the lines of the scoreboard.
+    """
+    conditions = sorted({str(trial.truth.condition) for trial in done})
+    grouped = {
+        text: scoring.scores([t for t in done if str(t.truth.condition) == text])
+        for text in conditions
+    }
+    grouped['all but mis-stated'] = scoring.scores(
+        [trial for trial in done if not trial.truth.condition.misstated] or done
+    )
+    yield '| | ' + ' | '.join(grouped) + ' |'
+    yield '|---|' + '---|' * len(grouped)
+    for name in grouped['all but mis-stated']:
+        cells = [_cell(columns[name]) for columns in grouped.values()]
+        yield f'| {name} | ' + ' | '.join(cells) + ' |'
+    yield ''
+    yield 'hidden: answers (name: how often)'
+    for truth, answers in scoring.confusion(done).items():
+        yield f'  {truth}: ' + ', '.join(f'{name} {n}' for name, n in answers.most_common())
+
+
+def _cell(value: scoring.Share | float) -> str:
+    if isinstance(value, scoring.Share):
+        return str(value) if value.of else '-'
+    return '-' if value != value else f'{value:.3g}'
+
+
+def main() -> None:
+    """
+    Ask, keep, reveal, and print.
+    """
+    parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
+    parser.add_argument('--by', default='command', help='oracle, command or MODULE:FUNCTION')
+    parser.add_argument('--as', dest='form', choices=('blocks', 'bags'), default='blocks')
+    parser.add_argument('--first', type=int, default=0, help='number of the first case')
+    parser.add_argument('--count', type=int, help='how many cases; all of them by default')
+    parser.add_argument('--processes', type=int, default=2)
+    parser.add_argument('--out', type=Path, help='answers, one line of JSON a case')
+    options = parser.parse_args()
+    last = cases.count() if options.count is None else options.first + options.count
+    numbers = range(options.first, min(last, cases.count()))
+    out = options.out or OUT / f'diagnosis_{options.by.replace(":", "_")}.jsonl'
+    out.parent.mkdir(parents=True, exist_ok=True)
+
+    kept = _kept(out)
+    tasks = [(options.by, options.form, number) for number in numbers if number not in kept]
+    with ProcessPoolExecutor(options.processes) as pool, out.open('a', encoding='utf-8') as file:
+        for row in pool.map(_answer, tasks):
+            file.write(json.dumps(row) + '\n')
+            file.flush()
+            kept[row['case']] = row
+    rows = [kept[number] for number in numbers]
+
+    print(f'{len(rows)} of {cases.count()} cases, seed {cases.SEED}, answers of {options.by}')
+    failed = [row for row in rows if 'error' in row]
+    for row in failed[:10]:
+        print(f'case {row["case"]}: {row["error"]}')
+    if failed:
+        print(f'{len(failed)} cases without an answer, not counted below')
+    done = trials(rows)
+    for line in table(done):
+        print(line)
+    _write_summary(out.with_suffix('.json'), done)
+
+
+def _kept(out: Path) -> dict[int, dict[str, Any]]:
+    if not out.exists():
+        return {}
+    rows = (json.loads(line) for line in out.read_text(encoding='utf-8').splitlines())
+    return {row['case']: row for row in rows if 'error' not in row}
+
+
+def _write_summary(path: Path, done: Sequence[scoring.Trial]) -> None:
+    figures = {
+        name: asdict(value) if isinstance(value, scoring.Share) else value
+        for name, value in scoring.scores(done).items()
+    }
+    summary = {
+        'seed': cases.SEED,
+        'cases': len(done),
+        'figures': figures,
+        'confusion': scoring.confusion(done),
+    }
+    path.write_text(json.dumps(summary, indent=1) + '\n', encoding='utf-8')
+
+
+if __name__ == '__main__':
+    # a diagnosis and its followers share the cores with each other alone
+    os.environ.setdefault('OMP_NUM_THREADS', '1')
+    main()

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The cases: what a diagnosis may see, and apart from it the truth.
+
+`observe` gives the ship file and the runs; `reveal` the truth, to be asked
+for once the verdict is kept. Both are made anew from the number of the case.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
+
+import numpy as np
+
+from hidden.effect import Effect, Leg
+from hidden.hull import SHAPE_TERMS, Hull, draw_hull
+from hidden.library import FIRST_SHELF, SECOND_SHELF
+from hidden.outside import OUTSIDE
+from hidden.recording import (
+    CONTEXT,
+    INPUTS,
+    MOTION,
+    Noise,
+    Recording,
+    disturb,
+    draw_noise,
+    record,
+)
+from hidden.sailing import World, sail
+
+SEED = 20260601
+SHAPE_RMS = 0.01
+RECIPROCAL = 'reciprocal_run'
+TESTS = (RECIPROCAL, *CONTEXT, 'speed_over_ground')
+PAIRS = (
+    ('current', 'fouling'),
+    ('current', 'log_scale'),
+    ('wind', 'fouling'),
+    ('wind', 'current'),
+    ('shallow_water', 'log_offset'),
+    ('locked_propeller', 'current'),
+    ('towed_cable', 'log_offset'),
+    ('turning', 'current'),
+    ('residual_thrust', 'log_scale'),
+    ('waves', 'log_scale'),
+    ('fouling', 'log_offset'),
+    ('radar_scale', 'fouling'),
+)
+_BY_NAME = {kind.name: kind for kind in (*FIRST_SHELF, *SECOND_SHELF)}
+_ONE, _SECOND, _PAIR, _OUTSIDE, _NONE, _MISSTATED = 7, 3, 1, 4, 60, 20  # of a kind
+
+
+@dataclass(frozen=True)
+class Condition:
+    """
+    What a diagnosis is given.
+
+    Attributes
+    ----------
+    runs
+        1, or 2 on reciprocal headings.
+    context
+        Wind, depth, heading and shaft are measured.
+    misstated
+        The baseline is three times worse than the ship file states.
+    """
+
+    runs: int
+    context: bool
+    misstated: bool = False
+
+    def __str__(self) -> str:
+        text = f'{self.runs} run' + 's' * (self.runs > 1) + ' + context' * self.context
+        return text + ', baseline mis-stated' * self.misstated
+
+
+CONDITIONS = tuple(Condition(runs, context) for context in (False, True) for runs in (1, 2))
+
+
+@dataclass(frozen=True)
+class Observation:
+    """
+    What a diagnosis may see.
+
+    Attributes
+    ----------
+    ship_file
+        YAML.
+    runs
+        Readings by input, one mapping a run.
+    """
+
+    ship_file: str
+    runs: tuple[Recording, ...]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """
+    What was hidden.
+
+    Attributes
+    ----------
+    kind
+        `none`, `one`, `pair` or `outside`.
+    shelf
+        0 outside the library and without effect, else 1 or 2; of a pair 1.
+    names
+        In alphabetical order.
+    parameters
+        By name of effect and of parameter.
+    condition
+    """
+
+    kind: str
+    shelf: int
+    names: tuple[str, ...]
+    parameters: dict[str, dict[str, float]]
+    condition: Condition
+
+
+@dataclass(frozen=True)
+class _Plan:
+    kinds: tuple[type[Effect], ...]
+    condition: Condition
+
+
+@dataclass(frozen=True)
+class _Voyage:
+    """One run as it was, and how."""
+
+    leg: Leg
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class _Case:
+    hull: Hull
+    noise: Noise
+    world: World
+    effects: tuple[Effect, ...]
+    voyages: tuple[_Voyage, ...]
+
+
+@cache
+def _plans() -> tuple[_Plan, ...]:
+    plans: list[_Plan] = []
+    for condition in CONDITIONS:
+        wanted: list[tuple[type[Effect], ...]] = []
+        wanted += [(kind,) for kind in FIRST_SHELF for _ in range(_ONE)]
+        wanted += [(kind,) for kind in SECOND_SHELF for _ in range(_SECOND)]
+        wanted += [tuple(_BY_NAME[name] for name in pair) for pair in PAIRS for _ in range(_PAIR)]
+        wanted += [(kind,) for kind in OUTSIDE for _ in range(_OUTSIDE)]
+        wanted += [()] * _NONE
+        plans += [_Plan(kinds, condition) for kinds in wanted]
+        plans += [_Plan((), replace(condition, misstated=True))] * _MISSTATED
+    # mixed, so that any part of them is a sample of all, and the number tells nothing
+    order = np.random.default_rng(SEED).permutation(len(plans))
+    return tuple(plans[i] for i in order)
+
+
+def count() -> int:
+    """
+    Return the number of cases.
+    """
+    return len(_plans())
+
+
+def composition() -> Counter[str]:
+    """
+    Return how many cases of each kind there are.
+    """
+    return Counter(reveal(number).kind for number in range(count()))
+
+
+def observe(number: int, *, added: tuple[str, ...] = ()) -> Observation:
+    """
+    Return what a diagnosis may see of a case.
+
+    Parameters
+    ----------
+    number
+        Of the case, from 0.
+    added
+        Of `TESTS`: what is measured besides. All else keeps its last digit.
+    """
+    case = _case(number)
+    condition = _plans()[number].condition
+    runs = 2 if RECIPROCAL in added else condition.runs
+    inputs = {*MOTION, *(CONTEXT if condition.context else ()), *added} - {RECIPROCAL}
+    ordered = tuple(name for name in INPUTS if name in inputs)
+    return Observation(
+        case.hull.ship_file(), tuple(_run(number, case, k, ordered) for k in range(runs))
+    )
+
+
+def noise(number: int) -> Noise:
+    """
+    Return the sizes of what is random; known to the oracle alone.
+    """
+    return _case(number).noise
+
+
+def reveal(number: int) -> Truth:
+    """
+    Return what was hidden in a case.
+    """
+    plan, case = _plans()[number], _case(number)
+    kinds = plan.kinds
+    kind = 'none'
+    if len(kinds) == 2:
+        kind = 'pair'
+    elif kinds:
+        kind = 'outside' if kinds[0] in OUTSIDE else 'one'
+    shelf = 2 if set(kinds) & set(SECOND_SHELF) else int(kind in ('one', 'pair'))
+    return Truth(
+        kind,
+        shelf,
+        tuple(sorted(effect.name for effect in case.effects)),
+        {effect.name: effect.parameters() for effect in case.effects},
+        plan.condition,
+    )
+
+
+@lru_cache(maxsize=8)
+def _case(number: int) -> _Case:
+    plan = _plans()[number]
+    rng = _stream(number, 0)
+    hull = draw_hull(rng)
+    resistance = float(hull.still_n(np.array([hull.speed_m_s]))[0])
+    slow_s = hull.speed_m_s * hull.mass_kg / resistance
+    duration_s = round(float(np.clip(2.4 * slow_s, 700.0, 3600.0)))
+    heading = rng.uniform(-np.pi, np.pi)
+    voyages = []
+    for sign in (1.0, -1.0):
+        speed = hull.speed_m_s * (1.0 if sign > 0.0 else rng.uniform(0.85, 1.0))
+        turned = heading if sign > 0.0 else heading + np.pi + rng.normal(0.0, 0.03)
+        voyages.append(_Voyage(Leg(hull, sign, duration_s, speed), turned))
+    worse = 3.0 if plan.condition.misstated else 1.0
+    world = World(
+        friction=worse * hull.friction_sd * rng.standard_normal(),
+        wave=worse * hull.wave_sd * rng.standard_normal(),
+        shape=tuple(SHAPE_RMS * rng.standard_normal(SHAPE_TERMS) / np.sqrt(0.5 * SHAPE_TERMS)),
+        n_r=hull.n_r_sd * rng.standard_normal(),
+        run_down_s=hull.run_down_sd * rng.standard_normal(),
+    )
+    effects = tuple(kind.draw(voyages[0].leg, rng) for kind in plan.kinds)
+    return _Case(hull, draw_noise(rng), world, effects, tuple(voyages))
+
+
+def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recording:
+    leg, heading = case.voyages[which].leg, case.voyages[which].heading_rad
+    motion = sail(
+        leg,
+        case.effects,
+        heading_rad=heading,
+        first_heading_rad=case.voyages[0].heading_rad,
+        world=case.world,
+        disturbance=disturb(leg, case.noise, heading, _stream(number, 1, which)),
+    )
+    streams = {name: _stream(number, 2, which, place) for place, name in enumerate(INPUTS)}
+    return record(
+        motion,
+        leg,
+        case.effects,
+        number=which,
+        inputs=inputs,
+        noise=case.noise,
+        heading_rad=heading,
+        streams=streams,
+    )
+
+
+def _stream(*key: int) -> np.random.Generator:
+    return np.random.default_rng([SEED, *key])
