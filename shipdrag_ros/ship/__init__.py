@@ -9,7 +9,14 @@ from shipdrag_ros.ship.added_mass import (
 )
 from shipdrag_ros.ship.baseline import Baseline, CoefficientBaseline, CoefficientSd, TableBaseline
 from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3, GRAVITY_M_S2, Ship
-from shipdrag_ros.ship.sections import Air, Effect, Propeller, Propulsion, Uncertain, Water
+from shipdrag_ros.ship.sections import (
+    Air,
+    Propeller,
+    Propulsion,
+    StatedEffect,
+    Uncertain,
+    Water,
+)
 
 __all__ = [
     'AIR_DENSITY_KG_M3',
@@ -20,11 +27,11 @@ __all__ = [
     'CoefficientBaseline',
     'CoefficientSd',
     'ConstantAddedMass',
-    'Effect',
     'MerchantAddedMass',
     'Propeller',
     'Propulsion',
     'Ship',
+    'StatedEffect',
     'TableAddedMass',
     'TableBaseline',
     'Uncertain',

@@ -24,7 +24,7 @@ from shipdrag_ros.ship.consistency import (
     slenderness,
 )
 from shipdrag_ros.ship.fields import declare, list_of, number, plain, read_keys, section, text
-from shipdrag_ros.ship.sections import Air, Effect, Propeller, Propulsion, Water
+from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
 
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.225
@@ -58,8 +58,8 @@ class Ship:
         section(Propulsion), 'run-down after the stop', default=None
     )
     baseline: Baseline | None = declare(baseline(), 'expected resistance', default=None)
-    effects: tuple[Effect, ...] = declare(
-        list_of(section(Effect)), 'effects on top of the baseline', default=()
+    effects: tuple[StatedEffect, ...] = declare(
+        list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
     )
 
     @classmethod

@@ -64,7 +64,7 @@ class Uncertain:
 
 
 @dataclass(frozen=True)
-class Effect:
+class StatedEffect:
     """
     An effect added to the baseline, as a diagnosis writes it.
     """

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Surge motion of a ship and the sensors that read it."""
 
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.columns import Columns, simulate_columns
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Prior, Quantity, Scope, Shape
 from shipdrag_ros.simulation.noise import GaussMarkov
 from shipdrag_ros.simulation.scenario import STOP, EngineOrder, Scenario, Turn
 from shipdrag_ros.simulation.sensors import START_NS, Sensor, sense, standard_sensors
@@ -9,13 +12,23 @@ from shipdrag_ros.simulation.surge import Truth, simulate
 __all__ = [
     'START_NS',
     'STOP',
+    'Action',
+    'Columns',
+    'Effect',
     'EngineOrder',
+    'Frame',
     'GaussMarkov',
+    'Measure',
+    'Prior',
+    'Quantity',
     'Scenario',
+    'Scope',
     'Sensor',
+    'Shape',
     'Truth',
     'Turn',
     'sense',
     'simulate',
+    'simulate_columns',
     'standard_sensors',
 ]

@@ -2,23 +2,24 @@
 """
 Compiled integration of the surge equation.
 
-A day of record is 10^5 steps and a benchmark needs hundreds of records: in
-compiled code both are a fraction of a second.
+A day of record is 10^5 steps, and naming an effect needs thousands of records:
+in compiled code both are a fraction of a second.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from shipdrag_ros.samples import Float64
 
 
 class Law(NamedTuple):
     """
-    What does not change during a record, per unit ship mass.
+    What all columns of a simulation share, per unit ship mass.
 
     Attributes
     ----------
@@ -26,115 +27,307 @@ class Law(NamedTuple):
         First speed and spacing of the table of resistance.
     resistance : (4, m)
         Cubic of each cell, highest power first [m/s^2].
+    extra_cell_m_s
+        Spacing of the columns' tables of extra resistance.
     n_r : (k,)
         Polynomial of n_r in |u|, lowest power first.
     air_1_m
         Air drag over wind |wind|.
-    current_m_s : (2,)
-        East and north.
     """
 
     low_m_s: float
     cell_m_s: float
     resistance: Float64
+    extra_cell_m_s: float
     n_r: Float64
     air_1_m: float
-    current_m_s: Float64
 
 
-class Leg(NamedTuple):
-    """
-    A stretch between two events; times count from its start.
+# what one column adds to the law; a wave's direction is a unit vector, its force and all else
+# per unit of the stated mass
+COLUMN = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            'speed_m_s',
+            'wind_east_m_s',
+            'wind_north_m_s',
+            'wave_m_s2',
+            'wave_east',
+            'wave_north',
+            'wave_encounter_s_m',
+            'current_east_m_s',
+            'current_north_m_s',
+            'change_east_m_s2',
+            'change_north_m_s2',
+            'change_from_s',
+            'run_down_s',
+            'residual_fraction',
+            'residual_decay_s',
+            'n_r_change',
+            'mass_fraction',
+        )
+    ]
+)
 
-    Attributes
-    ----------
-    step_s
-        Length of a step.
-    thrust_m_s2, thrust_excess_m_s2, run_down_s
-        Thrust is the first, plus the second times exp(-t / run_down_s).
-    yaw_rad, yaw_rate_rad_s
-    turning_1_m
-        Resistance of turning over u |u|.
-    gust_m_s2, water_m_s : (n + 1,)
-        Disturbances at the steps, linear between.
-    """
+# a stretch between two events; the thrust that is ordered is a fraction of the steady one,
+# turning_1_m the resistance of turning over u |u|
+LEG = np.dtype(
+    [
+        ('start_s', np.float64),
+        ('step_s', np.float64),
+        ('steps', np.int64),
+        ('thrust_ordered', np.float64),
+        ('yaw_rad', np.float64),
+        ('yaw_rate_rad_s', np.float64),
+        ('turning_1_m', np.float64),
+    ]
+)
 
-    step_s: float
-    thrust_m_s2: float
-    thrust_excess_m_s2: float
-    run_down_s: float
-    yaw_rad: float
-    yaw_rate_rad_s: float
-    turning_1_m: float
-    gust_m_s2: Float64
-    water_m_s: Float64
+Records = NDArray[np.void]
 
 
 @njit(cache=True)
-def _rates(law: Law, leg: Leg, step: int, part: float, speed: float) -> tuple[float, float, float]:
-    """Return du/dt, dx/dt and dy/dt at a part of a step."""
-    elapsed = (step + part) * leg.step_s
-    gust = leg.gust_m_s2[step] + part * (leg.gust_m_s2[step + 1] - leg.gust_m_s2[step])
-    change = leg.water_m_s[step + 1] - leg.water_m_s[step]
-    water = leg.water_m_s[step] + part * change
-    yaw = leg.yaw_rad + leg.yaw_rate_rad_s * elapsed
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    ground = speed + water + law.current_m_s[0] * cos + law.current_m_s[1] * sin
-
-    magnitude = abs(speed)
+def _magnitude_m_s2(law: Law, extra: Float64, magnitude: float) -> float:
+    """Look up the resistance at a speed through water."""
     cell = int((magnitude - law.low_m_s) / law.cell_m_s)
     cell = min(max(cell, 0), law.resistance.shape[1] - 1)
     offset = magnitude - law.low_m_s - cell * law.cell_m_s
     r = 0.0
     for power in range(4):
-        r = r * offset + law.resistance[power, cell]
-    r += leg.turning_1_m * magnitude * magnitude
+        r = r * offset + float(law.resistance[power, cell])
+    if len(extra) == 0:
+        return r
+    # cubic through the four nearest points
+    at = (magnitude - law.low_m_s) / law.extra_cell_m_s
+    first = min(max(int(at) - 1, 0), len(extra) - 4)
+    p = at - first
+    p1, p2, p3 = p - 1.0, p - 2.0, p - 3.0
+    added: float = (
+        -extra[first] * p1 * p2 * p3 / 6.0
+        + extra[first + 1] * p * p2 * p3 / 2.0
+        - extra[first + 2] * p * p1 * p3 / 2.0
+        + extra[first + 3] * p * p1 * p2 / 6.0
+    )
+    return r + added
+
+
+@njit(cache=True)
+def _retardation_m_s2(
+    law: Law,
+    column: Any,
+    extra: Float64,
+    speed: float,
+    ground: tuple[float, float],
+    cos: float,
+    sin: float,
+    turning_1_m: float,
+) -> float:
+    """Return all forces but thrust and gusts, `ground` along the ship and to port."""
+    magnitude = abs(speed)
+    r = _magnitude_m_s2(law, extra, magnitude) + turning_1_m * magnitude * magnitude
     if speed < 0.0:
         r = -r
     # the baseline holds the still-air drag at the speed through water
-    r += law.air_1_m * (ground * abs(ground) - speed * magnitude)
+    ahead = ground[0] - column.wind_east_m_s * cos - column.wind_north_m_s * sin
+    abeam = ground[1] - column.wind_north_m_s * cos + column.wind_east_m_s * sin
+    r += law.air_1_m * (ahead * np.sqrt(ahead * ahead + abeam * abeam) - speed * magnitude)
+    if column.wave_m_s2 != 0.0:
+        along = column.wave_east * cos + column.wave_north * sin
+        encounter = 1.0 - column.wave_encounter_s_m * speed * along
+        r -= column.wave_m_s2 * along * encounter * encounter
+    retardation: float = r
+    return retardation
 
-    n_r = 0.0
-    for power in range(len(law.n_r) - 1, -1, -1):
-        n_r = n_r * magnitude + law.n_r[power]
-    thrust = leg.thrust_m_s2
-    if leg.thrust_excess_m_s2 != 0.0:
-        thrust += leg.thrust_excess_m_s2 * np.exp(-elapsed / leg.run_down_s)
-    # the ship's inertia is over ground, that of the added mass through water
-    acceleration = (thrust + gust - r - change / leg.step_s) / (1.0 + n_r)
-    over_ground = speed + water
+
+@njit(cache=True)
+def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
+    """Return the velocity of the water to the east and to the north."""
+    since = max(time_s - column.change_from_s, 0.0)
     return (
-        acceleration,
-        over_ground * cos + law.current_m_s[0],
-        over_ground * sin + law.current_m_s[1],
+        column.current_east_m_s + column.change_east_m_s2 * since,
+        column.current_north_m_s + column.change_north_m_s2 * since,
     )
 
 
 @njit(cache=True)
-def integrate(law: Law, leg: Leg, speed: float, x: float, y: float) -> Float64:
+def _rates(
+    law: Law,
+    column: Any,
+    extra: Float64,
+    leg: Any,
+    thrust: tuple[float, float, float],
+    heading: tuple[float, float],
+    elapsed: float,
+    speed: float,
+    gust: float,
+    water: float,
+    water_rate: float,
+) -> tuple[float, float, float]:
     """
-    Follow one leg from its initial state.
+    Return du/dt, dx/dt and dy/dt.
 
-    Returns
-    -------
-    (n + 1, 3)
-        Speed through water, x and y at the steps.
+    `thrust` is the one ordered and what is still above it, nominal and
+    residual, at the start of the leg; `heading` cosine and sine of it then.
+    """
+    cos, sin = heading
+    if leg.yaw_rate_rad_s != 0.0:
+        yaw = leg.yaw_rad + leg.yaw_rate_rad_s * elapsed
+        cos, sin = np.cos(yaw), np.sin(yaw)
+    east, north = _current_m_s(column, leg.start_s + elapsed)
+    over_ground = speed + water
+    ground = (over_ground + east * cos + north * sin, north * cos - east * sin)
+    force = thrust[0] + gust
+    if thrust[1] != 0.0:
+        force += thrust[1] * np.exp(-elapsed / column.run_down_s)
+    if thrust[2] != 0.0:
+        force += thrust[2] * np.exp(-elapsed / column.residual_decay_s)
+    force -= _retardation_m_s2(law, column, extra, speed, ground, cos, sin, leg.turning_1_m)
+    if leg.start_s >= column.change_from_s:
+        water_rate += column.change_east_m_s2 * cos + column.change_north_m_s2 * sin
+
+    magnitude = abs(speed)
+    n_r = 0.0
+    for power in range(len(law.n_r) - 1, -1, -1):
+        n_r = n_r * magnitude + law.n_r[power]
+    # the ship's inertia is over ground, that of the added mass through water
+    acceleration = force / (1.0 + column.mass_fraction) - water_rate
+    return (
+        acceleration / (1.0 + n_r + column.n_r_change),
+        over_ground * cos + east,
+        over_ground * sin + north,
+    )
+
+
+@njit(cache=True)
+def follow(
+    law: Law,
+    column: Any,
+    extra: Float64,
+    legs: Records,
+    gust_m_s2: Float64,
+    water_m_s: Float64,
+    time_s: Float64,
+    path: Float64,
+) -> None:
+    """
+    Follow one column from the start to the end of its legs.
+
+    Parameters
+    ----------
+    extra : (e,) or (0,)
+        Extra resistance at speeds `extra_cell_m_s` apart [m/s^2].
+    legs : (l,)
+        Records of `LEG`, one after the other.
+    gust_m_s2, water_m_s : (n + 1,) or (0,)
+        Disturbances at all steps, linear between.
+    time_s : (m,)
+        When to look, ascending, within the legs.
+    path : (m, 5)
+        Filled with speed through water, x, y, and the velocity over ground.
 
     Notes
     -----
-    Runge-Kutta of fourth order; all forces are smooth within a step.
+    Runge-Kutta of fourth order with its interpolant of third order between
+    the steps; all forces are smooth within a leg.
     """
-    n = len(leg.gust_m_s2) - 1
-    h = leg.step_s
-    path = np.empty((n + 1, 3))
-    path[0, 0], path[0, 1], path[0, 2] = speed, x, y
-    for i in range(n):
-        u = path[i, 0]
-        u1, x1, y1 = _rates(law, leg, i, 0.0, u)
-        u2, x2, y2 = _rates(law, leg, i, 0.5, u + 0.5 * h * u1)
-        u3, x3, y3 = _rates(law, leg, i, 0.5, u + 0.5 * h * u2)
-        u4, x4, y4 = _rates(law, leg, i, 1.0, u + h * u3)
-        path[i + 1, 0] = u + h * (u1 + 2.0 * u2 + 2.0 * u3 + u4) / 6.0
-        path[i + 1, 1] = path[i, 1] + h * (x1 + 2.0 * x2 + 2.0 * x3 + x4) / 6.0
-        path[i + 1, 2] = path[i, 2] + h * (y1 + 2.0 * y2 + 2.0 * y3 + y4) / 6.0
-    return path
+    u, x, y = column.speed_m_s, 0.0, 0.0
+    cos, sin = np.cos(legs[0].yaw_rad), np.sin(legs[0].yaw_rad)
+    east, north = column.current_east_m_s, column.current_north_m_s
+    ground = (u + east * cos + north * sin, north * cos - east * sin)
+    steady = _retardation_m_s2(law, column, extra, u, ground, cos, sin, 0.0)
+    nominal = residual = 1.0  # thrust over the steady one, were it all of this kind
+    disturbed = len(gust_m_s2) > 0
+    gust = gust_change = water = water_change = 0.0
+    sample = done = 0
+    for i_leg in range(len(legs)):
+        leg = legs[i_leg]
+        h = leg.step_s
+        length = h * leg.steps
+        heading = (np.cos(leg.yaw_rad), np.sin(leg.yaw_rad))
+        ordered = leg.thrust_ordered
+        above = nominal - ordered if column.run_down_s > 0.0 else 0.0
+        above_residual = residual - ordered if column.residual_fraction != 0.0 else 0.0
+        thrust = (
+            steady * ordered,
+            steady * above * (1.0 - column.residual_fraction),
+            steady * above_residual * column.residual_fraction,
+        )
+        nominal = residual = ordered
+        if above != 0.0:
+            nominal += above * np.exp(-length / column.run_down_s)
+        if above_residual != 0.0:
+            residual += above_residual * np.exp(-length / column.residual_decay_s)
+        for step in range(leg.steps):
+            if disturbed:
+                gust, water = gust_m_s2[done], water_m_s[done]
+                gust_change = gust_m_s2[done + 1] - gust
+                water_change = water_m_s[done + 1] - water
+                done += 1
+            start = step * h
+            middle, end = start + 0.5 * h, start + h
+            rate = water_change / h
+            u1, x1, y1 = _rates(
+                law, column, extra, leg, thrust, heading, start, u, gust, water, rate
+            )
+            g, w = gust + 0.5 * gust_change, water + 0.5 * water_change
+            u2, x2, y2 = _rates(
+                law, column, extra, leg, thrust, heading, middle, u + 0.5 * h * u1, g, w, rate
+            )
+            u3, x3, y3 = _rates(
+                law, column, extra, leg, thrust, heading, middle, u + 0.5 * h * u2, g, w, rate
+            )
+            g, w = gust + gust_change, water + water_change
+            u4, x4, y4 = _rates(
+                law, column, extra, leg, thrust, heading, end, u + h * u3, g, w, rate
+            )
+            is_last = i_leg == len(legs) - 1 and step == leg.steps - 1
+            while sample < len(time_s) and (is_last or time_s[sample] < leg.start_s + end):
+                p = (time_s[sample] - leg.start_s - start) / h
+                b1 = h * p * (1.0 - p * (1.5 - p * (2.0 / 3.0)))
+                b2 = h * p * p * (1.0 - p * (2.0 / 3.0))
+                b4 = h * p * p * (p * (2.0 / 3.0) - 0.5)
+                path[sample, 0] = u + b1 * u1 + b2 * (u2 + u3) + b4 * u4
+                path[sample, 1] = x + b1 * x1 + b2 * (x2 + x3) + b4 * x4
+                path[sample, 2] = y + b1 * y1 + b2 * (y2 + y3) + b4 * y4
+                along = path[sample, 0] + water + p * water_change
+                at = start + p * h
+                yaw = leg.yaw_rad + leg.yaw_rate_rad_s * at
+                east, north = _current_m_s(column, leg.start_s + at)
+                path[sample, 3] = along * np.cos(yaw) + east
+                path[sample, 4] = along * np.sin(yaw) + north
+                sample += 1
+            u += h * (u1 + 2.0 * u2 + 2.0 * u3 + u4) / 6.0
+            x += h * (x1 + 2.0 * x2 + 2.0 * x3 + x4) / 6.0
+            y += h * (y1 + 2.0 * y2 + 2.0 * y3 + y4) / 6.0
+
+
+@njit(cache=True)
+def follow_columns(
+    law: Law,
+    columns: Records,
+    extra: Float64,
+    legs: Records,
+    own_legs: NDArray[np.int64],
+    time_s: Float64,
+    paths: Float64,
+) -> None:
+    """
+    Follow columns without disturbances.
+
+    Parameters
+    ----------
+    columns : (k,)
+        Records of `COLUMN`.
+    extra : (k, e)
+    legs : (l,)
+    own_legs : (k, 2)
+        Where the legs of each column begin and end.
+    time_s : (m,)
+    paths : (k, m, 5)
+        Filled as `path` is there.
+    """
+    none = np.empty(0)
+    for i in range(len(columns)):
+        mine = legs[own_legs[i, 0] : own_legs[i, 1]]
+        follow(law, columns[i], extra[i], mine, none, none, time_s, paths[i])

@@ -3,7 +3,8 @@
 Sensors that read a simulated motion, with the faults of real ones.
 
 A reading is the truth at its time of measurement plus noise; what the stamp
-says and when the reading arrives are faults of their own.
+says and when the reading arrives are faults of their own. A sensor that is
+wrong throughout, by its scale for instance, is an effect of the simulation.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+from shipdrag_ros.simulation.faults import log_reading
 from shipdrag_ros.simulation.noise import GaussMarkov
 from shipdrag_ros.simulation.surge import Truth
 
@@ -130,7 +132,7 @@ def _read(truth: Truth, sensor: Sensor, rng: np.random.Generator, start_ns: int)
     time = time[time <= end_s]
     n = len(time)
     columns = 2 if sensor.channel in _TWO_COLUMNS else 1
-    value = _true_values(truth.at(time), sensor.channel)
+    value = _perfect_values(truth, time, sensor.channel)
     value += sensor.sd * rng.standard_normal((n, columns))
     if sensor.coloured:
         for column in range(columns):
@@ -157,17 +159,23 @@ def _read(truth: Truth, sensor: Sensor, rng: np.random.Generator, start_ns: int)
     )
 
 
-def _true_values(truth: Truth, channel: Channel) -> Float64:
-    """Return what a perfect sensor reads, a new array of one or two columns."""
+def _perfect_values(whole: Truth, time: Float64, channel: Channel) -> Float64:
+    """
+    Return readings without noise, a new array of one or two columns.
+
+    What is systematically wrong with a sensor is an effect, and acts here.
+    """
+    truth, action = whole.at(time), whole.action
     match channel:
         case Channel.SPEED_THROUGH_WATER:
-            return truth.speed_through_water_m_s[:, None].copy()
+            speed = whole.speed_through_water_m_s
+            return log_reading(action, whole.time_s, speed, time)[:, None]
         case Channel.SPEED_OVER_GROUND:
             east, north = truth.velocity_over_ground_m_s.T
-            speed: Float64 = np.hypot(east, north)
-            return speed[:, None]
+            over_ground: Float64 = (1.0 + action.radar_factor) * np.hypot(east, north)
+            return over_ground[:, None]
         case Channel.POSITION:
-            return truth.position_m.copy()
+            return (1.0 + action.radar_factor) * truth.position_m
         case Channel.HEADING:
             return truth.heading_rad[:, None].copy()
         case Channel.SHAFT:
@@ -177,8 +185,8 @@ def _true_values(truth: Truth, channel: Channel) -> Float64:
         case Channel.DEPTH:
             return np.full((len(truth), 1), truth.scenario.depth_m)
         case Channel.WIND_APPARENT:
-            # still air, seen from the ship: forward and to port
-            east, north = -truth.velocity_over_ground_m_s.T
+            # the air, seen from the ship: forward and to port
+            east, north = (np.array(action.wind_m_s) - truth.velocity_over_ground_m_s).T
             cos, sin = np.cos(truth.heading_rad), np.sin(truth.heading_rad)
             return np.column_stack([east * cos + north * sin, north * cos - east * sin])
         case _:

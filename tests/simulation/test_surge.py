@@ -11,9 +11,9 @@ from shipdrag_ros.errors import ShipdragError, SimulationError
 from shipdrag_ros.ship import (
     Air,
     ConstantAddedMass,
-    Effect,
     Propulsion,
     Ship,
+    StatedEffect,
     TableBaseline,
     Water,
 )
@@ -295,7 +295,7 @@ def test_no_baseline_and_unknown_effects_are_errors():
     with pytest.raises(ShipdragError, match='no baseline'):
         simulate(replace(CARGO, baseline=None), Scenario(speed_m_s=8.2))
     with pytest.raises(SimulationError, match='fouling'):
-        simulate(replace(CARGO, effects=(Effect('fouling', {}),)), Scenario(speed_m_s=8.2))
+        simulate(replace(CARGO, effects=(StatedEffect('fouling', {}),)), Scenario(speed_m_s=8.2))
 
 
 def test_thirty_days_at_one_second_are_one_array():

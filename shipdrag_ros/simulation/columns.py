@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Many simulations of one scenario in one compiled call.
+
+Hypotheses, and the steps by which their parameters are found, differ in what
+acts on the ship and in nothing else: each is a column.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.faults import log_flow, log_reading
+from shipdrag_ros.simulation.kernel import Law, Records, follow_columns
+from shipdrag_ros.simulation.scenario import Scenario, Turn
+from shipdrag_ros.simulation.surge import own_action, steps_of
+from shipdrag_ros.simulation.terms import (
+    acted,
+    columns_of,
+    edges_of,
+    extra_of,
+    law_of,
+    legs_of,
+    outside,
+)
+
+_FINE_RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left
+_STEPS_A_RUN_DOWN = 8
+_STEPS_A_SLOW_DOWN = 80  # of v / r
+_STEP_S = 5.0
+_LOG_STEP_S = 0.25  # at which the faults of a log that have memory are followed
+
+
+@dataclass(frozen=True)
+class Columns:
+    """
+    Motions and readings of k simulations at the same times.
+
+    A column whose speed leaves the baseline's table is NaN from there on.
+
+    Attributes
+    ----------
+    time_s : (m,)
+        Time of the record.
+    speed_through_water_m_s : (k, m)
+    position_m : (k, m, 2)
+        East and north of the start.
+    velocity_over_ground_m_s : (k, m, 2)
+        To the east and to the north.
+    log_m_s : (k, m)
+        What the log reads, its faults included.
+    radar_position_m : (k, m, 2)
+    radar_speed_m_s : (k, m)
+        Position and speed over ground as radar or GNSS read them.
+    """
+
+    time_s: Float64
+    speed_through_water_m_s: Float64
+    position_m: Float64
+    velocity_over_ground_m_s: Float64
+    log_m_s: Float64
+    radar_position_m: Float64
+    radar_speed_m_s: Float64
+
+    def __len__(self) -> int:
+        return len(self.speed_through_water_m_s)
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    """What the kernel takes of some columns."""
+
+    law: Law
+    records: Records
+    extra: Float64
+    legs: Records
+    own_legs: NDArray[np.int64]
+
+    def paths(self, time_s: Float64, chosen: slice) -> Float64:
+        """Return what `follow` does (k, m, 5), of consecutive columns."""
+        records = self.records[chosen]
+        paths = np.empty((len(records), len(time_s), 5))
+        follow_columns(
+            self.law,
+            records,
+            self.extra[chosen],
+            self.legs,
+            self.own_legs[chosen],
+            time_s,
+            paths,
+        )
+        lost = np.maximum.accumulate(outside(self.law, paths[:, :, 0]), axis=1)
+        paths[lost] = np.nan
+        return paths
+
+
+def simulate_columns(
+    ship: Ship,
+    scenario: Scenario,
+    actions: Sequence[Action],
+    time_s: Float64,
+    *,
+    speed_m_s: Float64 | None = None,
+    reference_rad: float | None = None,
+    step_s: float | None = None,
+) -> Columns:
+    """
+    Simulate a scenario under many actions, one column each.
+
+    Parameters
+    ----------
+    ship
+        With a baseline; its own effects act in every column.
+    scenario
+        Without random disturbances.
+    actions
+        k of them; their values are taken as they are.
+    time_s : (m,)
+        When to look, ascending, within the record [s].
+    speed_m_s : (k,), optional
+        Steady speed before the stop, by column; the scenario's by default.
+    reference_rad
+        Heading of the first run, as in `simulate`.
+    step_s
+        As in `simulate`; found from the ship where it is not given, coarser
+        than there, and good for 0.1 mm/s.
+
+    Raises
+    ------
+    SimulationError
+        If the scenario has disturbances, an action's turns overlap others,
+        or the times are outside the record.
+    ShipdragError
+        If the ship has no baseline.
+    """
+    time = np.asarray(time_s, np.float64)
+    if scenario.water_speed or scenario.gust_force:
+        raise SimulationError(
+            'scenario: water_speed and gust_force differ from run to run; leave them out'
+        )
+    if len(time) and not (time[0] >= 0.0 and time[-1] <= scenario.length_s):
+        raise SimulationError(
+            f'time_s is {time[0]:g}..{time[-1]:g} s, expected within 0..{scenario.length_s:g} s'
+        )
+    own = own_action(ship, scenario, reference_rad=reference_rad)
+    if own != Action():
+        actions = [own + action for action in actions]
+    prepared = _prepare(ship, scenario, actions, speed_m_s, step_s)
+    paths = prepared.paths(time, slice(0, len(actions)))
+    speed, position, velocity = paths[:, :, 0], paths[:, :, 1:3], paths[:, :, 3:]
+    log = log_flow(
+        speed,
+        *(
+            np.array([getattr(action, name) for action in actions])[:, None]
+            for name in ('log_dead_band_m_s', 'log_factor', 'log_offset_m_s')
+        ),
+    )
+    for i, action in enumerate(actions):
+        if action.log_lag_s or action.log_late_s:
+            steps = int(np.ceil(scenario.length_s / _LOG_STEP_S))
+            fine = np.linspace(0.0, scenario.length_s, steps + 1)
+            followed = prepared.paths(fine, slice(i, i + 1))[0, :, 0]
+            log[i] = log_reading(action, fine, followed, time)
+    radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
+    over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
+    return Columns(
+        time,
+        speed,
+        position,
+        velocity,
+        log,
+        radar[:, :, None] * position,
+        radar * over_ground,
+    )
+
+
+def _prepare(
+    ship: Ship,
+    scenario: Scenario,
+    actions: Sequence[Action],
+    speed_m_s: Float64 | None,
+    step_s: float | None,
+) -> _Prepared:
+    law = law_of(ship, scenario)
+    speeds = np.full(len(actions), scenario.speed_m_s) if speed_m_s is None else speed_m_s
+    also = _also_s(ship, scenario, actions, step_s)
+    legs: list[Records] = []
+    places: dict[tuple[Turn, ...], tuple[int, int]] = {}
+    for action in actions:
+        if action.turns not in places:
+            of_column = acted(scenario, action) if action.turns else scenario
+            edges = edges_of(of_column, also_s=also)
+            steps = (
+                _steps(ship, of_column, edges)
+                if step_s is None
+                else steps_of(ship, of_column, edges, step_s=step_s)
+            )
+            first = sum(map(len, legs))
+            legs.append(legs_of(ship, of_column, edges, steps))
+            places[action.turns] = first, first + len(steps)
+    return _Prepared(
+        law,
+        columns_of(ship, scenario, actions, speed_m_s=speeds),
+        extra_of(ship, law, actions),
+        np.concatenate(legs),
+        np.array([places[action.turns] for action in actions]),
+    )
+
+
+def _also_s(
+    ship: Ship, scenario: Scenario, actions: Sequence[Action], step_s: float | None
+) -> list[float]:
+    """Return record times that part legs beside orders and turns."""
+    times = []
+    if any(any(action.current_change_m_s) for action in actions):
+        times.append(scenario.lead_in_s)
+    if step_s is None and ship.propulsion:
+        settled = _FINE_RUN_DOWNS * ship.propulsion.run_down_s
+        times += [scenario.moment_s(order.time_s) + settled for order in scenario.orders]
+    return times
+
+
+def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float]) -> list[int]:
+    """Return the number of steps between edges: small ones where thrust runs down."""
+    r = float(ship.resistance_n(scenario.speed_m_s)) / ship.mass_kg
+    longest = min(_STEP_S, scenario.speed_m_s / r / _STEPS_A_SLOW_DOWN)
+    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    orders = [scenario.moment_s(order.time_s) for order in scenario.orders]
+    quiet_s = min(scenario.events_s(), default=scenario.length_s)
+    counts = []
+    for start, end in pairwise(edges):
+        step = longest
+        if any(0.0 <= start - order < _FINE_RUN_DOWNS * run_down_s for order in orders):
+            step = min(step, run_down_s / _STEPS_A_RUN_DOWN)
+        # before anything happens the speed is steady, and a step of any length exact
+        counts.append(1 if end <= quiet_s else max(1, int(np.ceil((end - start) / step))))
+    return counts

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+How an effect is declared: what it does, how large it may be, what tells it apart.
+
+Simulation, command line, documentation and diagnosis read the declaration; no
+effect is known to them by name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+import numpy as np
+
+from shipdrag_ros.ship import GRAVITY_M_S2, Ship
+from shipdrag_ros.simulation.action import Action, Vector
+from shipdrag_ros.simulation.scenario import Scenario
+
+
+class Scope(StrEnum):
+    """What an effect belongs to, hence in which other runs it must be."""
+
+    EARTH = 'earth'
+    HULL = 'hull'
+    RUN = 'run'
+    SENSOR = 'sensor'
+
+
+class Measure(StrEnum):
+    """What can be done to tell two effects apart, as it is advised."""
+
+    RECIPROCAL_RUN = 'a run on the reciprocal heading'
+    OTHER_SPEED = 'a run that begins or ends at another speed'
+    ANOTHER_RUN = 'another run of the same ship'
+    RADAR = 'radar or GNSS positions'
+    LOG = 'a speed log'
+    WIND = 'an anemometer (wind_apparent)'
+    DEPTH = 'an echo sounder (depth)'
+    DEEP_WATER = 'a run in deep water'
+    HEADING = 'a compass (heading)'
+    SHAFT = 'the shaft speed (shaft)'
+    RUDDER = 'the rudder angle (rudder)'
+    THIRD_SPEED = 'a third source of speed, GNSS beside log and radar'
+    WITHOUT_CABLE = 'a run without the cable'
+    FREE_PROPELLER = 'a run with the propeller turning freely'
+    CLEAN_HULL = 'a run after the hull is cleaned'
+    DRAUGHT = 'the draughts, read on both sides fore and aft'
+    FAST_CHANGE = 'a quick change of speed at a known time'
+
+
+class Shape(StrEnum):
+    """Kinds of prior distributions."""
+
+    NORMAL = 'normal'
+    HALF_NORMAL = 'half-normal'
+    LOG_NORMAL = 'log-normal'
+    UNIFORM = 'uniform'
+    CHOICE = 'either'
+
+
+@dataclass(frozen=True)
+class Prior:
+    """
+    How large a parameter is thought to be before any data.
+
+    Attributes
+    ----------
+    shape
+    first, second
+        Mean and sd of a normal one; 0 and sd of the normal of a half-normal
+        one; median and sd of the logarithm; ends of a uniform one; the two
+        values of a choice.
+    """
+
+    shape: Shape
+    first: float
+    second: float
+
+    def log_density(self, value: float) -> float:
+        """
+        Return the logarithm of the density; of the probability of a choice.
+        """
+        a, b = self.first, self.second
+        match self.shape:
+            case Shape.NORMAL:
+                return _log_normal((value - a) / b) - math.log(b)
+            case Shape.HALF_NORMAL:
+                return math.log(2.0 / b) + _log_normal(value / b) if value >= 0.0 else -math.inf
+            case Shape.LOG_NORMAL:
+                if value <= 0.0:
+                    return -math.inf
+                return _log_normal(math.log(value / a) / b) - math.log(b * value)
+            case Shape.UNIFORM:
+                return -math.log(b - a) if a <= value <= b else -math.inf
+            case Shape.CHOICE:
+                return math.log(0.5) if value in (a, b) else -math.inf
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """
+        Return one value.
+        """
+        a, b = self.first, self.second
+        match self.shape:
+            case Shape.NORMAL:
+                return float(rng.normal(a, b))
+            case Shape.HALF_NORMAL:
+                return float(abs(rng.normal(0.0, b)))
+            case Shape.LOG_NORMAL:
+                return float(a * math.exp(b * rng.standard_normal()))
+            case Shape.UNIFORM:
+                return float(rng.uniform(a, b))
+            case Shape.CHOICE:
+                return float(rng.choice([a, b]))
+
+    def scaled(self, factor: float) -> Prior:
+        """
+        Return the prior of a quantity that is so many times larger.
+        """
+        if self.shape is Shape.LOG_NORMAL:
+            return Prior(self.shape, factor * self.first, self.second)
+        return Prior(self.shape, factor * self.first, factor * self.second)
+
+    def __str__(self) -> str:
+        a, b = f'{self.first:g}', f'{self.second:g}'
+        return {
+            Shape.NORMAL: f'normal, {a} ± {b}',
+            Shape.HALF_NORMAL: f'half-normal, 0 + {b}',
+            Shape.LOG_NORMAL: f'log-normal, median {a}, factor {math.exp(self.second):.2g}',
+            Shape.UNIFORM: f'uniform, {a}..{b}',
+            Shape.CHOICE: 'either',
+        }[self.shape]
+
+
+def normal(sd: float, *, mean: float = 0.0) -> Prior:
+    """
+    Expect either sign.
+    """
+    return Prior(Shape.NORMAL, mean, sd)
+
+
+def half_normal(sd: float) -> Prior:
+    """
+    Expect 0 or more, small values most.
+    """
+    return Prior(Shape.HALF_NORMAL, 0.0, sd)
+
+
+def log_normal(median: float, sd_of_log: float) -> Prior:
+    """
+    Expect more than 0, within a factor of the median.
+    """
+    return Prior(Shape.LOG_NORMAL, median, sd_of_log)
+
+
+def uniform(low: float, high: float) -> Prior:
+    """
+    Expect any value between two.
+    """
+    return Prior(Shape.UNIFORM, low, high)
+
+
+@dataclass(frozen=True)
+class Measuring:
+    """
+    What a size is counted in, so that one prior serves ships of all sizes.
+
+    Attributes
+    ----------
+    text
+        In words; '' for the unit of the parameter itself.
+    of
+        Its size, of a ship whose file has what the effect needs.
+    """
+
+    text: str
+    of: Callable[[Ship], float]
+
+
+ABSOLUTE = Measuring('', lambda ship: 1.0)
+WEIGHTS = Measuring('weight of the ship', lambda ship: ship.mass_kg * GRAVITY_M_S2)
+AREAS = Measuring('V^(2/3)', lambda ship: ship.displaced_volume_m3 ** (2.0 / 3.0))
+SPEEDS = Measuring('sqrt(g L)', lambda ship: float(ship.speed(1.0)))
+DRAUGHTS = Measuring('draught', lambda ship: ship.draught_m or math.nan)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """
+    A parameter of an effect.
+
+    Attributes
+    ----------
+    name
+        With its unit, as it is given.
+    unit
+        '' for a pure number.
+    meaning
+    prior
+    low, high
+        What a simulation accepts.
+    default
+        Where it is not given; None: it must be.
+    words
+        What may be given in place of a number.
+    measured_in
+        What prior, low, high and default are counted in; `of` makes them SI.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    prior: Prior
+    low: float
+    high: float
+    default: float | None = None
+    words: Mapping[str, float] = field(default_factory=dict)
+    measured_in: Measuring = ABSOLUTE
+
+    def of(self, ship: Ship) -> Quantity:
+        """
+        Return the same with all sizes in SI, for one ship.
+        """
+        size = self.measured_in.of(ship)
+        return replace(
+            self,
+            prior=self.prior.scaled(size),
+            low=self.low * size,
+            high=self.high * size,
+            default=None if self.default is None else self.default * size,
+            measured_in=ABSOLUTE,
+        )
+
+    @property
+    def expectation(self) -> str:
+        """What is accepted, in words."""
+        if self.words:
+            return ' or '.join(f'{word} ({value:g})' for word, value in self.words.items())
+        return f'{self.low:g}..{self.high:g} {self.unit}'.rstrip()
+
+    def accepts(self, value: float) -> bool:
+        """
+        Tell whether a simulation can use a value.
+        """
+        if self.words:
+            return value in self.words.values()
+        return self.low <= value <= self.high
+
+
+@dataclass(frozen=True)
+class Frame:
+    """
+    What an effect acts in.
+
+    Attributes
+    ----------
+    ship
+    scenario
+    reference_rad
+        Heading of the first run [rad]: effects of the earth are stated along
+        it and to port of it, whatever the heading of the run at hand.
+    """
+
+    ship: Ship
+    scenario: Scenario
+    reference_rad: float
+
+    def earth(self, along: float, to_port: float) -> Vector:
+        """
+        Turn a vector of the first run to the east and to the north.
+        """
+        cos, sin = math.cos(self.reference_rad), math.sin(self.reference_rad)
+        return along * cos - to_port * sin, along * sin + to_port * cos
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """
+    An effect of the library.
+
+    Attributes
+    ----------
+    name
+    scope
+    parameters
+        The first is the VALUE of `simulate --effect NAME=VALUE`.
+    formula, source
+        What is computed, and where it comes from.
+    struck_out_by
+        Context inputs that measure it, so that it is known not to be missing.
+    look_alikes
+        Effects of nearly the same trace, and what decides from each; nothing:
+        no record can.
+    act
+        From a frame and the values of the parameters, in their order.
+    needs
+        Keys of the ship file without which it cannot act.
+    """
+
+    name: str
+    scope: Scope
+    parameters: tuple[Quantity, ...]
+    formula: str
+    source: str
+    act: Callable[..., Action]
+    struck_out_by: tuple[str, ...] = ()
+    look_alikes: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
+    needs: tuple[str, ...] = ()
+
+    def missing(self, ship: Ship) -> tuple[str, ...]:
+        """
+        Return the keys that the ship file lacks.
+        """
+        return tuple(key for key in self.needs if getattr(ship, key) is None)
+
+    def quantities(self, ship: Ship) -> tuple[Quantity, ...]:
+        """
+        Return the parameters with all sizes in SI.
+        """
+        return tuple(quantity.of(ship) for quantity in self.parameters)
+
+    def action(self, frame: Frame, *values: float) -> Action:
+        """
+        Return what the effect does; the values are taken as they are.
+        """
+        return self.act(frame, *values)
+
+
+def _log_normal(standard: float) -> float:
+    return -0.5 * standard * standard - 0.5 * math.log(2.0 * math.pi)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The library of effects: every module in this folder is one.
+
+A new effect is a new module with an `EFFECT`; simulation, command line,
+diagnosis and documentation find it here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
+from pkgutil import iter_modules
+from types import MappingProxyType
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.ship import StatedEffect, Uncertain
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure
+
+__all__ = ['LIBRARY', 'action_of', 'deciders', 'find', 'look_alikes', 'parse']
+
+
+def _found() -> Iterator[Effect]:
+    for module in iter_modules(__path__):
+        effect = import_module(f'{__name__}.{module.name}').EFFECT
+        assert isinstance(effect, Effect)
+        yield effect
+
+
+LIBRARY: Mapping[str, Effect] = MappingProxyType({effect.name: effect for effect in _found()})
+
+
+def find(name: str) -> Effect:
+    """
+    Return an effect by its name.
+
+    Raises
+    ------
+    SimulationError
+        If there is none; the message lists what is known.
+    """
+    if name not in LIBRARY:
+        raise SimulationError(f'effect {name!r} is not known; known are {", ".join(LIBRARY)}')
+    return LIBRARY[name]
+
+
+def look_alikes(name: str) -> tuple[str, ...]:
+    """
+    Return the effects that leave nearly the same trace.
+
+    It is enough that one of two declares it.
+    """
+    declared_by = (other.name for other in LIBRARY.values() if name in other.look_alikes)
+    return tuple(sorted({*LIBRARY[name].look_alikes, *declared_by}))
+
+
+def deciders(one: str, other: str) -> tuple[Measure, ...]:
+    """
+    Return what tells two look-alikes apart; nothing: no record can.
+    """
+    declared = (*LIBRARY[one].look_alikes.get(other, ()), *LIBRARY[other].look_alikes.get(one, ()))
+    return tuple(dict.fromkeys(declared))
+
+
+def parse(text: str) -> StatedEffect:
+    """
+    Read `NAME=VALUE[,param=VALUE]...`, exactly known.
+
+    Raises
+    ------
+    SimulationError
+        If it cannot be read; whether a value is possible depends on the ship
+        and is told by `action_of`.
+    """
+    name, separator, rest = text.partition('=')
+    effect = find(name.strip())
+    form = ','.join(f'{quantity.name}=VALUE' for quantity in effect.parameters[1:])
+    usage = f'write {effect.name}=VALUE' + (f'[,{form}]' if form else '')
+    if not separator:
+        raise SimulationError(f'effect {text!r} has no value; {usage}')
+    first, *others = rest.split(',')
+    given = [(effect.parameters[0].name, first)]
+    given += [(key.strip(), value) for key, _, value in (item.partition('=') for item in others)]
+    known = {quantity.name: quantity for quantity in effect.parameters}
+    values: dict[str, Uncertain] = {}
+    for key, word in given:
+        if key not in known or key in values:
+            what = 'is given twice' if key in values else 'is not known'
+            raise SimulationError(f'effect {text!r}: parameter {key!r} {what}; {usage}')
+        word = word.strip()
+        try:
+            value = known[key].words[word] if word in known[key].words else float(word)
+        except ValueError as error:
+            raise SimulationError(
+                f'effect {text!r}: {key} is {word!r}, expected {known[key].meaning}: '
+                f'{known[key].unit or "a number"}'
+            ) from error
+        values[key] = Uncertain(value, 0.0)
+    return StatedEffect(effect.name, values)
+
+
+def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
+    """
+    Return what effects do together.
+
+    Raises
+    ------
+    SimulationError
+        Naming every effect and parameter that cannot be simulated.
+    """
+    problems: list[str] = []
+    total = Action()
+    names = [effect.name for effect in stated]
+    for name in dict.fromkeys(names):
+        if names.count(name) > 1:
+            problems.append(f'{name} is given {names.count(name)} times, expected once')
+    for item in stated:
+        if item.name not in LIBRARY:
+            problems.append(f'{item.name!r} is not known; known are {", ".join(LIBRARY)}')
+            continue
+        effect = LIBRARY[item.name]
+        before = len(problems)
+        problems.extend(_problems(effect, item, frame))
+        if len(problems) == before:
+            total += effect.action(frame, *_values(effect, item, frame))
+    if problems:
+        raise SimulationError('effects: ' + '; '.join(problems))
+    return total
+
+
+def _problems(effect: Effect, stated: StatedEffect, frame: Frame) -> Iterator[str]:
+    missing = effect.missing(frame.ship)
+    if missing:
+        yield f'{effect.name} needs {", ".join(missing)} in the ship file'
+        return
+    known = {quantity.name: quantity for quantity in effect.quantities(frame.ship)}
+    for key in stated.parameters:
+        if key not in known:
+            yield f'{effect.name}: parameter {key!r} is not known; known are {", ".join(known)}'
+    for quantity in known.values():
+        given = stated.parameters.get(quantity.name)
+        if given is None:
+            if quantity.default is None:
+                yield f'{effect.name}: {quantity.name} is missing, expected {quantity.expectation}'
+        elif not quantity.accepts(given.value):
+            yield (
+                f'{effect.name}: {quantity.name} is {given.value!r}, '
+                f'expected {quantity.expectation}'
+            )
+
+
+def _values(effect: Effect, stated: StatedEffect, frame: Frame) -> Iterator[float]:
+    for quantity in effect.quantities(frame.ship):
+        given = stated.parameters.get(quantity.name)
+        value = quantity.default if given is None else given.value
+        assert value is not None  # it was checked
+        yield value

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Added mass other than the ship file's."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+
+
+def _act(frame: Frame, n_r_change: float) -> Action:
+    return Action(n_r_change=n_r_change)
+
+
+EFFECT = Effect(
+    name='added_mass',
+    scope=Scope.HULL,
+    parameters=(
+        Quantity(
+            name='n_r_change',
+            unit='',
+            meaning='added to n_r at every speed',
+            prior=normal(0.06),
+            low=-0.5,
+            high=2.0,
+        ),
+    ),
+    formula='(1 + n_r + n_r_change) du/dt = -r',
+    source='S1 (1)',
+    act=_act,
+    look_alikes={'displacement': ()},
+)

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ship that is heavier or lighter than her file says."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+
+
+def _act(frame: Frame, fraction: float) -> Action:
+    return Action(mass_fraction=fraction)
+
+
+EFFECT = Effect(
+    name='displacement',
+    scope=Scope.HULL,
+    parameters=(
+        Quantity(
+            name='fraction',
+            unit='',
+            meaning="by which the mass is larger; the resistance [N] stays the baseline's",
+            prior=normal(0.08),
+            low=-0.5,
+            high=1.0,
+        ),
+    ),
+    formula='(1 + fraction) m (1 + n_r) du/dt = -R',
+    source='Newton',
+    act=_act,
+)

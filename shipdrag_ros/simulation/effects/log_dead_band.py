@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Log that reads too little when the ship is slow."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+
+
+def _act(frame: Frame, speed_m_s: float) -> Action:
+    return Action(log_dead_band_m_s=speed_m_s)
+
+
+EFFECT = Effect(
+    name='log_dead_band',
+    scope=Scope.SENSOR,
+    parameters=(
+        Quantity(
+            name='speed_m_s',
+            unit='m/s',
+            meaning='speed below which it under-reads',
+            prior=log_normal(2.5, 0.4),
+            low=0.0,
+            high=20.0,
+        ),
+    ),
+    formula='u^2 / speed below it, u above: continuous, and nothing at rest',
+    source='definition',
+    act=_act,
+    look_alikes={
+        'windmilling_propeller': (Measure.RADAR, Measure.SHAFT),
+    },
+)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Log that is smoothed."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+
+
+def _act(frame: Frame, lag_s: float) -> Action:
+    return Action(log_lag_s=lag_s)
+
+
+EFFECT = Effect(
+    name='log_lag',
+    scope=Scope.SENSOR,
+    parameters=(
+        Quantity(
+            name='lag_s',
+            unit='s',
+            meaning='time constant of a first-order filter',
+            prior=log_normal(15.0, 0.6),
+            low=0.0,
+            high=1e4,
+        ),
+    ),
+    formula='lag dy/dt = u - y',
+    source='definition',
+    act=_act,
+    look_alikes={'time_offset': (Measure.FAST_CHANGE,)},
+)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Log that reads a fixed amount too much."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+
+
+def _act(frame: Frame, offset_m_s: float) -> Action:
+    return Action(log_offset_m_s=offset_m_s)
+
+
+EFFECT = Effect(
+    name='log_offset',
+    scope=Scope.SENSOR,
+    parameters=(
+        Quantity(
+            name='offset_m_s',
+            unit='m/s',
+            meaning='reading = speed through water + offset',
+            prior=normal(0.2),
+            low=-5.0,
+            high=5.0,
+        ),
+    ),
+    formula='u + offset',
+    source='definition',
+    act=_act,
+    look_alikes={
+        'wind': (Measure.RADAR, Measure.WIND),
+        'log_dead_band': (Measure.OTHER_SPEED,),
+    },
+)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Log that reads a fixed share too much."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+
+
+def _act(frame: Frame, factor: float) -> Action:
+    return Action(log_factor=factor)
+
+
+EFFECT = Effect(
+    name='log_scale',
+    scope=Scope.SENSOR,
+    parameters=(
+        Quantity(
+            name='factor',
+            unit='',
+            meaning='reading = (1 + factor) times the speed through water',
+            prior=normal(0.04),
+            low=-0.9,
+            high=9.0,
+        ),
+    ),
+    formula='(1 + factor) u',
+    source='definition',
+    act=_act,
+    look_alikes={
+        'radar_scale': (Measure.THIRD_SPEED,),
+        'log_offset': (Measure.OTHER_SPEED, Measure.THIRD_SPEED),
+    },
+)

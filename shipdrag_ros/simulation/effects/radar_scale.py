@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Radar whose distances are a fixed share too long."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+
+
+def _act(frame: Frame, factor: float) -> Action:
+    return Action(radar_factor=factor)
+
+
+EFFECT = Effect(
+    name='radar_scale',
+    scope=Scope.SENSOR,
+    parameters=(
+        Quantity(
+            name='factor',
+            unit='',
+            meaning='reading = (1 + factor) times position and speed over ground',
+            prior=normal(0.03),
+            low=-0.9,
+            high=9.0,
+        ),
+    ),
+    formula='(1 + factor) (x, y)',
+    source='definition',
+    act=_act,
+)

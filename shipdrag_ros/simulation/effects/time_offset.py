@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Log whose clock, or transmission, is late."""
+
+from __future__ import annotations
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+
+
+def _act(frame: Frame, offset_s: float) -> Action:
+    return Action(log_late_s=offset_s)
+
+
+EFFECT = Effect(
+    name='time_offset',
+    scope=Scope.SENSOR,
+    parameters=(
+        Quantity(
+            name='offset_s',
+            unit='s',
+            meaning='log later than radar: what is stamped t was true at t - offset',
+            prior=normal(10.0),
+            low=-600.0,
+            high=600.0,
+        ),
+    ),
+    formula='reading(t) = u(t - offset)',
+    source='definition',
+    act=_act,
+)

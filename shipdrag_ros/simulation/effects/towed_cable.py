@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cable towed along the flow."""
+
+from __future__ import annotations
+
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import (
+    AREAS,
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    log_normal,
+)
+from shipdrag_ros.simulation.hydrodynamics import drag_n
+
+
+def _act(frame: Frame, drag_area_m2: float) -> Action:
+    def resistance(speed: Float64) -> Float64:
+        return drag_n(frame.ship, drag_area_m2, speed)
+
+    return Action(resistance=(resistance,))
+
+
+EFFECT = Effect(
+    name='towed_cable',
+    scope=Scope.HULL,
+    parameters=(
+        Quantity(
+            name='drag_area_m2',
+            unit='m^2',
+            meaning='C0 l d of length and diameter; C0 = 0.01..0.04 for ropes',
+            prior=log_normal(2e-3, 0.8),
+            low=0.0,
+            high=0.5,
+            measured_in=AREAS,
+        ),
+    ),
+    formula='0.5 rho C0 l d v^2',
+    source='S2: R0 in the self-similar region',
+    act=_act,
+    look_alikes={
+        'added_mass': (Measure.WITHOUT_CABLE,),
+        'displacement': (Measure.DRAUGHT, Measure.WITHOUT_CABLE),
+    },
+)

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Turn, or rudder held, during the coast."""
+
+from __future__ import annotations
+
+from math import copysign
+
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import (
+    AREAS,
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    log_normal,
+    normal,
+    uniform,
+)
+from shipdrag_ros.simulation.scenario import Turn
+
+_RUDDER_RAD = 0.17  # 10 degrees, to the side she turns to
+
+
+def _act(
+    frame: Frame, drag_area_m2: float, start_s: float, duration_s: float, rate_rad_s: float
+) -> Action:
+    turn = Turn(
+        start_s,
+        duration_s,
+        rate_rad_s,
+        drag_area_m2=drag_area_m2,
+        rudder_rad=copysign(_RUDDER_RAD, rate_rad_s),
+    )
+    return Action(turns=(turn,))
+
+
+EFFECT = Effect(
+    name='turning',
+    scope=Scope.RUN,
+    parameters=(
+        Quantity(
+            name='drag_area_m2',
+            unit='m^2',
+            meaning='of the resistance that drift, yaw and rudder add',
+            prior=log_normal(0.02, 0.7),
+            low=0.0,
+            high=1.0,
+            measured_in=AREAS,
+        ),
+        Quantity(
+            name='start_s',
+            unit='s',
+            meaning='after the stop',
+            prior=uniform(0.0, 1500.0),
+            low=0.0,
+            high=1e5,
+            default=200.0,
+        ),
+        Quantity(
+            name='duration_s',
+            unit='s',
+            meaning='of the turn',
+            prior=log_normal(150.0, 0.6),
+            low=0.0,
+            high=1e5,
+            default=150.0,
+        ),
+        Quantity(
+            name='rate_rad_s',
+            unit='rad/s',
+            meaning='yaw rate meanwhile, anticlockwise positive; 0 where helm and counter-helm '
+            'keep the course',
+            prior=normal(0.005),
+            low=-0.2,
+            high=0.2,
+            default=0.003,
+        ),
+    ),
+    formula='0.5 rho drag_area v^2 from start to start + duration, the heading turning evenly',
+    source='definition',
+    act=_act,
+    struck_out_by=('heading', 'rudder'),
+    look_alikes={
+        'windmilling_propeller': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
+        'current_change': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
+    },
+)

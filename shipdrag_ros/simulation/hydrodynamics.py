@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Forces on the hull that several effects are fractions or multiples of."""
+
+from __future__ import annotations
+
+from math import pi
+
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import CoefficientBaseline, Ship
+from shipdrag_ros.ship.baseline import ittc57
+from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
+
+_USUAL_FORM_FACTOR = 0.2  # where the baseline is a table
+
+
+def friction_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return (1 + k) C_F times the pressure on the wetted surface [N].
+
+    Parameters
+    ----------
+    speed_m_s
+        Through water, 0 or more.
+
+    Notes
+    -----
+    ITTC-57. A baseline that is a table has no form factor: k = 0.2.
+    """
+    base = ship.baseline
+    k = base.form_factor if isinstance(base, CoefficientBaseline) else _USUAL_FORM_FACTOR
+    reynolds = speed_m_s * ship.length_m / ship.water.kinematic_viscosity_m2_s
+    return (1.0 + k) * ittc57(reynolds) * _force_n(ship, speed_m_s)
+
+
+def viscous_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return the friction with the correlation allowance [N].
+    """
+    base = ship.baseline
+    allowance = base.correlation_allowance if isinstance(base, CoefficientBaseline) else 0.0
+    return friction_n(ship, speed_m_s) + allowance * _force_n(ship, speed_m_s)
+
+
+def drag_n(ship: Ship, drag_area_m2: float, speed_m_s: Float64) -> Float64:
+    """
+    Return 0.5 rho A v^2 [N].
+    """
+    return 0.5 * ship.water.density_kg_m3 * drag_area_m2 * speed_m_s**2
+
+
+def disc_area_m2(ship: Ship) -> float:
+    """
+    Return the area that the propeller sweeps.
+    """
+    assert ship.propeller is not None  # the effect says that it needs one
+    return 0.25 * pi * ship.propeller.diameter_m**2
+
+
+def _force_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
+        ship.length_m, ship.displaced_volume_m3
+    )
+    return drag_n(ship, surface, speed_m_s)

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From ship, scenario and actions to what the compiled integration takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import hypot
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.kernel import COLUMN, LEG, Law, Records
+from shipdrag_ros.simulation.scenario import Scenario
+
+_CELLS = 4000  # of the table of resistance; its error is far below that of any sensor
+_EXTRA_CELLS = 512  # of what effects add to it, which is smooth
+_RANGE = 2.0  # times the steady speed: room for disturbances, and the cells stay fine
+
+
+def law_of(ship: Ship, scenario: Scenario) -> Law:
+    """
+    Tabulate the baseline.
+
+    Raises
+    ------
+    SimulationError
+        If the steady speed is outside the baseline's table.
+    """
+    low, high = ship.baseline_range_m_s
+    if not low <= scenario.speed_m_s <= high:
+        raise SimulationError(
+            f'speed_m_s is {scenario.speed_m_s!r}, the baseline is stated for '
+            f'{low:.4g}..{high:.4g} m/s; choose a speed inside or extend the baseline'
+        )
+    speeds = np.linspace(low, min(high, _RANGE * scenario.speed_m_s), _CELLS + 1)
+    table = CubicSpline(speeds, ship.resistance_n(speeds) / ship.mass_kg)
+    span = float(speeds[-1] - low)
+    return Law(
+        low_m_s=low,
+        cell_m_s=span / _CELLS,
+        resistance=np.ascontiguousarray(table.c),
+        extra_cell_m_s=span / _EXTRA_CELLS,
+        n_r=ship.n_r_polynomial(),
+        air_1_m=float(ship.air_drag_n(1.0)) / ship.mass_kg,
+    )
+
+
+def top_m_s(law: Law) -> float:
+    """
+    Return the highest speed of the table.
+    """
+    return law.low_m_s + law.cell_m_s * int(law.resistance.shape[1])
+
+
+def outside(law: Law, speed_m_s: Float64) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    """
+    Tell which speeds the table does not hold; NaN is one.
+    """
+    top = top_m_s(law)
+    margin = 1e-9 * top  # rounding of a steady speed at the very end of the table
+    magnitude = np.abs(speed_m_s)
+    return ~((magnitude >= law.low_m_s - margin) & (magnitude <= top + margin))
+
+
+def extra_of(ship: Ship, law: Law, actions: Sequence[Action]) -> Float64:
+    """
+    Tabulate what actions add to the resistance, per ship mass.
+
+    Returns
+    -------
+    (k, e)
+        At speeds `extra_cell_m_s` apart; e = 0 where no action adds any.
+    """
+    if not any(action.resistance for action in actions):
+        return np.empty((len(actions), 0))
+    speeds: Float64 = law.low_m_s + law.extra_cell_m_s * np.arange(_EXTRA_CELLS + 1.0)
+    speeds[-1] = min(speeds[-1], ship.baseline_range_m_s[1])  # to the last digit
+    table = np.zeros((len(actions), len(speeds)))
+    for row, action in zip(table, actions):
+        for function in action.resistance:
+            row += function(speeds)
+    table /= ship.mass_kg
+    return table
+
+
+def columns_of(
+    ship: Ship, scenario: Scenario, actions: Sequence[Action], *, speed_m_s: Float64
+) -> Records:
+    """
+    Return what else the kernel must know of each action.
+
+    Parameters
+    ----------
+    speed_m_s : (k,)
+        Steady speed before the stop.
+
+    Returns
+    -------
+    (k,)
+        Records of `COLUMN`.
+    """
+    records = np.zeros(len(actions), COLUMN)
+    records['speed_m_s'] = speed_m_s
+    records['change_from_s'] = scenario.lead_in_s
+    per_s = 1.0 / scenario.duration_s if scenario.duration_s > 0.0 else 0.0
+    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    east, north = scenario.current_m_s
+    for record, action in zip(records, actions):
+        record['wind_east_m_s'], record['wind_north_m_s'] = action.wind_m_s
+        wave = hypot(*action.wave_force_n)
+        if wave > 0.0:
+            record['wave_m_s2'] = wave / ship.mass_kg
+            record['wave_east'] = action.wave_force_n[0] / wave
+            record['wave_north'] = action.wave_force_n[1] / wave
+        record['wave_encounter_s_m'] = action.wave_encounter_s_m
+        record['current_east_m_s'] = east + action.current_m_s[0]
+        record['current_north_m_s'] = north + action.current_m_s[1]
+        record['change_east_m_s2'] = action.current_change_m_s[0] * per_s
+        record['change_north_m_s2'] = action.current_change_m_s[1] * per_s
+        record['run_down_s'] = max(run_down_s + action.run_down_change_s, 0.0)
+        record['residual_fraction'] = action.residual_fraction
+        record['residual_decay_s'] = action.residual_decay_s
+        record['n_r_change'] = action.n_r_change
+        record['mass_fraction'] = action.mass_fraction
+    return records
+
+
+def acted(scenario: Scenario, action: Action) -> Scenario:
+    """
+    Return the scenario with what an action changes of it.
+
+    Raises
+    ------
+    SimulationError
+        If turns overlap.
+    """
+    east, north = scenario.current_m_s
+    turns = sorted((*scenario.turns, *action.turns), key=lambda turn: turn.start_s)
+    return replace(
+        scenario,
+        current_m_s=(east + action.current_m_s[0], north + action.current_m_s[1]),
+        depth_m=min(scenario.depth_m, action.depth_m),
+        turns=tuple(turns),
+    )
+
+
+def edges_of(scenario: Scenario, *, also_s: Sequence[float] = ()) -> list[float]:
+    """
+    Return the record times between which all forces are smooth.
+    """
+    length = scenario.length_s
+    inside = {moment for moment in (*scenario.events_s(), *also_s) if 0.0 < moment < length}
+    return sorted({0.0, *inside, length})
+
+
+def legs_of(
+    ship: Ship, scenario: Scenario, edges_s: Sequence[float], steps: Sequence[int]
+) -> Records:
+    """
+    Return the stretches between edges.
+
+    Returns
+    -------
+    (l,)
+        Records of `LEG`.
+    """
+    legs = np.zeros(len(steps), LEG)
+    for leg, start, end, n in zip(legs, edges_s, edges_s[1:], steps):
+        turn = scenario.turn_at(start)
+        leg['start_s'] = start
+        leg['step_s'] = (end - start) / n
+        leg['steps'] = n
+        leg['thrust_ordered'] = scenario.thrust_ordered(start)
+        leg['yaw_rad'] = scenario.heading(start)
+        if turn:
+            leg['yaw_rate_rad_s'] = turn.rate_rad_s
+            leg['turning_1_m'] = 0.5 * ship.water.density_kg_m3 * turn.drag_area_m2 / ship.mass_kg
+    return legs
