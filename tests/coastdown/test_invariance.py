@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Onset, Reset, Update
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset, Reset, Update
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.simulation import EngineOrder, Sensor, Turn
@@ -75,16 +75,16 @@ def spoil(block: Block, seed: int) -> Block:
 
 @pytest.fixture(scope='module')
 def eventful(record, sensors) -> Block:
-    """Two coastdowns, the second with a turn, on five inputs at uneven rates."""
+    """Two coastdowns, the second with a turn, on five inputs at five rates."""
     parts = []
     for i, turns in enumerate(((), (Turn(200.0, 60.0, 0.02),))):
         block = record(
             sensors=(
-                replace(sensors['log'], rate_hz=1.0),
+                replace(sensors['log'], rate_hz=2.5),
                 Sensor(channel=Channel.SPEED_OVER_GROUND, rate_hz=0.7, sd=0.1),
                 replace(sensors['radar'], rate_hz=0.5, sd=0.3),
                 replace(sensors['compass'], rate_hz=2.0),
-                sensors['shaft'],
+                replace(sensors['shaft'], rate_hz=1.0),
             ),
             lead_in_s=400.0,
             duration_s=450.0,
@@ -98,8 +98,12 @@ def eventful(record, sensors) -> Block:
     return concatenate(parts)
 
 
-def run(ship, blocks, estimate=window_only) -> tuple[list, dict]:
-    monitor = Monitor(ship, QUICK, estimate=estimate, final=estimate)
+def watching(ship) -> Monitor:
+    return Monitor(ship, QUICK, estimate=window_only, final=window_only)
+
+
+def run(ship, blocks) -> tuple[list, dict]:
+    monitor = watching(ship)
     events = []
     for block in blocks:
         events += monitor.update(block)
@@ -122,20 +126,29 @@ def on_the_globe(block: Block) -> Block:
     return replace(block, channel=channel, value=value)
 
 
+def thinned(block: Block, every) -> Block:
+    """Keep each so-and-so-many-th sample of each of the `INPUTS`, none for 0."""
+    kept = np.zeros(len(block), bool)
+    for channel, step in zip(INPUTS, every, strict=True):
+        if step:
+            kept[np.flatnonzero(block.channel == channel)[::step]] = True
+    return block[kept]
+
+
 @settings(max_examples=40, deadline=None)
 @given(
     data=st.data(),
     seed=st.integers(0, 1000),
-    inputs=st.sets(st.sampled_from(INPUTS), min_size=1),
+    every=st.tuples(*[st.integers(0, 4)] * len(INPUTS)).filter(any),
     globe=st.booleans(),
     silence=st.tuples(st.integers(0, 1700), st.integers(0, 300)),
 )
 def test_where_the_record_is_cut_changes_no_bit(
-    ship, eventful, bits, data, seed: int, inputs, globe: bool, silence
+    ship, eventful, bits, data, seed: int, every, globe: bool, silence
 ) -> None:
-    second = (eventful.stamp_ns - START_NS) // S
-    silent = (second >= silence[0]) & (second < sum(silence))
-    block = eventful[np.isin(eventful.channel, list(inputs)) & ~silent]
+    block = thinned(eventful, every)
+    second = (block.stamp_ns - START_NS) // S
+    block = block[(second < silence[0]) | (second >= sum(silence))]
     block = spoil(on_the_globe(block) if globe else block, seed)
     places = data.draw(st.lists(st.integers(0, len(block)), max_size=60))
     events, health = run(ship, [block])
@@ -143,6 +156,27 @@ def test_where_the_record_is_cut_changes_no_bit(
     again, health_again = run(ship, cut(block, places))
     assert bits(again) == bits(events)
     assert health_again == health
+
+
+@settings(max_examples=10, deadline=None)
+@given(data=st.data(), into_s=st.integers(0, 250), seed=st.integers(0, 1000))
+def test_a_reset_in_mid_coastdown_is_a_fresh_start(
+    ship, eventful, bits, data, into_s: int, seed: int
+) -> None:
+    onset = next(event for event in run(ship, [eventful])[0] if isinstance(event, Onset))
+    place = int(np.searchsorted(eventful.receive_ns, onset.detected_ns + into_s * S))
+    before, after = eventful[:place], spoil(eventful[place:], seed)
+    first, monitor = watching(ship), watching(ship)
+    expected = [*first.update(before), *first.reset(7, 'asked for'), *run(ship, [after])[0]]
+    assert any(isinstance(e, Coastdown) and e.ended_by is EndedBy.RESET for e in expected)
+
+    def pieces(block: Block) -> list[Block]:
+        return cut(block, data.draw(st.lists(st.integers(0, len(block)), max_size=20)))
+
+    events = [event for piece in pieces(before) for event in monitor.update(piece)]
+    events += monitor.reset(7, 'asked for')
+    events += [event for piece in pieces(after) for event in monitor.update(piece)]
+    assert bits(events + monitor.finish()) == bits(expected)
 
 
 def test_sample_by_sample_changes_no_bit(ship, eventful, bits) -> None:
