@@ -17,17 +17,16 @@ from mcap.opcode import Opcode
 from mcap.records import MessageIndex
 
 from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
-from shipdrag_ros.bags.layout import (
-    KNOWN,
+from shipdrag_ros.bags.layout import KNOWN, name
+from shipdrag_ros.bags.locate import locate
+from shipdrag_ros.bags.records import (
+    MAGIC,
     MESSAGE_HEAD,
+    Buffer,
     attachment_agrees,
     checksum,
     chunk_fields,
-    name,
 )
-from shipdrag_ros.bags.learnt import read_record
-from shipdrag_ros.bags.locate import locate
-from shipdrag_ros.bags.records import MAGIC, Buffer
 from shipdrag_ros.bags.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
 from shipdrag_ros.bags.statements import ChunkFacts, Facts, hold_against
 from shipdrag_ros.bags.unpack import opened, unpack_chunk_partly
@@ -165,7 +164,7 @@ class _Check:
             case Opcode.MESSAGE_INDEX:
                 self._message_index(found)
             case Opcode.SCHEMA | Opcode.CHANNEL if data is not self._data or not facts.ended:
-                self._declaration(read_record(data, found), found.opcode, offset)
+                self._declaration(found.read(data), found.opcode, offset)
             case Opcode.ATTACHMENT:
                 facts.attachments[offset] = found.end - found.offset
                 if not attachment_agrees(data, found.start, found.end):
@@ -175,7 +174,7 @@ class _Check:
             case Opcode.DATA_END:
                 self._once(found)
                 facts.ended = facts.ended or found.end
-                stated_end = read_record(data, found).data_section_crc
+                stated_end = found.read(data).data_section_crc
                 if stated_end and stated_end != checksum(data, 0, offset):
                     self._damages.add(offset, 'data_end', DamageKind.CHECKSUM)
             case Opcode.HEADER | Opcode.FOOTER | Opcode.STATISTICS:
@@ -239,12 +238,12 @@ class _Check:
             self._damages.add(
                 found.offset, 'chunk', DamageKind.DISAGREES, f'times {stated}, in it are {span}'
             )
-        size, _, compression, _, packed = chunk_fields(data[found.start : found.end])
+        size, _, compression, _, packed = chunk_fields(data, found.start, found.end)
         self._chunk = ChunkFacts(found.end - found.offset, stated, compression, packed, size)
         self.facts.chunks[found.offset] = self._chunk
 
     def _message_index(self, found: Found) -> None:
-        index: MessageIndex = read_record(self._data, found)
+        index: MessageIndex = found.read(self._data)
         if self._chunk is None:
             return
         self._chunk.indexes[found.offset] = index.channel_id

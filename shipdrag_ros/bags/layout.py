@@ -13,20 +13,13 @@ MCAP specification 0, section Records.
 from __future__ import annotations
 
 import struct
-import zlib
-from typing import Any
 
 from mcap.opcode import Opcode
 
-from shipdrag_ros.bags.records import Buffer
+from shipdrag_ros.bags.records import MESSAGE_HEAD, TIME_LIMIT_NS, Buffer
 
-MESSAGE_HEAD = struct.Struct('<HIQQ')
-"""Channel, sequence, log time [ns], publish time [ns]."""
-CHUNK_HEAD = struct.Struct('<QQQI')
-"""First and last log time [ns], unpacked bytes, checksum of these."""
-
-# a figure: so many bytes; s: a text; b: bytes with a length of 4, B: of 8; m: pairs of
-# texts; i: entries of a message index, c: entries of two and eight bytes
+# a figure: so many bytes; s: a name; b: bytes with a length of 4, B: of 8; m: pairs of
+# texts, t; i: entries of a message index, c: entries of two and eight bytes
 _FIELDS: dict[int, str] = {
     Opcode.HEADER: 'ss',
     Opcode.FOOTER: '884',
@@ -45,11 +38,10 @@ _FIELDS: dict[int, str] = {
 }
 KNOWN = frozenset((Opcode.MESSAGE, *_FIELDS))
 NAMES: dict[int, str] = {int(opcode): opcode.name.lower() for opcode in Opcode}
+_NAME_BYTES = 1 << 16  # no name is longer
 _ENTRY_BYTES = {'i': 16, 'c': 10}
 _UINT32 = struct.Struct('<I')
 _UINT64 = struct.Struct('<Q')
-_TIME_LIMIT_NS = 1 << 63
-_PIECE_BYTES = 1 << 20
 
 
 def name(opcode: int) -> str:
@@ -90,7 +82,7 @@ def fields_end(data: Buffer, opcode: int, start: int, end: int) -> int | None:
         if end - start < MESSAGE_HEAD.size:
             return None
         _, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, start)
-        return start + MESSAGE_HEAD.size if log_ns < _TIME_LIMIT_NS else None
+        return start + MESSAGE_HEAD.size if log_ns < TIME_LIMIT_NS else None
     at = start
     try:
         for field in _FIELDS[opcode]:
@@ -112,11 +104,13 @@ def _field_end(data: Buffer, field: str, at: int, end: int) -> int:
     (length,) = _UINT32.unpack_from(data, at)
     start = at + _UINT32.size
     stop = _inside(start + length, end)
-    if field == 's':
+    if field == 's' and length > _NAME_BYTES:
+        raise _DoesNotFit
+    if field in 'st':
         data[start:stop].decode()
     elif field == 'm':
         while start < stop:
-            start = _field_end(data, 's', start, stop)
+            start = _field_end(data, 't', start, stop)
     elif field in _ENTRY_BYTES and length % _ENTRY_BYTES[field]:
         raise _DoesNotFit
     return stop
@@ -126,44 +120,3 @@ def _inside(stop: int, end: int, *, cut: bool = False) -> int:
     if stop > end and not cut:
         raise _DoesNotFit
     return stop
-
-
-def attachment_agrees(data: Buffer, start: int, end: int) -> bool:
-    """
-    Say whether the content of an attachment has the checksum that it states, if any.
-    """
-    stated = int.from_bytes(data[end - _UINT32.size : end], 'little')
-    return stated in (0, checksum(data, start, end - _UINT32.size))
-
-
-def checksum(data: Buffer, start: int, end: int) -> int:
-    """
-    Return the CRC-32 of a span of any size.
-    """
-    value = 0
-    for at in range(start, end, _PIECE_BYTES):
-        value = zlib.crc32(data[at : min(at + _PIECE_BYTES, end)], value)
-    return value
-
-
-def chunk_fields(content: Any) -> tuple[int, int, str, int, int]:
-    """
-    Return unpacked size, checksum, compression, and where its bytes lie.
-
-    Of the content of a chunk; start and length of the packed bytes are as
-    stated, be they there or not.
-
-    Raises
-    ------
-    ValueError
-        If the head is damaged.
-    """
-    try:
-        _, _, size, checksum = CHUNK_HEAD.unpack_from(content, 0)
-        (length,) = _UINT32.unpack_from(content, CHUNK_HEAD.size)
-        at = CHUNK_HEAD.size + _UINT32.size
-        compression = bytes(content[at : at + length]).decode()
-        (packed,) = _UINT64.unpack_from(content, at + length)
-    except struct.error as error:
-        raise ValueError(str(error)) from None
-    return size, checksum, compression, at + length + _UINT64.size, packed

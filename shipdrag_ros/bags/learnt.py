@@ -10,55 +10,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from io import BytesIO
 from typing import Any
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    MessageIndex,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
+from mcap.records import Channel, Footer, Schema
+
+from shipdrag_ros.bags.layout import fits
+from shipdrag_ros.bags.records import (
+    FOOTER_BYTES,
+    HEAD,
+    MAGIC,
+    Buffer,
+    checksum,
+    read_record,
 )
+from shipdrag_ros.bags.scan import Scanner
 
-from shipdrag_ros.bags.layout import checksum, fits
-from shipdrag_ros.bags.records import FOOTER_BYTES, HEAD, MAGIC, Buffer
-from shipdrag_ros.bags.scan import Found, Scanner
-
-_RECORDS: dict[int, Any] = {
-    Opcode.HEADER: Header,
-    Opcode.FOOTER: Footer,
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.MESSAGE_INDEX: MessageIndex,
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.ATTACHMENT: Attachment,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-    Opcode.STATISTICS: Statistics,
-    Opcode.METADATA: Metadata,
-    Opcode.METADATA_INDEX: MetadataIndex,
-    Opcode.SUMMARY_OFFSET: SummaryOffset,
-    Opcode.DATA_END: DataEnd,
-}
 _CHECKSUM_BYTES = 4
-
-
-def read_record(data: Buffer, found: Found) -> Any:
-    """
-    Return the record of `mcap.records` whose fields are known to fit.
-    """
-    stream = ReadDataStream(BytesIO(data[found.start : found.end]))
-    return _RECORDS[found.opcode].read(stream)
 
 
 def read_footer(data: Buffer) -> Footer | None:
@@ -71,7 +39,7 @@ def read_footer(data: Buffer) -> Footer | None:
         return None
     if HEAD.unpack_from(data, at) != (Opcode.FOOTER, end - start):
         return None
-    return read_record(data, Found(Opcode.FOOTER, at, start, end))
+    return read_record(data, Opcode.FOOTER, start, end)
 
 
 def summary_checksum(data: Buffer, footer: Footer) -> int:
@@ -118,7 +86,7 @@ class Learnt:
             return
         for found in Scanner().walk(data, footer.summary_start, len(data) - FOOTER_BYTES):
             if found.damage is None and found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self.add(read_record(data, found), Trust.VERIFIED)
+                self.add(found.read(data), Trust.VERIFIED)
 
     def add(self, record: Schema | Channel, trust: Trust) -> bool:
         """

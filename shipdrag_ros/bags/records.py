@@ -25,11 +25,15 @@ from mcap.records import (
     AttachmentIndex,
     Channel,
     ChunkIndex,
+    DataEnd,
     Footer,
+    Header,
+    MessageIndex,
     Metadata,
     MetadataIndex,
     Schema,
     Statistics,
+    SummaryOffset,
 )
 
 MAGIC = b'\x89MCAP0\r\n'
@@ -38,25 +42,36 @@ Buffer = bytes | mmap
 # an opcode and a length, then the content
 HEAD = struct.Struct('<BQ')
 FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
-_MESSAGE_HEAD = struct.Struct('<HIQQ')
-_CHUNK_HEAD = struct.Struct('<QQQI')
+MESSAGE_HEAD = struct.Struct('<HIQQ')
+"""Channel, sequence, log time [ns], publish time [ns]."""
+TIME_LIMIT_NS = 1 << 63
+"""No log time is as late."""
+CHUNK_LIMIT_BYTES = 1 << 28
+"""Unpacked; far above what any writer makes, far below what would take the memory away."""
+_CHUNK_HEAD = struct.Struct('<QQQI')  # first and last log time, unpacked bytes, their checksum
 _UINT32 = struct.Struct('<I')
 _UINT64 = struct.Struct('<Q')
-_TIME_LIMIT_NS = 1 << 63
-# far above what any writer makes, far below what would take the memory away
-_CHUNK_LIMIT_BYTES = 1 << 28
+_PIECE_BYTES = 1 << 20
 
-_PARSERS: dict[int, Any] = {
+_RECORDS: dict[int, Any] = {
+    Opcode.HEADER: Header,
     Opcode.FOOTER: Footer,
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
+    Opcode.MESSAGE_INDEX: MessageIndex,
     Opcode.CHUNK_INDEX: ChunkIndex,
     Opcode.ATTACHMENT: Attachment,
     Opcode.ATTACHMENT_INDEX: AttachmentIndex,
     Opcode.STATISTICS: Statistics,
     Opcode.METADATA: Metadata,
     Opcode.METADATA_INDEX: MetadataIndex,
+    Opcode.SUMMARY_OFFSET: SummaryOffset,
+    Opcode.DATA_END: DataEnd,
 }
+
+
+UNPACKING_ERRORS = (zstandard.ZstdError, RuntimeError, MemoryError, ValueError, EOFError)
+"""What the libraries raise on damaged bytes."""
 
 
 class DamagedRecord(Exception):
@@ -104,16 +119,38 @@ def parse(data: Buffer, place: Place) -> Any:
     DamagedRecord
         If its content does not fit, or its checksum does not.
     """
-    content = data[place.start : place.end]
     try:
-        record = _PARSERS[place.opcode].read(ReadDataStream(BytesIO(content)))
+        record = read_record(data, place.opcode, place.start, place.end)
     except (McapError, ValueError, struct.error, MemoryError, OverflowError) as error:
         raise DamagedRecord(f'the record at byte {place.offset} is damaged') from error
-    if place.opcode == Opcode.ATTACHMENT:
-        (checksum,) = _UINT32.unpack(content[-4:])
-        if checksum and checksum != zlib.crc32(content[:-4]):
-            raise DamagedRecord(f'the attachment {record.name!r} has a wrong checksum')
+    if place.opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place.start, place.end):
+        raise DamagedRecord(f'the attachment {record.name!r} has a wrong checksum')
     return record
+
+
+def read_record(data: Buffer, opcode: int, start: int, end: int) -> Any:
+    """
+    Return the record of `mcap.records` whose fields are known to fit.
+    """
+    return _RECORDS[opcode].read(ReadDataStream(BytesIO(data[start:end])))
+
+
+def attachment_agrees(data: Buffer, start: int, end: int) -> bool:
+    """
+    Say whether an attachment has the checksum that it states, if any.
+    """
+    stated = int.from_bytes(data[end - _UINT32.size : end], 'little')
+    return stated in (0, checksum(data, start, end - _UINT32.size))
+
+
+def checksum(data: Buffer, start: int, end: int) -> int:
+    """
+    Return the CRC-32 of a span of any size.
+    """
+    value = 0
+    for at in range(start, end, _PIECE_BYTES):
+        value = zlib.crc32(data[at : min(at + _PIECE_BYTES, end)], value)
+    return value
 
 
 def unpack_chunk(data: Buffer, place: Place) -> tuple[str, bytes]:
@@ -126,31 +163,58 @@ def unpack_chunk(data: Buffer, place: Place) -> tuple[str, bytes]:
         If the chunk is not as it was written.
     """
     try:
-        _, _, size, checksum = _CHUNK_HEAD.unpack_from(data, place.start)
-        at = place.start + _CHUNK_HEAD.size
-        (length,) = _UINT32.unpack_from(data, at)
-        at += _UINT32.size
-        name_end = min(at + length, place.end)
-        compression = data[at:name_end].decode()
-        (length,) = _UINT64.unpack_from(data, name_end)
-        at = name_end + _UINT64.size
-        records = _decompress(compression, data[at : min(at + length, place.end)], size)
-    except (struct.error, ValueError, RuntimeError, MemoryError, zstandard.ZstdError) as error:
+        size, stated, compression, at, length = chunk_fields(data, place.start, place.end)
+        records = decompress(compression, data[at : min(at + length, place.end)], size)
+    except UNPACKING_ERRORS as error:
         raise DamagedRecord(f'the chunk at byte {place.offset} is damaged: {error}') from error
-    if checksum and zlib.crc32(records) != checksum:
+    if stated and zlib.crc32(records) != stated:
         raise DamagedRecord(f'the chunk at byte {place.offset} has a wrong checksum')
     return compression, records
 
 
-def _decompress(compression: str, packed: bytes, size: int) -> bytes:
-    if size > _CHUNK_LIMIT_BYTES:
+def chunk_fields(data: Buffer, start: int, end: int) -> tuple[int, int, str, int, int]:
+    """
+    Return unpacked size, checksum, compression, and where its bytes lie.
+
+    Of the content of a chunk; start and length of the packed bytes are as
+    stated, be they there or not.
+
+    Raises
+    ------
+    ValueError
+        If the head is damaged.
+    """
+    try:
+        _, _, size, stated = _CHUNK_HEAD.unpack_from(data, start)
+        at = start + _CHUNK_HEAD.size
+        (length,) = _UINT32.unpack_from(data, at)
+        at += _UINT32.size
+        name_end = min(at + length, end)
+        compression = data[at:name_end].decode()
+        (packed,) = _UINT64.unpack_from(data, name_end)
+    except struct.error as error:
+        raise ValueError(str(error)) from None
+    return size, stated, compression, name_end + _UINT64.size, packed
+
+
+def decompress(compression: str, packed: bytes, size: int) -> bytes:
+    """
+    Unpack what has a stated size.
+
+    Raises
+    ------
+    One of UNPACKING_ERRORS
+        If it is damaged, or of another size.
+    """
+    if size > CHUNK_LIMIT_BYTES:
         raise ValueError(f'{size} bytes are too many')
     if compression == '':
         records = packed
     elif compression == 'zstd':
         records = unpack_zstd(packed, size)
     elif compression == 'lz4':
-        records = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size)
+        # one byte more is asked for, as what is not asked for is dropped in silence
+        records = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
     else:
         raise ValueError(f'unknown compression {compression!r}')
     if len(records) != size:
@@ -167,10 +231,10 @@ def message_head(data: Buffer, place: Place) -> tuple[int, int]:
     DamagedRecord
         If it is too short or its time is none.
     """
-    if place.end - place.start < _MESSAGE_HEAD.size:
+    if place.end - place.start < MESSAGE_HEAD.size:
         raise DamagedRecord(f'the message at byte {place.offset} is too short')
-    channel, _, log_ns, _ = _MESSAGE_HEAD.unpack_from(data, place.start)
-    if log_ns >= _TIME_LIMIT_NS:
+    channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
+    if log_ns >= TIME_LIMIT_NS:
         raise DamagedRecord(f'the message at byte {place.offset} has no possible log time')
     return channel, log_ns
 

@@ -16,10 +16,10 @@ from pathlib import Path
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
-from shipdrag_ros.bags.layout import KNOWN, MESSAGE_HEAD, attachment_agrees, name
-from shipdrag_ros.bags.learnt import Learnt, Trust, read_footer, read_record
+from shipdrag_ros.bags.layout import KNOWN, name
+from shipdrag_ros.bags.learnt import Learnt, Trust, read_footer
 from shipdrag_ros.bags.locate import locate
-from shipdrag_ros.bags.records import MAGIC, Buffer
+from shipdrag_ros.bags.records import MAGIC, MESSAGE_HEAD, Buffer, attachment_agrees
 from shipdrag_ros.bags.salvaged_bag import SalvagedBag
 from shipdrag_ros.bags.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
 from shipdrag_ros.bags.unpack import opened, unpack_chunk_partly
@@ -223,16 +223,16 @@ class _Salvage:
                     publish_ns=publish_ns,
                 )
             case Opcode.SCHEMA | Opcode.CHANNEL:
-                if not self._learnt.add(read_record(data, found), trust):
+                if not self._learnt.add(found.read(data), trust):
                     self._damages.add(offset, name(found.opcode), DamageKind.DISAGREES)
             case Opcode.HEADER:
-                self.sound.profile = self.doubtful.profile = read_record(data, found).profile
+                self.sound.profile = self.doubtful.profile = found.read(data).profile
             case Opcode.ATTACHMENT:
                 if not attachment_agrees(data, found.start, found.end):
                     self._damages.add(offset, 'attachment', DamageKind.CHECKSUM)
                     bag = self.doubtful
-                bag.attach(read_record(data, found))
+                bag.attach(found.read(data))
             case Opcode.METADATA:
-                bag.describe(read_record(data, found))
+                bag.describe(found.read(data))
             case kind if kind not in KNOWN:
                 self.lost += found.end - found.offset

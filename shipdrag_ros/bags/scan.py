@@ -13,21 +13,20 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.damage import DamageKind
-from shipdrag_ros.bags.layout import (
-    KNOWN,
+from shipdrag_ros.bags.layout import KNOWN, fields_end, fills, fits, name
+from shipdrag_ros.bags.records import (
+    HEAD,
+    MAGIC,
     MESSAGE_HEAD,
+    Buffer,
     attachment_agrees,
-    fields_end,
-    fills,
-    fits,
-    name,
+    read_record,
 )
-from shipdrag_ros.bags.records import HEAD, MAGIC, Buffer
 
 MAGIC_PLACE = -1
 """Stands for an opcode where the magic bytes are."""
@@ -38,10 +37,12 @@ GARBAGE = 0
 _HEAD = re.compile(rb'[\x01-\x0f](?=.{4}\0{4})', re.DOTALL)
 _PRIVATE = 0x80
 _POSSIBLE_BYTES = 1 << 40
+_SOUGHT_BYTES = 1 << 20  # but for those with a body; so that chance costs little
 _NEAR_NS = 3600 * 10**9
 _CHAIN = 3
 # these carry a name, which no chance makes
 _NAMED = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.CHUNK))
+_WITH_BODY = frozenset((Opcode.MESSAGE, Opcode.CHUNK, Opcode.ATTACHMENT))
 _IN_CHUNK = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
 
 
@@ -59,6 +60,12 @@ class Found(NamedTuple):
     start: int
     end: int
     damage: DamageKind | None = None
+
+    def read(self, data: Buffer) -> Any:
+        """
+        Return it as a record of `mcap.records`.
+        """
+        return read_record(data, self.opcode, self.start, self.end)
 
 
 def found_name(data: Buffer, found: Found) -> str:
@@ -275,6 +282,8 @@ class Scanner:
                 and self._has_compression(data, start, end)
                 and fields_end(data, opcode, start, end) == stop
             )
+        if length > _SOUGHT_BYTES and opcode not in _WITH_BODY:
+            return False
         if not fills(data, opcode, start, stop):
             return False
         if opcode == Opcode.MESSAGE:

@@ -23,7 +23,7 @@ from mcap.records import (
 
 from shipdrag_ros.bags.damage import DamageKind, DamageList
 from shipdrag_ros.bags.layout import name
-from shipdrag_ros.bags.learnt import read_footer, read_record, summary_checksum
+from shipdrag_ros.bags.learnt import read_footer, summary_checksum
 from shipdrag_ros.bags.records import FOOTER_BYTES, Buffer
 from shipdrag_ros.bags.scan import Found
 
@@ -109,7 +109,7 @@ def hold_against(data: Buffer, facts: Facts, damages: DamageList) -> None:
         damages.add(len(data), 'data_end', DamageKind.MISSING)
     if footer is None:
         damages.add(len(data), 'footer', DamageKind.MISSING)
-    records = [(found, read_record(data, found)) for found in facts.summary]
+    records = [(found, found.read(data)) for found in facts.summary]
     stated = [each for each in records if not isinstance(each[1], Footer)]
     after = [found.offset for found, _ in stated if facts.ended and found.offset >= facts.ended]
     if not after:

@@ -17,18 +17,20 @@ import lz4.frame
 import zstandard
 
 from shipdrag_ros.bags.damage import DamageKind, DamageList
-from shipdrag_ros.bags.layout import chunk_fields
-from shipdrag_ros.bags.records import Buffer
+from shipdrag_ros.bags.records import (
+    CHUNK_LIMIT_BYTES,
+    UNPACKING_ERRORS,
+    Buffer,
+    chunk_fields,
+    decompress,
+)
 from shipdrag_ros.errors import BagError
 
-LIMIT_BYTES = 1 << 28
-"""Of a chunk, more is not unpacked; writers make chunks of some MiB."""
 _FILE_RATIO = 4096
 _PIECE_BYTES = 256  # packed; so that little is unpacked at once, and little lost at a damage
 _COPY_BYTES = 1 << 16
 _FRAMES = {b'\x28\xb5\x2f\xfd': 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
 _FRAME_SEARCH_BYTES = 64
-_ERRORS = (zstandard.ZstdError, RuntimeError, MemoryError, ValueError, EOFError)
 
 
 class Unpacked(NamedTuple):
@@ -62,7 +64,7 @@ def unpack_chunk_partly(data: Buffer, start: int, end: int) -> Unpacked:
     size, checksum = 0, 0
     damage = None
     try:
-        size, checksum, compression, at, length = chunk_fields(content)
+        size, checksum, compression, at, length = chunk_fields(content, 0, len(content))
     except ValueError:
         damage, compression, at, length = DamageKind.CONTENT, '', len(content), 0
     frame = _find_frame(content)
@@ -73,12 +75,11 @@ def unpack_chunk_partly(data: Buffer, start: int, end: int) -> Unpacked:
     packed = content[at : at + length]
     if at + length > len(content):
         damage = damage or DamageKind.TRUNCATED
-    whole, records = _unpack_whole(compression, packed, size)
-    read = len(packed)
-    if not whole:
-        read, records = _unpack_pieces(compression, packed)
-    if len(records) > LIMIT_BYTES:
-        return Unpacked(records[:LIMIT_BYTES], DamageKind.TOO_LARGE, False, len(packed) - read)
+    whole, read, records = _unpack(compression, packed, size)
+    if len(records) > CHUNK_LIMIT_BYTES:
+        return Unpacked(
+            records[:CHUNK_LIMIT_BYTES], DamageKind.TOO_LARGE, False, len(packed) - read
+        )
     verified = checksum != 0 and zlib.crc32(records) == checksum
     if not damage:
         damage = _damage_of(whole, read == len(packed), len(records) == size, checksum, verified)
@@ -95,6 +96,16 @@ def _damage_of(
     return DamageKind.CHECKSUM if checksum and not verified else None
 
 
+def _unpack(compression: str, packed: bytes, size: int) -> tuple[bool, int, bytes]:
+    """Return whether all is as stated, how many bytes were read, and what came out."""
+    if compression == '':
+        return True, len(packed), packed
+    try:
+        return True, len(packed), decompress(compression, packed, size)
+    except UNPACKING_ERRORS:
+        return False, *_unpack_pieces(compression, packed)
+
+
 def _find_frame(content: bytes) -> tuple[str, int] | None:
     for magic, compression in _FRAMES.items():
         at = content.find(magic, 0, _FRAME_SEARCH_BYTES)
@@ -103,30 +114,12 @@ def _find_frame(content: bytes) -> tuple[str, int] | None:
     return None
 
 
-def _unpack_whole(compression: str, packed: bytes, size: int) -> tuple[bool, bytes]:
-    """Unpack at once what is as it was written, the common case."""
-    if compression == '':
-        return True, packed
-    if size > LIMIT_BYTES:
-        return False, b''
-    try:
-        if compression == 'zstd':
-            if zstandard.frame_content_size(packed) not in (-1, size):
-                return False, b''
-            records = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
-        else:
-            records = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size)
-    except _ERRORS:
-        return False, b''
-    return len(records) == size, records
-
-
 def _unpack_pieces(compression: str, packed: bytes) -> tuple[int, bytes]:
     """
     Return how many bytes were read, and what came out, up to a damage or the limit.
     """
     at, out = _feed(_decoder(compression), packed, 0, len(packed), _PIECE_BYTES)
-    if at < len(packed) and sum(map(len, out)) <= LIMIT_BYTES:
+    if at < len(packed) and sum(map(len, out)) <= CHUNK_LIMIT_BYTES:
         # a decoder that has failed is of no use: up to the bad piece again, then byte by byte
         decoder = _decoder(compression)
         _, out = _feed(decoder, packed, 0, at, _PIECE_BYTES)
@@ -137,7 +130,7 @@ def _unpack_pieces(compression: str, packed: bytes) -> tuple[int, bytes]:
 
 def _decoder(compression: str) -> Any:
     if compression == 'zstd':
-        return zstandard.ZstdDecompressor(max_window_size=LIMIT_BYTES).decompressobj()
+        return zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
     return lz4.frame.LZ4FrameDecompressor()
 
 
@@ -151,10 +144,10 @@ def _feed(
             return end, out
         try:
             out.append(decoder.decompress(packed[at : min(at + piece, end)]))
-        except _ERRORS:
+        except UNPACKING_ERRORS:
             return at, out
         total += len(out[-1])
-        if total > LIMIT_BYTES:
+        if total > CHUNK_LIMIT_BYTES:
             return at, out
     return end, out
 
@@ -194,8 +187,8 @@ def opened(path: Path, damages: DamageList) -> Iterator[mmap]:
 def _unpack_file(
     packed: IO[bytes], unpacked: IO[bytes], size: int, add: Callable[..., None]
 ) -> None:
-    decoder = zstandard.ZstdDecompressor(max_window_size=LIMIT_BYTES).decompressobj()
-    limit = max(LIMIT_BYTES, size * _FILE_RATIO)
+    decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
+    limit = max(CHUNK_LIMIT_BYTES, size * _FILE_RATIO)
     at = 0
     while not decoder.eof:
         piece = packed.read(_PIECE_BYTES)
@@ -204,7 +197,7 @@ def _unpack_file(
             break
         try:
             unpacked.write(decoder.decompress(piece))
-        except _ERRORS as error:
+        except UNPACKING_ERRORS as error:
             add(at, 'file', DamageKind.COMPRESSION, str(error))
             break
         at += len(piece)

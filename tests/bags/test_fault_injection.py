@@ -209,7 +209,7 @@ def test_cut_at_every_record_and_inside(
 ) -> None:
     sample = samples[writer]
     for record in _each_kind(sample):
-        for cut in (record.offset, record.offset + 5, (record.offset + record.end) // 2):
+        for cut in (record.offset, record.offset + 5, record.end - 9):
             before = {n for r in sample.records if r.end <= cut for n in r.inside}
             content = sample.content[:cut]
             assert ('footer', 'missing') in damage_of(content)
@@ -219,6 +219,12 @@ def test_cut_at_every_record_and_inside(
             whole = {m for m in sample.messages if m.number in before}
             assert saved.sound == whole
             assert saved.doubtful <= sample.messages - whole
+            if (
+                writer == 'plain chunks'
+                and record.opcode == Opcode.CHUNK
+                and cut > record.end - 99
+            ):
+                assert saved.doubtful  # what lies before the cut needs no unpacking
 
 
 @pytest.mark.parametrize('writer', WRITERS)
