@@ -14,6 +14,7 @@ from _bad_case import Case, steady, write, write_messages
 from mcap.writer import Writer
 
 from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.messages import EncodedMessage, encode
 from shipdrag_ros.samples import Block, Channel
 
@@ -60,15 +61,25 @@ def _cut(fraction: float, *, zeros: bool = False) -> Callable[[Path], Path]:
     return make
 
 
-def _flip(place: Callable[[int], int]) -> Callable[[Path], Path]:
+def _flip(place: Callable[[Path], int]) -> Callable[[Path], Path]:
     def make(folder: Path) -> Path:
         path = _sound(folder)
         content = bytearray(path.read_bytes())
-        content[place(len(content))] ^= 1
+        content[place(path)] ^= 1
         path.write_bytes(content)
         return path
 
     return make
+
+
+def _in_a_chunk(path: Path) -> int:
+    segments = McapFile(path).contents.segments
+    chunk = segments[len(segments) // 2]
+    return (chunk.offset + chunk.end) // 2
+
+
+def _in_the_index(path: Path) -> int:
+    return path.stat().st_size - 200
 
 
 def _killed(folder: Path) -> Path:
@@ -221,14 +232,14 @@ CASES = (
     ),
     _case(
         'a bit flipped in the middle',
-        _flip(lambda n: n // 2),
+        _flip(_in_a_chunk),
         0,
         'Warning: bag.mcap: the chunk at byte',
         'messages are there where the index tells of 1208',
     ),
     _case(
         'a bit flipped in the index',
-        _flip(lambda n: n - 200),
+        _flip(_in_the_index),
         0,
         'Warning: bag.mcap: the index has a wrong checksum',
         '302   302',

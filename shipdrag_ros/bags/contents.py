@@ -18,7 +18,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
-from shipdrag_ros.bags.message_index import index_messages
+from shipdrag_ros.bags.message_index import CHANNELS, index_messages
 from shipdrag_ros.bags.records import (
     FOOTER_BYTES,
     MAGIC,
@@ -243,10 +243,13 @@ def scan(data: Buffer) -> Contents:
 _DECLARATIONS = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA}
 
 
+_EVERY_CHANNEL = np.ones(CHANNELS, np.uint8)
+
+
 def _scan_chunk(data: Buffer, chunk: Place, contents: Contents) -> None:
     compression, unpacked = unpack_chunk(data, chunk)
     contents.compressions.add(compression)
-    messages, others, damage = index_messages([unpacked], [chunk.offset])
+    messages, others, damage = index_messages([unpacked], [chunk.offset], _EVERY_CHANNEL)
     for offset in others:
         place = next(walk(unpacked, offset, len(unpacked)))
         if place.opcode in _DECLARATIONS:

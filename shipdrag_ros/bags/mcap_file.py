@@ -22,9 +22,10 @@ import zstandard
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.contents import Contents, Segment, read_index, scan
-from shipdrag_ros.bags.message_index import Messages, index_messages
+from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import MAGIC, DamagedRecord, unpack_chunk, walk
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.samples import UInt8
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
 # smaller chunks are read together: what a chunk costs beside its bytes is then small
@@ -93,11 +94,13 @@ class McapFile:
             s for s in self.contents.segments if s.end_ns >= start_ns and s.start_ns <= end_ns
         ]
         segments = deque(s for s in in_time if not s.channels or s.channels & wanted)
+        table = np.zeros(CHANNELS, np.uint8)
+        table[list(wanted)] = 1
         found = 0
         waiting: Messages | None = None
         with self._data() as data:
             while segments:
-                loaded = self._load(data, segments, wanted)
+                loaded = self._load(data, segments, table)
                 found += len(loaded)
                 if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
                     loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
@@ -116,7 +119,7 @@ class McapFile:
         if len(in_time) == len(self.contents.segments) and found != expected:
             self._warn(f'{found} messages are there where the index tells of {expected}')
 
-    def _load(self, data: mmap, segments: deque[Segment], wanted: frozenset[int]) -> Messages:
+    def _load(self, data: mmap, segments: deque[Segment], wanted: UInt8) -> Messages:
         """Take segments off the queue, one or as many small ones as are worth it."""
         unpacked: list[bytes] = []
         offsets: list[int] = []

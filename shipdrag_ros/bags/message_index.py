@@ -7,7 +7,7 @@ Every length is checked; a segment is indexed up to its first damage.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
@@ -64,8 +64,14 @@ class Messages:
         return len(self.log_ns)
 
     def __getitem__(self, part: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Messages:
-        places = (getattr(self, field.name)[part] for field in fields(self)[1:])
-        return Messages(self.data, *places)
+        return Messages(
+            self.data,
+            self.log_ns[part],
+            self.segment[part],
+            self.channel[part],
+            self.start[part],
+            self.end[part],
+        )
 
     def payload(self, number: int) -> bytes:
         """
@@ -130,7 +136,7 @@ class Indexed(NamedTuple):
 def index_messages(
     segments: Sequence[bytes],
     offsets: Sequence[int],
-    wanted: Collection[int] | None = None,
+    wanted: UInt8,
 ) -> Indexed:
     """
     Find the messages in the records of some segments.
@@ -141,13 +147,11 @@ def index_messages(
         Unpacked records.
     offsets
         Where each segment lies in the file [bytes].
-    wanted
-        Numbers of the channels to find; all by default.
+    wanted : (CHANNELS,) uint8
+        Not 0 at the numbers of the channels to find.
     """
     data = np.frombuffer(segments[0] if len(segments) == 1 else b''.join(segments), np.uint8)
     bounds = np.cumsum([0, *map(len, segments)], dtype=np.int64)
-    table = np.full(CHANNELS, wanted is None, np.uint8)
-    table[list(wanted or ())] = 1
     # of these only what is filled takes memory
     most = len(data) // (HEAD_BYTES + MESSAGE_HEAD_BYTES) + 1
     found = Messages(
@@ -164,7 +168,7 @@ def index_messages(
         data,
         bounds,
         np.array(offsets, np.int64),
-        table,
+        wanted,
         found.log_ns,
         found.segment,
         found.channel,

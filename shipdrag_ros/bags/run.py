@@ -31,9 +31,9 @@ from shipdrag_ros.messages import (
     read_event,
     types,
 )
-from shipdrag_ros.messages.decoding import decode_at
+from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.topics import EVENTS, RESISTANCE
-from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.samples import Block
 
 # messages decoded at once: a chunk as writers make them, and of a giant one a part
 BATCH = 1 << 14
@@ -266,29 +266,21 @@ class Inputs:
         self, messages: Messages, sources: tuple[Source, ...]
     ) -> tuple[Block, NDArray[np.intp]]:
         """Return the samples and which message each came from."""
-        blocks: list[Block] = []
-        places: list[NDArray[np.intp]] = []
-        for number, source in enumerate(sources):
-            mine = np.flatnonzero(messages.channel == number)
-            if not len(mine):
-                continue
-            decoded = decode_at(
-                source,
-                messages.data,
-                messages.start[mine],
-                messages.end[mine],
-                messages.log_ns[mine],
-            )
-            self.messages[source.input] += len(mine)
-            for reason, count in decoded.unreadable.items():
-                self.unreadable.setdefault(source.input, Counter())[reason.value] += count
-            blocks.append(decoded.block)
-            places.append(mine[decoded.kept])
-        if len(blocks) < 2:
-            return concatenate(blocks), places[0] if places else np.empty(0, np.intp)
-        joined = np.concatenate(places)
-        order = np.argsort(joined)
-        return concatenate(blocks)[order], joined[order]
+        block, kept, unreadable = decode_batch(
+            sources,
+            messages.channel,
+            messages.data,
+            messages.start,
+            messages.end,
+            messages.log_ns,
+        )
+        counts = np.bincount(messages.channel, minlength=len(sources)).tolist()
+        for source, count, reasons in zip(sources, counts, unreadable, strict=False):
+            if count:
+                self.messages[source.input] += count
+            for reason, number in reasons.items():
+                self.unreadable.setdefault(source.input, Counter())[reason.value] += number
+        return block, kept
 
 
 def _key(channel: FileChannel) -> tuple[str, str]:

@@ -10,10 +10,11 @@ message in a batch agree to the last bit.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import accumulate
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -76,244 +77,222 @@ def decode(source: Source, payloads: Sequence[bytes], receive_ns: ArrayLike) -> 
     """
     ends = np.fromiter(accumulate(map(len, payloads), initial=0), np.int64)
     data = np.frombuffer(b''.join(payloads), np.uint8)
-    return decode_at(source, data, ends[:-1], ends[1:], receive_ns)
+    received = np.atleast_1d(np.asarray(receive_ns, np.int64))
+    every = np.zeros(len(payloads), np.uint16)
+    block, kept, (unreadable,) = decode_batch(
+        (source,), every, data, ends[:-1], ends[1:], received
+    )
+    return Decoded(block, kept, unreadable)
 
 
-def decode_at(
-    source: Source, data: UInt8, start: Int64, end: Int64, receive_ns: ArrayLike
-) -> Decoded:
+class DecodedBatch(NamedTuple):
+    """The same as `Decoded` of several sources, with what is unreadable of each."""
+
+    block: Block
+    kept: NDArray[np.intp]
+    unreadable: tuple[Counter[Unreadable], ...]
+
+
+def decode_batch(
+    sources: Sequence[Source],
+    number: NDArray[np.uint16],
+    data: UInt8,
+    start: Int64,
+    end: Int64,
+    receive_ns: Int64,
+) -> DecodedBatch:
     """
-    Turn messages of one source that lie in one buffer into samples.
+    Turn messages of several sources, in one buffer, into samples in their order.
 
     Parameters
     ----------
-    source
-        The input and the type that its messages have.
+    sources
+        What is to be read.
+    number : (n,) uint16
+        Place of each message's source among them; messages beyond are left out.
     data : (b,) uint8
         The buffer.
     start, end : (n,) int64
         Where each message begins and ends in it.
-    receive_ns : (n,) integers
+    receive_ns : (n,) int64
         Time of arrival of each [ns].
     """
-    reading = _READINGS[source]
-    stamp_ns, rows, found = _gather(reading, reading.steps, data, start, end)
-    again = np.flatnonzero(found == Found.MALFORMED)
-    if reading.older_steps is not None and len(again):
-        stamp_ns[again], rows[again], found[again] = _gather(
-            reading, reading.older_steps, data, start[again], end[again]
-        )
-    unreadable: Counter[Unreadable] = Counter()
+    n = len(start)
+    code, found = np.empty(n, np.uint8), np.full(n, Found.NOTHING, np.uint8)
+    readings = [_READINGS[source] for source in sources]
+    width = max((reading.width for reading in readings), default=_COLUMNS)
+    stamp_ns, rows = np.empty(n, np.int64), np.empty((n, width))
+    unreadable = []
+    for i, reading in enumerate(readings):
+        place = np.flatnonzero(number == i)
+        code[place] = reading.channel
+        for by in reading.steps:
+            gather(data, start, end, place, by, reading.joint, stamp_ns, rows, found)
+            if reading.columns is not None:
+                computed = reading.columns(rows[place, _COLUMNS : reading.width])
+                rows[place, :_COLUMNS] = computed
+            bad = found[place] != Found.READ
+            place = place[bad] if bad.any() else place[:0]
+            if not len(place):
+                break
+        unreadable.append(Counter(_UNREADABLE[each] for each in found[place].tolist()))
     kept = np.flatnonzero(found == Found.READ)
-    received = np.atleast_1d(np.asarray(receive_ns, np.int64))
-    if len(kept) < len(found):
-        stamp_ns, rows, received = stamp_ns[kept], rows[kept], received[kept]
-        for code, reason in _UNREADABLE.items():
-            unreadable[reason] += int(np.count_nonzero(found == code))
-    value, variance = reading.columns(rows)
-    known = (variance > 0.0) & (variance < np.inf)
-    block = Block(
-        np.full(len(kept), reading.channel, np.uint8),
-        stamp_ns,
-        received,
-        value,
-        np.where(known, variance, np.nan),
-    )
-    return Decoded(block, kept, +unreadable)
+    if len(kept) < n:
+        code, stamp_ns, rows, receive_ns = code[kept], stamp_ns[kept], rows[kept], receive_ns[kept]
+    block = Block(code, stamp_ns, receive_ns, rows[:, :2], rows[:, 2:_COLUMNS])
+    return DecodedBatch(block, kept, tuple(unreadable))
+
+
+_UNREADABLE = {
+    int(Found.MALFORMED): Unreadable.MALFORMED,
+    int(Found.NO_JOINT): Unreadable.NO_JOINT,
+}
+_COLUMNS = 4  # two values and two variances, which the extra fields follow
+Columns = Callable[[Float64], Float64]
 
 
 @dataclass(frozen=True)
 class _Reading:
-    """How the messages of a source are read; `older_steps` where these fit none."""
+    """
+    How the messages of a source are read.
+
+    Attributes
+    ----------
+    steps
+        Through the type as it is, then through the type as it was.
+    joint : uint8
+        Name of the joint.
+    columns
+        Values and variances of the extra fields; None where they are as sent.
+    width
+        Number of values, variances and extra fields.
+    """
 
     channel: Channel
-    width: int
-    steps: Int64
-    columns: Callable[[Float64], tuple[Float64, Float64]]
+    steps: tuple[Int64, ...]
     joint: UInt8
-    older_steps: Int64 | None = None
+    columns: Columns | None
+    width: int
 
 
-def _gather(
-    reading: _Reading, by: Int64, data: UInt8, start: Int64, end: Int64
-) -> tuple[Int64, Float64, UInt8]:
-    """Return stamps, fields (NaN where the type has none) and `Found` of messages."""
-    n = len(start)
-    stamp_ns, found = np.empty(n, np.int64), np.empty(n, np.uint8)
-    rows = np.full((n, reading.width), np.nan)
-    gather(data, start, end, by, reading.joint, stamp_ns, rows, found)
-    return stamp_ns, rows, found
+def _table(*columns: Float64 | float) -> Float64:
+    """Put two values and two variances side by side; what says nothing is NaN."""
+    table = np.stack(np.broadcast_arrays(*columns), axis=1)
+    variance = table[:, 2:]
+    variance[~((variance > 0.0) & (variance < np.inf))] = np.nan
+    return table
 
 
-def _pair(first: Float64 | float, second: Float64 | float, n: int) -> Float64:
-    columns = np.empty((n, 2))
-    columns[:, 0], columns[:, 1] = first, second
-    return columns
+def _fix(extra: Float64) -> Float64:
+    """Return latitude and longitude [deg]; NaN where there is no fix."""
+    latitude, longitude, variance_north, variance_east, status, covariance_type = extra.T
+    table = _table(latitude, longitude, variance_north, variance_east)
+    table[covariance_type == _FIX.COVARIANCE_TYPE_UNKNOWN, 2:] = np.nan
+    table[status < _FIX_STATUS.STATUS_FIX] = np.nan
+    return table
 
 
-def _scalar(rows: Float64) -> tuple[Float64, Float64]:
-    n = len(rows)
-    return _pair(rows[:, 0], 0.0, n), _pair(rows[:, 1], np.nan, n)
-
-
-def _plane(rows: Float64) -> tuple[Float64, Float64]:
-    return rows[:, 0:2].copy(), rows[:, 2:4].copy()
-
-
-def _fix(rows: Float64) -> tuple[Float64, Float64]:
-    """Return latitude and longitude; NaN where there is no fix."""
-    value, variance = _plane(rows)
-    status, covariance_type = rows[:, 4], rows[:, 5]
-    variance[covariance_type == _FIX.COVARIANCE_TYPE_UNKNOWN] = np.nan
-    value[status < _FIX_STATUS.STATUS_FIX] = np.nan
-    variance[status < _FIX_STATUS.STATUS_FIX] = np.nan
-    return value, variance
-
-
-def _magnitude(rows: Float64) -> tuple[Float64, Float64]:
+def _magnitude(extra: Float64) -> Float64:
     """
     Return length of a vector and its variance, to first order.
 
     Without a direction, at rest, the larger of the two variances.
     """
-    x, y, variance_x, variance_y, covariance = rows.T
+    x, y, variance_x, variance_y, covariance = extra.T
     speed = np.hypot(x, y)
     with np.errstate(divide='ignore', over='ignore', invalid='ignore'):
         c = x / speed
         s = y / speed
         along = c * c * variance_x + s * s * variance_y + 2.0 * c * s * covariance
-    variance = np.where(speed > 0.0, along, np.maximum(variance_x, variance_y))
+    variance = np.where(speed == 0.0, np.maximum(variance_x, variance_y), along)
     # one negative variance says "unknown" for both
     known = np.where((variance_x < 0.0) | (variance_y < 0.0), np.nan, variance)
-    return _pair(speed, 0.0, len(rows)), _pair(known, np.nan, len(rows))
+    return _table(speed, 0.0, known, np.nan)
 
 
-def _yaw(rows: Float64) -> tuple[Float64, Float64]:
+def _yaw(extra: Float64) -> Float64:
     """Return yaw [rad] of x, y, z, w; NaN where that is no rotation."""
-    x, y, z, w, variance = rows[:, :5].T
+    x, y, z, w, variance = extra[:, :5].T
     with np.errstate(over='ignore', invalid='ignore'):
         norm = x * x + y * y + z * z + w * w
         yaw = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
     yaw = np.where(np.abs(norm - 1.0) <= QUATERNION_TOLERANCE, yaw, np.nan)
-    return _pair(yaw, 0.0, len(rows)), _pair(variance, np.nan, len(rows))
+    return _table(yaw, 0.0, variance, np.nan)
 
 
-def _imu(rows: Float64) -> tuple[Float64, Float64]:
-    value, variance = _yaw(rows)
-    none = rows[:, 5] == -1.0  # sensor_msgs/Imu: there is no orientation
-    value[none, 0] = variance[none, 0] = np.nan
-    return value, variance
+def _imu(extra: Float64) -> Float64:
+    table = _yaw(extra)
+    none = extra[:, 5] == -1.0  # sensor_msgs/Imu: there is no orientation
+    table[none, 0] = table[none, 2] = np.nan
+    return table
 
 
 _FIX = types.class_of(types.NAV_SAT_FIX)
 _FIX_STATUS = types.class_of('sensor_msgs/msg/NavSatStatus')
-_UNREADABLE = {Found.MALFORMED: Unreadable.MALFORMED, Found.NO_JOINT: Unreadable.NO_JOINT}
 
 
 def _reading(
     channel: Channel,
     type_name: str,
-    columns: Callable[[Float64], tuple[Float64, Float64]],
     *fields: str,
     joint: bytes = b'',
     older: str | None = None,
 ) -> tuple[Source, _Reading]:
-    """Pair a source with how it is read; '' is a column that the type does not have."""
-    reading = _Reading(
-        channel,
-        len(fields),
-        steps(type_name, fields),
-        columns,
-        np.frombuffer(joint, np.uint8),
-        None if older is None else steps(older, [each for each in fields if each != 'variance']),
-    )
+    """
+    Pair a source with how its two values and two variances are read.
+
+    '' is a field that the type does not have.
+    """
+    ways = [steps(type_name, fields)]
+    if older is not None:
+        ways.append(steps(older, [field for field in fields if field != 'variance']))
+    name = np.frombuffer(joint, np.uint8)
+    return Source(channel.input, type_name), _Reading(channel, tuple(ways), name, None, _COLUMNS)
+
+
+def _computed(
+    channel: Channel, type_name: str, columns: Columns, *fields: str
+) -> tuple[Source, _Reading]:
+    """Pair a source with how its fields are read, and with what is made of them."""
+    behind = (*[''] * _COLUMNS, *fields)
+    way = steps(type_name, behind)
+    reading = _Reading(channel, (way,), np.empty(0, np.uint8), columns, len(behind))
     return Source(channel.input, type_name), reading
 
 
-_POSE = (
-    'pose.pose.position.x',
-    'pose.pose.position.y',
-    'pose.covariance[0]',
-    'pose.covariance[7]',
-)
-_LINEAR = ('twist.twist.linear.x', 'twist.twist.linear.y')
-_COVARIANCE = ('twist.covariance[0]', 'twist.covariance[7]', 'twist.covariance[1]')
-_ROTATION = ('x', 'y', 'z', 'w')
+def _readings() -> Iterator[tuple[Source, _Reading]]:
+    speed, ground = Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND
+    linear, x, y = 'twist.twist.linear.x', 'twist.linear.x', 'twist.linear.y'
+    cells = [f'twist.covariance[{i}]' for i in (0, 7, 1)]
+    yield _reading(speed, types.TWIST_WITH_COVARIANCE, linear, '', cells[0])
+    yield _reading(speed, types.TWIST, x)
+    both = (linear, 'twist.twist.linear.y', *cells)
+    yield _computed(ground, types.TWIST_WITH_COVARIANCE, _magnitude, *both)
+    yield _computed(ground, types.TWIST, _magnitude, x, y, '', '', '')
 
-_READINGS: dict[Source, _Reading] = dict(
-    (
-        _reading(
-            Channel.SPEED_THROUGH_WATER,
-            types.TWIST_WITH_COVARIANCE,
-            _scalar,
-            _LINEAR[0],
-            _COVARIANCE[0],
-        ),
-        _reading(Channel.SPEED_THROUGH_WATER, types.TWIST, _scalar, 'twist.linear.x', ''),
-        _reading(
-            Channel.SPEED_OVER_GROUND,
-            types.TWIST_WITH_COVARIANCE,
-            _magnitude,
-            *_LINEAR,
-            *_COVARIANCE,
-        ),
-        _reading(
-            Channel.SPEED_OVER_GROUND,
-            types.TWIST,
-            _magnitude,
-            'twist.linear.x',
-            'twist.linear.y',
-            *('', '', ''),
-        ),
-        _reading(Channel.POSITION, types.POSE_WITH_COVARIANCE, _plane, *_POSE),
-        _reading(Channel.POSITION, types.ODOMETRY, _plane, *_POSE),
-        _reading(
-            Channel.POSITION, types.POSE, _plane, 'pose.position.x', 'pose.position.y', '', ''
-        ),
-        _reading(Channel.POSITION, types.POINT, _plane, 'point.x', 'point.y', '', ''),
-        _reading(
-            Channel.POSITION_GEODETIC,
-            types.NAV_SAT_FIX,
-            _fix,
-            'latitude',
-            'longitude',
-            'position_covariance[4]',  # the covariance is in east, north, up
-            'position_covariance[0]',
-            'status.status',
-            'position_covariance_type',
-        ),
-        _reading(
-            Channel.HEADING,
-            types.QUATERNION,
-            _yaw,
-            *(f'quaternion.{each}' for each in _ROTATION),
-            '',
-        ),
-        _reading(
-            Channel.HEADING,
-            types.IMU,
-            _imu,
-            *(f'orientation.{each}' for each in _ROTATION),
-            'orientation_covariance[8]',
-            'orientation_covariance[0]',
-        ),
-        _reading(Channel.SHAFT, types.JOINT_STATE, _scalar, 'velocity', '', joint=b'shaft'),
-        _reading(Channel.RUDDER, types.JOINT_STATE, _scalar, 'position', '', joint=b'rudder'),
-        _reading(
-            Channel.WIND_APPARENT,
-            types.TWIST,
-            _plane,
-            'twist.linear.x',
-            'twist.linear.y',
-            *('', ''),
-        ),
-        _reading(
-            Channel.DEPTH,
-            types.RANGE,
-            _scalar,
-            'range',
-            'variance',
-            older=types.RANGE_BEFORE_IRON,
-        ),
-    )
-)
+    position = Channel.POSITION
+    pose = ['pose.pose.position.x', 'pose.pose.position.y']
+    pose += ['pose.covariance[0]', 'pose.covariance[7]']
+    yield _reading(position, types.POSE_WITH_COVARIANCE, *pose)
+    yield _reading(position, types.ODOMETRY, *pose)
+    yield _reading(position, types.POSE, 'pose.position.x', 'pose.position.y')
+    yield _reading(position, types.POINT, 'point.x', 'point.y')
+    # the covariance is in east, north, up
+    fix = ['latitude', 'longitude', 'position_covariance[4]', 'position_covariance[0]']
+    fix += ['status.status', 'position_covariance_type']
+    yield _computed(Channel.POSITION_GEODETIC, types.NAV_SAT_FIX, _fix, *fix)
+
+    quaternion = [f'quaternion.{axis}' for axis in 'xyzw']
+    yield _computed(Channel.HEADING, types.QUATERNION, _yaw, *quaternion, '')
+    imu = [f'orientation.{axis}' for axis in 'xyzw']
+    imu += [f'orientation_covariance[{i}]' for i in (8, 0)]
+    yield _computed(Channel.HEADING, types.IMU, _imu, *imu)
+
+    yield _reading(Channel.SHAFT, types.JOINT_STATE, 'velocity', joint=b'shaft')
+    yield _reading(Channel.RUDDER, types.JOINT_STATE, 'position', joint=b'rudder')
+    yield _reading(Channel.WIND_APPARENT, types.TWIST, x, y)
+    depth = ('range', '', 'variance')
+    yield _reading(Channel.DEPTH, types.RANGE, *depth, older=types.RANGE_BEFORE_IRON)
+
+
+_READINGS: dict[Source, _Reading] = dict(_readings())

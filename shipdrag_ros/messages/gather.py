@@ -25,6 +25,7 @@ class Found(IntEnum):
     READ = 0
     MALFORMED = 1
     NO_JOINT = 2
+    NOTHING = 3  # not read yet, or of no source
 
 
 _READ = int(Found.READ)
@@ -37,6 +38,8 @@ _UINT8 = int(Step.UINT8)
 _INT8 = int(Step.INT8)
 _STRING = int(Step.STRING)
 _NAMES = int(Step.NAMES)
+_COLUMNS = 4
+_VARIANCES = 2  # from this column on
 _BODY = ENCAPSULATION_BYTES
 _PADDING = PADDING_BYTES
 _TIME_BYTES = 8
@@ -144,7 +147,7 @@ def _is_name(data: Any, start: int, end: int, name: Any) -> bool:
 
 @njit
 def _read(
-    data: Any, start: int, end: int, steps: Any, name: Any, i: int, stamp_ns: Any, rows: Any
+    data: Any, start: int, end: int, steps: Any, name: Any, i: Any, stamp_ns: Any, rows: Any
 ) -> int:
     body = start + _BODY
     size = end - body
@@ -168,13 +171,13 @@ def _read(
                 return _MALFORMED
             base += body
         elif step == _FLOAT64:
-            rows[i, second] = _float64(data, base + first, big)
+            rows[i, _U(second)] = _float64(data, base + first, big)
         elif step == _FLOAT32:
-            rows[i, second] = _float32(data, base + first, big)
+            rows[i, _U(second)] = _float32(data, base + first, big)
         elif step == _UINT8:
-            rows[i, second] = np.float64(data[_U(base + first)])
+            rows[i, _U(second)] = np.float64(data[_U(base + first)])
         elif step == _INT8:
-            rows[i, second] = np.float64(np.int8(data[_U(base + first)]))
+            rows[i, _U(second)] = np.float64(np.int8(data[_U(base + first)]))
         elif step == _STRING:
             at = _string_end(data, body, _aligned(at, 4), size, big)
             if at == _BAD:
@@ -205,7 +208,7 @@ def _read(
                 if joint < 0 or joint >= count:
                     found = _NO_JOINT
                 else:
-                    rows[i, second] = _float64(data, body + at + 8 * joint, big)
+                    rows[i, _U(second)] = _float64(data, body + at + 8 * joint, big)
             at += 8 * count
     return _MALFORMED if size - at > _PADDING else found
 
@@ -219,6 +222,7 @@ _PLACES = nb.Array(nb.int64, 1, 'C', readonly=True)
         _BUFFER,
         _PLACES,
         _PLACES,
+        _PLACES,
         nb.Array(nb.int64, 2, 'C', readonly=True),
         _BUFFER,
         nb.int64[::1],
@@ -227,9 +231,9 @@ _PLACES = nb.Array(nb.int64, 1, 'C', readonly=True)
     ),
     cache=True,
 )
-def gather(data, start, end, steps, name, stamp_ns, rows, found):  # type: ignore[no-untyped-def]
+def gather(data, start, end, place, steps, name, stamp_ns, rows, found):  # type: ignore[no-untyped-def]
     """
-    Read the stamp and the wanted numbers of messages.
+    Read the stamp and the wanted numbers of some messages.
 
     Parameters
     ----------
@@ -237,16 +241,26 @@ def gather(data, start, end, steps, name, stamp_ns, rows, found):  # type: ignor
         The bytes they lie in.
     start, end : (n,) int64
         Where each begins and ends.
+    place : (m,) int64
+        Which of them to read.
     steps : (k, 3) int64
         From `layout.steps`.
     name : uint8
         Of the joint, where the type has joints.
     stamp_ns : (n,) int64
         Filled with the stamps [ns].
-    rows : (n, m) float64
-        Filled with the fields; a column that no step names is left as it is.
+    rows : (n, c) float64
+        Filled with the fields. The first four are two values and two variances: a
+        value that the type lacks is 0, a variance that says nothing NaN.
     found : (n,) uint8
         Filled with a `Found` each.
     """
-    for i in range(len(start)):
+    for k in range(len(place)):
+        i = _U(place[k])
+        rows[i, 0] = rows[i, 1] = 0.0
+        for column in range(_VARIANCES, rows.shape[1]):
+            rows[i, _U(column)] = np.nan
         found[i] = _read(data, start[i], end[i], steps, name, i, stamp_ns, rows)
+        for column in range(_VARIANCES, _COLUMNS):
+            if not 0.0 < rows[i, _U(column)] < np.inf:
+                rows[i, _U(column)] = np.nan

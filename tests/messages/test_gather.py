@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, decode, types
-from shipdrag_ros.messages.decoding import decode_at
+from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.layout import steps
 
 SOURCES = [Source(name, type_name) for name, accepted in TOPICS.items() for type_name in accepted]
@@ -213,16 +213,19 @@ def test_messages_may_lie_anywhere_in_a_buffer_and_at_any_alignment(reference: A
         start.append(len(data))
         data += payload
         end.append(len(data))
-    order = [3, 1, 8, 0]
-    decoded = decode_at(
-        source,
+    order = [3, 1, 8, 0, 5]
+    decoded = decode_batch(
+        (source, Source('position', types.POSE)),
+        np.array([0, 0, 0, 0, 2], np.uint16),  # the last is of no source
         np.frombuffer(bytes(data), np.uint8),
         np.array(start)[order],
         np.array(end)[order],
-        np.arange(4),
+        np.arange(5),
     )
-    assert decoded.block.stamp_ns.tolist() == order
-    assert decoded.block.value[:, 0].tolist() == order
+    assert decoded.block.stamp_ns.tolist() == order[:4]
+    assert decoded.block.value[:, 0].tolist() == order[:4]
+    assert decoded.kept.tolist() == [0, 1, 2, 3]
+    assert decoded.unreadable == ({}, {})
 
 
 def test_a_field_that_the_type_lacks_is_a_defect() -> None:
