@@ -18,13 +18,26 @@ from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block, Channel
-from shipdrag_ros.ship import Ship, TableBaseline
-from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
+from shipdrag_ros.simulation import (
+    STANDARD_INPUTS,
+    STANDARD_SD,
+    Scenario,
+    sense,
+    simulate,
+    standard_sensors,
+)
+from shipdrag_ros.simulation.effects import LIBRARY, parse, values_of
 
 _AT_ONCE = 1000  # messages between two looks at the progress
 _TRUE_POINTS = 201
 _TRUE_MARGIN = 1.05
 _SPEED_FRACTION = 0.8  # of what the baseline reaches
+_RESISTANCE = (
+    'what depends on the speed through water alone: the baseline and what effects add to it as '
+    'functions of that speed, over the mass of the ship as she is; not wind, waves, current, '
+    'turns or thrust'
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +51,26 @@ class Settings:
     rate_hz: float
     noise: float
     seed: int
+    inputs: tuple[str, ...] = STANDARD_INPUTS
+    effects: tuple[StatedEffect, ...] = ()
+    first_heading_rad: float | None = None
+
+    def stated(self, ship: Ship) -> dict[str, object]:
+        """
+        Return them in plain terms, with all effects that act on the ship.
+        """
+        effects = [
+            {
+                'name': effect.name,
+                'scope': str(LIBRARY[effect.name].scope),
+                'parameters': values_of(effect, ship),
+            }
+            for effect in (*ship.effects, *self.effects)
+        ]
+        plain = {**asdict(self), 'inputs': list(self.inputs), 'effects': effects}
+        if self.first_heading_rad is None:
+            plain['first_heading_rad'] = self.heading_rad
+        return {**plain, 'resistance': _RESISTANCE}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -88,6 +121,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='heading [rad], anticlockwise from east as in REP-103: 1.5708 is north',
     )
     parser.add_argument(
+        '--effect',
+        action='append',
+        default=[],
+        metavar='NAME=VALUE[,PARAM=VALUE]...',
+        help='add an effect that the ship file does not state; may be repeated. Known: '
+        + '; '.join(_form(name) for name in LIBRARY)
+        + '. docs/effects.md says what each does',
+    )
+    parser.add_argument(
+        '--first-heading',
+        type=number(-2 * math.pi, 2 * math.pi, unit='rad'),
+        metavar='RAD',
+        help='heading of the first run [rad], to which current, wind and waves are stated; give '
+        'it to simulate another run of the same day (default: this run is the first)',
+    )
+    parser.add_argument(
+        '--inputs',
+        type=_inputs,
+        default=','.join(STANDARD_INPUTS),
+        metavar='INPUT[,INPUT]...',
+        help=f'sensors on board, of {", ".join(channel.input for channel in STANDARD_SD)}',
+    )
+    parser.add_argument(
         '--rate',
         type=number(0.001, 1000.0, unit='Hz'),
         default=1.0,
@@ -100,7 +156,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=1.0,
         metavar='FACTOR',
         help='factor [-] on the white noise of the sensors: 0.05 m/s of the log, 10 m of the '
-        'position, 0.5 deg of the heading, 0.02 rad/s of the shaft; 0: exact readings',
+        'position, 0.5 deg of heading and rudder, 0.02 rad/s of the shaft, 0.1 m/s of the speed '
+        'over ground, 0.5 m/s of the wind, 0.2 m of the depth; 0: exact readings',
     )
     parser.add_argument(
         '--seed',
@@ -129,6 +186,9 @@ def run(options: argparse.Namespace) -> int:
         rate_hz=options.rate,
         noise=options.noise,
         seed=options.seed,
+        inputs=options.inputs,
+        effects=tuple(parse(text) for text in options.effect),
+        first_heading_rad=options.first_heading,
     )
     block, truth = make(ship, settings)
     write_bag(options.out, block, ship, truth, output)
@@ -138,6 +198,11 @@ def run(options: argparse.Namespace) -> int:
         f'{settings.speed_m_s:g} m/s the engine stops, and the ship coasts for '
         f'{settings.duration_s:g} s'
     )
+    for effect in (*ship.effects, *settings.effects):
+        values = values_of(effect, ship).items()
+        output.say(
+            f'  {effect.name}: ' + ', '.join(f'{name} = {value:g}' for name, value in values)
+        )
     output.json(
         {
             'bag': str(options.out),
@@ -166,16 +231,18 @@ def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
         heading_rad=settings.heading_rad,
         seed=settings.seed,
     )
-    motion = simulate(ship, scenario)
+    motion = simulate(
+        ship, scenario, effects=settings.effects, reference_rad=settings.first_heading_rad
+    )
     block = sense(
         motion,
-        standard_sensors(rate_hz=settings.rate_hz, noise=settings.noise),
+        standard_sensors(rate_hz=settings.rate_hz, noise=settings.noise, inputs=settings.inputs),
         seed=settings.seed,
     )
     # the fit starts a little above or below the true speed
     highest = min(_TRUE_MARGIN * settings.speed_m_s, _highest_speed(ship))
     speed = np.linspace(0.0, highest, _TRUE_POINTS)
-    truth = TrueCurve(speed, motion.specific_resistance(speed), asdict(settings))
+    truth = TrueCurve(speed, motion.specific_resistance(speed), settings.stated(ship))
     return block, truth
 
 
@@ -207,6 +274,21 @@ def _highest_speed(ship: Ship) -> float:
         return ship.baseline.speed_m_s[-1]
     # a rounding error above the last point of the table is outside of it
     return float(np.nextafter(ship.speed(ship.baseline.wave_froude[-1]), 0.0))
+
+
+def _form(name: str) -> str:
+    """Return how an effect is given."""
+    first, *others = LIBRARY[name].parameters
+    unit = f' [{first.unit}]' if first.unit else ''
+    return f'{name}={first.name}{unit}' + ''.join(f',{other.name}=' for other in others)
+
+
+def _inputs(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(','))
+    known = [channel.input for channel in STANDARD_SD]
+    if unknown := [name for name in names if name not in known]:
+        raise argparse.ArgumentTypeError(f'{unknown}, expected some of {", ".join(known)}')
+    return names
 
 
 def _seed(text: str) -> int:

@@ -6,10 +6,19 @@ from shipdrag_ros.simulation.columns import Columns, simulate_columns
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Prior, Quantity, Scope, Shape
 from shipdrag_ros.simulation.noise import GaussMarkov
 from shipdrag_ros.simulation.scenario import STOP, EngineOrder, Scenario, Turn
-from shipdrag_ros.simulation.sensors import START_NS, Sensor, sense, standard_sensors
+from shipdrag_ros.simulation.sensors import (
+    STANDARD_INPUTS,
+    STANDARD_SD,
+    START_NS,
+    Sensor,
+    sense,
+    standard_sensors,
+)
 from shipdrag_ros.simulation.surge import Truth, simulate
 
 __all__ = [
+    'STANDARD_INPUTS',
+    'STANDARD_SD',
     'START_NS',
     'STOP',
     'Action',

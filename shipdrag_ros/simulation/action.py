@@ -56,6 +56,8 @@ class Action:
         The ship's mass is larger by this fraction, its resistance is not.
     turns
         On top of the scenario's.
+    windmill_above_m_s
+        Above this speed through water the flow keeps the shaft turning.
     depth_m
         Depth of the water, where it is less than the scenario's.
     log_factor, log_offset_m_s
@@ -82,6 +84,7 @@ class Action:
     n_r_change: float = 0.0
     mass_fraction: float = 0.0
     turns: tuple[Turn, ...] = ()
+    windmill_above_m_s: float = inf
     depth_m: float = inf
     log_factor: float = 0.0
     log_offset_m_s: float = 0.0
@@ -125,5 +128,6 @@ _ADD: dict[str, Callable[[Any, Any], Any]] = {
     'wave_force_n': _sum_of_vectors,
     'current_m_s': _sum_of_vectors,
     'current_change_m_s': _sum_of_vectors,
+    'windmill_above_m_s': min,
     'depth_m': min,
 }

@@ -9,7 +9,7 @@ wrong throughout, by its scale for instance, is an effect of the simulation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,19 @@ from shipdrag_ros.simulation.noise import GaussMarkov
 from shipdrag_ros.simulation.surge import Truth
 
 START_NS = 1_780_300_800_000_000_000  # 2026-06-01 08:00 UTC
+
+# white noise of well-kept sensors, in the unit of the channel
+STANDARD_SD: Mapping[Channel, float] = {
+    Channel.SPEED_THROUGH_WATER: 0.05,
+    Channel.POSITION: 10.0,
+    Channel.HEADING: float(np.radians(0.5)),
+    Channel.SHAFT: 0.02,
+    Channel.SPEED_OVER_GROUND: 0.1,
+    Channel.RUDDER: float(np.radians(0.5)),
+    Channel.WIND_APPARENT: 0.5,
+    Channel.DEPTH: 0.2,
+}
+STANDARD_INPUTS = ('speed_through_water', 'position', 'heading', 'shaft')
 
 _TWO_COLUMNS = (Channel.POSITION, Channel.WIND_APPARENT)
 
@@ -68,26 +81,33 @@ class Sensor:
     stated_sd: float = np.nan
 
 
-def standard_sensors(*, rate_hz: float = 1.0, noise: float = 1.0) -> tuple[Sensor, ...]:
+def standard_sensors(
+    *, rate_hz: float = 1.0, noise: float = 1.0, inputs: Sequence[str] = STANDARD_INPUTS
+) -> tuple[Sensor, ...]:
     """
-    Return log, position, heading and shaft of a well-kept ship.
+    Return the sensors of a well-kept ship.
 
     Parameters
     ----------
     rate_hz
         Readings per second of each.
     noise
-        Multiplies the standard deviations 0.05 m/s, 10 m, 0.5 deg and
-        0.02 rad/s; 0 for exact readings.
+        Multiplies the standard deviations of `STANDARD_SD`; 0 for exact
+        readings.
+    inputs
+        Which sensors she has.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such sensor.
     """
-    white = (
-        (Channel.SPEED_THROUGH_WATER, 0.05),
-        (Channel.POSITION, 10.0),
-        (Channel.HEADING, np.radians(0.5)),
-        (Channel.SHAFT, 0.02),
-    )
+    known = {channel.input: channel for channel in STANDARD_SD}
+    if unknown := [name for name in inputs if name not in known]:
+        raise SimulationError(f'sensors: {unknown} are not known; known are {", ".join(known)}')
     return tuple(
-        Sensor(channel=channel, rate_hz=rate_hz, sd=noise * float(sd)) for channel, sd in white
+        Sensor(channel=known[name], rate_hz=rate_hz, sd=noise * STANDARD_SD[known[name]])
+        for name in dict.fromkeys(inputs)
     )
 
 

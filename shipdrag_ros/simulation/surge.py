@@ -35,6 +35,7 @@ from shipdrag_ros.simulation.terms import (
     top_m_s,
 )
 
+_WINDMILLING = 0.7  # of the shaft speed that drives the ship as fast: no torque, a higher advance
 _QUIET_STEP_S = 1.0  # before the first order or turn nothing happens but the disturbances
 
 
@@ -98,16 +99,17 @@ class Truth:
             Ascending or not [s].
         """
         path = CubicHermiteSpline(self.time_s, self.position_m, self.velocity_over_ground_m_s)
+        speed = np.interp(time_s, self.time_s, self.speed_through_water_m_s)
         velocity = [np.interp(time_s, self.time_s, v) for v in self.velocity_over_ground_m_s.T]
         return Truth(
             self.ship,
             self.scenario,
             time_s,
-            np.interp(time_s, self.time_s, self.speed_through_water_m_s),
+            speed,
             path(time_s),
             np.column_stack(velocity),
             self.scenario.heading(time_s),
-            _shaft_rad_s(self.ship, self.scenario, self.action, time_s),
+            _shaft_rad_s(self.ship, self.scenario, self.action, time_s, speed),
             self.action,
         )
 
@@ -186,7 +188,7 @@ def simulate(
         path[:, 1:3],
         path[:, 3:],
         scenario.heading(time),
-        _shaft_rad_s(ship, scenario, action, time),
+        _shaft_rad_s(ship, scenario, action, time, path[:, 0]),
         action,
     )
 
@@ -244,10 +246,13 @@ def _check_range(law: Law, time: Float64, speed: Float64) -> None:
         )
 
 
-def _shaft_rad_s(ship: Ship, scenario: Scenario, action: Action, time: Float64) -> Float64:
+def _shaft_rad_s(
+    ship: Ship, scenario: Scenario, action: Action, time: Float64, speed: Float64
+) -> Float64:
     run_down_s = max(_run_down_s(ship) + action.run_down_change_s, 0.0)
     fraction = scenario.shaft_fraction(time, run_down_s=run_down_s)
     if action.residual_fraction:
         residual = scenario.shaft_fraction(time, run_down_s=action.residual_decay_s)
         fraction += action.residual_fraction * (residual - fraction)
-    return scenario.shaft_rad_s * fraction
+    turned = _WINDMILLING * speed / scenario.speed_m_s * (speed > action.windmill_above_m_s)
+    return scenario.shaft_rad_s * np.maximum(fraction, turned)

@@ -14,11 +14,11 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.ship import StatedEffect, Uncertain
+from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 
-__all__ = ['LIBRARY', 'action_of', 'deciders', 'find', 'look_alikes', 'parse']
+__all__ = ['LIBRARY', 'action_of', 'deciders', 'find', 'look_alikes', 'parse', 'values_of']
 
 
 def _found() -> Iterator[Effect]:
@@ -93,8 +93,8 @@ def parse(text: str) -> StatedEffect:
             value = known[key].words[word] if word in known[key].words else float(word)
         except ValueError as error:
             raise SimulationError(
-                f'effect {text!r}: {key} is {word!r}, expected {known[key].meaning}: '
-                f'{known[key].unit or "a number"}'
+                f'effect {text!r}: {key} is {word!r}, expected '
+                f'{" or ".join(known[key].words) or "a number"} ({known[key].meaning})'
             ) from error
         values[key] = Uncertain(value, 0.0)
     return StatedEffect(effect.name, values)
@@ -123,7 +123,7 @@ def action_of(frame: Frame, stated: Sequence[StatedEffect]) -> Action:
         before = len(problems)
         problems.extend(_problems(effect, item, frame))
         if len(problems) == before:
-            total += effect.action(frame, *_values(effect, item, frame))
+            total += effect.action(frame, *values_of(item, frame.ship).values())
     if problems:
         raise SimulationError('effects: ' + '; '.join(problems))
     return total
@@ -150,9 +150,14 @@ def _problems(effect: Effect, stated: StatedEffect, frame: Frame) -> Iterator[st
             )
 
 
-def _values(effect: Effect, stated: StatedEffect, frame: Frame) -> Iterator[float]:
-    for quantity in effect.quantities(frame.ship):
+def values_of(stated: StatedEffect, ship: Ship) -> dict[str, float]:
+    """
+    Return all parameters of an effect that was checked, defaults included.
+    """
+    values = {}
+    for quantity in find(stated.name).quantities(ship):
         given = stated.parameters.get(quantity.name)
         value = quantity.default if given is None else given.value
         assert value is not None  # it was checked
-        yield value
+        values[quantity.name] = value
+    return values

@@ -31,7 +31,7 @@ def _act(frame: Frame, drag_coefficient: float, stall_speed_m_s: float) -> Actio
         force: Float64 = drag_n(frame.ship, 1.0, speed) * area
         return force
 
-    return Action(resistance=(resistance,))
+    return Action(resistance=(resistance,), windmill_above_m_s=stall_speed_m_s)
 
 
 EFFECT = Effect(
@@ -59,7 +59,8 @@ EFFECT = Effect(
         ),
     ),
     formula='0.5 rho (pi/4) D^2 C v^2, C = drag_coefficient above the stall, 0.42 (locked) below '
-    'it; the step is 3 % of the stall speed wide',
+    'it, the step 3 % of the stall speed wide; until then the shaft turns at 0.7 of the speed '
+    'that drives the ship as fast',
     source='four-quadrant open-water data of B4-70: 0.03 turning freely, 0.65 locked, on the '
     'speed at the propeller',
     act=_act,
