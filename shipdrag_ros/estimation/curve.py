@@ -8,18 +8,77 @@ does not fall r(v) has two values: only the branch on which it falls is kept.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.motion import Motion, sigma
+from shipdrag_ros.estimation.motion import Motion
 from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 SIGNIFICANT = 2.0  # fall or rise of dr/dFr, in its standard deviations
 _MIN_POINTS = 3  # fewer are no curve
+
+
+_RESISTANCE, _SIGMA, _REPEATABLE, _SLOPE, _SLOPE_SIGMA = range(5)  # rows of `_of_motion`
+
+
+@njit('f8[:, ::1](f8[:], f8[:], f8[:], f8[:, :], f8[:, :], f8[::1], f8)', cache=True)
+def _of_motion(
+    speed: Float64,
+    acceleration: Float64,
+    jerk: Float64,
+    acceleration_error: Float64,
+    jerk_error: Float64,
+    n_r: Float64,
+    n_r_sd: float,
+) -> Float64:
+    """
+    Return r, its sigmas, dr/dv and its sigma, in the order of time.
+
+    With a = dv/dt: dr/dv = -((1 + n_r) da/dt / a + dn_r/dv a); its error is of the motion alone.
+    """
+    found = np.empty((5, len(speed)))
+    for i in range(len(speed)):
+        v, a = abs(speed[i]), acceleration[i]
+        inertia, by_v = 0.0, 0.0
+        for c in n_r[::-1]:
+            by_v = inertia + by_v * v
+            inertia = c + inertia * v
+        inertia += 1.0
+        # at rest r has no slope
+        per_a = 1.0 / a if a != 0.0 else np.nan
+        by_a = by_v - inertia * jerk[i] * per_a * per_a
+        of_acceleration = of_slope = 0.0
+        for k in range(acceleration_error.shape[1]):
+            error = acceleration_error[i, k]
+            of_acceleration += error * error
+            error = inertia * per_a * jerk_error[i, k] + by_a * error
+            of_slope += error * error
+        repeatable = inertia * math.sqrt(of_acceleration)
+        found[_RESISTANCE, i] = 0.0 - inertia * a  # no negative zero
+        found[_SIGMA, i] = math.sqrt(repeatable**2 + (a * n_r_sd) ** 2)
+        found[_REPEATABLE, i] = repeatable
+        found[_SLOPE, i] = -(inertia * jerk[i] * per_a + by_v * a)
+        found[_SLOPE_SIGMA, i] = math.sqrt(of_slope)
+    return found
+
+
+def _resistance(motion: Motion, ship: Ship) -> Float64:
+    found: Float64 = _of_motion(
+        motion.speed,
+        motion.acceleration,
+        motion.jerk,
+        motion.acceleration_error,
+        motion.jerk_error,
+        ship.n_r_polynomial(),
+        ship.added_mass.sd,
+    )
+    return found
 
 
 def specific_resistance(motion: Motion, ship: Ship) -> tuple[Float64, Float64, Float64]:
@@ -30,15 +89,8 @@ def specific_resistance(motion: Motion, ship: Ship) -> tuple[Float64, Float64, F
     -----
     S1 (12, 13); the error of n_r is independent of that of the motion.
     """
-    inertia = 1.0 + ship.n_r(motion.speed)
-    repeatable = inertia * sigma(motion.acceleration_error)
-    of_n_r = np.abs(motion.acceleration) * ship.added_mass.sd
-    # + 0.0: no negative zero
-    return (
-        0.0 - inertia * motion.acceleration,
-        np.sqrt(repeatable**2 + of_n_r**2),
-        repeatable,
-    )
+    found = _resistance(motion, ship)
+    return found[_RESISTANCE], found[_SIGMA], found[_REPEATABLE]
 
 
 def resistance_curve(motion: Motion, ship: Ship, *, froude_min: float) -> ResistanceCurve:
@@ -58,59 +110,47 @@ def resistance_curve(motion: Motion, ship: Ship, *, froude_min: float) -> Resist
     EstimationError
         If there is no such branch.
     """
-    branch = motion[_falling(motion, ship, froude_min)][::-1]
-    if len(branch.speed) < _MIN_POINTS:
+    froude = ship.froude(motion.speed)
+    first, end = _falling(motion.speed, motion.acceleration, froude, froude_min)
+    if end - first < _MIN_POINTS:
         low, high = float(motion.speed.min()), float(motion.speed.max())
         raise EstimationError(
             f'the fitted speed, {low:.4g}..{high:.4g} m/s (Fr {ship.froude(low):.3g}..'
             f'{ship.froude(high):.3g}), does not fall steadily above froude_min {froude_min:g}: '
             'give a window that lies in a coastdown, or a smaller froude_min'
         )
-    resistance, total, repeatable = specific_resistance(branch, ship)
-    slope, slope_error = _slope(branch, ship)
-    return ResistanceCurve(
-        np.ascontiguousarray(branch.speed),
-        resistance,
-        total,
-        repeatable,
-        ship.froude(branch.speed),
-        slope,
-        sigma(slope_error),
-    )
-
-
-def _falling(motion: Motion, ship: Ship, froude_min: float) -> slice:
-    """Find the times of the longest fall."""
-    speed = motion.speed
-    usable = (motion.acceleration < 0.0) & (ship.froude(speed) >= froude_min)
-    # time i belongs with i + 1: both usable, the speed strictly lower
-    linked = usable[:-1] & usable[1:] & (speed[1:] < speed[:-1])
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], linked, [False]])))
-    starts, ends = edges[::2], edges[1::2]
-    if len(starts) == 0:
-        return slice(0, 0)
-    best = int(np.argmax(speed[starts] - speed[ends]))
-    return slice(int(starts[best]), int(ends[best]) + 1)
-
-
-def _slope(motion: Motion, ship: Ship) -> tuple[Float64, Float64]:
-    """
-    Return dr/dFr and its error, of the motion alone.
-
-    With a = dv/dt: dr/dv = -((1 + n_r) da/dt / a + dn_r/dv a).
-    """
+    branch = motion[first:end]
+    # from the lowest speed to the highest, in fresh arrays
+    found = _resistance(branch, ship)[:, ::-1].copy()
     per_froude = float(ship.speed(1.0))
-    # exact for the quadratic n_r up to rounding
-    step = 1e-3 * per_froude
-    n_r_slope = (ship.n_r(motion.speed + step) - ship.n_r(motion.speed - step)) / (2.0 * step)
-    inertia = 1.0 + ship.n_r(motion.speed)
-    a, jerk = motion.acceleration, motion.jerk
-    slope = -per_froude * (inertia * jerk / a + n_r_slope * a)
-    by_a = n_r_slope - inertia * jerk / a**2
-    error = per_froude * (
-        (inertia / a)[:, None] * motion.jerk_error + by_a[:, None] * motion.acceleration_error
+    return ResistanceCurve(
+        branch.speed[::-1].copy(),
+        found[_RESISTANCE],
+        found[_SIGMA],
+        found[_REPEATABLE],
+        froude[first:end][::-1].copy(),
+        per_froude * found[_SLOPE],
+        per_froude * found[_SLOPE_SIGMA],
     )
-    return slope, error
+
+
+@njit('UniTuple(i8, 2)(f8[:], f8[:], f8[:], f8)', cache=True)
+def _falling(
+    speed: Float64, acceleration: Float64, froude: Float64, froude_min: float
+) -> tuple[int, int]:
+    """Find the times of the longest fall, first and end."""
+    best_first = best_end = first = 0
+    longest = -np.inf
+    for i in range(len(speed)):
+        usable = acceleration[i] < 0.0 and froude[i] >= froude_min
+        if not usable:
+            first = i + 1
+        elif i == first or not speed[i] < speed[i - 1]:
+            first = i
+        elif speed[first] - speed[i] > longest:
+            best_first, best_end = first, i + 1
+            longest = speed[first] - speed[i]
+    return best_first, best_end
 
 
 def froude_max(curve: ResistanceCurve) -> tuple[float, FroudeMax]:
@@ -127,18 +167,29 @@ def froude_max(curve: ResistanceCurve) -> tuple[float, FroudeMax]:
     standard deviation says; a maximum that is exceeded by as much further up
     is such a wiggle. Many hulls have none: then the top of the branch.
     """
-    slope, slope_sigma = curve.slope, curve.slope_sigma
-    rises = slope[1:-1] > slope[:-2]
-    falls = slope[1:-1] >= slope[2:]
-    for top in np.flatnonzero(rises & falls) + 1:
-        doubt = np.maximum(slope_sigma[top], slope_sigma[top + 1 :])
-        fall = (slope[top] - slope[top + 1 :]) / doubt
-        if np.any(fall < -SIGNIFICANT):
+    top = _inflection(curve.slope, curve.slope_sigma)
+    if top < 0:
+        return float(curve.froude[-1]), FroudeMax.BRANCH_TOP
+    return float(curve.froude[top]), FroudeMax.INFLECTION
+
+
+@njit('i8(f8[:], f8[:])', cache=True)
+def _inflection(slope: Float64, sigma: Float64) -> int:
+    """Find the first significant maximum; -1: there is none."""
+    for top in range(1, len(slope) - 1):
+        if not slope[top - 1] < slope[top] >= slope[top + 1]:
             continue
-        higher = np.flatnonzero(fall < 0.0)
-        if np.any(fall[: higher[0] if len(higher) else None] > SIGNIFICANT):
-            return float(curve.froude[top]), FroudeMax.INFLECTION
-    return float(curve.froude[-1]), FroudeMax.BRANCH_TOP
+        falls = exceeded = False
+        for i in range(top + 1, len(slope)):
+            fall, doubt = slope[top] - slope[i], max(sigma[top], sigma[i])
+            if fall < -SIGNIFICANT * doubt:
+                falls = False
+                break
+            exceeded = exceeded or fall < 0.0
+            falls = falls or (not exceeded and fall > SIGNIFICANT * doubt)
+        if falls:
+            return top
+    return -1
 
 
 @dataclass(frozen=True)

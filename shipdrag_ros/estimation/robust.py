@@ -195,9 +195,9 @@ def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, F
                 noise_sd[kind], used_sd[kind] = found, scale
                 first = last
             if turn < _PASSES:
-                coefficients_were = coefficients.copy()
-                products = condense(rows, value - combine(rows, coefficients), weight)
-                _, step, _ = posterior(products, coefficients_were, columns, mean, sd)
+                # about nothing at first: the residual of the first turn is to what is clean
+                products = condense(rows, residual if turn else value, weight)
+                _, step, _ = posterior(products, coefficients, columns, mean, sd)
                 for a in range(len(columns)):
                     coefficients[columns[a]] += step[a]
                 residual = value - combine(rows, coefficients)

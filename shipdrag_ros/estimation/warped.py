@@ -10,7 +10,7 @@ right.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -28,15 +28,14 @@ from shipdrag_ros.estimation.warped_model import (
     POSITION,
     THROUGH_WATER,
     THRUST,
-    coast_rows,
+    coast_motion,
     combine,
     design,
-    product,
     quadratic_coast,
 )
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.regression.averaging import average, condense, root
+from shipdrag_ros.regression.averaging import average, condense, deviations, root
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
@@ -136,13 +135,9 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     fit = _fit(inputs, ship, parameters)
     motion = _motion(inputs, fit)
     _check_deceleration(inputs, motion)
-    at_speed = _at_speed(motion)
-    # with the thrust running down the ship is slower at the start than that coast
-    thrust = float(fit.coefficients[-1])
-    start = float(motion.speed[0]) - fit.run_down_s * thrust
-    curve = resistance_curve(_from(at_speed, start), ship, froude_min=parameters.froude_min)
+    curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
     valid = ValidRange.of_polynomial(curve)
-    end = at_speed[-1:]
+    end = motion[-1:]
     r, r_sigma, _ = specific_resistance(end, ship)
     current, current_sd = fit.current
     return Estimate(
@@ -188,21 +183,21 @@ def _fit(inputs: Inputs, ship: Ship, parameters: Parameters) -> _Fit:
     full = np.ones(len(rows), np.bool_)
     full[-1] = False
     full[-3:-1] = inputs.tells_water_from_ground
+    columns = np.flatnonzero(full)
     start, weight, noise_sd, used_sd = robust_fit(
         rows,
         inputs.value,
         inputs.clean,
         inputs.count,
         inputs.known_sd,
-        np.flatnonzero(full),
+        columns,
         mean,
         sds[-1],
     )
     start[polynomials:] = 0.0
     products = condense(rows, inputs.value - combine(rows, start), weight)
-    one = np.ones(1)
-    _, covariance, _ = average(products, start, full[None], one, mean, sds[-1:])
-    told, notes = _told(np.sqrt(np.diag(covariance)[-3:-1]), inputs)
+    sd = deviations(products, start, columns, mean, sds[-1])
+    told, notes = _told(sd[polynomials:], inputs)
     families = _families(polynomials, *told)
     chance = np.ones(len(families))
     coefficients, covariance, share = average(products, start, families, chance, mean, sds[:-1])
@@ -293,13 +288,14 @@ def _about_noise(
 
 
 def _motion(inputs: Inputs, fit: _Fit) -> Motion:
-    """Evaluate the motion from the start to the end."""
+    """Evaluate the motion at the speeds that the ship had."""
     k = fit.polynomials
-    p, error = fit.coefficients[:k, None].copy(), fit.error[:k].copy()
-    rows = coast_rows(fit.tc_s, inputs.span_s, k, _POINTS)
-    return Motion(
-        *(product(part, p)[:, 0].copy() for part in rows), *(product(part, error) for part in rows)
+    # with the thrust running down the ship is slower at the start than the coast without it
+    drop = fit.run_down_s * float(fit.coefficients[k + THRUST])
+    values, errors = coast_motion(
+        fit.tc_s, inputs.span_s, fit.coefficients[:k], fit.error[:k], _POINTS, drop
     )
+    return Motion(*values, *errors)
 
 
 def _check_deceleration(inputs: Inputs, motion: Motion) -> None:
@@ -310,31 +306,6 @@ def _check_deceleration(inputs: Inputs, motion: Motion) -> None:
             f'no deceleration above the noise: the speed fell by {loss:.3g} +- {sd:.2g} m/s in '
             f'{inputs.span_s:.4g} s; give a longer window, or one after the engine stop'
         )
-
-
-def _at_speed(motion: Motion) -> Motion:
-    """Return the motion with the error of its acceleration at a given speed, not time."""
-    a = np.where(motion.acceleration == 0.0, np.inf, motion.acceleration)
-    shift = (motion.jerk / a)[:, None] * motion.speed_error
-    return replace(motion, acceleration_error=motion.acceleration_error - shift)
-
-
-def _from(motion: Motion, speed: float) -> Motion:
-    """Return the motion from where it has fallen to a speed."""
-    above = np.flatnonzero(motion.speed > speed)
-    if len(above) == 0 or above[-1] == len(motion.speed) - 1:
-        return motion
-    last = int(above[-1])
-    share = (motion.speed[last] - speed) / (motion.speed[last] - motion.speed[last + 1])
-    values = [getattr(motion, field.name) for field in fields(motion)]
-    return Motion(
-        *(
-            np.concatenate(
-                [[(1.0 - share) * value[last] + share * value[last + 1]], value[last + 1 :]]
-            )
-            for value in values
-        )
-    )
 
 
 def _tracks(inputs: Inputs, fit: _Fit) -> dict[str, Track]:

@@ -192,15 +192,58 @@ def coast_rows(tc: float, span: float, polynomials: int, points: int) -> Float64
     return rows
 
 
-@njit('f8[:, ::1](f8[:, ::1], f8[:, ::1])', cache=True, fastmath=_SUMS)
-def product(a: Float64, b: Float64) -> Float64:
+@njit(
+    'Tuple((f8[:, ::1], f8[:, :, ::1]))(f8, f8, f8[::1], f8[:, ::1], i8, f8)',
+    cache=True,
+    fastmath=_SUMS,
+)
+def coast_motion(
+    tc: float, span: float, coefficients: Float64, root: Float64, points: int, drop: float
+) -> tuple[Float64, Float64]:
     """
-    Return a b, in sums that do not depend on the number of threads.
+    Return the motion from where it has lost a speed, and its errors.
+
+    Parameters
+    ----------
+    tc, span
+        See `design`.
+    coefficients : (k,)
+        Of the polynomials.
+    root : (k, q)
+        Of their covariance.
+    points
+        Times, even in u from the start to the end of the window.
+    drop
+        Speed lost before the first time that is returned [m/s].
+
+    Returns
+    -------
+    values : (3, m)
+        Speed, acceleration, jerk.
+    errors : (3, m, q)
+        That of the acceleration is at a given speed, not at a given time.
     """
-    result = np.zeros((len(a), b.shape[1]))
-    for i in range(len(a)):
-        for k in range(len(b)):
-            p = a[i, k]
-            for j in range(b.shape[1]):
-                result[i, j] += p * b[k, j]
-    return result
+    rows = coast_rows(tc, span, len(coefficients), points)
+    q = root.shape[1]
+    values, errors = np.zeros((3, points)), np.zeros((3, points, q))
+    for derivative in range(3):
+        for i in range(points):
+            error = errors[derivative, i]
+            for j in range(len(coefficients)):
+                p = rows[derivative, i, j]
+                values[derivative, i] += p * coefficients[j]
+                for c in range(q):
+                    error[c] += p * root[j, c]
+    for i in range(points):
+        if values[1, i] != 0.0:
+            errors[1, i] -= values[2, i] / values[1, i] * errors[0, i]
+    first, start = 0, values[0, 0] - drop
+    for i in range(points - 1):
+        if values[0, i] > start:
+            first = i
+    if not values[0, first] > start >= values[0, first + 1]:
+        return values, errors
+    share = (values[0, first] - start) / (values[0, first] - values[0, first + 1])
+    values[:, first] += share * (values[:, first + 1] - values[:, first])
+    errors[:, first] += share * (errors[:, first + 1] - errors[:, first])
+    return values[:, first:].copy(), errors[:, first:].copy()

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.samples import Float64
 
+_BLOCK = 128
 _NEGLIGIBLE = 1e-3  # weight of a model against the best; the rest is left out of the spread
 # Sums may be taken in any order, so that they are vectorised; the order is
 # fixed when compiled, not by the data or where they lie.
@@ -39,20 +40,25 @@ def condense(rows: Float64, residual: Float64, weight: Float64) -> Float64:
         The last row holds the products with the residual.
     """
     k, n = rows.shape
-    products = np.empty((k + 1, k))
-    weighted = np.empty(n)
-    for a in range(k + 1):
-        row = residual if a == k else rows[a]
-        for i in range(n):
-            weighted[i] = weight[i] * row[i]
-        for b in range(min(a + 1, k)):
-            other = rows[b]
-            total = 0.0
-            for i in range(n):
-                total += weighted[i] * other[i]
-            products[a, b] = total
-            if a < k:
-                products[b, a] = total
+    products = np.zeros((k + 1, k))
+    weighted = np.empty(_BLOCK)
+    # so many samples at a time as stay in the fastest memory
+    for first in range(0, n, _BLOCK):
+        size = min(_BLOCK, n - first)
+        scale = weight[first : first + size]
+        for a in range(k + 1):
+            row = residual[first : first + size] if a == k else rows[a, first : first + size]
+            for i in range(size):
+                weighted[i] = scale[i] * row[i]
+            for b in range(min(a + 1, k)):
+                other = rows[b, first : first + size]
+                total = 0.0
+                for i in range(size):
+                    total += weighted[i] * other[i]
+                products[a, b] += total
+    for a in range(k):
+        for b in range(a):
+            products[b, a] = products[a, b]
     return products
 
 
@@ -168,6 +174,31 @@ def posterior(
         evidence += 0.5 * step[a] * step[a] - math.log(lower[a, a])
     _backward(lower, step)
     return evidence, step, lower
+
+
+@njit('f8[::1](f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])', cache=True)
+def deviations(
+    products: Float64,
+    start: Float64,
+    columns: NDArray[np.int64],
+    mean: Float64,
+    sd: Float64,
+) -> Float64:
+    """
+    Return the standard deviations of one model's coefficients; parameters as `posterior`.
+
+    Returns
+    -------
+    (k,)
+        0 of columns that it does not have.
+    """
+    _, _, lower = posterior(products, start, columns, mean, sd)
+    inverse = np.empty_like(lower)
+    _invert(lower, inverse)
+    found = np.zeros(len(start))
+    for a in range(len(columns)):
+        found[columns[a]] = math.sqrt(inverse[a, a])
+    return found
 
 
 @njit('Tuple((f8, f8[:, ::1]))(f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])', cache=True)

@@ -69,6 +69,31 @@ def test_slope_against_differences(ship: Ship) -> None:
     np.testing.assert_allclose(found.slope[5:-5], expected[5:-5], rtol=1e-5)
 
 
+def test_curve_is_that_of_plain_numpy(ship: Ship) -> None:
+    given = motion(np.linspace(0.0, 600.0, 50), FALL)
+    rng = np.random.default_rng(2)
+    given = replace(
+        given,
+        acceleration_error=1e-5 * rng.normal(size=(50, 4)),
+        jerk_error=1e-7 * rng.normal(size=(50, 4)),
+    )
+    found = resistance_curve(given, ship, froude_min=0.05)
+    n_r = np.polynomial.Polynomial(ship.n_r_polynomial())
+    inertia, by_v = 1.0 + n_r(given.speed), n_r.deriv()(given.speed)
+    a, jerk = given.acceleration, given.jerk
+    slope = -(inertia * jerk / a + by_v * a)
+    by_a = by_v - inertia * jerk / a**2
+    error = (inertia / a)[:, None] * given.jerk_error + by_a[:, None] * given.acceleration_error
+    one = float(ship.speed(1.0))
+    for name, expected in (
+        ('resistance_m_s2', -inertia * a),
+        ('sigma_repeatable_m_s2', inertia * np.linalg.norm(given.acceleration_error, axis=1)),
+        ('slope', one * slope),
+        ('slope_sigma', one * np.linalg.norm(error, axis=1)),
+    ):
+        np.testing.assert_allclose(getattr(found, name), expected[::-1], rtol=1e-12)
+
+
 def test_slope_sigma_by_simulation() -> None:
     """sd of dr/dFr over 4000 draws of the unit errors, seed 1: within 5 %, 4.5 sigma."""
     ship = Ship(

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from shipdrag_ros.regression.averaging import average, condense, posterior, root
+from shipdrag_ros.regression.averaging import (
+    average,
+    condense,
+    deviations,
+    posterior,
+    root,
+)
 from shipdrag_ros.samples import Float64
 
 K, N = 5, 40
@@ -100,3 +106,23 @@ def test_the_root_is_one_also_of_a_singular_covariance() -> None:
     lower = root(covariance)
     np.testing.assert_allclose(lower @ lower.T, covariance, atol=1e-12)
     assert not lower[3].any()
+
+
+@pytest.mark.parametrize('n', [1, 128, 129, 1000])
+def test_products_are_those_of_plain_numpy(n: int) -> None:
+    rng = np.random.default_rng(n)
+    rows, residual, weight = rng.normal(size=(7, n)), rng.normal(size=n), rng.uniform(0.5, 2.0, n)
+    plain = np.vstack([rows, residual]) * weight @ rows.T
+    size = np.vstack([np.abs(rows), np.abs(residual)]) * weight @ np.abs(rows).T
+    np.testing.assert_allclose(condense(rows, residual, weight) / size, plain / size, atol=1e-13)
+
+
+def test_deviations_are_the_roots_of_the_covariance(problem: Problem) -> None:
+    columns = [0, 1, 3]
+    products = condense(problem.rows, problem.value, problem.weight)
+    found = deviations(products, np.zeros(K), np.array(columns), problem.mean, problem.sd)
+    h = problem.rows[columns]
+    precision = h * problem.weight @ h.T + np.diag(problem.sd[columns] ** -2.0)
+    expected = np.sqrt(np.diag(np.linalg.inv(precision)))
+    np.testing.assert_allclose(found[columns], expected, rtol=1e-12)
+    assert found[2] == found[4] == 0.0
