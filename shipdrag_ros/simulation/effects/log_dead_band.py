@@ -19,7 +19,7 @@ EFFECT = Effect(
             name='speed_m_s',
             unit='m/s',
             meaning='speed below which it under-reads',
-            prior=log_normal(2.5, 0.4),
+            prior=log_normal(1.5, 0.5),
             low=0.0,
             high=20.0,
         ),

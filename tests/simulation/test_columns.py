@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Columns agree with one simulation each, however many go together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.errors import ShipdragError, SimulationError
+from shipdrag_ros.samples import Channel
+from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline, Uncertain
+from shipdrag_ros.simulation import (
+    Action,
+    EngineOrder,
+    Frame,
+    GaussMarkov,
+    Scenario,
+    Sensor,
+    Truth,
+    Turn,
+    sense,
+    simulate,
+    simulate_columns,
+)
+from shipdrag_ros.simulation.effects import LIBRARY
+
+CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
+SCENARIO = Scenario(
+    speed_m_s=8.2,
+    lead_in_s=100.0,
+    duration_s=800.0,
+    heading_rad=0.4,
+    current_m_s=(0.2, -0.1),
+    turns=(Turn(700.0, 50.0, rate_rad_s=0.004),),
+)
+REFERENCE_RAD = 1.3
+FRAME = Frame(CARGO, SCENARIO, REFERENCE_RAD)
+TIME_S = np.arange(0.0, 900.0, 10.0)
+STEP_S = 0.25
+
+
+def drawn(name: str, seed: int) -> tuple[Action, StatedEffect]:
+    """Draw the values of an effect from its priors."""
+    rng = np.random.default_rng(seed)
+    values = {}
+    for quantity in LIBRARY[name].quantities(CARGO):
+        value = quantity.prior.draw(rng)
+        while not quantity.accepts(value):
+            value = quantity.prior.draw(rng)
+        values[quantity.name] = value
+    if name == 'turning':
+        # before the scenario's own turn, and so that steps end at the times that are looked at:
+        # between steps the truth is interpolated more coarsely
+        values['start_s'] = round(min(values['start_s'], 300.0))
+        values['duration_s'] = round(min(values['duration_s'], 350.0))
+    stated = StatedEffect(name, {key: Uncertain(value, 0.0) for key, value in values.items()})
+    return LIBRARY[name].action(FRAME, *values.values()), stated
+
+
+def truth_of(stated: StatedEffect, **options: object) -> Truth:
+    return simulate(
+        CARGO, SCENARIO, effects=[stated], reference_rad=REFERENCE_RAD, step_s=STEP_S, **options
+    )
+
+
+@settings(max_examples=3, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_each_column_is_the_simulation_of_its_effect(seed):
+    pairs = [drawn(name, seed) for name in LIBRARY]
+    columns = simulate_columns(
+        CARGO, SCENARIO, [action for action, _ in pairs], TIME_S, step_s=STEP_S
+    )
+    for i, (_, stated) in enumerate(pairs):
+        truth = truth_of(stated).at(TIME_S)
+        u = truth.speed_through_water_m_s
+        np.testing.assert_allclose(columns.speed_through_water_m_s[i], u, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(columns.position_m[i], truth.position_m, rtol=0, atol=1e-7)
+        np.testing.assert_allclose(
+            columns.velocity_over_ground_m_s[i], truth.velocity_over_ground_m_s, rtol=0, atol=1e-9
+        )
+
+
+@pytest.mark.parametrize('name', LIBRARY)
+def test_readings_are_those_of_sensors(name):
+    action, stated = drawn(name, 5)
+    columns = simulate_columns(CARGO, SCENARIO, [action], TIME_S, step_s=STEP_S)
+    channels = (Channel.SPEED_THROUGH_WATER, Channel.POSITION, Channel.SPEED_OVER_GROUND)
+    block = sense(
+        truth_of(stated), [Sensor(channel=channel, rate_hz=0.1) for channel in channels], seed=1
+    )
+    log, position, speed = (
+        block.value[block.channel == channel][: len(TIME_S)] for channel in channels
+    )
+    np.testing.assert_allclose(columns.log_m_s[0], log[:, 0], rtol=0, atol=1e-8)
+    np.testing.assert_allclose(columns.radar_position_m[0], position, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(columns.radar_speed_m_s[0], speed[:, 0], rtol=0, atol=1e-8)
+
+
+def test_columns_do_not_disturb_each_other():
+    actions = [drawn(name, 3)[0] for name in LIBRARY]
+    together = simulate_columns(CARGO, SCENARIO, actions, TIME_S)
+    for i, action in enumerate(actions):
+        alone = simulate_columns(CARGO, SCENARIO, [action], TIME_S)
+        # where no column adds resistance its table is not even looked up
+        np.testing.assert_allclose(together.position_m[i], alone.position_m[0], rtol=1e-14)
+        np.testing.assert_allclose(together.log_m_s[i], alone.log_m_s[0], rtol=1e-14)
+
+
+def test_the_steps_that_are_chosen_are_good_for_a_tenth_of_a_millimetre_per_second():
+    # N = 4 draws of each effect, seeds 0..3
+    actions = [drawn(name, seed)[0] for name in LIBRARY for seed in range(4)]
+    times = np.arange(0.0, 900.0, 7.3)
+    chosen = simulate_columns(CARGO, SCENARIO, actions, times)
+    fine = simulate_columns(CARGO, SCENARIO, actions, times, step_s=0.1)
+    for field in ('speed_through_water_m_s', 'velocity_over_ground_m_s', 'log_m_s'):
+        np.testing.assert_allclose(getattr(chosen, field), getattr(fine, field), rtol=0, atol=1e-4)
+    np.testing.assert_allclose(chosen.position_m, fine.position_m, rtol=0, atol=1e-2)
+
+
+def test_several_orders_and_no_run_down_agree_too():
+    orders = (EngineOrder(0.0, 0.5, 0.4), EngineOrder(150.0, 0.0, 0.0))
+    scenario = replace(SCENARIO, orders=orders, turns=())
+    residual = Action(residual_fraction=0.3, residual_decay_s=80.0)
+    for ship in (
+        CARGO,
+        replace(CARGO, propulsion=None),
+        replace(CARGO, propulsion=Propulsion(30)),
+    ):
+        times = np.arange(0.0, 900.0, 10.0)
+        columns = simulate_columns(ship, scenario, [Action(), residual], times, step_s=0.25)
+        stated = StatedEffect(
+            'residual_thrust', {'decay_s': Uncertain(80.0, 0.0), 'fraction': Uncertain(0.3, 0.0)}
+        )
+        for i, effects in enumerate([(), (stated,)]):
+            truth = simulate(ship, scenario, effects=effects, step_s=0.25).at(times)
+            np.testing.assert_allclose(
+                columns.speed_through_water_m_s[i], truth.speed_through_water_m_s, atol=1e-9
+            )
+
+
+def test_nuisances_are_actions_and_speeds():
+    longer = simulate(replace(CARGO, propulsion=Propulsion(12.0)), SCENARIO, step_s=STEP_S)
+    faster = simulate(CARGO, replace(SCENARIO, speed_m_s=8.3), step_s=STEP_S)
+    columns = simulate_columns(
+        CARGO,
+        SCENARIO,
+        [Action(run_down_change_s=4.0), Action()],
+        TIME_S,
+        speed_m_s=np.array([8.2, 8.3]),
+        step_s=STEP_S,
+    )
+    for i, truth in enumerate((longer, faster)):
+        np.testing.assert_allclose(
+            columns.speed_through_water_m_s[i],
+            truth.at(TIME_S).speed_through_water_m_s,
+            rtol=0,
+            atol=1e-7,
+        )
+
+
+def test_the_effects_of_the_ship_act_in_every_column():
+    stated = StatedEffect('current', {'along_track_m_s': Uncertain(0.5, 0.0)})
+    ship = replace(CARGO, effects=(stated,))
+    offset = Action(log_offset_m_s=0.1)
+    columns = simulate_columns(
+        ship, SCENARIO, [Action(), offset], TIME_S, reference_rad=REFERENCE_RAD, step_s=STEP_S
+    )
+    expected = truth_of(stated).at(TIME_S).position_m
+    for position in columns.position_m:
+        np.testing.assert_allclose(position, expected, rtol=0, atol=1e-7)
+
+
+def test_a_column_that_leaves_the_table_is_lost_from_there_on():
+    table = TableBaseline((4.0, 6.0, 9.0), (7e4, 1.7e5, 4.2e5), 0.02)
+    ship = replace(CARGO, baseline=table)
+    scenario = Scenario(speed_m_s=8.5, lead_in_s=10.0, duration_s=2000.0)
+    times = np.arange(0.0, 2001.0, 10.0)
+    slow, none = simulate_columns(
+        ship, scenario, [Action(mass_fraction=9.0), Action()], times
+    ).speed_through_water_m_s
+    assert np.all(np.isfinite(slow))
+    lost = np.flatnonzero(np.isnan(none))
+    assert 3.9 < none[lost[0] - 1] < 4.1
+    np.testing.assert_array_equal(lost, np.arange(lost[0], len(times)))
+
+
+def test_what_columns_cannot_do_is_told():
+    for change, message in (
+        ({'gust_force': GaussMarkov(1e4, 50.0)}, 'water_speed and gust_force'),
+        ({'speed_m_s': 30.0}, 'speed_m_s is 30.0'),
+    ):
+        with pytest.raises(SimulationError, match=message):
+            simulate_columns(CARGO, replace(SCENARIO, **change), [Action()], TIME_S)
+    with pytest.raises(SimulationError, match=r'time_s is 0\.\.1000 s, expected within 0\.\.900'):
+        simulate_columns(CARGO, SCENARIO, [Action()], np.array([0.0, 1000.0]))
+    overlapping = Action(turns=(Turn(690.0, 50.0, 0.0),))
+    with pytest.raises(SimulationError, match='turns are at'):
+        simulate_columns(CARGO, SCENARIO, [overlapping], TIME_S)
+    with pytest.raises(ShipdragError, match='no baseline'):
+        simulate_columns(replace(CARGO, baseline=None), SCENARIO, [Action()], TIME_S)
