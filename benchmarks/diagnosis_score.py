@@ -27,6 +27,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+# before numpy: the processes share the cores with each other alone
+os.environ.setdefault('OMP_NUM_THREADS', '1')
 sys.path.insert(0, str(Path(__file__).parent))
 
 from hidden import cases, scoring
@@ -107,12 +109,12 @@ def command(ship: Path, bags: list[Path]) -> Found:
 
 def diagnosis(by: str, form: str, number: int) -> Diagnose:
     """
-    Return the diagnosis that is asked for; the oracle alone knows the case's noise.
+    Return the diagnosis that is asked for; the oracle alone is told of the noise.
     """
     if by == 'oracle':
         from hidden.oracle import diagnose
 
-        return lambda seen: diagnose(seen, cases.noise(number))
+        return lambda seen: diagnose(seen, cases.known(number))
     if by == 'command':
         return by_bags(command)
     module, _, function = by.partition(':')
@@ -260,6 +262,4 @@ def _write_summary(path: Path, done: Sequence[scoring.Trial]) -> None:
 
 
 if __name__ == '__main__':
-    # a diagnosis and its followers share the cores with each other alone
-    os.environ.setdefault('OMP_NUM_THREADS', '1')
     main()

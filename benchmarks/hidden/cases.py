@@ -50,6 +50,14 @@ PAIRS = (
 )
 _BY_NAME = {kind.name: kind for kind in (*FIRST_SHELF, *SECOND_SHELF)}
 _ONE, _SECOND, _PAIR, _OUTSIDE, _NONE, _MISSTATED = 7, 3, 1, 4, 60, 20  # of a kind
+# among the cases whose baseline is as stated
+SHARES: dict[tuple[str, ...], int] = {
+    **{(kind.name,): _ONE for kind in FIRST_SHELF},
+    **{(kind.name,): _SECOND for kind in SECOND_SHELF},
+    **dict.fromkeys(PAIRS, _PAIR),
+    ('unknown',): _OUTSIDE * len(OUTSIDE),
+    (): _NONE,
+}
 
 
 @dataclass(frozen=True)
@@ -94,6 +102,26 @@ class Observation:
 
     ship_file: str
     runs: tuple[Recording, ...]
+
+
+@dataclass(frozen=True)
+class Known:
+    """
+    What an oracle is told besides.
+
+    Attributes
+    ----------
+    hull
+        As the ship file states it.
+    noise
+        Sizes of what is random.
+    duration_s
+        From the stop, at the end of the lead-in, to the end of the record.
+    """
+
+    hull: Hull
+    noise: Noise
+    duration_s: float
 
 
 @dataclass(frozen=True)
@@ -196,11 +224,12 @@ def observe(number: int, *, added: tuple[str, ...] = ()) -> Observation:
     )
 
 
-def noise(number: int) -> Noise:
+def known(number: int) -> Known:
     """
-    Return the sizes of what is random; known to the oracle alone.
+    Return what the oracle alone is told.
     """
-    return _case(number).noise
+    case = _case(number)
+    return Known(case.hull, case.noise, case.voyages[0].leg.duration_s)
 
 
 def reveal(number: int) -> Truth:
@@ -252,9 +281,10 @@ def _case(number: int) -> _Case:
 
 def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recording:
     leg, heading = case.voyages[which].leg, case.voyages[which].heading_rad
+    effects = tuple(effect for effect in case.effects if which == 0 or not effect.single_run)
     motion = sail(
         leg,
-        case.effects,
+        effects,
         heading_rad=heading,
         first_heading_rad=case.voyages[0].heading_rad,
         world=case.world,
@@ -264,7 +294,7 @@ def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recor
     return record(
         motion,
         leg,
-        case.effects,
+        effects,
         number=which,
         inputs=inputs,
         noise=case.noise,

@@ -71,10 +71,13 @@ class Effect:
         As a diagnosis has to name it; of one outside its library, for the table.
     sizes
         In the order of the arguments.
+    single_run
+        It is there in the first run only.
     """
 
     name: ClassVar[str]
     sizes: ClassVar[tuple[Size, ...]]
+    single_run: ClassVar[bool] = False
 
     @classmethod
     def units(cls, leg: Leg) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ from hidden.hull import GRAVITY, Array, Hull
 _LOCKED = 0.40
 # zero thrust before zero torque: a free-wheeling propeller drags a little
 _ADVANCE_RATIO = 0.65
+_SMOOTH = 0.15  # of a turn, in which its drag grows and falls
 _WAVE_LENGTH = 0.6  # over that of the ship
 
 
@@ -237,6 +238,7 @@ class Turning(Effect):
     duration_s: float
     turn: float
     name = 'turning'
+    single_run = True
     sizes = (
         Size('drag_area_m2', 0.4, 1.5),  # of that of the hull
         Size('start_s', 0.06, 0.5),  # of the duration of the coastdown
@@ -259,8 +261,9 @@ class Turning(Effect):
         return (time - self.start_s) / self.duration_s
 
     def drag_area_m2(self, leg: Leg, time: Array) -> Array:
-        part = self._part(time)
-        return np.where((part > 0.0) & (part < 1.0), self.drag_area, 0.0)
+        part = self._part(time) / _SMOOTH
+        grown = np.clip(part + 0.5, 0.0, 1.0) * np.clip(1.0 / _SMOOTH - part + 0.5, 0.0, 1.0)
+        return self.drag_area * grown
 
     def swing_rad(self, leg: Leg, time: Array) -> Array:
         part = np.clip(self._part(time), 0.0, 1.0)
@@ -274,6 +277,7 @@ class ResidualThrust(Effect):
     decay_s: float
     fraction: float
     name = 'residual_thrust'
+    single_run = True
     sizes = (Size('decay_s', 60.0, 400.0), Size('fraction', 0.15, 0.5))
 
     def thrust(self, leg: Leg, time: Array) -> Array:

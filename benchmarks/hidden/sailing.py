@@ -4,15 +4,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from hidden.effect import Effect, Leg
-from hidden.hull import SHAPE_TERMS, Array
+from hidden.hull import SHAPE_TERMS, Array, Hull
 from hidden.motion import TABLE_POINTS, Drive, integrate
 
 LEAD_IN_S = 1800.0
-_FINE_FROM_S = -10.0
+_FINE_FROM_S, _FINE_TO_S = -10.0, 50.0
 _COARSE_S = 5.0
 _FREE_WHEEL = 0.4  # shaft speed of a free-wheeling propeller over that under power
 
@@ -59,11 +60,11 @@ class Disturbance:
     swing_rad: Array
 
     @classmethod
-    def none(cls, leg: Leg) -> Disturbance:
+    def none(cls, leg: Leg, *, step_s: float) -> Disturbance:
         """
         Return stillness.
         """
-        n = len(times(leg))
+        n = len(times(leg, step_s=step_s))
         return cls(np.zeros(n), np.zeros((n, 2)), np.zeros(n))
 
 
@@ -90,12 +91,19 @@ class Motion:
     shaft_rad_s: Array
 
 
-def times(leg: Leg) -> Array:
+def times(leg: Leg, *, step_s: float = 1.0) -> Array:
     """
     Return the steps of a run: coarse while it is steady.
+
+    Parameters
+    ----------
+    leg
+    step_s
+        Once the thrust has run down.
     """
     coarse = np.arange(-LEAD_IN_S, _FINE_FROM_S, _COARSE_S)
-    return np.concatenate([coarse, np.arange(_FINE_FROM_S, leg.duration_s + 0.5)])
+    fine = np.arange(_FINE_FROM_S, _FINE_TO_S)
+    return np.concatenate([coarse, fine, np.arange(_FINE_TO_S, leg.duration_s + step_s, step_s)])
 
 
 def sail(
@@ -106,6 +114,7 @@ def sail(
     first_heading_rad: float,
     world: World,
     disturbance: Disturbance,
+    step_s: float = 1.0,
 ) -> Motion:
     """
     Sail and coast.
@@ -120,8 +129,10 @@ def sail(
     first_heading_rad
         Of the first run, from which earth-fixed effects count.
     world, disturbance
+    step_s
+        See `times`; the disturbance has the same.
     """
-    time = times(leg)
+    time = times(leg, step_s=step_s)
     drive = _drive(leg, effects, time, world, first_heading_rad)
     drive = drive._replace(
         push_m_s2=drive.push_m_s2 + disturbance.force_m_s2,
@@ -160,7 +171,7 @@ def _drive(
         residual = residual + effect.thrust(leg, time)
         cross_wind += leg.sign * effect.wind_m_s()[1]
 
-    speed = np.linspace(0.0, 1.25 * hull.speed_m_s, TABLE_POINTS)
+    speed = _speeds(hull)
     steady = _resistance_n(leg, effects, speed, world, leg.sign * float(ahead[0]))
     coasting = steady + sum(effect.coasting_drag_n(leg, speed) for effect in effects)
     at_start = np.interp(leg.speed_m_s, speed, steady)
@@ -188,13 +199,23 @@ def _drive(
     )
 
 
+def _speeds(hull: Hull) -> Array:
+    return np.linspace(0.0, 1.25 * hull.speed_m_s, TABLE_POINTS)
+
+
+@lru_cache(maxsize=4)
+def _stated_n(hull: Hull) -> tuple[Array, Array]:
+    """Return friction and wave resistance at the speeds of the table."""
+    return hull.friction_n(_speeds(hull)), hull.wave_n(_speeds(hull))
+
+
 def _resistance_n(
     leg: Leg, effects: tuple[Effect, ...], speed: Array, world: World, current_m_s: float
 ) -> Array:
     """Return the resistance [N] while sailing."""
     hull = leg.hull
-    water = (1.0 + world.friction) * hull.friction_n(speed)
-    water += (1.0 + world.wave) * hull.wave_n(speed)
+    friction, wave = _stated_n(hull)
+    water = (1.0 + world.friction) * friction + (1.0 + world.wave) * wave
     water *= 1.0 + hull.shape(speed, np.array(world.shape))
     # still air moves with the ground, not with the water
     total: Array = water + hull.air_n(speed + current_m_s)
