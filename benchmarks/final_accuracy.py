@@ -23,7 +23,6 @@ from rich.table import Table
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, motion_fit
-from shipdrag_ros.estimation.motion_fit.families import Family
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.problem import Problem
 from shipdrag_ros.estimation.motion_fit.record import Record
@@ -40,7 +39,6 @@ CONFIG = Path(__file__).parents[1] / 'config'
 COURSE_RAD = 0.7
 STEADY_S = 1800.0
 SLOW_S = 300.0
-BOUND_FAMILY = Family((1, 2, 3, 4))
 
 
 @dataclass(frozen=True)
@@ -173,12 +171,11 @@ def bound(case: Case, ship: Ship) -> tuple[float, float]:
     about = Disturbance(gust_m_s2(case, ship), SLOW_S, case.log_m_s, SLOW_S)
     guess = Guess.of(record.coast, float(ship.n_r(1.0)))
     problem = Problem.of(record, run_down, ship, guess)
-    start = problem.start(BOUND_FAMILY, None, guess)
-    plain, _ = problem.fit(BOUND_FAMILY, start)
+    plain, _ = problem.fit_first(problem.start())
     assert plain is not None
     if case.log_m_s or case.gust_m_s:
         problem = problem.disturbed(about, plain)
-    found, _ = problem.fit(BOUND_FAMILY, plain.unknowns)
+    found, _ = problem.fit_first(plain.unknowns)
     assert found is not None
     low = max(float(record.coast.value[record.coast.kind == 0][-1]), float(ship.speed(0.05)))
     speeds = np.linspace(low, case.hull.speed_m_s, 200)

@@ -14,19 +14,17 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.motion_fit.coast import (
     CURRENT,
-    EXTRAS,
     LOG,
     LOG_SCALE,
     V0,
     Rows,
     predict,
 )
-from shipdrag_ros.estimation.motion_fit.families import Average, FamilyFit
+from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.learning import learn
 from shipdrag_ros.estimation.motion_fit.problem import (
     Problem,
-    average_families,
     fit_robustly,
     weigh_disturbed,
     with_log_scale,
@@ -71,9 +69,9 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     notes = [*window.notes, *ship.warnings, f'{run_down.source}']
     # first the coastdown alone, as if nothing but sensor noise disturbed
     alone = record.without_steady()
-    first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess), guess)
+    first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess))
     if record.steady_s >= LEAST_S:
-        plain = problem.plain(first, guess)
+        plain = first.plainly(guess.lowest)
         about = _learn(record, plain, run_down)
         problem = Problem.of(record, run_down, ship, guess).disturbed(about, plain)
         problem = weigh_disturbed(problem, first)
@@ -87,16 +85,15 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     full = problem
     first, problem = with_log_scale(problem.condensed(first), first)
     if LOG_SCALE in problem.extras:
-        scale, sd = Average.of((first,)).unknown(LOG_SCALE)
+        scale, sd = first.unknown(LOG_SCALE)
         notes.append(
             f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
             'deviations), taken out'
         )
-    average = average_families(problem, first, guess)
-    return _result(average, full, record, window, ship, parameters, tuple(notes))
+    return _result(problem.average(first), full, record, window, ship, parameters, tuple(notes))
 
 
-def _learn(record: Record, plain: FamilyFit, run_down: RunDown) -> Disturbance:
+def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> Disturbance:
     """Learn the disturbances of the steady record, damped as a plain fit has it."""
     damping, inertia = plain.damping(plain.unknowns[plain.law.size + V0 :][:1])
     quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else 0.0
@@ -120,7 +117,7 @@ def _disturbance_note(about: Disturbance, steady_s: float) -> str:
 
 
 def _result(
-    average: Average,
+    found: FittedMotion,
     problem: Problem,
     record: Record,
     window: Window,
@@ -128,44 +125,35 @@ def _result(
     parameters: Parameters,
     notes: tuple[str, ...],
 ) -> Estimate:
-    best = average.best
-    k = best.law.size
     coast = record.coast
-    end_s = float(coast.time_s[-1])
-    ends = Rows(np.array([end_s, end_s]), np.array([LOG, LOG]), np.zeros(2))
-    every = np.arange(k + EXTRAS, dtype=np.int64)
-    plain = best.unknowns.copy()
-    plain[k + LOG_SCALE] = 0.0
-    table, speed = predict(best.law, plain, problem.grid_s, ends, every[:-1])
-    by_unknown = table[1:, 0]
-    last_var = np.einsum('i,ij,j->', by_unknown, best.covariance[:-1, :-1], by_unknown)
-    low = max(float(speed[0]), float(ship.speed(parameters.froude_min)))
-    high, _ = average.unknown(V0)
-    _, at_start = predict(best.law, plain, problem.grid_s, coast, every[:1])
-    high = min(high, float(at_start.max()))
+    last_speed, last_sigma = _speed_at(found, problem, float(coast.time_s[-1]))
+    none = np.zeros(0, np.int64)
+    residual, speed = predict(found.law, found.unknowns, problem.grid_s, coast, none)
+    low = max(last_speed, float(ship.speed(parameters.froude_min)))
+    high = min(found.unknown(V0)[0], float(speed.max()))
     if not high > low * 1.02:
         raise EstimationError(
             f'the fitted speed falls from {high:.4g} to {low:.4g} m/s only, above froude_min '
             f'{parameters.froude_min:g}: give a window that lies in a coastdown, or a smaller '
             'froude_min'
         )
-    curve = _curve(average, np.linspace(low, high, _CURVE_POINTS), ship)
+    curve = _curve(found, np.linspace(low, high, _CURVE_POINTS), ship)
     valid = ValidRange.of_branch(curve)
-    residual = predict(best.law, best.unknowns, problem.grid_s, coast, every[:1])[0][0]
     tracks = {}
     for name, stamps in record.stamps.items():
         chosen = coast.kind == KINDS[name]
         measured = coast.value[chosen]
-        tracks[name] = Track(stamps, measured, measured - residual[chosen])
-    last = average.resistance(speed[:1])
-    r_last = float(last[0][0])
-    inertia = 1.0 + float(ship.n_r(speed[0]))
+        tracks[name] = Track(stamps, measured, measured - residual[0, chosen])
+    last_r, last_repeatable = (
+        float(value[0]) for value in found.resistance(np.array([last_speed]))
+    )
+    last_of_n_r = last_r / (1.0 + float(ship.n_r(last_speed))) * ship.added_mass.sd
     noise = {}
     for name in record.white_sd:
         chosen = problem.rows.kind == KINDS[name]
         chosen[: len(record.steady.time_s)] = False
         noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen])))
-    current = average.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
+    current = found.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
     stamps = np.concatenate(list(record.stamps.values()))
     return Estimate(
         estimator=NAME,
@@ -180,10 +168,10 @@ def _result(
         froude_max_by=valid.by,
         froude_max_argmax=valid.argmax,
         w=valid.w,
-        last_speed_m_s=float(speed[0]),
-        last_speed_sigma_m_s=float(np.sqrt(last_var)),
-        last_resistance_m_s2=r_last,
-        last_sigma_m_s2=float(np.hypot(last[1][0], r_last / inertia * ship.added_mass.sd)),
+        last_speed_m_s=last_speed,
+        last_speed_sigma_m_s=last_sigma,
+        last_resistance_m_s2=last_r,
+        last_sigma_m_s2=float(np.hypot(last_repeatable, last_of_n_r)),
         tracks=tracks,
         current_m_s=current[0],
         current_sigma_m_s=current[1],
@@ -191,10 +179,24 @@ def _result(
     )
 
 
-def _curve(average: Average, speed: Float64, ship: Ship) -> ResistanceCurve:
+def _speed_at(found: FittedMotion, problem: Problem, time_s: float) -> tuple[float, float]:
+    """Return the speed through water at a time, and its standard deviation."""
+    row = Rows(np.array([time_s]), np.array([LOG]), np.zeros(1))
+    k = found.law.size
+    every = np.arange(k + LOG_SCALE, dtype=np.int64)
+    unknowns = found.unknowns.copy()
+    unknowns[k + LOG_SCALE] = 0.0
+    table, speed = predict(found.law, unknowns, problem.grid_s, row, every)
+    by_unknown = table[1:, 0]
+    covariance = found.covariance[: len(every), : len(every)]
+    variance = np.einsum('i,ij,j->', by_unknown, covariance, by_unknown)
+    return float(speed[0]), float(np.sqrt(variance))
+
+
+def _curve(found: FittedMotion, speed: Float64, ship: Ship) -> ResistanceCurve:
     """Return r(v) where it retards."""
-    r, repeatable = average.resistance(speed)
-    slope, slope_sigma = average.slope(speed)
+    r, repeatable = found.resistance(speed)
+    slope, slope_sigma = found.slope(speed)
     of_n_r = np.abs(r) / (1.0 + ship.n_r(speed)) * ship.added_mass.sd
     per_froude = float(ship.speed(1.0))
     driving = np.flatnonzero(r <= 0.0)

@@ -6,8 +6,7 @@ No single family is right: friction is nearly quadratic, wave making rises by
 the fourth to the sixth power, with humps and hollows where the waves of bow and
 stern meet. Humps are B-splines whose sizes are known beforehand, before any
 measurement, to be small at low Froude numbers; how many of them count grows
-with what the samples tell. How well each family explains the samples decides
-its weight.
+with what the samples tell.
 """
 
 from __future__ import annotations
@@ -18,10 +17,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.estimation.motion_fit.coast import Law, shape_table, spread
 from shipdrag_ros.samples import Float64
 
-_TYPICAL_POWER = 2.5
+FIRST = (1, 2, 3, 4)  # powers fitted first, to find the outliers
+PLAIN = (2, 3)  # hardly ever negative, and right enough to tell how a force is damped
+POWERS = (1, 2, 3, 4, 6)  # of any family
+_OF_FAMILY = ((2, 3, 4), (2, 4, 6), (1, 2, 4, 6))
+_HUMP_SIZES = (0.0, 0.3, 1.0)  # of a family, over the sizes of `Humps`
+
 _SPACING_FROUDE = 0.02  # of the humps: about a quarter wave of the pattern at Fr 0.2
 _MOST = 14  # humps
 _HUMP_SD = 0.2  # of r, at _HUMP_FROUDE
@@ -31,28 +34,21 @@ _LEAST_SD = 1e-4  # of r
 _ABOVE, _BELOW = 1.05, 0.9  # of the speeds of the coastdown, where humps still matter
 
 
-class Family(NamedTuple):
+class Families(NamedTuple):
     """
-    One family of r(v).
+    Families as choices among `POWERS` and humps.
 
     Attributes
     ----------
-    powers
-        Of the speed.
-    humpy
-        Whether humps are added.
+    included : (f, k)
+        Which of the k coefficients each of f families has.
+    precision : (f, k)
+        1 over the variance that a coefficient has before any measurement, about
+        0; 0: not known.
     """
 
-    powers: tuple[int, ...]
-    humpy: bool = False
-
-
-FIRST = Family((1, 2, 3, 4))  # fitted first, finds the outliers
-FAMILIES = tuple(
-    Family(powers, humpy)
-    for powers in ((2, 3, 4), (2, 4, 6), (1, 2, 4, 6))
-    for humpy in (False, True)
-)
+    included: np.ndarray
+    precision: Float64
 
 
 @dataclass(frozen=True)
@@ -97,129 +93,20 @@ class Humps:
         sd = _HUMP_SD * np.maximum(at / _HUMP_FROUDE, 0.0) ** _HUMP_POWER
         return cls(first, spacing, np.maximum(sd, _LEAST_SD))
 
-
-@dataclass(frozen=True)
-class FamilyFit:
-    """
-    One family fitted.
-
-    Attributes
-    ----------
-    law
-        Its powers and humps.
-    unknowns
-        See `coast`.
-    covariance : (k + 6, k + 6)
-        Of all unknowns; rows of what was not fitted are 0.
-    chi2
-        Sum of the squares of the whitened residuals.
-    samples
-        How many were fitted.
-    parameters
-        Number of unknowns, a hump by how much of it the samples tell.
-    """
-
-    law: Law
-    unknowns: Float64
-    covariance: Float64
-    chi2: float
-    samples: int
-    parameters: float
-
-    @property
-    def aicc(self) -> float:
-        """Akaike's criterion with the correction for few samples."""
-        p = self.parameters
-        return self.chi2 + 2.0 * p * self.samples / max(self.samples - p - 1.0, 1.0)
-
-    def resistance(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
+    def families(self, unit_m_s2: float) -> Families:
         """
-        Return r and its standard deviation at (m,) speeds.
-        """
-        value, _ = shape_table(self.law, speed_m_s)
-        result: tuple[Float64, Float64] = spread(value, self.unknowns, self.covariance)
-        return result
+        Return all families.
 
-    def slope(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
+        Parameters
+        ----------
+        unit_m_s2
+            r that the sizes of the humps are relative to, at the reference speed.
         """
-        Return dr/dv and its standard deviation at (m,) speeds.
-        """
-        _, slope = shape_table(self.law, speed_m_s)
-        result: tuple[Float64, Float64] = spread(slope, self.unknowns, self.covariance)
-        return result
-
-    def damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
-        """
-        Return dr/dv over 1 + n_r [1/s], and 1 + n_r, at (m,) speeds.
-
-        Notes
-        -----
-        From r alone, as if it rose by `_TYPICAL_POWER` of the speed: between
-        friction and wave making, and far steadier than a fitted slope.
-        """
-        n_r = np.polynomial.polynomial.polyval(speed_m_s, self.law.n_r)
-        inertia = 1.0 + np.asarray(n_r, np.float64)
-        r, _ = self.resistance(speed_m_s)
-        damping = _TYPICAL_POWER * r / np.maximum(speed_m_s, 1e-3) / inertia
-        damped: Float64 = np.maximum(damping, 1e-6)
-        return damped, inertia
-
-
-@dataclass(frozen=True)
-class Average:
-    """
-    Families with their weights.
-
-    Attributes
-    ----------
-    fits, weights
-        The weights sum to 1.
-    """
-
-    fits: tuple[FamilyFit, ...]
-    weights: Float64
-
-    @classmethod
-    def of(cls, fits: tuple[FamilyFit, ...]) -> Average:
-        """
-        Weigh families by AICc.
-        """
-        criterion = np.array([fit.aicc for fit in fits])
-        weights = np.exp(-0.5 * (criterion - criterion.min()))
-        return cls(fits, weights / weights.sum())
-
-    @property
-    def best(self) -> FamilyFit:
-        """The family of the largest weight."""
-        return self.fits[int(np.argmax(self.weights))]
-
-    def resistance(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
-        """
-        Return r and its standard deviation, between families too.
-        """
-        return self._mix([fit.resistance(speed_m_s) for fit in self.fits])
-
-    def slope(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
-        """
-        Return dr/dv and its standard deviation, between families too.
-        """
-        return self._mix([fit.slope(speed_m_s) for fit in self.fits])
-
-    def unknown(self, which: int) -> tuple[float, float]:
-        """
-        Return one of the unknowns behind the coefficients, and its sd.
-        """
-        pairs = []
-        for fit in self.fits:
-            at = fit.law.size + which
-            value, variance = fit.unknowns[at], fit.covariance[at, at]
-            pairs.append((np.array([value]), np.array([np.sqrt(variance)])))
-        value, sigma = self._mix(pairs)
-        return float(value[0]), float(sigma[0])
-
-    def _mix(self, pairs: list[tuple[Float64, Float64]]) -> tuple[Float64, Float64]:
-        values = np.array([value for value, _ in pairs])
-        sigmas = np.array([sigma for _, sigma in pairs])
-        mean = np.einsum('f,fm->m', self.weights, values)
-        variance = np.einsum('f,fm->m', self.weights, sigmas**2 + (values - mean) ** 2)
-        return mean, np.sqrt(variance)
+        included, precision = [], []
+        for powers in _OF_FAMILY:
+            for size in _HUMP_SIZES:
+                has = np.full(len(self.sd), size > 0.0)
+                included.append([*(power in powers for power in POWERS), *has])
+                known = has / (max(size, 1e-9) * unit_m_s2 * self.sd) ** 2
+                precision.append([*np.zeros(len(POWERS)), *known])
+        return Families(np.array(included), np.array(precision))

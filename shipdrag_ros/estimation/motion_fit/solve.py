@@ -6,7 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from shipdrag_ros.estimation.motion_fit.coast import Law, Rows, predict
+from shipdrag_ros.estimation.motion_fit.coast import Rows, predict
+from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.whitening import Noise, whiten
 from shipdrag_ros.samples import Float64, Int64
 

@@ -10,7 +10,8 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final, motion_fit
-from shipdrag_ros.estimation.motion_fit.coast import LOG, Law, Rows, integrate, predict
+from shipdrag_ros.estimation.motion_fit.coast import LOG, Rows, integrate, predict
+from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.learning import learn
 from shipdrag_ros.estimation.motion_fit.solve import cholesky_solve
 from shipdrag_ros.estimation.motion_fit.steady import white_sd
