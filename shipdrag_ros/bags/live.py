@@ -91,9 +91,12 @@ class LiveFile:
             )
             self.sync()
             sync_directory(path.parent)
-        except (OSError, BagError) as error:
+        except BagError:
             self.abandon()
-            raise BagError(f'{str(path)!r} cannot be made: {_reason(error)}') from error
+            raise
+        except OSError as error:
+            self.abandon()
+            raise BagError(f'{str(path)!r} cannot be made: {error.strerror}') from error
 
     def append(self, messages: Sequence[EncodedMessage]) -> None:
         """
@@ -225,7 +228,3 @@ def _attachment(name: str, text: str) -> bytes:
             data=text.encode(),
         )
     )
-
-
-def _reason(error: OSError | BagError) -> str:
-    return str(error) if isinstance(error, BagError) else str(error.strerror)

@@ -112,7 +112,7 @@ def recording_status(status: RecordingStatus) -> DiagnosticStatus:
     level = OK
     if status.state is RecordingState.FAILED:
         level = ERROR
-    elif progress is not None and (progress.lost or status.slow):
+    elif status.lost or status.slow:
         level = WARN
     values: dict[str, object] = {'state': status.state.value}
     if progress is not None:
@@ -123,7 +123,7 @@ def recording_status(status: RecordingStatus) -> DiagnosticStatus:
             'messages': progress.messages,
             'messages in memory only': progress.waiting,
             'longest in memory only [s]': progress.oldest_s,
-            'messages lost': progress.lost,
+            'messages lost': status.lost,
             'parts left uncompacted': progress.uncompacted,
         }
     values['memory for a later start'] = 'too small' if status.ring_cut else 'sufficient'

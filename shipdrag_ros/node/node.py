@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
@@ -65,6 +65,7 @@ class CoastdownNode(LifecycleNode):
         self._settings: NodeSettings | None = None
         self._ship: Ship | None = None
         self._recorder: Recorder | None = None
+        self._recording_level = DiagnosticStatus.OK
         self._session: Session | None = None
         self._input_topics: list[InputTopic] = []
         self._outputs: dict[str, Publisher] = {}
@@ -202,16 +203,14 @@ class CoastdownNode(LifecycleNode):
         if self._settings.record:
             self._recorder.start()
         self._session.note_lifecycle('active', self._now_ns())
-        status = self._recorder.status()
-        if status.state is RecordingState.FAILED:
-            self.get_logger().error(status.text)
-        self.get_logger().info(f'active; {status.text}')
+        self.get_logger().info(f'active; {self._recorder.status().text}')
 
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
             session, self._session = self._session, None
             session.note_lifecycle(why, self._now_ns())
             session.finish()
+            self.get_logger().info(f'{why}; {session.recorder.status().text}')
 
     def _release(self) -> None:
         self._deactivate('released')
@@ -280,9 +279,22 @@ class CoastdownNode(LifecycleNode):
         ]
         if self._recorder is not None:
             message.status.append(diagnostics.recording_status(self._recorder.status()))
+            self._log_recording(message.status[-1])
         if self._session is not None:
             message.status.append(diagnostics.estimate_status(self._session.latest))
         self._diagnostics.publish(message)
+
+    def _log_recording(self, status: DiagnosticStatus) -> None:
+        """Keep a trace of when a disk failed, and of when it was back."""
+        if status.level == self._recording_level:
+            return
+        self._recording_level = status.level
+        if status.level == DiagnosticStatus.ERROR:
+            self.get_logger().error(status.message)
+        elif status.level == DiagnosticStatus.WARN:
+            self.get_logger().warning(status.message)
+        else:
+            self.get_logger().info(status.message)
 
     # services
 

@@ -45,6 +45,8 @@ class RecordingStatus:
     ----------
     progress
         Of this or of the last recording, None before the first.
+    lost
+        Messages that were not written, of all recordings of this recorder.
     ring_cut
         Whether memory was too small to keep all that a recording started now should
         begin with; its replay may then differ from the live figures at first.
@@ -52,6 +54,7 @@ class RecordingStatus:
 
     state: RecordingState
     progress: RecordingProgress | None
+    lost: int
     ring_cut: bool
 
     @property
@@ -59,7 +62,7 @@ class RecordingStatus:
         """One line for a log or for an operator."""
         if self.progress is None:
             return 'not recording'
-        lost = f'{self.progress.lost} message(s) lost'
+        lost = f'{self.lost} message(s) lost'
         if self.state is RecordingState.FAILED:
             return (
                 f'recording failed, {lost}, {self.progress.waiting} kept in memory: '
@@ -71,7 +74,7 @@ class RecordingStatus:
             text = f'the disk is slow, {self.progress.oldest_s:.0f} s are in memory only'
         else:
             text = f'recording to {self.progress.path or "no file yet"}'
-        return f'{text}, {lost}' if self.progress.lost else text
+        return f'{text}, {lost}' if self.lost else text
 
     @property
     def slow(self) -> bool:
@@ -117,6 +120,7 @@ class Recorder:
         self._ring = RawRing(history_ns + MARGIN_NS)
         self._recording: DurableRecording | None = None
         self._ended: list[DurableRecording] = []
+        self._lost = 0  # by recordings that are no longer kept
 
     def start(self) -> None:
         """
@@ -131,7 +135,9 @@ class Recorder:
         """
         if self._recording is not None:
             self._recording.stop()
-            self._ended = [it for it in self._ended if not it.wait_ended(0)]
+            for recording in [it for it in self._ended if it.wait_ended(0)]:
+                self._lost += recording.progress().lost
+                self._ended.remove(recording)
             self._ended.append(self._recording)
             self._recording = None
 
@@ -181,13 +187,15 @@ class Recorder:
         """
         Return how the recording stands.
         """
-        recording = self._recording or next(reversed(self._ended), None)
-        progress = None if recording is None else recording.progress()
+        recordings = [*self._ended, *filter(None, [self._recording])]
+        progresses = [it.progress() for it in recordings]
+        progress = progresses[-1] if progresses else None
+        lost = self._lost + sum(it.lost for it in progresses)
         if progress is not None and progress.error:
             state = RecordingState.FAILED
         else:
             state = RecordingState.OFF if self._recording is None else RecordingState.RECORDING
-        return RecordingStatus(state, progress, self._ring.cut)
+        return RecordingStatus(state, progress, lost, self._ring.cut)
 
     def _begin(self) -> DurableRecording:
         stamp = datetime.now(UTC).strftime('%Y%m%dT%H%M%SZ')

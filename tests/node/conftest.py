@@ -6,6 +6,7 @@ from __future__ import annotations
 import fcntl
 import gc
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -18,14 +19,18 @@ from typing import Any, TextIO
 import pytest
 import yaml
 
-START_S = 90.0  # the first start of a machine compiles the kernels
+START_S = 240.0  # the first start of a machine compiles the kernels
 ANSWER_S = 30.0
 
 
 def _own_domain() -> tuple[int, TextIO]:
     """Find a domain that no other test process of this machine is in, and lock it."""
     for domain in range(10, 102):
-        lock = (Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock').open('w')
+        path = Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock'
+        try:
+            lock = path.open('w')
+        except PermissionError:  # that of another user
+            continue
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -76,7 +81,18 @@ class NodeProcess:
         self._process.send_signal(number)
         return self._process.wait(timeout=ANSWER_S)
 
+    def fill_disk(self, full_bytes: int | None) -> None:
+        """
+        Let no file grow beyond a size, as a full disk would; None: as before.
+        """
+        _, hard = resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE)
+        soft = hard if full_bytes is None else full_bytes
+        resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE, (soft, hard))
+
     def kill(self) -> None:
+        """
+        End it at once, with no chance to close anything.
+        """
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait()

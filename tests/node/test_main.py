@@ -19,7 +19,7 @@ rclpy = pytest.importorskip('rclpy')
 from shipdrag_ros.node.main import main  # noqa: E402
 from shipdrag_ros.node.node import CoastdownNode  # noqa: E402
 
-START_S = 90.0
+START_S = 240.0
 
 
 def attachments(bag: Path) -> dict[str, str]:
