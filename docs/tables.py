@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Write the README's tables from the code.
+Write tables of README and docs from the code.
 
-`python docs/tables.py` rewrites what stands between the markers in README.md;
-a test fails while the two differ.
+`python docs/tables.py` rewrites what stands between the markers in README.md and
+docs/effects.md; a test fails while the two differ.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
 
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.simulation import Quantity
+from shipdrag_ros.simulation.effects import LIBRARY, deciders, look_alikes
 
-README = Path(__file__).resolve().parents[1] / 'README.md'
+DOCS = Path(__file__).resolve().parent
+README = DOCS.parent / 'README.md'
+EFFECTS = DOCS / 'effects.md'
 _INPUT_MEANING = {
     'speed_through_water': 'speed log, `linear.x` forward [m/s]',
     'speed_over_ground': 'radar or GNSS, `hypot(linear.x, linear.y)` [m/s], frame not trusted',
@@ -40,7 +44,8 @@ _OUTPUT_MEANING = {
 def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     head = list(head)
     lines = [head, ['---'] * len(head), *rows]
-    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
+    cells = ([cell.replace('|', r'\|') for cell in line] for line in lines)
+    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in cells)
 
 
 def _short(type_name: str) -> str:
@@ -87,14 +92,86 @@ def parameters() -> str:
     return _table(['parameter', 'default', 'allowed', 'meaning'], rows)
 
 
-TABLES: dict[str, Callable[[], str]] = {
-    'inputs': inputs,
-    'outputs': outputs,
-    'parameters': parameters,
+def _per(quantity: Quantity) -> str:
+    return f' times {quantity.measured_in.text}' if quantity.measured_in.text else ''
+
+
+def effects() -> str:
+    """
+    Return the table of what effects do.
+    """
+    rows = (
+        [
+            f'`{effect.name}`',
+            effect.scope,
+            effect.formula,
+            effect.source,
+            ', '.join(f'`{name}`' for name in effect.struck_out_by) or '-',
+            ', '.join(f'`{name}`' for name in effect.needs) or '-',
+        ]
+        for effect in LIBRARY.values()
+    )
+    head = ['effect', 'scope', 'formula', 'source', 'struck out by', 'needs in the ship file']
+    return _table(head, rows)
+
+
+def effect_parameters() -> str:
+    """
+    Return the table of the parameters of effects.
+    """
+    rows = []
+    for effect in LIBRARY.values():
+        for quantity in effect.parameters:
+            if quantity.words:
+                accepted = ', '.join(f'`{word}`' for word in quantity.words)
+            else:
+                accepted = f'{quantity.low:g} .. {quantity.high:g}{_per(quantity)}'
+            default = '' if quantity.default is None else f'{quantity.default:g}{_per(quantity)}'
+            rows.append(
+                [
+                    f'`{effect.name}`',
+                    f'`{quantity.name}`',
+                    quantity.unit or '-',
+                    quantity.meaning,
+                    f'{quantity.prior}{_per(quantity)}',
+                    accepted,
+                    default or 'to be given',
+                ]
+            )
+    head = ['effect', 'parameter', 'unit', 'meaning', 'prior', 'accepted', 'default']
+    return _table(head, rows)
+
+
+def effect_look_alikes() -> str:
+    """
+    Return the table of effects that leave nearly the same trace.
+    """
+    rows = (
+        [
+            f'`{name}`',
+            f'`{other}`',
+            '; '.join(deciders(name, other)) or 'nothing that can be recorded',
+        ]
+        for name in LIBRARY
+        for other in look_alikes(name)
+        if name < other
+    )
+    return _table(['effect', 'looks like', 'what decides'], rows)
+
+
+Tables = Mapping[str, Callable[[], str]]
+TABLES: Tables = {'inputs': inputs, 'outputs': outputs, 'parameters': parameters}
+PAGES: Mapping[Path, Tables] = {
+    README: TABLES,
+    EFFECTS: {
+        'effects': effects,
+        'effect parameters': effect_parameters,
+        'look-alikes': effect_look_alikes,
+    },
 }
 
 
-def updated(text: str) -> str:
+def updated(text: str, tables: Tables = TABLES) -> str:
     """
     Return a page with every marked table made anew.
 
@@ -103,7 +180,7 @@ def updated(text: str) -> str:
     ValueError
         If the page lacks the markers of a table.
     """
-    for name, table in TABLES.items():
+    for name, table in tables.items():
         begin, end = f'<!-- {name} -->', f'<!-- end {name} -->'
         if begin not in text or end not in text:
             raise ValueError(f'no {begin} .. {end} in the page')
@@ -113,4 +190,5 @@ def updated(text: str) -> str:
 
 
 if __name__ == '__main__':
-    README.write_text(updated(README.read_text(encoding='utf-8')), encoding='utf-8')
+    for page, tables in PAGES.items():
+        page.write_text(updated(page.read_text(encoding='utf-8'), tables), encoding='utf-8')

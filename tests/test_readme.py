@@ -22,6 +22,9 @@ def test_tables_are_made_from_the_code() -> None:
     tables = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(tables)
     assert tables.updated(TEXT) == TEXT, 'run: python docs/tables.py'
+    for page, of_page in tables.PAGES.items():
+        text = page.read_text(encoding='utf-8')
+        assert tables.updated(text, of_page) == text, 'run: python docs/tables.py'
 
 
 def test_opens_with_the_two_commands() -> None:

@@ -124,14 +124,18 @@ class Prior:
         return Prior(self.shape, factor * self.first, factor * self.second)
 
     def __str__(self) -> str:
-        a, b = f'{self.first:g}', f'{self.second:g}'
-        return {
-            Shape.NORMAL: f'normal, {a} ± {b}',
-            Shape.HALF_NORMAL: f'half-normal, 0 + {b}',
-            Shape.LOG_NORMAL: f'log-normal, median {a}, factor {math.exp(self.second):.2g}',
-            Shape.UNIFORM: f'uniform, {a}..{b}',
-            Shape.CHOICE: 'either',
-        }[self.shape]
+        a, b = self.first, self.second
+        match self.shape:
+            case Shape.NORMAL:
+                return f'normal, {a:g} ± {b:g}'
+            case Shape.HALF_NORMAL:
+                return f'half-normal, 0 + {b:g}'
+            case Shape.LOG_NORMAL:
+                return f'log-normal, median {a:g}, factor {math.exp(b):.2g}'
+            case Shape.UNIFORM:
+                return f'uniform, {a:g} .. {b:g}'
+            case Shape.CHOICE:
+                return 'either alike'
 
 
 def normal(sd: float, *, mean: float = 0.0) -> Prior:

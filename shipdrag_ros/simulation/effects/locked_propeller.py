@@ -32,7 +32,7 @@ EFFECT = Effect(
             high=3.0,
         ),
     ),
-    formula='0.5 rho (pi/4) D^2 C v^2; while the thrust runs down it is net of it',
+    formula='0.5 rho (pi/4) D^2 C v^2',
     source='four-quadrant open-water data of B4-70 at rest',
     act=_act,
     struck_out_by=('shaft',),
