@@ -95,6 +95,8 @@ def check(
 def _check_file(path: Path, progress: Callable[[int, int], None]) -> FileCheck:
     damages = DamageList()
     with opened(path, damages) as data:
+        if not data:
+            return FileCheck(path, 0, 0, tuple(damages.listed), damages.count)
         walk = _Check(data, damages)
         walk.run(progress)
         if not walk.records and data[: len(MAGIC)] != MAGIC:

@@ -54,18 +54,21 @@ class Damage:
         What is wrong with it.
     detail
         The values, or ''.
+    file
+        Name of the file where a source has several, or ''.
     """
 
     offset: int
     record: str
     kind: DamageKind
     detail: str = ''
+    file: str = ''
 
 
 @dataclass
 class DamageList:
     """
-    The damages of a file, of which the first are kept.
+    The damages of a file or several, of which the first are kept.
 
     Attributes
     ----------
@@ -73,10 +76,13 @@ class DamageList:
         In order of discovery.
     count
         All of them.
+    file
+        Name of the file at hand, where there are several.
     """
 
     listed: list[Damage] = field(default_factory=list)
     count: int = 0
+    file: str = ''
 
     def add(self, offset: int, record: str, kind: DamageKind, detail: str = '') -> None:
         """
@@ -84,4 +90,4 @@ class DamageList:
         """
         self.count += 1
         if len(self.listed) < _LISTED:
-            self.listed.append(Damage(offset, record, kind, detail))
+            self.listed.append(Damage(offset, record, kind, detail, self.file))

@@ -18,8 +18,16 @@ from mcap.opcode import Opcode
 from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
 from shipdrag_ros.bags.layout import KNOWN, name
 from shipdrag_ros.bags.learnt import Learnt, Trust, read_footer
-from shipdrag_ros.bags.locate import locate
-from shipdrag_ros.bags.records import MAGIC, MESSAGE_HEAD, Buffer, attachment_agrees
+from shipdrag_ros.bags.locate import BagFiles, locate
+from shipdrag_ros.bags.records import (
+    CHUNK_LIMIT_BYTES,
+    MAGIC,
+    MESSAGE_HEAD,
+    UNPACKING_ERRORS,
+    Buffer,
+    attachment_agrees,
+    unpack_zstd,
+)
 from shipdrag_ros.bags.salvaged_bag import SalvagedBag
 from shipdrag_ros.bags.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
 from shipdrag_ros.bags.unpack import opened, unpack_chunk_partly
@@ -44,7 +52,7 @@ class Recovery:
         Of the source, unpacked if it was packed as a whole; lost are those that
         gave nothing.
     damage
-        What is wrong with the source, in order of place.
+        What is wrong with the source, file by file in order of place.
     damage_count
         How much of it there is; `damage` lists the first.
     output
@@ -72,99 +80,107 @@ def recover(
     Parameters
     ----------
     source
-        MCAP file, or a rosbag2 directory of one file.
+        MCAP file or rosbag2 directory; the files of a directory are joined.
     output
         File to make; one that exists is never overwritten. What is doubtful
         goes beside it, into `NAME.quarantine.mcap`.
     progress
-        Told bytes done, and in all.
+        Told bytes done, and in all, of each file.
 
     Raises
     ------
     BagError
         If nothing in the source is of MCAP, or the output cannot be made.
     """
-    file = _only_file(source)
+    bag = _only_bag(source)
     quarantine = output.with_suffix('.quarantine.mcap')
     for path in (output, quarantine):
         if path.exists():
             raise BagError(f'{str(path)!r} exists; choose another name or remove it')
-    packing = DamageList()
-    with opened(file, packing) as data:
-        learnt = Learnt()
-        learnt.learn_summary(data)
-        while True:
-            learnt.missed.clear()
-            damages = DamageList(list(packing.listed), packing.count)
-            salvage = _Salvage(
-                data,
-                learnt,
-                SalvagedBag(output, learnt),
-                SalvagedBag(quarantine, learnt),
-                damages,
-            )
-            try:
-                salvage.run(progress)
-                if learnt.found_later():
-                    continue  # messages came before their channel: once more, with what is known
-                if not salvage.records:
-                    raise BagError(
-                        f'{str(file)!r} holds no record of MCAP, nothing can be saved; '
-                        'give a .mcap file'
-                    )
-                salvage.sound.publish()
-                if salvage.doubtful.used:
-                    salvage.doubtful.publish()
-            finally:
-                salvage.sound.discard()
-                salvage.doubtful.discard()
-            return Recovery(
-                messages_recovered=salvage.sound.messages,
-                messages_crc_suspect=salvage.doubtful.messages,
-                bytes_read=len(data),
-                bytes_lost=salvage.lost,
-                damage=tuple(sorted(damages.listed, key=lambda damage: damage.offset)),
-                damage_count=damages.count,
-                output=output,
-                quarantine=quarantine if salvage.doubtful.used else None,
-            )
-
-
-def _only_file(source: Path) -> Path:
-    if source.is_file():
-        return source
-    files = [file for bag in locate(source) for file in bag.files]
-    if len(files) > 1:
-        raise BagError(
-            f'{str(source)!r} has {len(files)} files; recover each by itself: '
-            f'{", ".join(map(str, files))}'
+    learnt = [Learnt() for _ in bag.files]
+    while True:
+        salvage = _Salvage(SalvagedBag(output), SalvagedBag(quarantine), bag, progress)
+        try:
+            for file, known in zip(bag.files, learnt, strict=True):
+                known.missed.clear()
+                salvage.take(file, known)
+            if any(known.found_later() for known in learnt):
+                continue  # messages came before their channel: once more, with what is known
+            if not salvage.records:
+                raise BagError(
+                    f'{str(source)!r} holds no record of MCAP, nothing can be saved; '
+                    'give a .mcap file'
+                )
+            salvage.sound.publish()
+            if salvage.doubtful.used:
+                salvage.doubtful.publish()
+        finally:
+            salvage.sound.discard()
+            salvage.doubtful.discard()
+        return Recovery(
+            messages_recovered=salvage.sound.messages,
+            messages_crc_suspect=salvage.doubtful.messages,
+            bytes_read=salvage.size,
+            bytes_lost=salvage.lost,
+            damage=tuple(salvage.listed),
+            damage_count=salvage.damage_count,
+            output=output,
+            quarantine=quarantine if salvage.doubtful.used else None,
         )
-    return files[0]
+
+
+def _only_bag(source: Path) -> BagFiles:
+    bags = locate(source)
+    if len(bags) > 1:
+        raise BagError(
+            f'{str(source)!r} holds {len(bags)} bags; recover each by itself: '
+            f'{", ".join(bag.name for bag in bags)}'
+        )
+    return bags[0]
 
 
 class _Salvage:
-    """One pass over a file."""
+    """One pass over the files of a bag."""
 
     def __init__(
         self,
-        data: Buffer,
-        learnt: Learnt,
         sound: SalvagedBag,
         doubtful: SalvagedBag,
-        damages: DamageList,
+        bag: BagFiles,
+        progress: Callable[[int, int], None],
     ) -> None:
         self.sound = sound
         self.doubtful = doubtful
+        self.listed: list[Damage] = []
+        self.damage_count = 0
+        self.size = 0
         self.lost = 0
         self.records = 0
-        self._data = data
-        self._learnt = learnt
-        self._damages = damages
-        self._scanner = Scanner(set(learnt.channels))
+        self._bag = bag
+        self._progress = progress
+        for warning in bag.warnings:
+            self._note(DamageList([Damage(0, 'file', DamageKind.MISSING, warning)], 1))
 
-    def run(self, progress: Callable[[int, int], None]) -> None:
-        """Write what can be saved."""
-        data = self._data
+    def take(self, file: Path, learnt: Learnt) -> None:
+        """Write what can be saved of a file."""
+        damages = DamageList(file=file.name if len(self._bag.files) > 1 else '')
+        with opened(file, damages) as data:
+            self.size += len(data)
+            learnt.learn_summary(data)
+            self.sound.begin(learnt)
+            self.doubtful.begin(learnt)
+            self._learnt = learnt
+            self._damages = damages
+            self._scanner = Scanner(set(learnt.channels))
+            self._walk(data)
+            self.sound.declare()
+        self._note(damages)
+
+    def _note(self, damages: DamageList) -> None:
+        self.listed += sorted(damages.listed, key=lambda damage: damage.offset)
+        self.damage_count += damages.count
+
+    def _walk(self, data: Buffer) -> None:
         if data[: len(MAGIC)] != MAGIC:
             self._damages.add(0, 'magic', DamageKind.MISSING)
         for found in self._scanner.walk(data, 0, len(data)):
@@ -172,8 +188,8 @@ class _Salvage:
                 continue
             self.records += found.opcode != GARBAGE
             if found.opcode == Opcode.CHUNK:
-                progress(found.offset, len(data))
-                self._chunk(found)
+                self._progress(found.offset, len(data))
+                self._chunk(data, found)
                 continue
             if found.damage is not None:
                 self._damages.add(found.offset, found_name(data, found), found.damage)
@@ -185,26 +201,28 @@ class _Salvage:
         if read_footer(data) is None:
             self._damages.add(len(data), 'footer', DamageKind.MISSING)
 
-    def _chunk(self, chunk: Found) -> None:
-        unpacked = unpack_chunk_partly(self._data, chunk.start, chunk.end)
+    def _chunk(self, data: Buffer, chunk: Found) -> None:
+        unpacked = unpack_chunk_partly(data, chunk.start, chunk.end)
         kind = chunk.damage or unpacked.damage
         if kind is not None:
             self._damages.add(chunk.offset, 'chunk', kind)
-        self.lost += unpacked.unread
         trust = Trust.DOUBTFUL
         if unpacked.verified:
             trust = Trust.VERIFIED
         elif kind is None:
             trust = Trust.READ
         records = unpacked.records
+        used = 0
         for found in self._scanner.walk(records, 0, len(records), in_chunk=True):
-            whole = found.opcode != GARBAGE and found.damage in _WHOLE
             if found.damage is not None and trust is not Trust.DOUBTFUL:
                 # elsewhere it is what the damage of the chunk has made
                 self._damages.add(chunk.offset, found_name(records, found), found.damage)
-            if whole:
+            if found.opcode != GARBAGE and found.damage in _WHOLE:
+                used += found.end - found.offset
                 believed = trust if found.damage is None else Trust.DOUBTFUL
                 self._record(records, found, believed, chunk.offset)
+        packed = chunk.end - chunk.start - unpacked.unread
+        self.lost += unpacked.unread + packed * (len(records) - used) // max(len(records), 1)
 
     def _record(self, data: Buffer, found: Found, trust: Trust, offset: int) -> None:
         bag = self.doubtful if trust is Trust.DOUBTFUL else self.sound
@@ -215,13 +233,12 @@ class _Salvage:
                     if f'channel {number}' not in self._learnt.missed:
                         self._damages.add(offset, 'message', DamageKind.REFERENCE)
                     bag = self.doubtful
-                bag.write(
-                    number,
-                    bytes(data[found.start + MESSAGE_HEAD.size : found.end]),
-                    sequence=sequence,
-                    log_ns=log_ns,
-                    publish_ns=publish_ns,
-                )
+                payload = self._payload(data[found.start + MESSAGE_HEAD.size : found.end])
+                if payload is None:
+                    self._damages.add(offset, 'message', DamageKind.COMPRESSION)
+                    self.lost += found.end - found.offset
+                    return
+                bag.write(number, payload, sequence=sequence, log_ns=log_ns, publish_ns=publish_ns)
             case Opcode.SCHEMA | Opcode.CHANNEL:
                 if not self._learnt.add(found.read(data), trust):
                     self._damages.add(offset, name(found.opcode), DamageKind.DISAGREES)
@@ -236,3 +253,12 @@ class _Salvage:
                 bag.describe(found.read(data))
             case kind if kind not in KNOWN:
                 self.lost += found.end - found.offset
+
+    def _payload(self, payload: bytes) -> bytes | None:
+        """Unpack a message that is packed by itself; None if it is damaged."""
+        if not self._bag.message_compression:
+            return payload
+        try:
+            return unpack_zstd(payload, CHUNK_LIMIT_BYTES)
+        except UNPACKING_ERRORS:
+            return None

@@ -6,7 +6,7 @@ The bag that salvage writes: whole under its name, or not there at all.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -22,14 +22,12 @@ from shipdrag_ros.errors import BagError
 
 class SalvagedBag:
     """
-    Writes records of another file as they are, but for the numbers of their channels.
+    Writes records of other files as they are, but for the numbers of their channels.
 
     Parameters
     ----------
     path
         File to make.
-    learnt
-        Where channels and their schemas are known; it may grow meanwhile.
 
     Attributes
     ----------
@@ -41,19 +39,35 @@ class SalvagedBag:
         Whether anything was written.
     """
 
-    def __init__(self, path: Path, learnt: Learnt) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
         self.profile = 'ros2'
         self.messages = 0
-        self._learnt = learnt
+        self._learnt = Learnt()
         self._file: IO[bytes] | None = None
         self._writer: Writer | None = None
         self._channels: dict[int, tuple[Channel | None, int]] = {}
-        self._schemas: dict[int, int] = {}
+        self._registered: dict[tuple[Hashable, ...], int] = {}
 
     @property
     def used(self) -> bool:
         return self._writer is not None
+
+    def begin(self, learnt: Learnt) -> None:
+        """
+        Begin with a file whose channels are known there; it may grow meanwhile.
+        """
+        self._learnt = learnt
+        self._channels = {}
+
+    def declare(self) -> None:
+        """
+        Write the channels of the file at hand that have no message.
+        """
+        with self._errors_told():
+            for number, channel in self._learnt.channels.items():
+                if number not in self._channels:
+                    self._register(number, channel)
 
     def write(
         self, number: int, payload: bytes, *, sequence: int, log_ns: int, publish_ns: int
@@ -104,9 +118,6 @@ class SalvagedBag:
         with self._errors_told():
             writer = self._open()
             assert self._file is not None
-            for number in self._learnt.channels:  # topics without a message are told as well
-                if number not in self._channels:
-                    self._register(number, self._learnt.channels[number])
             writer.finish()
             self._file.flush()
             os.fsync(self._file.fileno())
@@ -138,24 +149,23 @@ class SalvagedBag:
         writer = self._open()
         if channel is None:
             return int(writer.register_channel(f'/unknown_channel_{number}', '', 0, {}))
-        schema_id = 0
-        if channel.schema_id:
-            schema_id = self._schema(writer, channel.schema_id)
-        return int(
-            writer.register_channel(
+        schema_id = self._schema(channel.schema_id)
+        metadata = tuple(sorted(channel.metadata.items()))
+        key = channel.topic, channel.message_encoding, schema_id, metadata
+        if key not in self._registered:
+            self._registered[key] = writer.register_channel(
                 channel.topic, channel.message_encoding, schema_id, channel.metadata
             )
-        )
+        return self._registered[key]
 
-    def _schema(self, writer: Writer, number: int) -> int:
-        schema = self._learnt.schema(number)
+    def _schema(self, number: int) -> int:
+        schema = self._learnt.schema(number) if number else None
         if schema is None:
             return 0  # a channel without one
-        if number not in self._schemas:
-            self._schemas[number] = writer.register_schema(
-                schema.name, schema.encoding, schema.data
-            )
-        return self._schemas[number]
+        key = schema.name, schema.encoding, schema.data
+        if key not in self._registered:
+            self._registered[key] = self._open().register_schema(*key)
+        return self._registered[key]
 
     @contextmanager
     def _errors_told(self) -> Iterator[None]:

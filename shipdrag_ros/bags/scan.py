@@ -235,7 +235,8 @@ class Scanner:
             if _one_bit(after - start ^ length) and fills(data, opcode, start, after):
                 return Found(opcode, at, start, after, DamageKind.LENGTH)
             if self._is_chunk(data, at, end):
-                return Found(opcode, at, start, after, DamageKind.TRUNCATED)
+                kind = _end_or(DamageKind.LENGTH, length < _POSSIBLE_BYTES)
+                return Found(opcode, at, start, after, kind)
             stop = fields_end(data, opcode, start, min(start + length, end))
             if opcode != Opcode.MESSAGE and stop is not None and start < stop <= after:
                 # the record ends where its fields do; what follows is looked at next

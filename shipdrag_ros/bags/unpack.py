@@ -153,21 +153,21 @@ def _feed(
 
 
 @contextmanager
-def opened(path: Path, damages: DamageList) -> Iterator[mmap]:
+def opened(path: Path, damages: DamageList) -> Iterator[Buffer]:
     """
-    Open a file that may be packed and damaged.
+    Open a file that may be packed, damaged or empty.
 
     Parameters
     ----------
     path
         `.mcap`, or `.mcap.zstd` as rosbag2 compresses files.
     damages
-        Where a damage of the packing is noted.
+        Where it is noted that it is empty, or its packing damaged.
 
     Raises
     ------
     BagError
-        If it cannot be read or is empty.
+        If it cannot be read.
     """
     try:
         with path.open('rb') as file, TemporaryFile(prefix='shipdrag_') as unpacked:
@@ -176,7 +176,9 @@ def opened(path: Path, damages: DamageList) -> Iterator[mmap]:
                 _unpack_file(file, unpacked, path.stat().st_size, damages.add)
                 source = unpacked
             if source.seek(0, 2) == 0:
-                raise BagError(f'{str(path)!r} is empty; nothing was recorded')
+                damages.add(0, 'file', DamageKind.TRUNCATED, 'it is empty')
+                yield b''
+                return
             data = mmap(source.fileno(), 0, access=ACCESS_READ)
     except OSError as error:
         raise BagError(f'{str(path)!r} cannot be read: {error.strerror}') from error

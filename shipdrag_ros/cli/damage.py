@@ -20,7 +20,12 @@ def damage_table(output: Output, damages: Sequence[Damage], count: int) -> None:
         Table(
             ('offset', 'record', 'kind', 'what'),
             tuple(
-                (f'{each.offset}', each.record, each.kind.value, each.detail or '-')
+                (
+                    f'{each.offset}',
+                    each.record,
+                    each.kind.value,
+                    ': '.join(filter(None, (each.file, each.detail))) or '-',
+                )
                 for each in damages[:_SHOWN]
             ),
         )

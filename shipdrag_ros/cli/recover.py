@@ -23,7 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'go into a bag of their own beside it, NAME.quarantine.mcap. The source is not touched.'
     )
     parser.add_argument(
-        'source', type=bag, metavar='SOURCE', help='MCAP file, or rosbag2 directory of one file'
+        'source',
+        type=bag,
+        metavar='SOURCE',
+        help='MCAP file, or rosbag2 directory, whose files are joined',
     )
     parser.add_argument(
         '-o',
@@ -71,6 +74,7 @@ def _document(result: Recovery) -> dict[str, Any]:
         'bytes_lost': result.bytes_lost,
         'damage': [
             {'offset': each.offset, 'record': each.record, 'kind': each.kind.value}
+            | ({'file': each.file} if each.file else {})
             for each in result.damage
         ],
         'output': str(result.output),
