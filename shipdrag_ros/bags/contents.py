@@ -12,6 +12,7 @@ import zlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,11 +23,13 @@ from shipdrag_ros.bags.message_index import CHANNELS, index_messages
 from shipdrag_ros.bags.records import (
     FOOTER_BYTES,
     MAGIC,
+    TIME_LIMIT_NS,
     Buffer,
     DamagedRecord,
     Place,
     message_head,
     parse,
+    release,
     unpack_chunk,
     walk,
 )
@@ -149,9 +152,14 @@ def read_index(data: Buffer) -> Contents | None:
             if place.opcode != opcode:
                 raise DamagedRecord(f'record at byte {place.offset} is not what the index says')
             contents.add(parse(data, place))
-    for chunk in found.get(Opcode.CHUNK_INDEX, []):
+    end = 0
+    for chunk in sorted(found.get(Opcode.CHUNK_INDEX, []), key=attrgetter('chunk_start_offset')):
         start = chunk.chunk_start_offset
-        end = _record_at(data, start, footer_at).end
+        place = _record_at(data, start, footer_at)
+        late = max(chunk.message_start_time, chunk.message_end_time) >= TIME_LIMIT_NS
+        if place.opcode != Opcode.CHUNK or start < end or late:
+            raise DamagedRecord(f'record at byte {start} is not what the index says')
+        end = place.end
         contents.compressions.add(chunk.compression)
         contents.segments.append(
             Segment(
@@ -250,10 +258,10 @@ def _scan_chunk(data: Buffer, chunk: Place, contents: Contents) -> None:
     compression, unpacked = unpack_chunk(data, chunk)
     contents.compressions.add(compression)
     messages, others, damage = index_messages([unpacked], [chunk.offset], _EVERY_CHANNEL)
-    for offset in others:
-        place = next(walk(unpacked, offset, len(unpacked)))
-        if place.opcode in _DECLARATIONS:
-            contents.add(parse(unpacked, place))
+    kinds = np.frombuffer(unpacked, np.uint8)[others]
+    for offset in others[np.isin(kinds, list(_DECLARATIONS))]:
+        place = next(walk(unpacked, int(offset), len(unpacked)))
+        contents.add(parse(unpacked, place))
     counts = np.bincount(messages.channel)
     channels = np.flatnonzero(counts)
     contents.counts.update(dict(zip(channels.tolist(), counts[channels].tolist(), strict=True)))
@@ -283,6 +291,7 @@ class _LooseMessages:
         self._end = place.end
         if self._end - self._offset > _SEGMENT_BYTES:
             self.close()
+            release(data)
 
     def close(self) -> None:
         if self._times:

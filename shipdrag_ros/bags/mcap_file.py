@@ -23,13 +23,24 @@ from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.contents import Contents, Segment, read_index, scan
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
-from shipdrag_ros.bags.records import MAGIC, DamagedRecord, unpack_chunk, walk
+from shipdrag_ros.bags.records import (
+    CHUNK_LIMIT_BYTES,
+    MAGIC,
+    DamagedRecord,
+    release,
+    unpack_chunk,
+    walk,
+)
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import UInt8
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
 # smaller chunks are read together: what a chunk costs beside its bytes is then small
 _WORTHWHILE_BYTES = 1 << 18
+# messages held back because earlier ones may follow in the file
+_WAITING_LIMIT_BYTES = 1 << 29
+# of a packed file, by its size; logs of ships are packed to a tenth or so
+_FILE_RATIO = 4096
 _FOREIGN = {
     b'SQLite format 3\0': 'is a bag in sqlite3 storage',
     b'#ROSBAG V2.0': 'is a bag of ROS 1',
@@ -100,7 +111,8 @@ class McapFile:
         waiting: Messages | None = None
         with self._data() as data:
             while segments:
-                loaded = self._load(data, segments, table)
+                # as much again as waits, so that what overlaps is not sorted over and over
+                loaded = self._load(data, segments, table, len(waiting.data) if waiting else 0)
                 found += len(loaded)
                 if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
                     loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
@@ -113,18 +125,26 @@ class McapFile:
                     ready = int(np.searchsorted(loaded.log_ns, segments[0].start_ns))
                 if ready < len(loaded):
                     waiting = loaded[ready:].packed()
+                    if len(waiting.data) > _WAITING_LIMIT_BYTES:
+                        raise BagError(
+                            f'{str(self.path)!r}: more than {_WAITING_LIMIT_BYTES} bytes of '
+                            'messages are out of order; write it anew in order of arrival'
+                        )
                 if ready:
                     yield loaded[:ready]
         expected = sum(self.contents.counts[channel] for channel in wanted)
         if len(in_time) == len(self.contents.segments) and found != expected:
             self._warn(f'{found} messages are there where the index tells of {expected}')
 
-    def _load(self, data: mmap, segments: deque[Segment], wanted: UInt8) -> Messages:
+    def _load(
+        self, data: mmap, segments: deque[Segment], wanted: UInt8, least_bytes: int
+    ) -> Messages:
         """Take segments off the queue, one or as many small ones as are worth it."""
+        least_bytes = max(least_bytes, _WORTHWHILE_BYTES)
         unpacked: list[bytes] = []
         offsets: list[int] = []
         size = 0
-        while segments and size < _WORTHWHILE_BYTES:
+        while segments and size < least_bytes:
             segment = segments.popleft()
             try:
                 records = _records(data, segment)
@@ -182,14 +202,20 @@ def _records(data: mmap, segment: Segment) -> bytes:
     first = next(walk(data, segment.offset, segment.end))
     if first.opcode == Opcode.CHUNK:
         return unpack_chunk(data, first)[1]
-    return data[segment.offset : segment.end]
+    records = data[segment.offset : segment.end]
+    release(data)
+    return records
 
 
 def _unpack(path: Path) -> IO[bytes]:
     unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
     try:
         with path.open('rb') as packed:
-            zstandard.ZstdDecompressor().copy_stream(packed, unpacked)
+            limit = max(CHUNK_LIMIT_BYTES, path.stat().st_size * _FILE_RATIO)
+            for piece in zstandard.ZstdDecompressor().read_to_iter(packed):
+                unpacked.write(piece)
+                if unpacked.tell() > limit:
+                    raise BagError(f'{str(path)!r} unpacks to more than {limit} bytes')
     except OSError as error:
         raise BagError(f'{str(path)!r} cannot be unpacked: {error.strerror}') from error
     except zstandard.ZstdError as error:

@@ -122,14 +122,14 @@ class Indexed(NamedTuple):
     ----------
     messages
         In the order of the segments, then of place.
-    others
+    others : (m,) int64
         Offsets of records that are no messages, in the buffer.
     damage
         A sentence for each segment that is not whole.
     """
 
     messages: Messages
-    others: list[int]
+    others: Int64
     damage: list[str]
 
 
@@ -183,7 +183,7 @@ def index_messages(
         for (kind, place), offset in zip(damage.tolist(), offsets, strict=True)
         if kind != _WHOLE
     ]
-    return Indexed(found[:n], others[:m].tolist(), told)
+    return Indexed(found[:n], others[:m], told)
 
 
 @njit

@@ -12,7 +12,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from io import BytesIO
-from mmap import mmap
+from mmap import MADV_DONTNEED, mmap
 from typing import Any, NamedTuple
 
 import lz4.frame
@@ -164,7 +164,9 @@ def unpack_chunk(data: Buffer, place: Place) -> tuple[str, bytes]:
     """
     try:
         size, stated, compression, at, length = chunk_fields(data, place.start, place.end)
-        records = decompress(compression, data[at : min(at + length, place.end)], size)
+        packed = data[at : min(at + length, place.end)]
+        release(data)
+        records = decompress(compression, packed, size)
     except UNPACKING_ERRORS as error:
         raise DamagedRecord(f'the chunk at byte {place.offset} is damaged: {error}') from error
     if stated and zlib.crc32(records) != stated:
@@ -220,6 +222,16 @@ def decompress(compression: str, packed: bytes, size: int) -> bytes:
     if len(records) != size:
         raise ValueError('sizes disagree')
     return records
+
+
+def release(data: Buffer) -> None:
+    """
+    Give back the memory of what was read of a mapped file.
+
+    The system would do so when it is short, but until then it counts as ours.
+    """
+    if isinstance(data, mmap):
+        data.madvise(MADV_DONTNEED)
 
 
 def message_head(data: Buffer, place: Place) -> tuple[int, int]:
