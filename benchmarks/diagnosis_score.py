@@ -202,7 +202,7 @@ def _cell(value: scoring.Share | float) -> str:
     return '-' if value != value else f'{value:.3g}'
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """
     Ask, keep, reveal, and print.
     """
@@ -213,7 +213,7 @@ def main() -> None:
     parser.add_argument('--count', type=int, help='how many cases; all of them by default')
     parser.add_argument('--processes', type=int, default=2)
     parser.add_argument('--out', type=Path, help='answers, one line of JSON a case')
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     last = cases.count() if options.count is None else options.first + options.count
     numbers = range(options.first, min(last, cases.count()))
     out = options.out or OUT / f'diagnosis_{options.by.replace(":", "_")}.jsonl'

@@ -278,6 +278,9 @@ class _Oracle:
             if (shoal := run.shoal) is not None:
                 values.append(shoal[0])
                 variances.append(shoal[1])
+            if (factor := run.radar_factor) is not None:
+                values.append(factor[0])
+                variances.append(factor[1])
         return np.array(values), np.array(variances)
 
     def _context_predicted(self, effects: tuple[Effect, ...]) -> Array:
@@ -291,6 +294,8 @@ class _Oracle:
                 # any depth may be read where the water does not matter
                 deep = min(shoal[0], 0.12)
                 values.append(run.known.hull.draught_m / depths[0] if depths else deep)
+            if run.radar_factor is not None:
+                values.append(_radar_factor(run, effects))
         return np.array(values)
 
     def _generic(self, nothing: _Fit, channel: str) -> float:
@@ -327,6 +332,13 @@ class _Oracle:
         first = len(self.runs[0].measured)
         residual = fit.residual[first : first + len(self.runs[1].measured)]
         return float(residual @ residual) / len(residual)
+
+
+def _radar_factor(run: SeenRun, effects: tuple[Effect, ...]) -> float:
+    leg, place = run.leg(run.speed_m_s), np.array([[1.0, 0.0]])
+    for effect in effects:
+        place = effect.radar(leg, np.zeros(1), place)
+    return float(place[0, 0])
 
 
 def _middle(size: Size) -> float:

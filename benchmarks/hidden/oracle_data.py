@@ -26,6 +26,7 @@ _START_SD_M = 1000.0  # of the position that is counted from
 _SLIP_SD = 0.02  # of the shaft speed over that under power
 _BEARING_SD_RAD = 0.005  # of the compass
 _STEP_S = 4.0  # of the oracle's simulations
+_RADAR_SD = 0.003  # of its scale, beside another speed over ground
 _DEPTH_SD = 0.01  # of draught over depth
 
 
@@ -253,6 +254,20 @@ class SeenRun:
             return None
         depth = float(np.mean(self._binned('depth').value[:, 0]))
         return self.known.hull.draught_m / depth, _DEPTH_SD**2
+
+    @cached_property
+    def radar_factor(self) -> tuple[float, float] | None:
+        """Way by radar over that by another speed over ground, and its variance."""
+        if 'speed_over_ground' not in self._series:
+            return None
+        ground = self._binned('speed_over_ground')
+        place = self.place
+        steps = np.hypot(*np.diff(place.value[place.middle_s < 0.0], axis=0).T)
+        middles = place.middle_s[place.middle_s < 0.0]
+        between = np.interp(
+            0.5 * (middles[1:] + middles[:-1]), ground.middle_s, ground.value[:, 0]
+        )
+        return float(np.sum(steps) / np.sum(between * np.diff(middles))), _RADAR_SD**2
 
     def _binned(self, name: str) -> Means:
         series = self._series[name]

@@ -113,7 +113,7 @@ def _recommendation(item: str | Mapping[str, Any]) -> Recommendation:
     text = item if isinstance(item, str) else ' '.join(map(str, item.values()))
     probability = None if isinstance(item, str) else item.get('probability')
     for words, test in _WORDS:
-        if any(word in text.lower() for word in words):
+        if any(word in text.lower().replace('_', ' ') for word in words):
             return Recommendation(test, probability)
     return Recommendation(None, probability)
 
