@@ -47,12 +47,11 @@ def main() -> None:
     print(f'{"columns":24s}{"ms a column":>12s}{"mm/s":>10s}{"mm":>10s}')
     for name, actions in groups.items():
         speed, position = errors(ship, actions)
-        print(f'{name:24s}{cost_ms(ship, actions):12.3f}{speed:10.4f}{position:10.3f}')
+        print(f'{name:24s}{cost_ms(ship, actions):12.3f}{speed:10.1e}{position:10.1e}')
     begin = time.process_time()
     simulate(ship, SCENARIO)
-    print(
-        f'one simulation by `simulate`, for comparison: {1e3 * (time.process_time() - begin):.1f} ms'
-    )
+    alone = 1e3 * (time.process_time() - begin)
+    print(f'one simulation by `simulate`, for comparison: {alone:.1f} ms')
 
 
 def cost_ms(ship: Ship, actions: Sequence[Action]) -> float:

@@ -34,10 +34,10 @@ from shipdrag_ros.simulation.terms import (
 )
 
 _FINE_RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left
-_STEPS_A_RUN_DOWN = 8
-_STEPS_A_SLOW_DOWN = 80  # of v / r
-_STEP_S = 5.0
-_LOG_STEP_S = 0.25  # at which the faults of a log that have memory are followed
+_STEPS_A_RUN_DOWN = 4
+_STEPS_A_SLOW_DOWN = 40  # of v / r
+_STEP_S = 10.0
+_LOG_STEP_S = 0.5  # at which a log that lags is followed
 
 
 @dataclass(frozen=True)
@@ -166,10 +166,9 @@ def simulate_columns(
     )
     for i, action in enumerate(actions):
         if action.log_lag_s or action.log_late_s:
-            steps = int(np.ceil(scenario.length_s / _LOG_STEP_S))
-            fine = np.linspace(0.0, scenario.length_s, steps + 1)
-            followed = prepared.paths(fine, slice(i, i + 1))[0, :, 0]
-            log[i] = log_reading(action, fine, followed, time)
+            seen = _log_times_s(action, time, scenario.length_s)
+            followed = prepared.paths(seen, slice(i, i + 1))[0, :, 0]
+            log[i] = log_reading(action, seen, followed, time)
     radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
     over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
     return Columns(
@@ -181,6 +180,14 @@ def simulate_columns(
         radar[:, :, None] * position,
         radar * over_ground,
     )
+
+
+def _log_times_s(action: Action, time_s: Float64, length_s: float) -> Float64:
+    """Return when a log with memory must be followed to be read at some times."""
+    if action.log_lag_s > 0.0:
+        return np.linspace(0.0, length_s, int(np.ceil(length_s / _LOG_STEP_S)) + 1)
+    late: Float64 = np.clip(time_s - action.log_late_s, 0.0, length_s)
+    return late
 
 
 def _prepare(

@@ -294,6 +294,8 @@ class Effect:
         What is computed, and where it comes from.
     struck_out_by
         Context inputs that measure it, so that it is known not to be missing.
+    formula_sd
+        How far what the effect does may depart from its formula, relative.
     look_alikes
         Effects of nearly the same trace, and what decides from each; nothing:
         no record can.
@@ -311,6 +313,7 @@ class Effect:
     act: Callable[..., Action]
     struck_out_by: tuple[str, ...] = ()
     look_alikes: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
+    formula_sd: float = 0.0
     needs: tuple[str, ...] = ()
 
     def missing(self, ship: Ship) -> tuple[str, ...]:

@@ -120,6 +120,55 @@ def test_the_seed_repeats_the_noise_and_another_does_not(simulate) -> None:
     assert np.any(first != other)
 
 
+def test_effects_act_and_the_truth_says_which_but_the_ship_does_not(
+    simulate, ship_file: Path
+) -> None:
+    quiet = ('--noise', '0')
+    clean = simulate(*quiet)
+    bag = simulate(*quiet, '--effect', 'fouling=0.5', '--effect', 'log_scale=0.1')
+    assert bag.settings['effects'] == [
+        {'name': 'fouling', 'scope': 'hull', 'parameters': {'friction_factor': 0.5}},
+        {'name': 'log_scale', 'scope': 'sensor', 'parameters': {'factor': 0.1}},
+    ]
+    assert 'not wind, waves, current' in str(bag.settings['resistance'])
+    assert Ship.from_yaml(bag.attachments['ship.yaml'], subject='bag') == Ship.load(ship_file)
+    assert np.all(bag.truth.resistance_m_s2[1:] > 1.2 * clean.truth.resistance_m_s2[1:])
+    log, true = (one.of(Channel.SPEED_THROUGH_WATER).value[:, 0] for one in (bag, clean))
+    np.testing.assert_allclose(log[:20], 1.1 * true[:20], rtol=1e-6)
+    assert bag.of(Channel.POSITION).value[-1, 0] < clean.of(Channel.POSITION).value[-1, 0] - 1.0
+
+
+def test_an_effect_of_the_ship_file_is_in_ship_and_truth(ship_file: Path, tmp_path: Path) -> None:
+    stated = 'effects: [{name: current, parameters: {along_track_m_s: {value: 1.0, sd: 0.1}}}]'
+    path = tmp_path / 'ship.yaml'
+    path.write_text(ship_file.read_text().replace('effects: []', stated))
+    line = ['simulate', '--ship', str(path), '-o', str(tmp_path / 'a.mcap'), *SHORT]
+    assert main([*line, '--speed', '6', '--noise', '0']) == 0
+    bag = read(tmp_path / 'a.mcap')
+    assert [effect['name'] for effect in bag.settings['effects']] == ['current']
+    assert Ship.from_yaml(bag.attachments['ship.yaml'], subject='').effects[0].name == 'current'
+    np.testing.assert_allclose(bag.of(Channel.POSITION).value[20, 0], 7.0 * 20.0, rtol=1e-6)
+
+
+def test_another_run_of_the_day_has_the_same_current(simulate) -> None:
+    line = ('--noise', '0', '--speed', '6', '--effect', 'current=1', '--heading', str(np.pi))
+    own, of_first = simulate(*line), simulate(*line, '--first-heading', '0')
+    np.testing.assert_allclose(own.of(Channel.POSITION).value[20, 0], -7.0 * 20.0, rtol=1e-6)
+    np.testing.assert_allclose(of_first.of(Channel.POSITION).value[20, 0], -5.0 * 20.0, rtol=1e-6)
+    assert (own.settings['first_heading_rad'], of_first.settings['first_heading_rad']) == (
+        pytest.approx(np.pi),
+        0.0,
+    )
+
+
+def test_inputs_say_which_sensors_see_it(simulate) -> None:
+    bag = simulate(
+        '--noise', '0', '--inputs', 'wind_apparent,depth', '--effect', 'wind=4', '--speed', '6'
+    )
+    assert set(bag.block.channel.tolist()) == {Channel.WIND_APPARENT, Channel.DEPTH}
+    np.testing.assert_allclose(bag.of(Channel.WIND_APPARENT).value[:20, 0], -10.0, rtol=1e-6)
+
+
 def test_the_json_says_what_was_made(
     ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -140,6 +189,12 @@ def test_the_json_says_what_was_made(
     ('arguments', 'said'),
     [
         (('--speed', '30'), 'ERROR: '),
+        (('--effect', 'barnacles=1'), "ERROR: effect 'barnacles' is not known; known are added_"),
+        (('--effect', 'current=1,up=2'), "ERROR: effect 'current=1,up=2': parameter 'up' is not"),
+        (
+            ('--effect', 'current=9'),
+            'ERROR: effects: current: along_track_m_s is 9.0, expected -5',
+        ),
         (('--ship', 'no such.yaml'), 'ERROR: no such.yaml: 1 problem(s)'),
         (('-o', '/no/such/folder/a.mcap'), "ERROR: '/no/such/folder/a.mcap' cannot be made"),
     ],
@@ -178,7 +233,14 @@ def test_an_existing_bag_is_kept(
 
 @pytest.mark.parametrize(
     'arguments',
-    [('--seed', '-1'), ('--rate', '0'), ('--noise', '-1'), ('--heading', 'inf'), ('--speed', '0')],
+    [
+        ('--seed', '-1'),
+        ('--inputs', 'sonar'),
+        ('--rate', '0'),
+        ('--noise', '-1'),
+        ('--heading', 'inf'),
+        ('--speed', '0'),
+    ],
 )
 def test_an_impossible_value_is_wrong_usage(
     ship_file: Path, tmp_path: Path, arguments: tuple[str, ...]

@@ -26,6 +26,7 @@ EFFECT = Effect(
     ),
     formula='(1 + n_r + n_r_change) du/dt = -r',
     source='S1 (1)',
+    formula_sd=0.05,
     act=_act,
     look_alikes={'displacement': ()},
 )

@@ -28,6 +28,7 @@ EFFECT = Effect(
     formula='c(t) = c + change t / T from the stop on; the ship lags behind by her inertia: '
     '(1 + n_r) du/dt = ... - dc/dt',
     source='kinematics; Newton',
+    formula_sd=0.3,
     act=_act,
     look_alikes={
         'log_scale': (Measure.RECIPROCAL_RUN,),

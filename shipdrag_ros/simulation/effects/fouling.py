@@ -31,6 +31,7 @@ EFFECT = Effect(
     ),
     formula='0.5 rho S v^2 (1 + k) C_F times friction_factor, C_F of the ITTC-57 line',
     source='ITTC-57; a baseline that is a table has k = 0.2',
+    formula_sd=0.05,
     act=_act,
     look_alikes={
         'locked_propeller': (Measure.SHAFT, Measure.FREE_PROPELLER, Measure.CLEAN_HULL),

@@ -34,6 +34,7 @@ EFFECT = Effect(
     ),
     formula='0.5 rho (pi/4) D^2 C v^2',
     source='four-quadrant open-water data of B4-70 at rest',
+    formula_sd=0.1,
     act=_act,
     struck_out_by=('shaft',),
     look_alikes={

@@ -26,6 +26,7 @@ EFFECT = Effect(
     ),
     formula='lag dy/dt = u - y',
     source='definition',
+    formula_sd=0.1,
     act=_act,
     look_alikes={'time_offset': (Measure.FAST_CHANGE,)},
 )

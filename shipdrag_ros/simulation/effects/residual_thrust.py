@@ -35,6 +35,7 @@ EFFECT = Effect(
     ),
     formula='T = T0 [(1 - fraction) exp(-t/run_down) + fraction exp(-t/decay)], shaft speed alike',
     source='definition',
+    formula_sd=0.2,
     act=_act,
     struck_out_by=('shaft',),
     look_alikes={

@@ -90,6 +90,7 @@ EFFECT = Effect(
     'sinkage 1.46 V/L^2 [Fr_h^2 / sqrt(1 - Fr_h^2)] less that at h = 0.3 L, at most 5 %; '
     'n_r grows by [3.77 + 1.14 B/T - 0.233 L/T - 3.43 C_B] / (h/T - 1)^1.3 of itself, if at all',
     source='Raven (2016), ITTC 7.5-04-01-01.1, for T/h below 0.5; added mass: Sheng (1981)',
+    formula_sd=0.15,
     act=_act,
     struck_out_by=('depth',),
     look_alikes={

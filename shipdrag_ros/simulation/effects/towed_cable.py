@@ -40,6 +40,7 @@ EFFECT = Effect(
     ),
     formula='0.5 rho C0 l d v^2',
     source='S2: R0 in the self-similar region',
+    formula_sd=0.05,
     act=_act,
     look_alikes={
         'added_mass': (Measure.WITHOUT_CABLE,),

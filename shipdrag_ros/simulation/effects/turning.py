@@ -79,6 +79,7 @@ EFFECT = Effect(
     ),
     formula='0.5 rho drag_area v^2 from start to start + duration, the heading turning evenly',
     source='definition',
+    formula_sd=0.3,
     act=_act,
     struck_out_by=('heading', 'rudder'),
     look_alikes={

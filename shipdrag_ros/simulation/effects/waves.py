@@ -59,6 +59,7 @@ EFFECT = Effect(
     'ahead: as the square of the frequency of encounter, waves half as long as the ship',
     source='ITTC 7.5-04-01-01.1 STAWAVE-1 for the size; the speed dependence agrees to first '
     'order with Faltinsen et al. (1980), 1 + 2 omega u / g',
+    formula_sd=0.3,
     act=_act,
     look_alikes={
         'fouling': (Measure.RECIPROCAL_RUN,),

@@ -36,6 +36,7 @@ EFFECT = Effect(
     formula='air drag 0.5 rho_air A C_X |W| W_x, W the wind relative to the ship, W_x its '
     'component from ahead, less the still-air drag of the baseline',
     source='C_X(angle) = C_X(0) cos(angle), the simplest of the forms that Blendermann fits',
+    formula_sd=0.15,
     act=_act,
     struck_out_by=('wind_apparent',),
     look_alikes={
