@@ -15,6 +15,7 @@ import numpy as np
 
 from shipdrag_ros.samples import Block, Channel, Float64, Int64
 
+_PLANE = ('position', 'wind_apparent')  # inputs of two columns
 # WGS84
 _SEMI_MAJOR_M = 6378137.0
 _ECCENTRICITY_2 = 6.69437999014e-3
@@ -29,7 +30,7 @@ class Series:
     ----------
     time_ns : (n,) int64
         Time of measurement, strictly ascending [ns since the epoch].
-    value : (n,), for a position (n, 2)
+    value : (n,), for a position or wind (n, 2)
     variance
         Of each value, in its unit squared; NaN where unknown.
     """
@@ -59,6 +60,10 @@ class Window:
         Yaw as sent [rad].
     shaft
         Rate of turn [rad/s].
+    wind_apparent
+        (n, 2): of the air relative to the ship, forward and to port [m/s].
+    depth
+        Of the water [m].
     notes
         What was left out, a sentence each.
     before
@@ -78,6 +83,8 @@ class Window:
     position: Series
     heading: Series
     shaft: Series
+    wind_apparent: Series
+    depth: Series
     notes: tuple[str, ...] = ()
     before: Window | None = None
 
@@ -118,7 +125,7 @@ class Window:
             time_ns = block.stamp_ns[rows]
             if np.any(time_ns[1:] <= time_ns[:-1]):
                 raise ValueError(f'{channel.name}: the stamps do not ascend strictly')
-            columns = 2 if channel.input == 'position' else 1
+            columns = 2 if channel.input in _PLANE else 1
             value, variance = block.value[rows, :columns], block.variance[rows, :columns]
             if columns == 1:
                 value, variance = value.reshape(-1), variance.reshape(-1)
@@ -140,6 +147,8 @@ class Window:
             _local_plane(degrees, degrees.value[0]) if in_degrees else metres,
             series(Channel.HEADING),
             series(Channel.SHAFT),
+            series(Channel.WIND_APPARENT),
+            series(Channel.DEPTH),
             notes,
         )
         if before_ns is None or before_ns >= start_ns:
@@ -156,6 +165,8 @@ class Window:
             metres_before,
             series(Channel.HEADING),
             series(Channel.SHAFT),
+            series(Channel.WIND_APPARENT),
+            series(Channel.DEPTH),
         )
         return replace(window, before=before)
 

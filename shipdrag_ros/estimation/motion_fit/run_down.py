@@ -12,6 +12,10 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
 _BAND = (0.08, 0.92)  # of the fall of the shaft speed from which its decay is found
+_FALLEN = 0.8  # of the steady shaft speed: at more the engine was not stopped
+_EARLIEST_S = 300.0  # before the onset as found
+_SOON = (5.0, 10.0)  # after the fall, in half-lives
+_ROUNDS = 3
 _LEAST_SD = 0.01  # of the run-down, relative: no shaft falls exactly so
 ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the fit finds it
 
@@ -81,6 +85,42 @@ class RunDown:
         )
 
 
+def _kept_up(time_s: Float64, shaft: Float64, high: float, low: float) -> Float64:
+    """
+    Return the shaft speed that the water keeps up, as a line from the fall on.
+
+    A propeller that the water turns slows down with the ship; that is not the
+    run-down of the engine.
+
+    Parameters
+    ----------
+    time_s, shaft : (n,)
+    high, low
+        Before the stop, and a first guess.
+
+    Returns
+    -------
+    (n,)
+    """
+    kept = np.full(len(time_s), low)
+    near = time_s > -_EARLIEST_S
+    for _ in range(_ROUNDS):
+        half = np.flatnonzero(near & (shaft < 0.5 * (high + kept)))
+        if len(half) == 0:
+            break
+        full = np.flatnonzero(shaft[: half[0]] > 0.95 * high + 0.05 * kept[: half[0]])
+        if len(full) == 0:
+            break
+        after = (time_s - time_s[half[0]]) / (time_s[half[0]] - time_s[full[-1]])
+        soon = (after > _SOON[0]) & (after < _SOON[1])
+        if soon.sum() < 3:
+            break
+        slope, level = np.polyfit(after[soon], shaft[soon], 1)
+        top = _FALLEN * high
+        kept = np.clip(level + min(slope, 0.0) * np.clip(after, 0.0, _SOON[1]), 0.0, top)
+    return kept
+
+
 def _from_shaft(window: Window) -> RunDown | None:
     """Fit an exponential fall to the shaft speed; None if it shows none."""
     if window.before is None:
@@ -90,15 +130,16 @@ def _from_shaft(window: Window) -> RunDown | None:
     steady = window.before.shaft.value
     if len(steady) < 3 or len(window.shaft) < 3:
         return None
+    time_s = (time_ns - window.start_ns) * 1e-9
     high = float(np.median(np.abs(steady)))
     low = float(np.median(np.abs(window.shaft.value)))
-    if not low < 0.7 * high:
+    if not low < _FALLEN * high:
         return None
+    kept = _kept_up(time_s, shaft, high, low)
     noise = float(np.median(np.abs(np.abs(steady) - high))) * 1.4826 / (high - low)
-    fall = (shaft - low) / (high - low)
-    time_s = (time_ns - window.start_ns) * 1e-9
+    fall = (shaft - kept) / (high - kept)
     # the last stay at full speed ends where the fall begins
-    below = np.flatnonzero((fall < 0.5) & (time_s > -300.0))
+    below = np.flatnonzero((fall < 0.5) & (time_s > -_EARLIEST_S))
     if len(below) == 0 or below[0] == 0:
         return None
     middle = int(below[0])
