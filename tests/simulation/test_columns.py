@@ -104,6 +104,22 @@ def test_readings_are_those_of_sensors(name):
     np.testing.assert_allclose(columns.radar_speed_m_s[0], speed[:, 0], rtol=0, atol=1e-8)
 
 
+@settings(max_examples=20, deadline=None)
+@given(
+    name=st.sampled_from(['fouling', 'locked_propeller', 'towed_cable', 'windmilling_propeller']),
+    size=st.floats(0.05, 1.0),
+)
+def test_more_drag_makes_a_slower_ship(name, size):
+    rest = [quantity.default for quantity in LIBRARY[name].quantities(CARGO)[1:]]
+    small, large = (LIBRARY[name].action(FRAME, value, *rest) for value in (size, 1.5 * size))
+    clean, little, much = simulate_columns(
+        CARGO, SCENARIO, [Action(), small, large], TIME_S
+    ).speed_through_water_m_s
+    late = TIME_S > 150.0
+    assert np.all(clean[late] > little[late] + 1e-4)
+    assert np.all(little[late] > much[late] + 1e-5)
+
+
 def test_columns_do_not_disturb_each_other():
     actions = [drawn(name, 3)[0] for name in LIBRARY]
     together = simulate_columns(CARGO, SCENARIO, actions, TIME_S)
