@@ -147,10 +147,14 @@ def simulate_columns(
         raise SimulationError(
             'scenario: water_speed and gust_force differ from run to run; leave them out'
         )
-    if len(time) and not (time[0] >= 0.0 and time[-1] <= scenario.length_s):
+    # written so that NaN fails
+    if not (np.all(time >= 0.0) and np.all(time <= scenario.length_s)):
         raise SimulationError(
-            f'time_s is {time[0]:g}..{time[-1]:g} s, expected within 0..{scenario.length_s:g} s'
+            f'time_s is {np.min(time):g}..{np.max(time):g} s, expected within '
+            f'0..{scenario.length_s:g} s'
         )
+    if np.any(np.diff(time) < 0.0):
+        raise SimulationError('time_s is not ascending; sort the times')
     own = own_action(ship, scenario, reference_rad=reference_rad)
     if own != Action():
         actions = [own + action for action in actions]

@@ -217,6 +217,8 @@ def test_what_columns_cannot_do_is_told():
             simulate_columns(CARGO, replace(SCENARIO, **change), [Action()], TIME_S)
     with pytest.raises(SimulationError, match=r'time_s is 0\.\.1000 s, expected within 0\.\.900'):
         simulate_columns(CARGO, SCENARIO, [Action()], np.array([0.0, 1000.0]))
+    with pytest.raises(SimulationError, match='not ascending'):
+        simulate_columns(CARGO, SCENARIO, [Action()], TIME_S[::-1])
     overlapping = Action(turns=(Turn(690.0, 50.0, 0.0),))
     with pytest.raises(SimulationError, match='turns are at'):
         simulate_columns(CARGO, SCENARIO, [overlapping], TIME_S)

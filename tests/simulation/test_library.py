@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,6 +94,22 @@ def test_the_promised_names_stay(name):
 def test_every_module_of_the_folder_is_an_effect_of_its_name():
     modules = {path.stem for path in Path(library.__file__).parent.glob('[!_]*.py')}
     assert modules == set(LIBRARY)
+
+
+def test_one_new_module_is_a_new_effect(tmp_path, monkeypatch):
+    (tmp_path / 'ice.py').write_text(
+        'from shipdrag_ros.simulation import Action, Effect, Quantity, Scope\n'
+        'from shipdrag_ros.simulation.effect import half_normal\n'
+        'EFFECT = Effect(name="ice", scope=Scope.EARTH, formula="F", source="a test", parameters=('
+        'Quantity(name="force_n", unit="N", meaning="ice", prior=half_normal(1.0), low=0, high=1e9'
+        '),), act=lambda frame, force: Action(resistance=(lambda v: 0 * v + force,)))\n'
+    )
+    monkeypatch.setattr(library, '__path__', [*library.__path__, str(tmp_path)])
+    monkeypatch.setattr(library, 'LIBRARY', {found.name: found for found in library._found()})
+    monkeypatch.delitem(sys.modules, f'{library.__name__}.ice')
+    truth = simulate(CARGO, SCENARIO, effects=[parse('ice=1e5')])
+    extra = truth.specific_resistance(5.0) * CARGO.mass_kg - CARGO.resistance_n(5.0)
+    np.testing.assert_allclose(extra, 1e5, rtol=1e-9)
 
 
 @EACH
