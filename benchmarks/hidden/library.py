@@ -14,6 +14,7 @@ from hidden.hull import GRAVITY, Array, Hull
 _LOCKED = 0.40
 # zero thrust before zero torque: a free-wheeling propeller drags a little
 _ADVANCE_RATIO = 0.65
+_PITCH_LEFT = 0.3  # shaft speed, over that under power, that full thrust would add
 _SMOOTH = 0.15  # of a turn, in which its drag grows and falls
 _WAVE_LENGTH = 0.6  # over that of the ship
 
@@ -272,13 +273,17 @@ class Turning(Effect):
 
 @dataclass(frozen=True)
 class ResidualThrust(Effect):
-    """The propeller still pushes, less and less."""
+    """
+    The propeller still pushes, less and less: a pitch that was not taken back.
+
+    The shaft is free, and turns a little faster than without thrust.
+    """
 
     decay_s: float
     fraction: float
     name = 'residual_thrust'
     single_run = True
-    sizes = (Size('decay_s', 60.0, 400.0), Size('fraction', 0.15, 0.5))
+    sizes = (Size('decay_s', 60.0, 400.0), Size('fraction', 0.15, 0.45))
 
     def thrust(self, leg: Leg, time: Array) -> Array:
         after = np.maximum(time, 0.0)
@@ -286,11 +291,8 @@ class ResidualThrust(Effect):
         return self.fraction * (np.exp(-after / self.decay_s) - nominal)
 
     def shaft(self, leg: Leg, time: Array, speed: Array, free: Array) -> Array:
-        # thrust goes with n (n - free)
-        wanted = np.maximum(self.thrust(leg, time), 0.0)
-        full = leg.hull.shaft_rad_s
-        room = wanted * full * (full - 0.4 * full)
-        return np.where(time > 0.0, 0.5 * (free + np.sqrt(free**2 + 4.0 * room)), free)
+        pushed = np.maximum(self.thrust(leg, time), 0.0) * leg.hull.shaft_rad_s
+        return free + np.where(time > 0.0, _PITCH_LEFT * pushed, 0.0)
 
 
 @dataclass(frozen=True)

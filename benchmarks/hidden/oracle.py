@@ -28,6 +28,7 @@ NAME_FROM = 0.9
 HELD = 0.99  # by the set of candidates
 LACK_NATS = 5.0  # by which a smooth discrepancy may beat the name alone
 _STEPS = 9
+_HOPELESS_NATS = 40.0
 _STARTS = 2  # of the signs that signed parameters may have
 _COURSE_SD_RAD = 0.2
 _BY_NAME = {kind.name: kind for kind in (*FIRST_SHELF, *SECOND_SHELF)}
@@ -98,11 +99,12 @@ class _Oracle:
 
     def answer(self) -> dict[str, Any]:
         fits = [self._fit(())]
-        fits += [self._fit((name,)) for name in _BY_NAME]
+        for name in _BY_NAME:
+            fits.append(self._fit((name,), floor=max(fit.log_evidence for fit in fits)))
         generic = {channel: self._generic(fits[0], channel) for channel in self.generic}
         best = max(fits, key=lambda fit: fit.log_evidence)
         if self._lacks(best, nats=0.0):
-            fits += [self._fit(pair) for pair in PAIRS]
+            fits += [self._fit(pair, floor=best.log_evidence) for pair in PAIRS]
         logs = np.array([fit.log_evidence for fit in fits] + list(generic.values()))
         chances = np.exp(logs - np.max(logs))
         chances /= np.sum(chances)
@@ -180,8 +182,8 @@ class _Oracle:
         tests = [test for test, of in wanted if names & of and test not in self.inputs]
         return [test for test in dict.fromkeys(tests) if test in TESTS]
 
-    def _fit(self, names: Names) -> _Fit:
-        """Climb from the best of a few starts."""
+    def _fit(self, names: Names, *, floor: float = -np.inf) -> _Fit:
+        """Climb from the best of a few starts; far below the floor is not climbed on."""
         sizes = [size for name in names for size in _BY_NAME[name].sizes]
         prior = np.concatenate([1.0 / self.common_sd**2, [1.0 / _spread(s) ** 2 for s in sizes]])
         centre = np.concatenate([self.common, [_middle(size) for size in sizes]])
@@ -189,7 +191,8 @@ class _Oracle:
         starts = [np.array(sign) for sign in signs]
         costs = [_square(self._residual(names, sign, centre)) for sign in starts]
         climbed = [
-            self._climb(names, starts[i], centre, prior) for i in np.argsort(costs)[:_STARTS]
+            self._climb(names, starts[i], centre, prior, floor)
+            for i in np.argsort(costs)[:_STARTS]
         ]
         share = np.log(SHARES[names])
         evidences = np.array([fit.log_evidence for fit in climbed])
@@ -207,7 +210,9 @@ class _Oracle:
             best.prior,
         )
 
-    def _climb(self, names: Names, signs: Array, centre: Array, prior: Array) -> _Fit:
+    def _climb(
+        self, names: Names, signs: Array, centre: Array, prior: Array, floor: float
+    ) -> _Fit:
         """Levenberg-Marquardt on the whitened residuals and the prior."""
         theta, damping = centre.copy(), 1e-3
         residual = self._residual(names, signs, theta)
@@ -229,7 +234,8 @@ class _Oracle:
             gained, cost = cost - cost_after, cost_after
             theta, residual, damping = tried, after, 0.1 * damping
             jacobian = self._jacobian(names, signs, theta, residual)
-            if gained < 0.1:
+            hopeless = -0.5 * cost < floor - _HOPELESS_NATS and gained < 0.3 * cost
+            if gained < 0.1 or hopeless:
                 break
         precision = jacobian.T @ jacobian + np.diag(prior)
         evidence = (

@@ -14,8 +14,7 @@ from hidden.motion import TABLE_POINTS, Drive, integrate
 
 LEAD_IN_S = 1800.0
 _FINE_FROM_S, _FINE_TO_S = -10.0, 50.0
-_COARSE_S = 5.0
-_FREE_WHEEL = 0.4  # shaft speed of a free-wheeling propeller over that under power
+_FREE_WHEEL = 0.35  # shaft speed of a free-wheeling propeller over that under power
 
 
 @dataclass(frozen=True)
@@ -99,9 +98,9 @@ def times(leg: Leg, *, step_s: float = 1.0) -> Array:
     ----------
     leg
     step_s
-        Once the thrust has run down.
+        Once the thrust has run down; five of it before the stop.
     """
-    coarse = np.arange(-LEAD_IN_S, _FINE_FROM_S, _COARSE_S)
+    coarse = np.arange(-LEAD_IN_S, _FINE_FROM_S, 5.0 * step_s)
     fine = np.arange(_FINE_FROM_S, _FINE_TO_S)
     return np.concatenate([coarse, fine, np.arange(_FINE_TO_S, leg.duration_s + step_s, step_s)])
 
