@@ -255,4 +255,5 @@ def _shaft_rad_s(
         residual = scenario.shaft_fraction(time, run_down_s=action.residual_decay_s)
         fraction += action.residual_fraction * (residual - fraction)
     turned = _WINDMILLING * speed / scenario.speed_m_s * (speed > action.windmill_above_m_s)
-    return scenario.shaft_rad_s * np.maximum(fraction, turned)
+    # an engine that turns the shaft faster, or astern, is stronger than the flow
+    return scenario.shaft_rad_s * np.where(np.abs(fraction) < turned, turned, fraction)

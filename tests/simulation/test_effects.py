@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Air, ConstantAddedMass, Propeller, Ship, TableBaseline
-from shipdrag_ros.simulation import Scenario, Sensor, Truth, sense, simulate
+from shipdrag_ros.simulation import STOP, EngineOrder, Scenario, Sensor, Truth, sense, simulate
 from shipdrag_ros.simulation.effects import parse
 
 CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
@@ -114,6 +114,15 @@ def test_the_flow_turns_a_windmilling_shaft_until_it_stalls():
     shaft = truth.shaft_rad_s[late]
     np.testing.assert_allclose(shaft[u > 4.0], 0.7 * 11.5 * u[u > 4.0] / 8.0, rtol=1e-9)
     assert np.all(shaft[u < 4.0] < 1e-3)
+
+
+def test_an_engine_that_turns_the_shaft_is_stronger_than_the_flow():
+    orders = (STOP, EngineOrder(100.0, shaft=-0.8, thrust=-0.5))
+    scenario = replace(SCENARIO, duration_s=200.0, orders=orders)
+    for texts in ((), ('windmilling_propeller=0.1,stall_speed_m_s=1',)):
+        shaft = run(CARGO, *texts, scenario=scenario).at(np.array([60.0, 190.0])).shaft_rad_s
+        np.testing.assert_allclose(shaft[1], -0.8 * 11.5, rtol=1e-3)
+        assert (shaft[0] > 2.0) == bool(texts)
 
 
 def test_head_wind_acts_by_the_relative_wind_less_the_still_air():
