@@ -8,13 +8,14 @@ held against it.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import MessageIndex
 
 from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
 from shipdrag_ros.bags.layout import KNOWN, name
@@ -29,8 +30,14 @@ from shipdrag_ros.bags.records import (
 )
 from shipdrag_ros.bags.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
 from shipdrag_ros.bags.statements import ChunkFacts, Facts, hold_against
-from shipdrag_ros.bags.unpack import opened, unpack_chunk_partly
+from shipdrag_ros.bags.unpack import Unpacked, opened, unpack_chunk_partly
+from shipdrag_ros.bags.whole_chunk import WholeChunk, read_whole
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.samples import Int64
+
+_INDEX_HEAD = struct.Struct('<HI')  # channel, bytes of the entries
+_NO_ENTRIES = np.empty((0, 2), np.int64)
+_InChunk = dict[int, Int64]  # log times [ns] and offsets, (n, 2), by channel
 
 
 @dataclass(frozen=True)
@@ -124,7 +131,7 @@ class _Check:
         self._damages = damages
         self._scanner = Scanner()
         self._chunk: ChunkFacts | None = None
-        self._in_chunk: dict[int, list[tuple[int, int]]] = {}
+        self._in_chunk: _InChunk = {}
         self._indexed: set[int] = set()
         self._told: set[str] = set()
 
@@ -193,6 +200,9 @@ class _Check:
 
     def _message(self, data: Buffer, found: Found, offset: int) -> None:
         channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, found.start)
+        self._messages(channel, [log_ns], offset)
+
+    def _messages(self, channel: int, log_ns: list[int], offset: int) -> None:
         self.facts.count(channel, log_ns)
         if channel not in self.facts.channels:
             self._reference(offset, 'message', f'channel {channel}')
@@ -215,25 +225,17 @@ class _Check:
         unpacked = unpack_chunk_partly(data, found.start, found.end)
         if unpacked.damage is not None and unpacked.damage is not found.damage:
             self._damages.add(found.offset, 'chunk', unpacked.damage)
-        records = unpacked.records
-        self._in_chunk = {}
+        whole = read_whole(unpacked.records) if unpacked.damage is None else None
+        if whole is None:
+            self._in_chunk = self._walk_chunk(found, unpacked)
+        else:
+            self._in_chunk = self._take_chunk(found, unpacked.records, whole)
         self._indexed = set()
-        times: list[int] = []
-        for inner in self._scanner.walk(records, 0, len(records), in_chunk=True):
-            if inner.damage is not None and (unpacked.damage is None or unpacked.verified):
-                detail = f'at byte {inner.offset} of the unpacked chunk'
-                self._damages.add(found.offset, found_name(records, inner), inner.damage, detail)
-            if inner.opcode == GARBAGE or inner.damage is DamageKind.CONTENT:
-                continue
-            self._record(records, inner, found.offset)
-            if inner.opcode == Opcode.MESSAGE:
-                channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(records, inner.start)
-                self._in_chunk.setdefault(channel, []).append((log_ns, inner.offset))
-                times.append(log_ns)
         if unpacked.damage is not None or found.damage is not None:
             self.facts.chunks[found.offset] = ChunkFacts(0, (0, 0), '', 0, 0, sound=False)
             return
-        span = (min(times), max(times)) if times else (0, 0)
+        times = [entries[:, 0] for entries in self._in_chunk.values()]
+        span = (int(min(map(np.min, times))), int(max(map(np.max, times)))) if times else (0, 0)
         head = data[found.start : found.start + 16]
         stated = int.from_bytes(head[:8], 'little'), int.from_bytes(head[8:], 'little')
         if times and stated != span:
@@ -244,18 +246,47 @@ class _Check:
         self._chunk = ChunkFacts(found.end - found.offset, stated, compression, packed, size)
         self.facts.chunks[found.offset] = self._chunk
 
+    def _take_chunk(self, chunk: Found, records: bytes, whole: WholeChunk) -> _InChunk:
+        """Take note of all of a chunk at once."""
+        for found in whole.declarations:
+            self._record(records, self._scanner.noted(records, found), chunk.offset)
+        in_chunk: _InChunk = {}
+        for channel in np.unique(whole.channel).tolist():
+            in_chunk[channel] = whole.entries[whole.channel == channel]
+            self._messages(channel, in_chunk[channel][:, 0].tolist(), chunk.offset)
+        return in_chunk
+
+    def _walk_chunk(self, chunk: Found, unpacked: Unpacked) -> _InChunk:
+        """Take note of one record after the other, of what is left of a chunk."""
+        records = unpacked.records
+        in_chunk: dict[int, list[tuple[int, int]]] = {}
+        for found in self._scanner.walk(records, 0, len(records), in_chunk=True):
+            if found.damage is not None and (unpacked.damage is None or unpacked.verified):
+                detail = f'at byte {found.offset} of the unpacked chunk'
+                self._damages.add(chunk.offset, found_name(records, found), found.damage, detail)
+            if found.opcode == GARBAGE or found.damage is DamageKind.CONTENT:
+                continue
+            self._record(records, found, chunk.offset)
+            if found.opcode == Opcode.MESSAGE:
+                channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(records, found.start)
+                in_chunk.setdefault(channel, []).append((log_ns, found.offset))
+        return {channel: np.array(entries) for channel, entries in in_chunk.items()}
+
     def _message_index(self, found: Found) -> None:
-        index: MessageIndex = found.read(self._data)
         if self._chunk is None:
             return
-        self._chunk.indexes[found.offset] = index.channel_id
+        channel, length = _INDEX_HEAD.unpack_from(self._data, found.start)
+        start = found.start + _INDEX_HEAD.size
+        stated = np.frombuffer(self._data[start : start + length], np.int64).reshape(-1, 2)
+        self._chunk.indexes[found.offset] = channel
         self._chunk.index_bytes += found.end - found.offset
-        if index.channel_id in self._indexed:
+        if channel in self._indexed:
             self._damages.add(found.offset, 'message_index', DamageKind.DUPLICATE)
-        self._indexed.add(index.channel_id)
-        if sorted(index.records) != sorted(self._in_chunk.get(index.channel_id, [])):
+        self._indexed.add(channel)
+        actual = self._in_chunk.get(channel, _NO_ENTRIES)
+        if not np.array_equal(_sorted(stated), _sorted(actual)):
             self._damages.add(
-                found.offset, 'message_index', DamageKind.MISPLACED, f'channel {index.channel_id}'
+                found.offset, 'message_index', DamageKind.MISPLACED, f'channel {channel}'
             )
 
     def _close_chunk(self) -> None:
@@ -268,3 +299,7 @@ class _Check:
                 f'channels {sorted(missing)}',
             )
         self._chunk = None
+
+
+def _sorted(entries: Int64) -> Int64:
+    return entries[np.lexsort(entries.T)]

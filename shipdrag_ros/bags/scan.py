@@ -114,13 +114,15 @@ class Scanner:
             if here is None:
                 held, here = self._damaged(data, at, end, kinds, held)
             if held is not None:
-                yield self._noted(data, held)
+                yield self.noted(data, held)
             held, at = here, here.end
         if held is not None:
-            yield self._noted(data, held)
+            yield self.noted(data, held)
 
-    def _noted(self, data: Buffer, found: Found) -> Found:
-        """Remember what tells a later record from chance."""
+    def noted(self, data: Buffer, found: Found) -> Found:
+        """
+        Remember what tells a later record from chance; returns the record.
+        """
         if found.damage is None:
             if found.opcode == Opcode.MESSAGE:
                 self._log_ns = MESSAGE_HEAD.unpack_from(data, found.start)[2]

@@ -91,13 +91,14 @@ class Facts:
     ended: int = 0
     summary: list[Found] = field(default_factory=list)
 
-    def count(self, channel: int, log_ns: int) -> None:
+    def count(self, channel: int, log_ns: list[int]) -> None:
         """
-        Take note of a message.
+        Take note of messages of a channel, by their log times [ns].
         """
-        self.first_ns = min(log_ns, self.first_ns) if self.counts else log_ns
-        self.last_ns = max(log_ns, self.last_ns)
-        self.counts[channel] += 1
+        first_ns = min(log_ns)
+        self.first_ns = min(first_ns, self.first_ns) if self.counts else first_ns
+        self.last_ns = max(*log_ns, self.last_ns)
+        self.counts[channel] += len(log_ns)
 
 
 def hold_against(data: Buffer, facts: Facts, damages: DamageList) -> None:
