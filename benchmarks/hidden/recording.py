@@ -153,105 +153,121 @@ def record(
     """
     start_ns = START_NS + number * BETWEEN_RUNS_NS
     return {
-        name: _read(name, motion, leg, effects, start_ns, noise, heading_rad, streams[name])
+        name: _read(
+            name, _Scene(motion, leg, effects, noise, heading_rad, streams[name]), start_ns
+        )
         for name in inputs
     }
 
 
-def _read(
-    name: str,
-    motion: Motion,
-    leg: Leg,
-    effects: tuple[Effect, ...],
-    start_ns: int,
-    noise: Noise,
-    heading_rad: float,
-    rng: np.random.Generator,
-) -> Series:
+@dataclass(frozen=True)
+class _Scene:
+    """What a sensor is in the middle of."""
+
+    motion: Motion
+    leg: Leg
+    effects: tuple[Effect, ...]
+    noise: Noise
+    heading_rad: float
+    rng: np.random.Generator
+
+
+def _read(name: str, scene: _Scene, start_ns: int) -> Series:
+    rng, motion = scene.rng, scene.motion
     every = _EVERY_S.get(name, 1.0)
-    time = np.arange(-LEAD_IN_S + rng.uniform(0.0, every), leg.duration_s, every)
+    time = np.arange(-LEAD_IN_S + rng.uniform(0.0, every), scene.leg.duration_s, every)
     time = time + rng.normal(0.0, 0.01 * every, len(time))
     time = np.clip(time, motion.time_s[0], motion.time_s[-1])
-    value = _SENSORS[name](motion, leg, effects, time, noise, heading_rad, rng)
+    value = _SENSORS[name](scene, time)
     keep = _kept(time, rng)
     late = 0.0
     if name == 'speed_through_water':
-        late = sum(effect.log_delay_s() for effect in effects)
+        late = sum(effect.log_delay_s() for effect in scene.effects)
     stamp = start_ns + _nanoseconds(time + late + LEAD_IN_S)
     # a stamp may not lie ahead of its arrival
     receive = start_ns + _nanoseconds(time + max(late, 0.0) + LEAD_IN_S + rng.uniform(0.05, 0.3))
     return Series(stamp[keep], receive[keep], value[keep])
 
 
-def _log(motion, leg, effects, time, noise, heading_rad, rng) -> Array:  # type: ignore[no-untyped-def]
-    speed = np.interp(time, motion.time_s, motion.surge_m_s)
-    for effect in effects:
-        speed = effect.log(leg, time, speed)
-    sd, colour_s = noise.log_colour
-    speed = speed + rng.normal(0.0, noise.log_m_s, len(time)) + sd * _slow(time, colour_s, rng)
-    wrong = rng.random(len(time)) < noise.outliers
-    speed = np.where(wrong, speed * rng.uniform(0.4, 1.6, len(time)), speed)
-    return _columns(_rounded(speed, noise.log_quantum_m_s))
+def _log(scene: _Scene, time: Array) -> Array:
+    speed = np.interp(time, scene.motion.time_s, scene.motion.surge_m_s)
+    for effect in scene.effects:
+        speed = effect.log(scene.leg, time, speed)
+    sd, colour_s = scene.noise.log_colour
+    speed = (
+        speed
+        + scene.rng.normal(0.0, scene.noise.log_m_s, len(time))
+        + sd * _slow(time, colour_s, scene.rng)
+    )
+    wrong = scene.rng.random(len(time)) < scene.noise.outliers
+    speed = np.where(wrong, speed * scene.rng.uniform(0.4, 1.6, len(time)), speed)
+    return _columns(_rounded(speed, scene.noise.log_quantum_m_s))
 
 
-def _position(motion, leg, effects, time, noise, heading_rad, rng) -> Array:  # type: ignore[no-untyped-def]
+def _position(scene: _Scene, time: Array) -> Array:
     place = np.column_stack(
-        [np.interp(time, motion.time_s, motion.position_m[:, k]) for k in range(2)]
+        [np.interp(time, scene.motion.time_s, scene.motion.position_m[:, k]) for k in range(2)]
     )
     # the mark lies ahead of where she stops, and to one side
-    bearing = heading_rad + rng.uniform(0.1, 0.5) * rng.choice([-1.0, 1.0])
-    distance = leg.speed_m_s * (LEAD_IN_S + leg.duration_s) * rng.uniform(1.1, 1.4)
+    bearing = scene.heading_rad + scene.rng.uniform(0.1, 0.5) * scene.rng.choice([-1.0, 1.0])
+    distance = (
+        scene.leg.speed_m_s * (LEAD_IN_S + scene.leg.duration_s) * scene.rng.uniform(1.1, 1.4)
+    )
     place = place - distance * np.array([np.cos(bearing), np.sin(bearing)])
-    for effect in effects:
-        place = effect.radar(leg, time, place)
-    sd, colour_s = noise.position_colour
-    wrong = rng.random(len(time)) < noise.outliers
+    for effect in scene.effects:
+        place = effect.radar(scene.leg, time, place)
+    sd, colour_s = scene.noise.position_colour
+    wrong = scene.rng.random(len(time)) < scene.noise.outliers
     for k in range(2):
-        place[:, k] += noise.position_m * rng.standard_normal(len(time))
-        place[:, k] += sd * _slow(time, colour_s, rng)
-        place[:, k] += wrong * rng.uniform(-300.0, 300.0, len(time))
-    return _rounded(place, noise.position_quantum_m)
+        place[:, k] += scene.noise.position_m * scene.rng.standard_normal(len(time))
+        place[:, k] += sd * _slow(time, colour_s, scene.rng)
+        place[:, k] += wrong * scene.rng.uniform(-300.0, 300.0, len(time))
+    return _rounded(place, scene.noise.position_quantum_m)
 
 
-def _ground_speed(motion, leg, effects, time, noise, heading_rad, rng) -> Array:  # type: ignore[no-untyped-def]
-    velocity = [np.gradient(motion.position_m[:, k], motion.time_s) for k in range(2)]
-    speed = np.interp(time, motion.time_s, np.hypot(*velocity))
-    return _columns(np.abs(speed + rng.normal(0.0, 0.05, len(time))))
+def _ground_speed(scene: _Scene, time: Array) -> Array:
+    velocity = [np.gradient(scene.motion.position_m[:, k], scene.motion.time_s) for k in range(2)]
+    speed = np.interp(time, scene.motion.time_s, np.hypot(*velocity))
+    return _columns(np.abs(speed + scene.rng.normal(0.0, 0.05, len(time))))
 
 
-def _heading(motion, leg, effects, time, noise, heading_rad, rng) -> Array:  # type: ignore[no-untyped-def]
-    yaw = np.interp(time, motion.time_s, motion.heading_rad)
-    yaw = yaw + rng.normal(0.0, 0.005) + rng.normal(0.0, 0.005, len(time))
+def _heading(scene: _Scene, time: Array) -> Array:
+    yaw = np.interp(time, scene.motion.time_s, scene.motion.heading_rad)
+    yaw = yaw + scene.rng.normal(0.0, 0.005) + scene.rng.normal(0.0, 0.005, len(time))
     return _columns(np.arctan2(np.sin(yaw), np.cos(yaw)))
 
 
-def _shaft(motion, leg, effects, time, noise, heading_rad, rng) -> Array:  # type: ignore[no-untyped-def]
-    rate = np.interp(time, motion.time_s, motion.shaft_rad_s)
-    return _columns(rate + rng.normal(0.0, 0.02, len(time)))
+def _shaft(scene: _Scene, time: Array) -> Array:
+    rate = np.interp(time, scene.motion.time_s, scene.motion.shaft_rad_s)
+    return _columns(rate + scene.rng.normal(0.0, 0.02, len(time)))
 
 
-def _depth(motion, leg, effects, time, noise, heading_rad, rng) -> Array:  # type: ignore[no-untyped-def]
-    stated = [depth for effect in effects if (depth := effect.depth_m()) is not None]
-    depth = stated[0] if stated else _DEEP * leg.hull.draught_m
-    depth = depth * (1.0 + 0.005 * _slow(time, 200.0, rng))
-    return _columns(depth + rng.normal(0.0, 0.1, len(time)))
+def _depth(scene: _Scene, time: Array) -> Array:
+    stated = [depth for effect in scene.effects if (depth := effect.depth_m()) is not None]
+    depth = stated[0] if stated else _DEEP * scene.leg.hull.draught_m
+    depth = depth * (1.0 + 0.005 * _slow(time, 200.0, scene.rng))
+    return _columns(depth + scene.rng.normal(0.0, 0.1, len(time)))
 
 
-def _wind(motion, leg, effects, time, noise, heading_rad, rng) -> Array:  # type: ignore[no-untyped-def]
-    true = np.array([effect.wind_m_s() for effect in effects] or [(0.0, 0.0)]).sum(axis=0)
-    over_ground = [np.gradient(motion.position_m[:, k], motion.time_s) for k in range(2)]
-    yaw = motion.heading_rad
+def _wind(scene: _Scene, time: Array) -> Array:
+    true = np.array([effect.wind_m_s() for effect in scene.effects] or [(0.0, 0.0)]).sum(axis=0)
+    over_ground = [
+        np.gradient(scene.motion.position_m[:, k], scene.motion.time_s) for k in range(2)
+    ]
+    yaw = scene.motion.heading_rad
     ahead = over_ground[0] * np.cos(yaw) + over_ground[1] * np.sin(yaw)
     to_port = over_ground[1] * np.cos(yaw) - over_ground[0] * np.sin(yaw)
-    gusts = np.column_stack([0.4 * _slow(time, 60.0, rng) for _ in range(2)])
+    gusts = np.column_stack([0.4 * _slow(time, 60.0, scene.rng) for _ in range(2)])
     # air from ahead flows aft, air from port flows to starboard
     air = np.column_stack(
         [
-            -np.interp(time, motion.time_s, ahead) - leg.sign * true[0],
-            -np.interp(time, motion.time_s, to_port) - leg.sign * true[1],
+            -np.interp(time, scene.motion.time_s, ahead) - scene.leg.sign * true[0],
+            -np.interp(time, scene.motion.time_s, to_port) - scene.leg.sign * true[1],
         ]
     )
-    return (1.0 + rng.normal(0.0, 0.03)) * air + gusts + rng.normal(0.0, 0.3, air.shape)
+    return (
+        (1.0 + scene.rng.normal(0.0, 0.03)) * air + gusts + scene.rng.normal(0.0, 0.3, air.shape)
+    )
 
 
 _SENSORS = {
