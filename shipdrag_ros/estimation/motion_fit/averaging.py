@@ -20,8 +20,8 @@ from shipdrag_ros.estimation.motion_fit.solve import cholesky_solve, normal_equa
 from shipdrag_ros.estimation.motion_fit.whitening import Noise
 from shipdrag_ros.samples import Float64, Int64
 
-_ROUNDS = 8
-_CLOSE = 0.03  # of chi^2, between one average and the next
+_ROUNDS, _WHOLE_ROUNDS = 16, 3  # the later ones go half the way: a late onset may oscillate
+_CLOSE, _NEAR = 0.03, 1.0  # of chi^2, between one average and the next; and at the end
 
 
 @njit(cache=True)
@@ -132,8 +132,8 @@ def average(
     kept = np.ones(p, np.bool_)
     precision = np.zeros(p)
     mean = np.zeros(p)
-    converged = False
-    for _ in range(_ROUNDS):
+    away = np.inf
+    for number in range(_ROUNDS):
         chi2, matrix, gradient, _ = normal_equations(
             law, unknowns, grid_s, rows, noise, active, prior
         )
@@ -154,16 +154,16 @@ def average(
         for f in range(count):
             mean += weights[f] * steps[f]
         away = 0.0
+        part = 1.0 if number < _WHOLE_ROUNDS else 0.5
         for a in range(p):
-            unknowns[active[a]] += mean[a]
+            unknowns[active[a]] += part * mean[a]
             for b in range(p):
                 away += mean[a] * matrix[a, b] * mean[b]
         if away < _CLOSE:
-            converged = True
             break
     for f in range(count):
         for a in range(p):
             for b in range(p):
                 between = (steps[f, a] - mean[a]) * (steps[f, b] - mean[b])
                 covariance[active[a], active[b]] += weights[f] * (spreads[f, a, b] + between)
-    return converged, unknowns, covariance
+    return away < _NEAR, unknowns, covariance

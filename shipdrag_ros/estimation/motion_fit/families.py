@@ -22,7 +22,7 @@ from shipdrag_ros.samples import Float64
 FIRST = (1, 2, 3, 4)  # powers fitted first, to find the outliers
 PLAIN = (2, 3)  # hardly ever negative, and right enough to tell how a force is damped
 POWERS = (1, 2, 3, 4, 6)  # of any family
-_OF_FAMILY = ((2, 3, 4), (2, 4, 6), (1, 2, 4, 6))
+_OF_FAMILY = [np.isin(POWERS, own) for own in ((2, 3, 4), (2, 4, 6), (1, 2, 4, 6))]
 _HUMP_SIZES = (0.0, 0.3, 1.0)  # of a family, over the sizes of `Humps`
 
 _SPACING_FROUDE = 0.02  # of the humps: about a quarter wave of the pattern at Fr 0.2
@@ -102,11 +102,12 @@ class Humps:
         unit_m_s2
             r that the sizes of the humps are relative to, at the reference speed.
         """
+        unknown = np.zeros(len(POWERS))
         included, precision = [], []
-        for powers in _OF_FAMILY:
-            for size in _HUMP_SIZES:
-                has = np.full(len(self.sd), size > 0.0)
-                included.append([*(power in powers for power in POWERS), *has])
-                known = has / (max(size, 1e-9) * unit_m_s2 * self.sd) ** 2
-                precision.append([*np.zeros(len(POWERS)), *known])
+        for size in _HUMP_SIZES:
+            has = np.full(len(self.sd), size > 0.0)
+            known = 1.0 / (size * unit_m_s2 * self.sd) ** 2 if size > 0.0 else 0.0 * self.sd
+            for powers in _OF_FAMILY:
+                included.append(np.concatenate([powers, has]))
+                precision.append(np.concatenate([unknown, known]))
         return Families(np.array(included), np.array(precision))

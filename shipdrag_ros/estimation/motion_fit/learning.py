@@ -25,6 +25,8 @@ _OFFSETS = (-1.0, -0.25, 0.5, 1.25)  # of the logarithms, in averaging
 _LARGEST = 12.0  # logarithm
 _CLOSE = 0.05  # of the logarithms and of the criterion, in searching
 _EVALUATIONS = 160  # in one search
+_GUESSES = (-2.0, -1.0, 0.0, 1.0)  # of the logarithm of a second disturbance's size
+_WORTH = 0.5  # fall of the criterion
 _GUST, _WATER = np.array([0, 1]), np.array([2, 3])  # of the logarithms searched for
 _BOTH = np.array([0, 1, 2, 3])
 
@@ -183,8 +185,8 @@ def _mean(top: Float64, least: float, which: Int64, steady: _Steady) -> Float64:
     Return the mean over what is likely, instead of the most likely.
 
     A short record is explained best by too small and too fast a disturbance; the
-    band would be too narrow. Of each disturbance: the mean of its variance and
-    of variance times correlation time, under a flat prior of the sd.
+    band would be too narrow. Of each disturbance: the mean of its variance, and of
+    the logarithm of its correlation time, under a flat prior of the sd.
     """
     mean = top.copy()
     for first in which[::2]:
@@ -197,9 +199,9 @@ def _mean(top: Float64, least: float, which: Int64, steady: _Steady) -> Float64:
                 weight = np.exp(0.5 * (least - _criterion(x, which, steady)) + x[first])
                 total += weight
                 variances += weight * np.exp(2.0 * x[first])
-                times += weight * np.exp(2.0 * x[first] + x[first + 1])
+                times += weight * x[first + 1]
         mean[first] = 0.5 * np.log(variances / total)
-        mean[first + 1] = np.log(times / variances)
+        mean[first + 1] = times / total
     return mean
 
 
@@ -208,19 +210,25 @@ def _learn(steady: _Steady, logged: bool) -> Disturbance:
     """Choose between no disturbance, one and two by Akaike's criterion."""
     best, chosen, which = _criterion(np.zeros(4), _GUST[:0], steady), np.zeros(4), _GUST[:0]
     calm, least = best, best
-    start = np.zeros(4)
     for one in (_GUST, _WATER):
         if one[0] == 2 and not logged:
             continue
         found, cost = _search(np.zeros(4), one, steady)
-        start[one] = found[one]
         if cost + 2.0 * len(one) < best:
             best, least, chosen, which = cost + 2.0 * len(one), cost, found, one
-    # two are worth a search only where one is
     if logged and best < calm:
-        found, cost = _search(start, _BOTH, steady)
-        if cost + 2.0 * len(_BOTH) < best:
-            best, least, chosen, which = cost + 2.0 * len(_BOTH), cost, found, _BOTH
+        # a second one is worth a search only where a guess of it helps
+        start, guessed = chosen, np.inf
+        for size in _GUESSES:
+            trial = chosen.copy()
+            trial[2 if which[0] == 0 else 0] = size
+            cost = _criterion(trial, _BOTH, steady)
+            if cost < guessed:
+                start, guessed = trial, cost
+        if guessed < least - _WORTH:
+            found, cost = _search(start, _BOTH, steady)
+            if cost + 2.0 * len(_BOTH) < best:
+                best, least, chosen, which = cost + 2.0 * len(_BOTH), cost, found, _BOTH
     if len(which):
         chosen = _mean(chosen, least, which, steady)
     disturbance: Disturbance = _about(chosen, which, steady.units)
