@@ -39,7 +39,7 @@ from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 OUT = Path(__file__).parent / 'out'
 Found = dict[str, Any]
-Diagnose = Callable[[cases.Observation], Found]
+Diagnose = Callable[[cases.Observation], tuple[Found, float]]  # and its CPU time [s]
 
 
 def as_block(recording: Recording) -> Block:
@@ -78,7 +78,7 @@ def by_blocks(diagnose: Callable[[str, list[Block]], Found]) -> Diagnose:
     """
     Adapt a function of the ship file's text and one block a run.
     """
-    return lambda seen: diagnose(seen.ship_file, [as_block(run) for run in seen.runs])
+    return lambda seen: _timed(diagnose, seen.ship_file, [as_block(run) for run in seen.runs])
 
 
 def by_bags(diagnose: Callable[[Path, list[Path]], Found]) -> Diagnose:
@@ -86,21 +86,29 @@ def by_bags(diagnose: Callable[[Path, list[Path]], Found]) -> Diagnose:
     Adapt a function of the paths of the ship file and the bags.
     """
 
-    def adapted(seen: cases.Observation) -> Found:
+    def adapted(seen: cases.Observation) -> tuple[Found, float]:
         with TemporaryDirectory() as folder:
-            return diagnose(*write_bags(seen, Path(folder)))
+            return _timed(diagnose, *write_bags(seen, Path(folder)))
 
     return adapted
+
+
+def _timed(diagnose: Callable[..., Found], *arguments: Any) -> tuple[Found, float]:
+    start = time.process_time()
+    found = diagnose(*arguments)
+    return found, time.process_time() - start
 
 
 def command(ship: Path, bags: list[Path]) -> Found:
     """
     Diagnose with the verb `shipdrag diagnose`, in this process.
     """
-    main = import_module('shipdrag_ros.cli.__main__').main
     written = io.StringIO()
     with contextlib.redirect_stdout(written), contextlib.redirect_stderr(io.StringIO()) as told:
-        status = main(['diagnose', *map(str, bags), '--ship', str(ship), '--json'])
+        try:
+            status = cli.main(['diagnose', *map(str, bags), '--ship', str(ship), '--json'])
+        except SystemExit as ended:  # wrong usage
+            status = ended.code
     if status:
         raise RuntimeError(f'shipdrag diagnose ended with {status}: {told.getvalue()}')
     found: Found = json.loads(written.getvalue())
@@ -114,7 +122,7 @@ def diagnosis(by: str, form: str, number: int) -> Diagnose:
     if by == 'oracle':
         from hidden.oracle import diagnose
 
-        return lambda seen: diagnose(seen, cases.known(number))
+        return lambda seen: _timed(diagnose, seen, cases.known(number))
     if by == 'command':
         return by_bags(command)
     module, _, function = by.partition(':')
@@ -127,12 +135,10 @@ def answer(by: str, form: str, number: int) -> dict[str, Any]:
     Diagnose one case, and again with what the answer recommends.
     """
     diagnose = diagnosis(by, form, number)
-    seen = cases.observe(number)
-    start = time.process_time()
-    found = diagnose(seen)
+    found, cpu_s = diagnose(cases.observe(number))
     row: dict[str, Any] = {
         'case': number,
-        'cpu_s': time.process_time() - start,
+        'cpu_s': cpu_s,
         'found': found,
         'followed': None,
         'everything': None,
@@ -140,8 +146,8 @@ def answer(by: str, form: str, number: int) -> dict[str, Any]:
     if found['verdict'] == 'one_of':
         recommended = scoring.parse(found).recommended
         if recommended and recommended[0].test is not None:
-            row['followed'] = diagnose(cases.observe(number, added=(recommended[0].test,)))
-        row['everything'] = diagnose(cases.observe(number, added=cases.TESTS))
+            row['followed'], _ = diagnose(cases.observe(number, added=(recommended[0].test,)))
+        row['everything'], _ = diagnose(cases.observe(number, added=cases.TESTS))
     return row
 
 

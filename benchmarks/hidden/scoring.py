@@ -184,6 +184,9 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
     ]
     return {
         'precision of a name': Share.over(_right(trial) for trial in named),
+        'precision, whatever is hidden': Share.over(
+            _right(trial) for trial in trials if trial.answer.verdict == 'named'
+        ),
         'named, first shelf': Share.over(_right(trial) for trial in first_shelf),
         'name or set of <= 3 with the truth, first shelf': _covered(first_shelf),
         'name or set of <= 3 with the truth, second shelf': _covered(
@@ -229,6 +232,7 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
             ]
         ),
         'CPU s a case, median': float(np.median([trial.cpu_s for trial in trials])),
+        'CPU s a case, 95 % are below': float(np.quantile([t.cpu_s for t in trials], 0.95)),
     }
 
 

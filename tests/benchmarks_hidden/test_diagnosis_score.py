@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,7 @@ def test_names_sets_and_alarms_are_counted(scoring) -> None:
         ]
     )
     assert _share(scores, 'precision of a name') == (1, 2)
+    assert _share(scores, 'precision, whatever is hidden') == (1, 4)
     assert _share(scores, 'named, first shelf') == (1, 4)
     assert _share(scores, 'name or set of <= 3 with the truth, first shelf') == (2, 4)
     assert _share(scores, 'alarm, nothing hidden') == (1, 2)
@@ -190,6 +192,28 @@ def test_the_oracle_tells_what_is_far_above_the_noise(score) -> None:
     found = [score.answer('oracle', 'blocks', number)['found'] for number in (2, 3, 4)]
     assert [one['verdict'] for one in found] == ['named', 'unknown', 'none']
     assert found[0]['effects'][0]['name'] == 'log_dead_band'
+
+
+def test_the_command_is_given_bags_and_a_ship_file_and_its_errors_are_told(
+    score, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = []
+
+    def fake(arguments):
+        given.append(arguments)
+        if len(given) > 1:
+            print('ERROR: no baseline', file=sys.stderr)
+            return 1
+        print(json.dumps(_found('none')))
+        return 0
+
+    monkeypatch.setattr(score.cli, 'main', fake)
+    row = score.answer('command', 'bags', 0)
+    assert row['found']['verdict'] == 'none'
+    assert given[0][0] == 'diagnose'
+    assert given[0][-3] == '--ship'
+    assert given[0][-1] == '--json'
+    assert 'no baseline' in score._answer(('command', 'bags', 0))['error']
 
 
 def test_an_answer_that_fails_is_told_and_not_counted(score, tmp_path: Path) -> None:
