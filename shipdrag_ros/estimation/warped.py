@@ -21,6 +21,7 @@ from shipdrag_ros.estimation.curve import ValidRange, resistance_curve, specific
 from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.robust import GROSS, robust_fit
+from shipdrag_ros.estimation.slow import Slow
 from shipdrag_ros.estimation.warped_inputs import KINDS, Inputs, gather
 from shipdrag_ros.estimation.warped_model import (
     CURRENT,
@@ -130,9 +131,11 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     S1 (5)-(7) in warped time: x = sum p_j T_j(u), u = ln(1 + t / tc). While
     the thrust runs down, r is that of the coast without it, which the ship has
     joined afterwards. sigma is that of r at a speed, var(r - (dr/dv) v).
+    Where the record before the window shows slow disturbances, the rows are
+    whitened of them: generalised least squares.
     """
     inputs = gather(window, parameters)
-    fit = _fit(inputs, ship, parameters)
+    fit = _fit(window, inputs, ship, parameters)
     motion = _motion(inputs, fit)
     _check_deceleration(inputs, motion)
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
@@ -164,7 +167,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     )
 
 
-def _fit(inputs: Inputs, ship: Ship, parameters: Parameters) -> _Fit:
+def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> _Fit:
     span = inputs.span_s
     kind = next(k for k in (THROUGH_WATER, OVER_GROUND, POSITION) if inputs.count[k])
     part = inputs.part(kind)
@@ -195,9 +198,17 @@ def _fit(inputs: Inputs, ship: Ship, parameters: Parameters) -> _Fit:
         sds[-1],
     )
     start[polynomials:] = 0.0
-    products = condense(rows, inputs.value - combine(rows, start), weight)
+    residual = inputs.value - combine(rows, start)
+    slow = Slow.of(window, ship, parameters, coast_s=tc, speed_m_s=speed)
+    if slow is None:
+        products = condense(rows, residual, weight)
+    else:
+        white = slow.whitened(rows, residual, weight, inputs, ship)
+        products = condense(*white, np.ones(len(residual)))
     sd = deviations(products, start, columns, mean, sds[-1])
     told, notes = _told(sd[polynomials:], inputs)
+    if slow is not None:
+        notes.append(slow.note)
     families = _families(polynomials, *told)
     chance = np.ones(len(families))
     coefficients, covariance, share = average(products, start, families, chance, mean, sds[:-1])
