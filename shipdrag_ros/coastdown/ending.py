@@ -3,24 +3,27 @@
 When a coastdown is over, and where its record ends.
 
 Judged each second on the bins, in this order: the shaft turns again, the ship
-turns, the minimum speed is reached, the speed settles or rises. The record ends
-where the cause began, not where it was noticed.
+turns, the minimum speed is reached, the speed settles or rises; or falls faster
+than before, which is how a turn shows where nothing tells the heading. The
+record ends where the cause began, not where it was noticed.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.bins import Bins, line
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.onset import Candidate, bend
-from shipdrag_ros.coastdown.tracking import shaft_rose_at, shaft_speed, turned_at
+from shipdrag_ros.coastdown.tracking import heading_is_told, shaft_rose_at, shaft_speed, turned_at
 from shipdrag_ros.parameters import Parameters
 
 # A ship that coasts decelerates no less than by the fourth power of its falling speed: more
 # than friction (2) and waves (3) make it.
 _EXPONENT = 4.0
+_EXPONENT_MIN = 1.0  # and no more than in proportion to it
 _EARLIER_WINDOWS = 3  # slope windows before the newest one that say how it decelerated
 
 
@@ -55,11 +58,10 @@ def end_of(
     slope, level, _ = line(bins, coasting.source, number, width)
     if level < tuning.speed_min:
         return End(EndedBy.SPEED, number)
-    settled = _settled_since(coasting, bins, tuning, parameters, number, slope, level)
-    return None if settled is None else End(EndedBy.ENGINE, settled)
+    return _departed(coasting, bins, tuning, parameters, number, slope, level)
 
 
-def _settled_since(
+def _departed(
     coasting: Candidate,
     bins: Bins,
     tuning: Tuning,
@@ -67,40 +69,55 @@ def _settled_since(
     number: int,
     slope: float,
     level: float,
-) -> int | None:
-    """Return the last bin before the speed settled or rose; None where it falls on."""
+) -> End | None:
+    """Say whether the speed has ceased to fall as it did; None where it falls on."""
     width, start, source = tuning.slopes.width, coasting.start, coasting.source
+    told = heading_is_told(bins, start)
+    excess, first = math.nan, start
     earlier = number - width
     span = min(_EARLIER_WINDOWS * width, earlier - start)
     if span >= width:
-        expected = _extrapolated(bins, source, earlier, span, level - 0.5 * slope * width)
-        if slope - expected > coasting.limits[0]:
-            return _bend(bins, coasting, tuning, earlier - width, number)
-    confirm = round(parameters.confirm_s)
-    long = 2 * confirm
-    if number - long >= start + long:
+        excess = _excess(bins, source, earlier, span, slope, level - 0.5 * slope * width)
+        # while the thrust runs down the fall steepens
+        if told or span < _EARLIER_WINDOWS * width:
+            excess = max(excess, 0.0)
+        first = earlier - width
+    long = 2 * round(parameters.confirm_s)
+    if not abs(excess) > coasting.limits[0] and number - long >= start + long:
         overall, newest, _ = line(bins, source, number, long)
-        expected = _extrapolated(
-            bins, source, start + long, confirm, newest - 0.5 * overall * long
-        )
         # slopes over a longer span wander less, at least in proportion
-        if overall - expected > coasting.limits[0] * width / long:
-            return _bend(bins, coasting, tuning, start, number)
+        excess = (long / width) * _excess(
+            bins, source, start + long, long // 2, overall, newest - 0.5 * overall * long
+        )
+        first = start
+    if excess > coasting.limits[0]:
+        return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
+    # where nothing tells the heading, a turn shows in the speed alone
+    if -excess > coasting.limits[0] and not told:
+        return End(EndedBy.TURN, _bend(bins, coasting, tuning, first, number, sign=1))
     return None
 
 
-def _bend(bins: Bins, coasting: Candidate, tuning: Tuning, first: int, number: int) -> int:
-    """Return the last bin before the speed began to settle or to rise."""
+def _bend(
+    bins: Bins, coasting: Candidate, tuning: Tuning, first: int, number: int, *, sign: int
+) -> int:
+    """Return the last bin before the speed began to settle or rise (-1), or to fall faster (1)."""
     first = max(first, coasting.start)
-    at = bend(bins, coasting.source, first, number, tuning.speed_min, degree=1, sign=-1)
-    # the thrust builds up before the speed shows it
+    at = bend(bins, coasting.source, first, number, tuning.speed_min, degree=1, sign=sign)
+    # the force builds up before the speed shows it
     return max(first, at - tuning.slopes.width // 6)
 
 
-def _extrapolated(bins: Bins, source: int, last: int, span: int, speed: float) -> float:
-    """Return the gentlest slope that coasting on at `speed` explains [m/s^2]."""
-    slope, level, _ = line(bins, source, last, span)
-    middle = level - 0.5 * slope * span
+def _excess(bins: Bins, source: int, last: int, span: int, slope: float, speed: float) -> float:
+    """
+    Return by how much a slope at `speed` is gentler than coasting on explains [m/s^2].
+
+    Negative where it is steeper, 0 where it is explained.
+    """
+    before, level, _ = line(bins, source, last, span)
+    middle = level - 0.5 * before * span
     if not middle > 0.0:
-        return 0.0
-    return float(min(slope, 0.0) * min(1.0, max(0.0, speed / middle)) ** _EXPONENT)
+        return max(slope, 0.0)
+    slower = min(1.0, max(0.0, speed / middle))
+    steepest, gentlest = (min(before, 0.0) * slower**p for p in (_EXPONENT_MIN, _EXPONENT))
+    return float(slope - min(max(slope, steepest), gentlest))

@@ -113,6 +113,8 @@ class Steadiness(NamedTuple):
         Size of a slope that chance does not explain [m/s^2]; NaN while unknown.
     spread : (sources, SCALES)
         Standard deviation of a slope [m/s^2].
+    scratch : (4 width,)
+        Room to sort in: compiled code makes no arrays.
     """
 
     slope: Float64

@@ -84,7 +84,7 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
             return _apart(mean_heading(bins, at, _YAW_S), before)
     else:
         half = max(1, width // 2)
-        tracks = [t for t in range(FIRST_TRACK, SOURCES) if newest_bin(bins, t) > start]
+        tracks = _tracks(bins, start)
         if not tracks:
             return None
         track = tracks[0]
@@ -102,6 +102,17 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
     while last > start and not change(last) <= 0.5 * turn_rad:
         last -= 1
     return last
+
+
+def heading_is_told(bins: Bins, start: int) -> bool:
+    """
+    Say whether a heading or a course has come since bin `start`.
+    """
+    return newest_bin(bins, _HEADING) > start or bool(_tracks(bins, start))
+
+
+def _tracks(bins: Bins, start: int) -> list[int]:
+    return [track for track in range(FIRST_TRACK, SOURCES) if newest_bin(bins, track) > start]
 
 
 def _course(bins: Bins, track: int, last: int, half: int) -> float:

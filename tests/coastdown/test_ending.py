@@ -54,6 +54,14 @@ def test_a_turn_ends_it_where_it_begins(
     assert 295.0 <= end_s(coastdown) <= 305.0 + half_s + (30.0 if second == 'radar' else 0.0)
 
 
+@pytest.mark.parametrize('seed', range(3))
+def test_a_hard_turn_shows_in_the_speed_alone(watch, record, seed: int) -> None:
+    turn = Turn(400.0, 180.0, 0.014, drag_area_m2=14.0)
+    coastdown = the_coastdown(watch(record(turns=(turn,), seed=seed)))
+    assert coastdown.ended_by is EndedBy.TURN
+    assert 370.0 <= end_s(coastdown) <= 420.0
+
+
 @pytest.mark.parametrize('thrust', [1.0, 0.5])
 @pytest.mark.parametrize('seed', range(3))
 def test_an_engaged_engine_shows_in_the_speed(watch, record, thrust: float, seed: int) -> None:
