@@ -34,6 +34,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from hidden import cases, scoring
 from hidden.recording import Recording
 
+from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
