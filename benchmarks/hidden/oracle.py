@@ -29,6 +29,7 @@ HELD = 0.99  # by the set of candidates
 LACK_NATS = 5.0  # by which a smooth discrepancy may beat the name alone
 _STEPS = 9
 _HOPELESS_NATS = 40.0
+_DRAWN = 8  # starts from the prior
 _STARTS = 2  # of the signs that signed parameters may have
 _COURSE_SD_RAD = 0.2
 _BY_NAME = {kind.name: kind for kind in (*FIRST_SHELF, *SECOND_SHELF)}
@@ -188,15 +189,21 @@ class _Oracle:
         prior = np.concatenate([1.0 / self.common_sd**2, [1.0 / _spread(s) ** 2 for s in sizes]])
         centre = np.concatenate([self.common, [_middle(size) for size in sizes]])
         signs = product(*(((1.0, -1.0) if size.signed else (1.0,)) for size in sizes))
-        starts = [np.array(sign) for sign in signs]
-        costs = [_square(self._residual(names, sign, centre)) for sign in starts]
-        climbed = [
-            self._climb(names, starts[i], centre, prior, floor)
-            for i in np.argsort(costs)[:_STARTS]
-        ]
+        starts = [(np.array(sign), centre) for sign in signs]
+        if len(sizes) > 1:
+            drawn = np.random.default_rng(0).standard_normal((_DRAWN, len(sizes)))
+            common = np.zeros((_DRAWN, len(self.common)))
+            spread = np.column_stack([common, drawn]) / np.sqrt(prior)
+            starts += [(sign, centre + off) for sign, _ in starts for off in spread]
+        costs = [_square(self._residual(names, *start)) for start in starts]
+        climbed = {}
+        for i in np.argsort(costs):
+            sign, start = starts[i]
+            if tuple(sign) not in climbed and len(climbed) < _STARTS:
+                climbed[tuple(sign)] = self._climb(names, sign, start, centre, prior, floor)
         share = np.log(SHARES[names])
-        evidences = np.array([fit.log_evidence for fit in climbed])
-        best = climbed[int(np.argmax(evidences))]
+        evidences = np.array([fit.log_evidence for fit in climbed.values()])
+        best = max(climbed.values(), key=lambda fit: fit.log_evidence)
         halves = sum(size.signed for size in sizes) * np.log(2.0)
         total = float(np.logaddexp.reduce(evidences)) - halves + share
         return _Fit(
@@ -211,10 +218,16 @@ class _Oracle:
         )
 
     def _climb(
-        self, names: Names, signs: Array, centre: Array, prior: Array, floor: float
+        self,
+        names: Names,
+        signs: Array,
+        start: Array,
+        centre: Array,
+        prior: Array,
+        floor: float,
     ) -> _Fit:
         """Levenberg-Marquardt on the whitened residuals and the prior."""
-        theta, damping = centre.copy(), 1e-3
+        theta, damping = start.copy(), 1e-3
         residual = self._residual(names, signs, theta)
         cost = _cost(residual, theta - centre, prior)
         jacobian = self._jacobian(names, signs, theta, residual)
