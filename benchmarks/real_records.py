@@ -255,6 +255,31 @@ def show(record: Record, out: Path) -> Outcome:
     return Outcome(found, line)
 
 
+def default_line(record: Record, published: Estimate, out: Path) -> str:
+    """
+    Return what the default estimators give beside the published problem.
+    """
+    cells = [record.name]
+    found = [
+        replayed(record, out, estimator=estimator, order_max=Parameters().order_max)
+        .coastdowns[0]
+        .estimate
+        for estimator in ('auto', 'warped')
+    ]
+    for each in (published, *found):
+        assert each is not None
+        curve = each.valid_curve
+        at = [resistance_at(each, speed) for speed in record.speeds_m_s]
+        shown = [
+            f'{speed:g}: {words.plus_minus(r[0], 2 * r[1])}'
+            for speed, r in zip(record.speeds_m_s, at)
+            if r is not None
+        ]
+        limits = f'{curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f}'
+        cells.append('<br>'.join([f'{each.estimator}, {limits}', *shown]))
+    return f'| {" | ".join(cells)} |'
+
+
 def show_model_ship_at_rest(out: Path) -> None:
     """
     Print r of the model ship where the speed all but vanishes, and by other orders.
@@ -360,6 +385,10 @@ def main() -> None:
     print('| --- | --- | --- | --- | --- |')
     for outcome in found.values():
         print(outcome.line)
+    print('\n| record | published problem | default, final figure | default, live |')
+    print('| --- | --- | --- | --- |')
+    for record in RECORDS:
+        print(default_line(record, found[record.name].estimate, out))
     draw(out, data)
 
 

@@ -280,8 +280,10 @@ def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
         first, white = problem.fit_first(start)
         if first is None:
             raise EstimationError(
-                'the equation of motion could not be fitted to the window: is it one coastdown, '
-                'with the engine stopped all the time?'
+                'the equation of motion could not be fitted to the window: give one coastdown, '
+                'with the engine stopped; leave out an input that moves otherwise, as a path '
+                'does that drifts sideways; or set `estimator` to warped or one of s1_speed, '
+                's1_position, s1_joint'
             )
         start = first.unknowns
         weigh(white, problem.rows.kind, problem.steady, unknown, base, weight)

@@ -18,7 +18,7 @@ from shipdrag_ros.estimation.motion_fit.steady import white_sd
 from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Noise, whiten
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Channel, Float64, in_arrival_order
+from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.noise import GaussMarkov
 
@@ -127,6 +127,45 @@ def test_refusals_say_why(coast, ship) -> None:
     still = Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
     with pytest.raises(EstimationError, match='no deceleration'):
         motion_fit.estimate(still, ship, Parameters())
+
+
+def test_what_no_motion_explains_is_refused_with_what_to_use_instead(coast, ship) -> None:
+    block = coast.block(15)
+    block = block[block.channel == Channel.POSITION]
+    block.value[7:] += 300.0
+    cut = Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
+    with pytest.raises(EstimationError, match='warped or one of s1_speed'):
+        motion_fit.estimate(cut, ship, Parameters())
+    # the figure during the coastdown is kept, and a note says why
+    kept = estimate_final(cut, ship, Parameters())
+    assert kept.estimator == 'warped'
+    assert any('not fitted as a motion' in note for note in kept.notes)
+
+
+def test_a_late_onset_is_found_with_all_families(coast, ship) -> None:
+    # the window starts 8 s before the stop: the averaging must settle on the onset
+    for seed in range(4):
+        block = coast.block(500, seed=seed)
+        rng = np.random.default_rng(100 + seed)
+        steady_s = np.arange(-900.0, 0.0, 3.0)
+        both = in_arrival_order(
+            [
+                Block.of(
+                    Channel.SPEED_THROUGH_WATER,
+                    block.stamp_ns[0] + np.round(steady_s * 1e9).astype(np.int64),
+                    coast.speed_m_s + 0.05 * rng.normal(size=len(steady_s)),
+                ),
+                block[block.channel == Channel.SPEED_THROUGH_WATER],
+            ]
+        )
+        start_ns = int(block.stamp_ns[0]) - 8_000_000_000
+        cut = Window.from_block(
+            both, start_ns, int(block.stamp_ns[-1]), before_ns=int(both.stamp_ns[0])
+        )
+        found = motion_fit.estimate(cut, ship, Parameters())
+        away = error(found, coast, ship)
+        largest = float(found.curve.resistance_m_s2.max())
+        assert np.sqrt(np.mean(away**2)) < 0.03 * largest
 
 
 def test_the_final_figure_is_the_fit_unless_another_is_asked_for(coast, ship) -> None:
