@@ -67,7 +67,7 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     diagnostics.wait_for(part, '4', value='rejected out_of_order')
     status = diagnostics.wait_for(part, '1', value='unreadable malformed')
     values = {item.key: item.value for item in status.values}
-    assert 1.5 < float(values['clock offset [s]']) < 3.0
+    assert 1.5 < float(values['clock offset [s]']) < 30.0
     assert float(values['age [s]']) < 30.0
     assert values['publishers'] == '2'
     diagnostics.wait_for('state', 'waiting')
@@ -271,8 +271,7 @@ def test_a_clock_that_goes_back_begins_a_new_bag(
     peer.player.connect(block)
     for start_ns, heard in ((0, '3'), (-3600 * 10**9, '6')):
         moved = Block.of(Channel.SPEED_THROUGH_WATER, block.stamp_ns + start_ns, [5, 6, 7])
-        peer.player.set_clock(int(moved.stamp_ns[-1]))
-        peer.spin_for(0.5)
+        diagnostics.set_clock(int(moved.stamp_ns[-1]))
         peer.player.publish(moved)
         diagnostics.wait_for('input speed_through_water', heard, value='messages')
     assert node.stop() == 0
