@@ -159,7 +159,7 @@ def test_where_the_record_is_cut_changes_no_bit(
 
 
 @settings(max_examples=10, deadline=None)
-@given(data=st.data(), into_s=st.integers(0, 250), seed=st.integers(0, 1000))
+@given(data=st.data(), into_s=st.integers(1, 250), seed=st.integers(0, 1000))
 def test_a_reset_in_mid_coastdown_is_a_fresh_start(
     ship, eventful, bits, data, into_s: int, seed: int
 ) -> None:
