@@ -3,6 +3,8 @@
 Error and coverage of r(v) beside other ways to differentiate, on the same simulated records.
 
 Prints Markdown; `--write` puts it into docs/accuracy.md, and the short table into README.md.
+All of it takes half an hour of a processor: `--parts FOLDER` keeps what is done, goes on from
+there, and with `--group` does a part only.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import os
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import argparse
+import json
 import sys
 import time
 from collections.abc import Callable
@@ -67,6 +70,8 @@ CASES = (
     GUSTS,
 )
 FINAL, LIVE = 'ours, final', 'ours, live'
+
+Figures = dict[str, dict[str, str]]  # by row and column of a table
 
 
 @dataclass(frozen=True)
@@ -163,20 +168,23 @@ def tuned(by_truth: bool, coast: Coast) -> Callable[[Coast], Found]:
     return peer(_peers.TunedByPynumdiff.on(samples, acceleration), None)
 
 
-ESTIMATORS = (
+OURS = (
     Estimator(FINAL, 10_000, partial(own, estimate_final, 'auto')),
     Estimator(LIVE, 10_000, partial(own, estimate, 'auto')),
     Estimator('S1 joint', 10_000, partial(own, estimate, 's1_joint')),
     Estimator('S1 speed', 10_000, partial(own, estimate, 's1_speed')),
     Estimator('S1 position', 10_000, partial(own, estimate, 's1_position')),
+)
+PEERS = (
     Estimator('Chebyshev, BIC (numpy)', 10_000, partial(peer, _peers.chebyshev)),
-    Estimator('Savitzky-Golay, CV (scipy)', 100, partial(peer, _peers.savitzky_golay)),
-    Estimator('smoothing spline, GCV (scipy)', 12, partial(peer, _peers.smoothing_spline)),
-    Estimator('Kalman RTS, ML (statsmodels)', 40, partial(peer, _peers.kalman_rts)),
-    Estimator('Matern 5/2 process (scikit-learn)', 12, partial(peer, _peers.gaussian_process)),
+    Estimator('Savitzky-Golay, CV (scipy)', 50, partial(peer, _peers.savitzky_golay)),
+    Estimator('smoothing spline, GCV (scipy)', 6, partial(peer, _peers.smoothing_spline)),
+    Estimator('Kalman RTS, ML (statsmodels)', 10, partial(peer, _peers.kalman_rts)),
+    Estimator('Matern 5/2 process (scikit-learn)', 6, partial(peer, _peers.gaussian_process)),
     Estimator('pynumdiff, tuned by itself', 10_000, partial(tuned, False)),
     Estimator('pynumdiff, tuned to the truth', 10_000, partial(tuned, True)),
 )
+GROUPS = {'ours': OURS, 'peers': PEERS, 'bound': ()}
 
 
 @dataclass
@@ -230,6 +238,7 @@ class Tally:
         }
 
 
+EFFICIENCY = ('RMSE', 'bias', 'spread', 'v .. v⁴', 'v, v², v⁴')
 HEADINGS = ('RMSE', 'bias', 'spread', 'at the top', 'cover', 'where valid', 'valid', 'runs')
 
 
@@ -247,39 +256,73 @@ def percent(part: float) -> str:
     return f'{100.0 * part:.2f}'
 
 
-def tally(hull: Hull, case: Case, n: int, runs: int) -> dict[str, Tally]:
+def tally(
+    hull: Hull, case: Case, n: int, runs: int, estimators: tuple[Estimator, ...]
+) -> dict[str, Tally]:
     """
-    Run all estimators on the same records of one case.
+    Run estimators on the same records of one case.
     """
-    start = time.process_time()
-    tallies = {each.name: Tally() for each in ESTIMATORS}
+    tallies = {each.name: Tally() for each in estimators}
     calls: dict[str, Callable[[Coast], Found]] = {}
     largest = np.nan
-    for seed, coast in enumerate(coasts(hull, case, n, runs)):
+    most = min(runs, max(each.runs for each in estimators))
+    for seed, coast in enumerate(coasts(hull, case, n, most)):
         if not calls:
             largest = float(coast.resists(np.array([hull.speed_m_s]))[0])
-            calls = {each.name: each.train(coast) for each in ESTIMATORS}
-        for each in ESTIMATORS:
+            calls = {each.name: each.train(coast) for each in estimators}
+        for each in estimators:
             if seed >= each.runs:
                 continue
             try:
                 tallies[each.name].add(calls[each.name](coast), coast, largest)
             except (EstimationError, ValueError, np.linalg.LinAlgError):
                 tallies[each.name].failed += 1
-    spent = time.process_time() - start
-    print(f'{hull.name}, {case.name}, n = {n}: {spent:.0f} s', file=sys.stderr, flush=True)
     return tallies
 
 
-def figures(hull: Hull, case: Case, n: int, runs: int) -> dict[str, dict[str, str]]:
+def figures(hull: Hull, case: Case, n: int, runs: int, group: str) -> Figures:
     """
-    Return the figures of all estimators in one case, and the bound.
+    Return the figures of a group of estimators in one case, or the bound.
     """
-    found = {name: one.figures() for name, one in tally(hull, case, n, runs).items()}
+    if group != 'bound':
+        found = tally(hull, case, n, runs, GROUPS[group])
+        return {name: one.figures() for name, one in found.items()}
     sd, largest = bound(hull, case, n)
     rmse = percent(rms(sd) / largest)
     top = f'{100.0 * sd[-1] / largest:.1f}'
-    return {**found, 'Cramer-Rao bound': {'RMSE': rmse, 'spread': rmse, 'at the top': top}}
+    return {'Cramer-Rao bound': {'RMSE': rmse, 'spread': rmse, 'at the top': top}}
+
+
+def efficiency(n: int, runs: int) -> Figures:
+    """
+    Return the figures on the hull whose resistance lies in the family.
+    """
+    found = tally(FAMILY, WHITE, n, runs, OURS[:2])
+    result = {}
+    for name, one in found.items():
+        shown = {key: one.figures()[key] for key in EFFICIENCY[:3]}
+        for heading, powers in zip(EFFICIENCY[3:], (BOUND_FAMILY, IN_FAMILY)):
+            sd, largest = bound(FAMILY, WHITE, n, powers)
+            limit = rms(sd) / largest
+            shown[heading] = f'{percent(limit)}: {100.0 * (limit / one.spread) ** 2:.0f} %'
+        result[name] = shown
+    return result
+
+
+def part(folder: Path | None, name: str, make: Callable[[], Figures]) -> Figures:
+    """
+    Return figures, from the folder where an earlier call has left them.
+    """
+    kept = None if folder is None else folder / f'{name.replace("/", "_")}.json'
+    if kept is not None and kept.exists():
+        found: Figures = json.loads(kept.read_text(encoding='utf-8'))
+        return found
+    start = time.process_time()
+    found = make()
+    print(f'{name}: {time.process_time() - start:.0f} s', file=sys.stderr, flush=True)
+    if kept is not None:
+        kept.write_text(json.dumps(found), encoding='utf-8')
+    return found
 
 
 def row(cells: list[str]) -> str:
@@ -296,7 +339,7 @@ def head(headings: list[str]) -> list[str]:
     return [row(headings), row(['---'] * len(headings))]
 
 
-def table(counts: list[int], by_count: list[dict[str, dict[str, str]]]) -> list[str]:
+def table(counts: list[int], by_count: list[Figures]) -> list[str]:
     """
     Return the table of one hull and case; figures of all n in a cell.
     """
@@ -311,24 +354,7 @@ def table(counts: list[int], by_count: list[dict[str, dict[str, str]]]) -> list[
     return lines
 
 
-def efficiency(n: int, runs: int) -> list[str]:
-    """
-    Return the lines on the hull whose resistance lies in the family.
-    """
-    bounds = [bound(FAMILY, WHITE, n, powers) for powers in (BOUND_FAMILY, IN_FAMILY)]
-    found = tally(FAMILY, WHITE, n, runs)
-    lines = []
-    for name in (FINAL, LIVE):
-        shown = found[name].figures()
-        cells = [str(n), name, *(shown[key] for key in ('RMSE', 'bias', 'spread'))]
-        for sd, largest in bounds:
-            limit = rms(sd) / largest
-            cells.append(f'{percent(limit)}: {100.0 * (limit / found[name].spread) ** 2:.0f} %')
-        lines.append(row(cells))
-    return lines
-
-
-def short_table(results: dict[Case, dict[str, dict[str, str]]]) -> list[str]:
+def short_table(results: dict[Case, Figures]) -> list[str]:
     """
     Return the table of the README: the cargo ship, three cases, RMSE, top, cover.
     """
@@ -348,7 +374,7 @@ def preface(runs: int) -> list[str]:
     """
     Say what the page shows and how it was measured.
     """
-    fewer = ', '.join(f'{each.name} {each.runs}' for each in ESTIMATORS if each.runs < runs)
+    fewer = ', '.join(f'{each.name} {each.runs}' for each in PEERS if each.runs < runs)
     return [
         '# Accuracy beside other estimators',
         '',
@@ -410,6 +436,8 @@ def main() -> None:
     parser.add_argument('--hull', choices=[hull.name for hull in HULLS], help='this one alone')
     parser.add_argument('--write', action='store_true', help='docs/accuracy.md and README.md')
     parser.add_argument('--jobs', type=int, default=1, help='processes')
+    parser.add_argument('--parts', type=Path, metavar='FOLDER', help='keep and reuse what is done')
+    parser.add_argument('--group', choices=list(GROUPS), help='fill the parts with this one alone')
     options = parser.parse_args()
     runs, counts = options.runs, options.n
     hulls = [hull for hull in HULLS if options.hull in (None, hull.name)]
@@ -418,13 +446,35 @@ def main() -> None:
         parser.error('--runs must be 2 or more: the spread is shown')
     if options.write and not has_short:
         parser.error(f'--write needs n = {SHORT} and the {CARGO.name} for the short table')
+    if options.group and not options.parts:
+        parser.error('--group needs --parts, where the figures are kept')
+    if options.parts:
+        options.parts.mkdir(parents=True, exist_ok=True)
+    calls: dict[tuple[object, ...], tuple[str, Callable[[], Figures]]] = {}
+    # the long ones first
+    for n, hull, case, group in product(counts[::-1], hulls, CASES, GROUPS):
+        name = f'{hull.name}, {case.name}, n = {n}, {group}, {runs}'
+        calls[hull, case, n, group] = name, partial(figures, hull, case, n, runs, group)
+    for n in counts:
+        calls[FAMILY, n, 'ours'] = f'efficiency, n = {n}, {runs}', partial(efficiency, n, runs)
     with ProcessPoolExecutor(options.jobs) as pool:
-        # the long ones first
-        given = sorted(product(hulls, CASES, counts), key=lambda each: -each[2])
-        waiting = {each: pool.submit(figures, *each, runs) for each in given}
-        family = [pool.submit(efficiency, n, runs) for n in counts]
-        found = {each: future.result() for each, future in waiting.items()}
-        efficient = [line for future in family for line in future.result()]
+        waiting = {
+            key: pool.submit(part, options.parts, name, make)
+            for key, (name, make) in calls.items()
+            if options.group in (None, key[-1])
+        }
+        results = {key: future.result() for key, future in waiting.items()}
+    if options.group:
+        return
+    found: dict[tuple[Hull, Case, int], Figures] = {}
+    for hull, case, n in product(hulls, CASES, counts):
+        of_all = [results[hull, case, n, group] for group in GROUPS]
+        found[hull, case, n] = {name: row for group in of_all for name, row in group.items()}
+    efficient = [
+        row([str(n), name, *(shown[key] for key in EFFICIENCY)])
+        for n in counts
+        for name, shown in results[FAMILY, n, 'ours'].items()
+    ]
     body = []
     for hull in hulls:
         body += ['', f'## {hull.name.capitalize()}']
@@ -437,9 +487,10 @@ def main() -> None:
         '',
         'The cargo ship with r = c₁v + c₂v² + c₄v⁴, which the families of the final fit hold; '
         'white noise.',
-        'Efficiency: variance of the bound over that of ours, which does not know the family.',
+        'Under each family: its bound, and the efficiency, the variance of the bound over '
+        'that of ours. Ours does not know the family.',
         '',
-        *head(['n', '', 'RMSE', 'bias', 'spread', 'v .. v⁴: efficiency', 'v, v², v⁴: efficiency']),
+        *head(['n', '', *EFFICIENCY]),
         *efficient,
     ]
     lines = [*preface(runs), *body]

@@ -5,7 +5,8 @@ Error and coverage of the live estimator beside S1's three problems.
 Simulated coastdowns of three hulls, none of which anything was tuned to; log
 and position with n samples each. Errors of r(v) are over the valid range of
 each estimate, in percent of the true r at the start; `top` is where that range
-ends, in percent of the speed at the start.
+ends, in percent of the speed at the start. Where something disturbs slowly, the
+half hour before the stop is given too.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from _coasts import COURSE_RAD, errors
+from _coasts import COURSE_RAD, STEADY_S, errors
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
@@ -93,6 +94,11 @@ class Case:
     log_scale: float = 0.0
     run_down: bool = False
 
+    @property
+    def lead_in_s(self) -> float:
+        """Length of the record before the stop."""
+        return STEADY_S if self.coloured or self.water else 0.0
+
 
 CASES = (
     Case('n = 100', n=100),
@@ -119,7 +125,7 @@ def truth_of(hull: Hull, case: Case, seed: int) -> Truth:
     water = GaussMarkov(case.water * hull.speed_m_s, 300.0) if case.water else None
     scenario = Scenario(
         speed_m_s=hull.speed_m_s,
-        lead_in_s=0.0,
+        lead_in_s=case.lead_in_s,
         duration_s=hull.duration_s,
         heading_rad=COURSE_RAD,
         current_m_s=(current * np.cos(COURSE_RAD), current * np.sin(COURSE_RAD)),
@@ -136,7 +142,8 @@ def read(truth: Truth, hull: Hull, case: Case, seed: int) -> Window:
     length_s = hull.duration_s
     # a trifle more, so that the last sample is not lost to rounding
     rate_hz = (case.n - 1 + 1e-6) / length_s
-    gaps = ((0.1 * length_s, 0.2 * length_s),) if case.gap else ()
+    start_s = case.lead_in_s
+    gaps = ((start_s + 0.1 * length_s, start_s + 0.2 * length_s),) if case.gap else ()
     log = Sensor(
         channel=Channel.SPEED_THROUGH_WATER,
         rate_hz=rate_hz,
@@ -151,7 +158,13 @@ def read(truth: Truth, hull: Hull, case: Case, seed: int) -> Window:
     scaled = block.value.copy()
     scaled[block.channel == Channel.SPEED_THROUGH_WATER, 0] *= 1.0 + case.log_scale
     block = replace(block, value=scaled)
-    return Window.from_block(block, START_NS, START_NS + round(length_s * 1e9))
+    start_ns = START_NS + round(start_s * 1e9)
+    return Window.from_block(
+        block,
+        start_ns,
+        start_ns + round(length_s * 1e9),
+        before_ns=START_NS if start_s else None,
+    )
 
 
 def windows(hull: Hull, case: Case, runs: int) -> Iterator[tuple[Truth, Window]]:
