@@ -8,7 +8,6 @@ for once the verdict is kept. Both are made anew from the number of the case.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 
@@ -194,13 +193,6 @@ def count() -> int:
     Return the number of cases.
     """
     return len(_plans())
-
-
-def composition() -> Counter[str]:
-    """
-    Return how many cases of each kind there are.
-    """
-    return Counter(reveal(number).kind for number in range(count()))
 
 
 def observe(number: int, *, added: tuple[str, ...] = ()) -> Observation:
