@@ -56,3 +56,7 @@ class EstimationError(ShipdragError):
 
 class SimulationError(ShipdragError):
     """A simulation that was asked for something impossible."""
+
+
+class DiagnosisError(ShipdragError):
+    """Runs, or a ship file, from which no effect can be named."""

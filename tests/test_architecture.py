@@ -23,6 +23,7 @@ FLOORS = {
     'regression': 2,
     'simulation': 2,
     'estimation': 3,
+    'diagnosis': 4,
     'coastdown': 4,
     'messages': 5,
     'bags': 6,

@@ -130,7 +130,7 @@ def _from_shaft(window: Window) -> RunDown | None:
     steady = window.before.shaft.value
     if len(steady) < 3 or len(window.shaft) < 3:
         return None
-    time_s = (time_ns - window.start_ns) * 1e-9
+    time_s = np.asarray((time_ns - window.start_ns) * 1e-9, np.float64)
     high = float(np.median(np.abs(steady)))
     low = float(np.median(np.abs(window.shaft.value)))
     if not low < _FALLEN * high:

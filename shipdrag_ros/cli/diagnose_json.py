@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The JSON document of `diagnose`, whose keys others rely on."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from shipdrag_ros.diagnosis import Diagnosis, Gap, Verdict
+
+
+def document(found: Diagnosis) -> dict[str, Any]:
+    """
+    Return the document of a diagnosis.
+
+    The candidate `none` says that nothing is missing, `unknown` that it is
+    something without a name.
+    """
+    candidates: list[dict[str, Any]] = [
+        {'names': list(each.names) or ['none'], 'probability': each.probability}
+        for each in found.candidates
+    ]
+    if found.verdict is Verdict.UNKNOWN:
+        candidates.insert(0, {'names': ['unknown'], 'probability': found.unnamed})
+    return {
+        'verdict': str(found.verdict),
+        'effects': [
+            {
+                'name': effect.name,
+                'probability': effect.probability,
+                'parameters': {name: asdict(v) for name, v in effect.parameters.items()},
+            }
+            for effect in found.effects
+        ],
+        'candidates': candidates,
+        'would_decide': [each.measure for each in found.would_decide],
+        'resolves': {each.measure: each.probability for each in found.would_decide},
+        'where': None if found.where is None else asdict(found.where),
+        'gap': {
+            'before': _gap(found.before),
+            'after': _gap(found.after) or {},
+            'held_out_before': _gap(found.held_out_before),
+            'held_out_after': _gap(found.held_out_after),
+        },
+        'baseline': found.baseline,
+        'notes': list(found.notes),
+    }
+
+
+def _gap(gap: Gap | None) -> dict[str, Any] | None:
+    return None if gap is None else asdict(gap)

@@ -1,0 +1,26 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which effect is missing where model and data disagree."""
+
+from shipdrag_ros.diagnosis.diagnose import CoastRun, diagnose, with_effects
+from shipdrag_ros.diagnosis.result import (
+    Advice,
+    Candidate,
+    Diagnosis,
+    Gap,
+    Named,
+    Verdict,
+    Where,
+)
+
+__all__ = [
+    'Advice',
+    'Candidate',
+    'CoastRun',
+    'Diagnosis',
+    'Gap',
+    'Named',
+    'Verdict',
+    'Where',
+    'diagnose',
+    'with_effects',
+]

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From coastdowns to the effect that is missing in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, where
+from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.linear import Hypothesis
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.result import Advice, Candidate, Diagnosis, Named, Verdict
+from shipdrag_ros.diagnosis.terms import EffectTerm
+from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, weigh
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
+from shipdrag_ros.simulation.effects import deciders
+
+_PAIRED = 4  # most probable names that pairs are tried with
+_PAIRS = 8  # that are fitted to the end
+_SCREENING = 3  # iterations
+_AT_ODDS = 2.0  # nats that something unnamed gains, from which pairs are tried
+
+
+@dataclass(frozen=True)
+class CoastRun:
+    """
+    A coastdown to be diagnosed.
+
+    Attributes
+    ----------
+    name
+        For the user.
+    window
+        With the steady record before it.
+    """
+
+    name: str
+    window: Window
+
+
+def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Diagnosis:
+    """
+    Name the effect that is missing in a ship's model.
+
+    Parameters
+    ----------
+    runs
+        One or more; effects of the earth are stated along the first one.
+    ship
+        With a baseline; the effects that its file states are part of the model.
+    parameters
+        For the noise of the sensors and the convention of the heading.
+
+    Raises
+    ------
+    DiagnosisError
+        If the ship has no baseline, or a run too little steady record.
+    EstimationError
+        If a run has too few samples.
+    """
+    seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
+    library = Library(ship, seen)
+    nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
+    named = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
+    unnamed = [library.with_discrepancy(library.nothing, c) for c in library.channels()]
+    both = [*named, *unnamed]
+    found = fit(library.problem, both, [library.start(h, nothing) for h in both])
+    smooth = found[len(named) :]
+    weighed = weigh([nothing, *found])
+    best = weighed.best[weighed.named()[0]]
+    more = _with_more(library, best, smooth)
+    if weighed.nothing < QUIET and lacks(best, more, nats=_AT_ODDS):
+        found += _pairs(library, weighed)
+        weighed = weigh([nothing, *found])
+        best = weighed.best[weighed.named()[0]]
+        more = _with_more(library, best, smooth)
+    verdict, candidates = decide(
+        weighed, lacking=lacks(best, more), inseparable=_inseparable(library)
+    )
+    as_stated = frozen(library)
+    missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.hypothesis.names)
+    return Diagnosis(
+        verdict=verdict,
+        effects=_named(best, weighed) if verdict is Verdict.NAMED else (),
+        candidates=candidates,
+        nothing=weighed.nothing,
+        unnamed=weighed.unnamed,
+        would_decide=_advice(candidates) if verdict is Verdict.ONE_OF else (),
+        where=None if verdict is Verdict.NONE else where(library, as_stated, smooth),
+        before=gap_of(library.problem, as_stated.best),
+        after=gap_of(library.problem, best.best) if missing else None,
+        held_out_before=held_out(library, None),
+        held_out_after=held_out(library, best) if missing else None,
+        baseline='stated',
+        best=_named(best, weighed),
+    )
+
+
+def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
+    """
+    Return a ship with effects added to what its file states.
+    """
+    added = tuple(StatedEffect(effect.name, dict(effect.parameters)) for effect in effects)
+    return replace(ship, effects=(*ship.effects, *added))
+
+
+def _with_more(library: Library, best: Fit, smooth: Sequence[Fit]) -> list[Fit]:
+    """Fit something smooth besides a name."""
+    if not best.hypothesis.names:
+        return list(smooth)
+    more = [library.with_discrepancy(best.hypothesis, c) for c in library.channels()]
+    return fit(library.problem, more, [library.start(h, best) for h in more])
+
+
+def _pairs(library: Library, weighed: Weighed) -> list[Fit]:
+    """Fit pairs of the likeliest names with all others."""
+    first = [names for names in weighed.named() if names][:_PAIRED]
+    tried: dict[tuple[str, ...], tuple[Hypothesis, Fit]] = {}
+    for names in first:
+        base = weighed.best[names]
+        for effect in library.effects:
+            pair = tuple(sorted((*names, effect.name)))
+            if effect.name in names or pair in tried:
+                continue
+            for hypothesis in library.with_effect(base.hypothesis, effect):
+                tried[(*pair, str(len(tried)))] = hypothesis, base
+    hypotheses = [hypothesis for hypothesis, _ in tried.values()]
+    starts = [library.start(hypothesis, base) for hypothesis, base in tried.values()]
+    screened = fit(library.problem, hypotheses, starts, iterations=_SCREENING)
+    screened.sort(key=lambda one: -one.log_evidence)
+    kept = screened[:_PAIRS]
+    return fit(library.problem, [one.hypothesis for one in kept], [one.best.z for one in kept])
+
+
+def _named(best: Fit, weighed: Weighed) -> tuple[Named, ...]:
+    """Return the effects of a fit with their parameters."""
+    probability = weighed.probability[best.hypothesis.names]
+    found = []
+    for part, place in best.hypothesis.parts:
+        if not isinstance(part, EffectTerm) or part.stated:
+            continue
+        values: dict[str, Uncertain] = {}
+        for i, unknown in enumerate(part.unknowns):
+            z = float(best.best.z[place + i])
+            sd = abs(unknown.slope(z)) * float(np.sqrt(best.covariance[place + i, place + i]))
+            values[unknown.name] = Uncertain(unknown.value(z), sd)
+        for name, value in part.fixed:
+            values[name] = Uncertain(value, 0.0)
+        ordered = {q.name: values[q.name] for q in part.effect.parameters}
+        found.append(Named(part.effect.name, probability, ordered))
+    return tuple(sorted(found, key=lambda effect: effect.name))
+
+
+def _inseparable(library: Library) -> list[frozenset[str]]:
+    """Return look-alikes that no record of a coastdown tells apart."""
+    return [
+        frozenset((one.name, other))
+        for one in library.effects
+        for other, measures in one.look_alikes.items()
+        if not measures
+    ]
+
+
+def _advice(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
+    """Return what tells the candidates apart, what serves most pairs of them first."""
+    votes: dict[str, float] = {}
+    for one, other in combinations(candidates, 2):
+        for a in one.names:
+            for b in other.names:
+                if a == b:
+                    continue
+                for measure in deciders(a, b):
+                    weight = one.probability * other.probability
+                    votes[measure.value] = votes.get(measure.value, 0.0) + weight
+    ranked = sorted(votes, key=lambda measure: -votes[measure])
+    return tuple(Advice(measure, None) for measure in ranked)

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Hypotheses fitted all in step, and their evidence.
+
+Damped Gauss-Newton; the evidence is Laplace's about the best fit, with the part
+beyond the end of a one-sided parameter taken off.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr
+
+from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Problem
+from shipdrag_ros.diagnosis.unknowns import Tail
+from shipdrag_ros.samples import Float64
+
+_ITERATIONS = 12
+_CONVERGED = 0.02  # fall of -2 ln posterior
+_DAMPING = 1e-2
+_HOPELESS = 1e4  # damping
+
+
+@dataclass(frozen=True)
+class Fit:
+    """
+    A fitted hypothesis.
+
+    Attributes
+    ----------
+    best
+        At the most probable unknowns.
+    covariance : (p, p)
+        NaN where it could not be fitted.
+    log_evidence
+        With the prior probability, less a constant.
+    """
+
+    best: Linear
+    covariance: Float64
+    log_evidence: float
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """What was fitted."""
+        return self.best.hypothesis
+
+    @property
+    def log_likelihood(self) -> float:
+        """Evidence without the prior probability."""
+        return self.log_evidence - self.hypothesis.weight
+
+    @property
+    def chi2_per_row(self) -> float:
+        """About 1 where the noise explains what is left."""
+        return self.best.chi2 / self.best.rows
+
+
+def fit(
+    problem: Problem,
+    hypotheses: Sequence[Hypothesis],
+    starts: Sequence[Float64],
+    *,
+    iterations: int = _ITERATIONS,
+) -> list[Fit]:
+    """
+    Fit hypotheses; those that cannot be have no evidence.
+
+    Parameters
+    ----------
+    starts
+        (p,) each, as `Linear.z`.
+    """
+    states = [_State(h, z.copy()) for h, z in zip(hypotheses, starts, strict=True)]
+    active = states
+    for _ in range(iterations):
+        points = problem.linearise([s.hypothesis for s in active], [s.trial for s in active])
+        for state, point in zip(active, points, strict=True):
+            state.take(point)
+        active = [state for state in active if not state.done]
+        if not active:
+            break
+    return [state.result() for state in states]
+
+
+class _State:
+    """A hypothesis on its way to the best fit."""
+
+    def __init__(self, hypothesis: Hypothesis, z: Float64) -> None:
+        self.hypothesis = hypothesis
+        self.trial = z
+        self.best: Linear | None = None
+        self.damping = 0.0
+        self.done = False
+        self._half = np.zeros(len(z), bool)
+        for i, unknown in enumerate(hypothesis.unknowns):
+            self._half[i] = unknown.tail is Tail.HALF
+
+    def take(self, point: Linear) -> None:
+        """Go on from a point that was tried, or from the one before with a smaller step."""
+        if self.best is None or point.cost < self.best.cost + 1e-9:
+            fallen = math.inf if self.best is None else self.best.cost - point.cost
+            self.best = point
+            self.done = fallen < _CONVERGED or not math.isfinite(point.cost)
+            self.damping = 0.2 * self.damping if self.damping > 1e-4 else 0.0
+        else:
+            self.damping = max(8.0 * self.damping, _DAMPING)
+            self.done = self.damping > _HOPELESS
+        if not self.done:
+            self.trial = self._step()
+
+    def _step(self) -> Float64:
+        assert self.best is not None
+        matrix, fall = self.best.normal
+        free = np.ones(len(fall), bool)
+        while True:
+            size = np.sqrt(np.maximum(np.diag(matrix)[free], 1e-300))
+            scaled = matrix[np.ix_(free, free)] / np.outer(size, size)
+            scaled[np.diag_indices_from(scaled)] *= 1.0 + self.damping
+            step = np.zeros(len(fall))
+            step[free] = np.linalg.lstsq(scaled, fall[free] / size, rcond=1e-13)[0] / size
+            trial: Float64 = self.best.z + step
+            # one that would leave its side at once is held where it ends
+            held = free & self._half & (trial < 0.0) & (self.best.z <= 0.0)
+            if not held.any():
+                return np.where(self._half, np.maximum(trial, 0.0), trial)
+            free &= ~held
+
+    def result(self) -> Fit:
+        """Return the fit, with Laplace's evidence."""
+        best = self.best
+        assert best is not None
+        failed = Fit(best, np.full((len(best.z), len(best.z)), np.nan), -math.inf)
+        if not math.isfinite(best.cost):
+            return failed
+        matrix, fall = best.normal
+        size = np.sqrt(np.diag(matrix))
+        if not (size > 0.0).all():
+            return failed
+        scaled = matrix / np.outer(size, size)
+        sign, log_det = np.linalg.slogdet(scaled)
+        if sign <= 0.0:
+            return failed
+        covariance = np.linalg.inv(scaled) / np.outer(size, size)
+        # where the fit is held at the end of a parameter, the best is beyond
+        step = covariance @ fall
+        log_evidence = -0.5 * (best.cost - float(fall @ step))
+        log_evidence -= 0.5 * float(log_det) + float(np.log(size).sum())
+        for i in np.flatnonzero(self._half):
+            beyond = (best.z[i] + step[i]) / math.sqrt(covariance[i, i])
+            log_evidence += math.log(2.0) + float(log_ndtr(beyond))
+        return Fit(best, covariance, log_evidence + self.hypothesis.weight)

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far model and data are apart, and where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.linear import Linear, Problem
+from shipdrag_ros.diagnosis.result import Gap, Where
+from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION
+from shipdrag_ros.samples import Float64
+
+_PARTS = 12  # of a coastdown, in telling where a gap is
+_SHARE = 0.9  # of the excess, between the ends of where it is
+_EVEN_NATS = 3.0  # of evidence by which two channels are not told apart
+_ROUNDS = 3
+
+
+def gap_of(problem: Problem, linear: Linear) -> Gap:
+    """
+    Return how far a fitted model is from the runs.
+    """
+    speeds, places = [], []
+    for seen, residual in zip(problem.seen, linear.residuals, strict=True):
+        n = len(seen.along)
+        along, kind = residual[:n], seen.along.rows.kind
+        coasting = seen.along.rows.time_s >= seen.lead_in_s
+        speeds.append(along[coasting & (kind == LOG)])
+        ahead = along[coasting & (kind == POSITION)]
+        if seen.across is not None and len(ahead):
+            across = residual[n : n + len(seen.across)][seen.across.rows.time_s >= seen.lead_in_s]
+            places.append(np.hypot(ahead, across))
+    return Gap(_rms(speeds), _rms(places), linear.chi2 / linear.rows)
+
+
+def _rms(parts: Sequence[Float64]) -> float | None:
+    whole = np.concatenate([*parts, np.empty(0)])
+    return float(np.sqrt(np.mean(whole**2))) if len(whole) else None
+
+
+def frozen(library: Library) -> Fit:
+    """
+    Fit where and how fast the runs began, the ship being as its file states it.
+    """
+    as_stated = replace(library.nothing, terms=library.nothing.terms[1:])
+    return fit(library.problem, [as_stated], [library.start(as_stated)])[0]
+
+
+def held_out(library: Library, found: Fit | None) -> Gap | None:
+    """
+    Predict each run from the others, and tell how far off that is.
+
+    Parameters
+    ----------
+    found
+        With the effect; None: the ship as its file states it.
+
+    Notes
+    -----
+    What the other runs do not tell is allowed for: chi^2 is of residuals whose
+    covariance holds that of the prediction.
+    """
+    if len(library.seen) < 2:
+        return None
+    gaps, rows = [], []
+    for j, run in enumerate(library.seen):
+        alone = replace(library, seen=(run,))
+        if found is None:
+            linear = frozen(alone).best
+        else:
+            others = tuple(other for i, other in enumerate(library.seen) if i != j)
+            linear = _predicted(replace(library, seen=others), alone, found)
+        gaps.append(gap_of(alone.problem, linear))
+        rows.append(linear.rows)
+    return Gap(
+        _mean_square([gap.rms_speed_m_s for gap in gaps]),
+        _mean_square([gap.rms_position_m for gap in gaps]),
+        float(np.average([gap.chi2_per_sample for gap in gaps], weights=rows)),
+    )
+
+
+def _mean_square(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.sqrt(np.mean(np.square(known)))) if known else None
+
+
+def _predicted(others: Library, alone: Library, found: Fit) -> Linear:
+    """Predict a run, learning from the others what belongs to it too."""
+    there = others.transferred(found.hypothesis)
+    learnt = fit(others.problem, [there], [others.start(there)])[0]
+    here = alone.transferred(found.hypothesis)
+    shared = sum(len(term.unknowns) for term in here.terms)
+    z = alone.start(here)
+    z[:shared] = learnt.best.z[:shared]
+    mean = z[:shared].copy()
+    precision = np.linalg.pinv(learnt.covariance[:shared, :shared], hermitian=True)
+    linear = alone.problem.linearise([here], [z])[0]
+    for _ in range(_ROUNDS):
+        matrix, fall = linear.normal
+        for i, unknown in enumerate(here.unknowns[:shared]):
+            matrix[i, i] -= unknown.weight(linear.z[i])
+            fall[i] += unknown.weight(linear.z[i]) * linear.z[i]
+        matrix[:shared, :shared] += precision
+        fall[:shared] -= precision @ (linear.z[:shared] - mean)
+        step = np.linalg.lstsq(matrix, fall, rcond=1e-13)[0]
+        linear = alone.problem.linearise([here], [linear.z + step])[0]
+    return linear
+
+
+def where(library: Library, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
+    """
+    Return in which channel, and when, model and data disagree.
+
+    Parameters
+    ----------
+    as_stated
+        From `frozen`.
+    unnamed
+        Fits with a smooth discrepancy each.
+    """
+    best = max(unnamed, key=lambda fit: fit.log_likelihood)
+    channel = best.hypothesis.discrepancy
+    near = {
+        fit.hypothesis.discrepancy
+        for fit in unnamed
+        if fit.log_likelihood > best.log_likelihood - _EVEN_NATS
+    }
+    if {'log', 'radar'} <= near:
+        channel = 'log_radar'
+    times, speeds = [], []
+    for j, seen in enumerate(library.seen):
+        excess = np.zeros(_PARTS)
+        white = as_stated.best.tables[j][0]
+        after = (seen.along.rows.time_s - seen.lead_in_s) / seen.duration_s
+        part = np.clip((after * _PARTS).astype(int), 0, _PARTS - 1)
+        rows = np.flatnonzero(after >= 0.0)
+        np.add.at(excess, part[rows], white[rows] ** 2 - 1.0)
+        share = np.cumsum(np.maximum(excess, 0.0))
+        if share[-1] <= 0.0:
+            continue
+        share /= share[-1]
+        first = int(np.searchsorted(share, 0.5 * (1.0 - _SHARE)))
+        last = int(np.searchsorted(share, 0.5 * (1.0 + _SHARE)))
+        ends = np.array([first, last + 1]) / _PARTS * seen.duration_s
+        speed = library.problem.predict(j, as_stated.best).speed
+        times.append(ends)
+        speeds.append(np.interp(ends + seen.lead_in_s, seen.time_s, speed))
+    if not times:
+        whole = max(seen.duration_s for seen in library.seen)
+        return Where(channel, (0.0, whole), (0.0, max(s.speed_m_s for s in library.seen)))
+    return Where(
+        channel,
+        (float(np.min(times)), float(np.max(times))),
+        (float(np.min(speeds)), float(np.max(speeds))),
+    )

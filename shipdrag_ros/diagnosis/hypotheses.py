@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which hypotheses there are: nothing, each effect, pairs, something unnamed.
+
+Effects are found in the library; none is known here by its name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.linear import Hypothesis, Problem
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.terms import (
+    BaselineTerm,
+    EffectTerm,
+    ForceTerm,
+    FormTerm,
+    PlaceTerm,
+    RowTerm,
+    SpeedErrorTerm,
+    Term,
+    scope_runs,
+)
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation.motion_fit.coast import LOG
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
+from shipdrag_ros.simulation.effects import LIBRARY, find
+
+DISCREPANCIES = ('force', 'log', 'radar')
+_NOTHING, _ONE, _PAIR, _UNNAMED = 0.5, 0.38, 0.04, 0.08  # probabilities before the data
+_APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find from 0
+
+
+@dataclass(frozen=True)
+class Library:
+    """
+    The hypotheses about some runs.
+
+    Attributes
+    ----------
+    ship
+        As its file states it.
+    seen
+    """
+
+    ship: Ship
+    seen: tuple[Observation, ...]
+
+    @cached_property
+    def problem(self) -> Problem:
+        """What all share."""
+        return Problem(replace(self.ship, effects=()), self.seen)
+
+    @cached_property
+    def effects(self) -> tuple[Effect, ...]:
+        """Those of the library that can act on this ship."""
+        return tuple(effect for effect in LIBRARY.values() if not effect.missing(self.ship))
+
+    @cached_property
+    def nothing(self) -> Hypothesis:
+        """The ship as its file states it, and no more."""
+        if self.ship.baseline is None:
+            raise DiagnosisError(
+                f'ship {self.ship.name!r} has no baseline to hold a run against; '
+                'add `baseline` to its ship file, or learn one with `shipdrag baseline`'
+            )
+        ship = self.problem.ship
+        stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
+        baseline = BaselineTerm(
+            ship,
+            1.05 * max(run.speed_m_s for run in self.seen),
+            tuple(run.run_down_s - stated for run in self.seen),
+            max(run.run_down_sd_s for run in self.seen),
+        )
+        places = tuple(
+            PlaceTerm(j, run.heading_sd_rad, run.stop_sd_s) for j, run in enumerate(self.seen)
+        )
+        given: list[Term] = [
+            EffectTerm(
+                find(effect.name),
+                ship,
+                stated=tuple(
+                    (effect.parameters[q.name].value, effect.parameters[q.name].sd)
+                    if q.name in effect.parameters
+                    else (q.of(ship).default or 0.0, 0.0)
+                    for q in find(effect.name).parameters
+                ),
+            )
+            for effect in self.ship.effects
+        ]
+        return Hypothesis((), (baseline, *given), places, weight=math.log(_NOTHING))
+
+    def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
+        """
+        Return a hypothesis with one effect more, in the ways that it may be there.
+
+        They differ in where a fit begins, in what is a choice, and in which run
+        an effect of a single run was.
+        """
+        free = [q for q in effect.parameters if q.prior.shape is not Shape.CHOICE]
+        choices = [q for q in effect.parameters if q.prior.shape is Shape.CHOICE]
+        starts = list(product(*(_starts(q, first=q is free[0]) for q in free)))
+        words = list(product(*((q.prior.first, q.prior.second) for q in choices)))
+        runs = scope_runs(effect, len(self.seen))
+        names = tuple(sorted((*base.names, effect.name)))
+        among = _ONE / len(self.effects)
+        if len(names) == 2:
+            among = _PAIR / math.comb(len(self.effects), 2)
+        weight = math.log(among / len(words) / len(runs))
+        found = []
+        for start, word, run in product(starts, words, runs):
+            term = EffectTerm(effect, self.problem.ship, start, _named(choices, word), run)
+            sd = effect.formula_sd
+            forms = (*base.forms, FormTerm(term, sd)) if sd > 0.0 else base.forms
+            terms = (*base.terms, term)
+            found.append(replace(base, names=names, terms=terms, forms=forms, weight=weight))
+        return found
+
+    def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
+        """
+        Return a hypothesis with something smooth and unnamed besides.
+        """
+        found = replace(base, discrepancy=channel, weight=math.log(_UNNAMED / len(DISCREPANCIES)))
+        if channel == 'force':
+            top = 1.05 * max(run.speed_m_s for run in self.seen)
+            return replace(found, terms=(*base.terms, ForceTerm(self.problem.ship, top)))
+        errors: list[RowTerm] = [
+            SpeedErrorTerm(j, channel == 'log', run.speed_m_s) for j, run in enumerate(self.seen)
+        ]
+        return replace(found, row_terms=(*base.row_terms, *errors))
+
+    def transferred(self, other: Hypothesis) -> Hypothesis:
+        """
+        Return a hypothesis about other runs as one about these.
+
+        What belongs to a single run is left out.
+        """
+        kept = [
+            term
+            for term in other.terms[len(self.nothing.terms) :]
+            if isinstance(term, EffectTerm) and term.effect.scope is not Scope.RUN
+        ]
+        return replace(self.nothing, names=other.names, terms=(*self.nothing.terms, *kept))
+
+    def channels(self) -> tuple[str, ...]:
+        """
+        Return where something unnamed can be.
+        """
+        kinds = set(np.concatenate([run.along.rows.kind for run in self.seen]).tolist())
+        if kinds == {LOG} or LOG not in kinds:
+            return ('force',)
+        return DISCREPANCIES
+
+    def start(self, hypothesis: Hypothesis, near: Fit | None = None) -> Float64:
+        """
+        Return unknowns to begin from: those of a fit where it has them.
+        """
+        z = np.array([u.start for u in hypothesis.unknowns])
+        speeds = np.array([run.speed_m_s for run in self.seen])
+        if near is None:
+            return np.concatenate([z, speeds])
+        known = {id(part): place for part, place in near.hypothesis.parts}
+        for part, place in hypothesis.parts:
+            if id(part) in known:
+                size = len(part.unknowns)
+                z[place : place + size] = near.best.z[known[id(part)] : known[id(part)] + size]
+        return np.concatenate([z, near.best.z[len(near.hypothesis.unknowns) :]])
+
+
+def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:
+    shape = quantity.prior.shape
+    if first:
+        return {Shape.HALF_NORMAL: (0.3,), Shape.LOG_NORMAL: _APART}.get(shape, (0.0,))
+    return (0.0,) if shape is Shape.NORMAL else _APART
+
+
+def _named(
+    choices: Sequence[Quantity], values: tuple[float, ...]
+) -> tuple[tuple[str, float], ...]:
+    return tuple((q.name, value) for q, value in zip(choices, values, strict=True))

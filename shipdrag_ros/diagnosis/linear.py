@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Hypotheses about runs, simulated and made linear.
+
+All that all hypotheses need of a run, each with a step in each of its unknowns,
+are columns of one batched simulation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from shipdrag_ros.diagnosis.noise import apply
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.terms import FormTerm, Predicted, RowTerm, Term
+from shipdrag_ros.diagnosis.unknowns import Unknown
+from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Action, Columns, Frame, Scenario, simulate_columns
+
+_STEP_Z = 0.05  # of the differences, in units of the prior
+_STEP_M_S = 0.01  # of the steady speed
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """
+    What may be missing.
+
+    Attributes
+    ----------
+    names
+        Of the effects, sorted; none: nothing is missing.
+    terms, row_terms
+        All that is fitted, the baseline's uncertainty included.
+    forms
+        How far effects among the terms may depart from their formulas.
+    weight
+        Logarithm of the prior probability.
+    discrepancy
+        'force', 'log' or 'radar' where something smooth without a name is
+        fitted besides; '' without.
+    """
+
+    names: tuple[str, ...]
+    terms: tuple[Term, ...]
+    row_terms: tuple[RowTerm, ...]
+    forms: tuple[FormTerm, ...] = ()
+    weight: float = 0.0
+    discrepancy: str = ''
+
+    @cached_property
+    def parts(self) -> tuple[tuple[Term | RowTerm | FormTerm, int], ...]:
+        """All that has unknowns, with the place of its first."""
+        found: list[tuple[Term | RowTerm | FormTerm, int]] = []
+        place = 0
+        parts: tuple[Term | RowTerm | FormTerm, ...] = (
+            *self.terms,
+            *self.row_terms,
+            *self.forms,
+        )
+        for part in parts:
+            found.append((part, place))
+            place += len(part.unknowns)
+        return tuple(found)
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """In the order of the parts; the steady speeds of the runs are behind them."""
+        return tuple(unknown for part, _ in self.parts for unknown in part.unknowns)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """
+    Whitened rows of a hypothesis, linear about some unknowns.
+
+    Attributes
+    ----------
+    hypothesis
+    z : (p,)
+        Of its unknowns, then the steady speed of each run [m/s].
+    tables
+        (1 + p, rows) of each run: residual, then derivatives of the prediction.
+    residuals
+        (rows,) of each run, not whitened.
+    """
+
+    hypothesis: Hypothesis
+    z: Float64
+    tables: tuple[Float64, ...]
+    residuals: tuple[Float64, ...]
+
+    @cached_property
+    def chi2(self) -> float:
+        """Sum of squared whitened residuals; infinite where it cannot be simulated."""
+        if not all(np.isfinite(table).all() for table in self.tables):
+            return math.inf
+        return sum(float(table[0] @ table[0]) for table in self.tables)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return sum(table.shape[1] for table in self.tables)
+
+    @cached_property
+    def cost(self) -> float:
+        """-2 ln of the posterior, less a constant."""
+        return self.chi2 + sum(u.penalty(z) for u, z in zip(self.hypothesis.unknowns, self.z))
+
+    @cached_property
+    def normal(self) -> tuple[Float64, Float64]:
+        """Half the curvature of the cost, and half its fall by each unknown."""
+        weight = np.zeros(len(self.z))
+        for i, (unknown, z) in enumerate(zip(self.hypothesis.unknowns, self.z)):
+            weight[i] = unknown.weight(z)
+        matrix = np.diag(weight)
+        fall = -weight * self.z
+        for table in self.tables:
+            matrix += np.einsum('ai,bi->ab', table[1:], table[1:])
+            fall += table[1:] @ table[0]
+        return matrix, fall
+
+
+@dataclass
+class _Batch:
+    """Columns of one simulation, as they are asked for."""
+
+    actions: list[Action] = field(default_factory=list)
+    speeds: list[float] = field(default_factory=list)
+
+    def add(self, action: Action, speed_m_s: float) -> int:
+        """Ask for a column; return its number."""
+        self.actions.append(action)
+        self.speeds.append(speed_m_s)
+        return len(self.actions) - 1
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """
+    Which columns a hypothesis needs of a run.
+
+    Attributes
+    ----------
+    base
+        At its unknowns.
+    steps
+        Unknown, column and size of the step of each.
+    without
+        Without each effect whose form is open.
+    """
+
+    base: int
+    steps: list[tuple[int, int, float]]
+    without: list[int]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """
+    What all hypotheses share.
+
+    Attributes
+    ----------
+    ship
+        Without effects: those that its file states are terms.
+    seen
+        The runs.
+    """
+
+    ship: Ship
+    seen: tuple[Observation, ...]
+
+    @cached_property
+    def frames(self) -> tuple[Frame, ...]:
+        """One a run; effects of the earth lie along the first run."""
+        return tuple(
+            Frame(
+                self.ship,
+                Scenario(
+                    speed_m_s=run.speed_m_s,
+                    lead_in_s=run.lead_in_s,
+                    duration_s=run.duration_s,
+                    heading_rad=run.heading_rad,
+                ),
+                self.seen[0].heading_rad,
+            )
+            for run in self.seen
+        )
+
+    def linearise(self, hypotheses: Sequence[Hypothesis], at: Sequence[Float64]) -> list[Linear]:
+        """
+        Return the whitened rows of each hypothesis about some unknowns.
+        """
+        runs = [self._run(j, hypotheses, at) for j in range(len(self.seen))]
+        return [
+            Linear(
+                hypothesis, z, tuple(run[i][0] for run in runs), tuple(run[i][1] for run in runs)
+            )
+            for i, (hypothesis, z) in enumerate(zip(hypotheses, at, strict=True))
+        ]
+
+    def predict(self, run: int, linear: Linear) -> Predicted:
+        """
+        Return what a hypothesis predicts of a run, without its row terms.
+        """
+        batch = _Batch()
+        plan = self._plan(run, linear.hypothesis, linear.z, batch)
+        columns = self._simulate(run, batch)
+        return _predicted(self.seen[run], columns)[plan.base]
+
+    def _simulate(self, run: int, batch: _Batch) -> Columns:
+        frame = self.frames[run]
+        return simulate_columns(
+            self.ship,
+            frame.scenario,
+            batch.actions,
+            self.seen[run].time_s,
+            speed_m_s=np.array(batch.speeds),
+        )
+
+    def _run(
+        self, run: int, hypotheses: Sequence[Hypothesis], at: Sequence[Float64]
+    ) -> list[tuple[Float64, Float64]]:
+        batch, seen = _Batch(), self.seen[run]
+        plans = [self._plan(run, h, z, batch) for h, z in zip(hypotheses, at, strict=True)]
+        columns = self._simulate(run, batch)
+        predicted = _predicted(seen, columns)
+        context = seen.context.predict(
+            self.ship, seen.heading_rad, seen.lead_in_s, columns, batch.actions
+        )
+        return [
+            self._table(run, hypothesis, z, plan, predicted, context)
+            for hypothesis, z, plan in zip(hypotheses, at, plans, strict=True)
+        ]
+
+    def _plan(self, run: int, hypothesis: Hypothesis, z: Float64, batch: _Batch) -> _Plan:
+        frame = self.frames[run]
+        speed = float(z[len(hypothesis.unknowns) + run])
+        acting = [
+            (term, place, [u.value(z[place + i]) for i, u in enumerate(term.unknowns)])
+            for term, (_, place) in zip(hypothesis.terms, hypothesis.parts)
+            if term.acts_in(run)
+        ]
+        actions = [term.action(frame, run, values) for term, _, values in acting]
+        whole = sum(actions, Action())
+        base = batch.add(whole, speed)
+        steps: list[tuple[int, int, float]] = []
+        without: dict[int, int] = {}
+        open_forms = {id(form.term) for form in hypothesis.forms}
+        for i, (term, place, values) in enumerate(acting):
+            others = sum((action for j, action in enumerate(actions) if j != i), Action())
+            if id(term) in open_forms:
+                without[id(term)] = batch.add(others, speed)
+            for k, unknown in enumerate(term.unknowns):
+                value = unknown.value(z[place + k] + _STEP_Z)
+                if value != values[k]:
+                    stepped = [*values[:k], value, *values[k + 1 :]]
+                    column = batch.add(others + term.action(frame, run, stepped), speed)
+                    steps.append((place + k, column, _STEP_Z))
+        column = batch.add(whole, speed + _STEP_M_S)
+        steps.append((len(hypothesis.unknowns) + run, column, _STEP_M_S))
+        return _Plan(base, steps, [without.get(id(form.term), base) for form in hypothesis.forms])
+
+    def _table(
+        self,
+        run: int,
+        hypothesis: Hypothesis,
+        z: Float64,
+        plan: _Plan,
+        predicted: list[Predicted],
+        context: Float64,
+    ) -> tuple[Float64, Float64]:
+        """Return whitened rows, and the residual as it is."""
+        seen, base = self.seen[run], predicted[plan.base]
+        n = len(seen.along)
+        k = 0 if seen.across is None else len(seen.across)
+        table = np.zeros((1 + len(z), n + k + len(seen.context)))
+        table[0, :n] = seen.along.rows.value - base.along
+        if seen.across is not None:
+            table[0, n : n + k] = seen.across.rows.value - base.across
+        table[0, n + k :] = seen.context.value - context[plan.base]
+        for unknown, column, step in plan.steps:
+            table[1 + unknown, :n] = (predicted[column].along - base.along) / step
+            table[1 + unknown, n : n + k] = (predicted[column].across - base.across) / step
+            table[1 + unknown, n + k :] = (context[column] - context[plan.base]) / step
+        added = [term.columns(seen, run, base) for term in hypothesis.row_terms]
+        for form, other in zip(hypothesis.forms, plan.without):
+            trace = base.along - predicted[other].along, base.across - predicted[other].across
+            added.append(form.columns(seen, trace))
+        behind = hypothesis.parts[len(hypothesis.terms) :]
+        for (part, place), (along, across) in zip(behind, added, strict=True):
+            for i, of_part in enumerate(part.unknowns):
+                at = place + i
+                table[1 + at, :n], table[1 + at, n : n + k] = along[i], across[i]
+                table[0] -= table[1 + at] * of_part.value(z[at])
+                table[1 + at] *= of_part.slope(z[at])
+        residual = table[0].copy()
+        if np.isfinite(table).all():
+            table[:, :n] = apply(seen.along.whitener, table[:, :n])
+            if seen.across is not None:
+                table[:, n : n + k] = apply(seen.across.whitener, table[:, n : n + k])
+            table[:, n + k :] = apply(seen.context.whitener, table[:, n + k :])
+        return table, residual
+
+
+def _predicted(seen: Observation, columns: Columns) -> list[Predicted]:
+    """Return what each column predicts of the rows."""
+    cos, sin = math.cos(seen.heading_rad), math.sin(seen.heading_rad)
+    place, velocity = columns.radar_position_m, columns.velocity_over_ground_m_s
+    ahead = cos * place[..., 0] + sin * place[..., 1]
+    to_port = cos * place[..., 1] - sin * place[..., 0]
+    ground = cos * velocity[..., 0] + sin * velocity[..., 1]
+    kind, at = seen.along.rows.kind, seen.along.at
+    along = ahead[:, at]
+    along[:, kind == LOG] = columns.log_m_s[:, at[kind == LOG]]
+    along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
+    across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
+    speed = columns.speed_through_water_m_s
+    return [
+        Predicted(along[i], across[i], speed[i], ground[i], ahead[i]) for i in range(len(along))
+    ]

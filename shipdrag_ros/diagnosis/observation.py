@@ -1,0 +1,289 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A run as a diagnosis sees it: condensed rows of measurements, and their noise.
+
+Rows are means over times in which the motion is as good as even, so that a few
+hundred hold all that a run can tell. The noise is that of the steady record
+before the stop, colour included: what a coastdown leaves over a fit would hold
+the very effect that is sought.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from shipdrag_ros.diagnosis.context import Context
+from shipdrag_ros.diagnosis.noise import Damping, bin_means, learn, whiten
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
+from shipdrag_ros.estimation.motion_fit.run_down import RunDown
+from shipdrag_ros.estimation.motion_fit.steady import LEAST_S
+from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.ship import Ship
+
+_STEADY_BIN_S = 30.0
+_FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
+_LEAST_LONGEST_S, _BINS = 12.0, 80.0  # the longest bin is at least this, or this part of all
+_NEIGHBOURS = 9  # an outlier is told from the median of so many
+_OUTLIER = 5.0  # standard deviations
+_COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
+_LEAST_ROWS = 8
+
+
+@dataclass(frozen=True)
+class Measured:
+    """
+    Rows along one direction, in ascending time.
+
+    Attributes
+    ----------
+    at : (n,)
+        Places of the rows in the times of the observation.
+    rows
+        `POSITION` rows are distances along the direction [m].
+    whitener : (n, n)
+        Makes of residuals what is white, of variance 1; lower triangular.
+    """
+
+    at: Int64
+    rows: Rows
+    whitener: Float64
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
+@dataclass(frozen=True)
+class Observation:
+    """
+    One run.
+
+    Attributes
+    ----------
+    name
+        For the user.
+    lead_in_s
+        Length of the steady record.
+    time_s : (m,)
+        Times of all rows, ascending, from the start of the steady record.
+    stop_sd_s
+        How well the time of the stop, at the end of the lead-in, is known.
+    run_down_s, run_down_sd_s
+        Of the thrust.
+    heading_rad, heading_sd_rad
+        Direction through water in the lead-in, from east, anticlockwise.
+    speed_m_s
+        Speed in the lead-in, roughly.
+    along, across
+        Measured along the heading and to port of it; across there are only
+        positions, None without.
+    context
+        What is measured besides.
+    """
+
+    name: str
+    lead_in_s: float
+    time_s: Float64
+    stop_sd_s: float
+    run_down_s: float
+    run_down_sd_s: float
+    heading_rad: float
+    heading_sd_rad: float
+    speed_m_s: float
+    along: Measured
+    across: Measured | None
+    context: Context
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the coastdown."""
+        return float(self.time_s[-1]) - self.lead_in_s
+
+    @classmethod
+    def of(cls, window: Window, ship: Ship, parameters: Parameters, *, name: str) -> Observation:
+        """
+        Condense a coastdown with the steady record before it.
+
+        Raises
+        ------
+        DiagnosisError
+            If the steady record is too short.
+        EstimationError
+            If no input has enough samples.
+        """
+        run_down = RunDown.of(window, ship)
+        record = Record.of(window, run_down, parameters)
+        if record.steady_s < LEAST_S or window.before is None:
+            raise DiagnosisError(
+                f'{name}: {record.steady_s:.0f} s of steady sailing before the stop, at least '
+                f'{LEAST_S:.0f} s are needed to tell an effect from the noise: give a record '
+                'that begins earlier'
+            )
+        since_ns = run_down.stop_ns + round(float(record.steady.time_s[0]) * 1e9)
+        series = {
+            input_: _joined(getattr(window.before, input_), getattr(window, input_), since_ns)
+            for input_ in record.white_sd
+        }
+        lead_in_s = (run_down.stop_ns - since_ns) * 1e-9
+        seconds = {
+            input_: np.asarray((found.time_ns - since_ns) * 1e-9, np.float64)
+            for input_, found in series.items()
+        }
+        heading_rad, heading_sd = _heading(window, series, seconds, lead_in_s, parameters)
+        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        parts: list[_Part] = []
+        across: list[_Part] = []
+        edges = _edges(lead_in_s, max(float(time[-1]) for time in seconds.values()))
+        for input_, found in series.items():
+            sd, time = record.white_sd[input_], seconds[input_]
+            if input_ != 'position':
+                parts.append(_condensed(time, found.value, edges, sd, KINDS[input_]))
+                continue
+            east, north = (found.value - found.value[0]).T
+            parts.append(_condensed(time, cos * east + sin * north, edges, sd, POSITION))
+            across.append(_condensed(time, cos * north - sin * east, edges, sd, POSITION))
+        times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
+        speed = _speed(parts, lead_in_s)
+        learnt = _Learner(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
+        return cls(
+            name,
+            lead_in_s,
+            times,
+            run_down.stop_sd_s,
+            run_down.run_down_s,
+            run_down.run_down_sd_s,
+            heading_rad,
+            heading_sd,
+            speed,
+            learnt.measured(parts, times),
+            learnt.measured(across, times) if across else None,
+            Context.of(window, ship, since_ns, times, heading_rad),
+        )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Condensed rows of one kind."""
+
+    time_s: Float64
+    kind: int
+    value: Float64
+    variance: Float64
+
+
+@dataclass(frozen=True)
+class _Learner:
+    """What is needed to learn the noise of rows from their steady part."""
+
+    ship: Ship
+    speed_m_s: float
+    lead_in_s: float
+    margin_s: float
+
+    def measured(self, parts: list[_Part], times: Float64) -> Measured:
+        """Put parts in the order of time, and learn their disturbances."""
+        time = np.concatenate([part.time_s for part in parts])
+        order = np.argsort(time, kind='stable')
+        kind = np.concatenate([np.full(len(part.time_s), part.kind) for part in parts])[order]
+        value = np.concatenate([part.value for part in parts])[order]
+        variance = np.concatenate([part.variance for part in parts])[order]
+        time = time[order]
+        rows = Rows(time, kind.astype(np.int64), value)
+        steady = time < self.lead_in_s - self.margin_s
+        damping, inertia = self._damping(np.array([self.speed_m_s]))
+        learnt = learn(
+            Rows(time[steady], rows.kind[steady], value[steady]),
+            variance[steady],
+            damping_1_s=float(damping[0]),
+            inertia=float(inertia[0]),
+        )
+        # the ship slows down about as v0 / (1 + t / t0)
+        after = np.maximum(time - self.lead_in_s, 0.0)
+        speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
+        whitener = np.eye(len(time))
+        whiten(rows, variance, learnt, Damping(*self._damping(speed)), whitener)
+        return Measured(np.searchsorted(times, time), rows, np.ascontiguousarray(whitener.T))
+
+    def _damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
+        """Return dr/dv / (1 + n_r) and 1 + n_r of the baseline."""
+        low, high = self.ship.baseline_range_m_s
+        speed = np.clip(speed_m_s, max(low, 1e-3 * high), high)
+        step = 1e-3 * speed
+        above, below = np.minimum(speed + step, high), np.maximum(speed - step, low)
+        rise = self.ship.resistance_n(above) - self.ship.resistance_n(below)
+        inertia = 1.0 + self.ship.n_r(speed)
+        damping = np.maximum(rise / (above - below), 0.0) / (self.ship.mass_kg * inertia)
+        return np.maximum(damping, 1e-6), inertia
+
+
+def _joined(before: Series, after: Series, since_ns: int) -> Series:
+    first = int(np.searchsorted(before.time_ns, since_ns))
+    return Series(
+        np.concatenate([before.time_ns[first:], after.time_ns]),
+        np.concatenate([before.value[first:], after.value]),
+        np.concatenate([before.variance[first:], after.variance]),
+    )
+
+
+def _edges(lead_in_s: float, end_s: float) -> Float64:
+    """Return the edges of the bins, one of them at the stop."""
+    steady = np.arange(lead_in_s, 0.0, -_STEADY_BIN_S)[::-1]
+    widths: list[float] = []
+    total = 0.0
+    longest = max(_LEAST_LONGEST_S, (end_s - lead_in_s) / _BINS)
+    while total < end_s - lead_in_s:
+        widths.append(min(_FIRST_BIN_S * _BIN_GROWTH ** len(widths), longest))
+        total += widths[-1]
+    return np.concatenate([[-1.0], steady, lead_in_s + np.cumsum(widths)])
+
+
+def _condensed(time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int) -> _Part:
+    """Average over bins, without what stands out from its neighbours."""
+    away = np.abs(value - median_filter(value, _NEIGHBOURS, mode='nearest'))
+    keep = away <= _OUTLIER * max(sd, float(np.median(away)))
+    when, mean, count = bin_means(time_s[keep], value[keep], edges)
+    return _Part(when, kind, mean, sd**2 / count)
+
+
+def _heading(
+    window: Window,
+    series: dict[str, Series],
+    seconds: dict[str, Float64],
+    lead_in_s: float,
+    parameters: Parameters,
+) -> tuple[float, float]:
+    """Return direction through water in the lead-in, and its sd: compass, or else course."""
+    assert window.before is not None
+    yaw = window.before.heading.value
+    if len(yaw):
+        mean = math.atan2(float(np.sin(yaw).mean()), float(np.cos(yaw).mean()))
+        if parameters.heading_convention == 'compass':
+            mean = 0.5 * math.pi - mean
+        return mean, _COMPASS_SD_RAD
+    if 'position' not in series:
+        return 0.0, 0.0
+    steady = seconds['position'] < lead_in_s
+    time = seconds['position'][steady]
+    place = series['position'].value[steady]
+    slopes = [float(np.polyfit(time - time.mean(), place[:, i], 1)[0]) for i in range(2)]
+    return math.atan2(slopes[1], slopes[0]), _COURSE_SD_RAD
+
+
+def _speed(parts: list[_Part], lead_in_s: float) -> float:
+    for part in sorted(parts, key=lambda part: part.kind):
+        steady = part.time_s < lead_in_s
+        if steady.sum() < _LEAST_ROWS:
+            continue
+        if part.kind in (LOG, OVER_GROUND):
+            return float(np.median(part.value[steady]))
+        return float(np.polyfit(part.time_s[steady], part.value[steady], 1)[0])
+    raise DiagnosisError(
+        f'{lead_in_s:.0f} s before the stop hold too few samples of any speed or position'
+    )

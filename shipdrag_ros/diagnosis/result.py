@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a diagnosis says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from shipdrag_ros.ship.sections import Uncertain
+
+
+class Verdict(StrEnum):
+    """What is missing in the model."""
+
+    NONE = 'none'
+    NAMED = 'named'
+    ONE_OF = 'one_of'
+    UNKNOWN = 'unknown'
+
+
+@dataclass(frozen=True)
+class Named:
+    """
+    An effect with its size.
+
+    Attributes
+    ----------
+    name
+    probability
+        Of the hypothesis that it is part of.
+    parameters
+        In their units.
+    """
+
+    name: str
+    probability: float
+    parameters: Mapping[str, Uncertain]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One name, or a pair, with its probability."""
+
+    names: tuple[str, ...]
+    probability: float
+
+
+@dataclass(frozen=True)
+class Advice:
+    """
+    What would decide, and how probably it would.
+    """
+
+    measure: str
+    probability: float | None
+
+
+@dataclass(frozen=True)
+class Where:
+    """
+    Where model and data disagree.
+
+    Attributes
+    ----------
+    channel
+        'log', 'radar', 'log_radar' or 'force'.
+    time_s
+        After the stop, from .. to.
+    speed_m_s
+        From .. to.
+    """
+
+    channel: str
+    time_s: tuple[float, float]
+    speed_m_s: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """
+    How far model and data are apart.
+
+    Attributes
+    ----------
+    rms_speed_m_s, rms_position_m
+        None without such a measurement.
+    chi2_per_sample
+        Of residuals whitened by the noise of the steady record.
+    """
+
+    rms_speed_m_s: float | None
+    rms_position_m: float | None
+    chi2_per_sample: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """
+    The result.
+
+    Attributes
+    ----------
+    verdict
+    effects
+        Of `named`, otherwise empty.
+    candidates
+        The smallest set that holds 99 %, most probable first; empty names:
+        nothing is missing.
+    nothing, unnamed
+        Probabilities that nothing, and that something without a name is missing.
+    would_decide
+    where
+        None where model and data agree.
+    before, after, held_out_before, held_out_after
+        The last two are None with one run, and where no effect was added.
+    baseline
+        'stated', 'fitted_here' or 'none'.
+    best
+        Effects of the most probable candidate, named or not.
+    notes
+        For the reader.
+    """
+
+    verdict: Verdict
+    effects: tuple[Named, ...]
+    candidates: tuple[Candidate, ...]
+    nothing: float
+    unnamed: float
+    would_decide: tuple[Advice, ...]
+    where: Where | None
+    before: Gap
+    after: Gap | None
+    held_out_before: Gap | None
+    held_out_after: Gap | None
+    baseline: str
+    best: tuple[Named, ...] = ()
+    notes: tuple[str, ...] = ()

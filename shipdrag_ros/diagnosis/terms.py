@@ -1,0 +1,378 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The parts that hypotheses are put together from, each with its unknowns.
+
+A `Term` acts on the ship and is simulated; `Rows` add to what is measured, and
+need no simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Protocol
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, of_prior, scaled
+from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.baseline import CoefficientBaseline
+from shipdrag_ros.simulation import Action
+from shipdrag_ros.simulation.effect import Effect, Frame, Scope
+from shipdrag_ros.simulation.hydrodynamics import viscous_n
+
+SHAPE_SD = 0.01  # of a baseline's form, beyond what its coefficients can follow
+_SHAPES = 5
+_DISCREPANCIES = 6
+_FORMS = 4
+_FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
+_SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
+
+
+class Term(Protocol):
+    """A part that acts on the ship."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What it leaves open."""
+
+    def acts_in(self, run: int) -> bool:
+        """Tell whether it does anything in a run."""
+
+    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
+        """Return what it does in a run."""
+
+
+@dataclass(frozen=True)
+class EffectTerm:
+    """
+    An effect of the library.
+
+    Attributes
+    ----------
+    effect
+    ship
+        That its sizes are measured by.
+    starts
+        z that a fit begins from, one a parameter.
+    fixed
+        Parameters that are a choice, by name.
+    only_run
+        Where an effect of a single run is looked for; None: in all runs.
+    stated
+        Value and sd of each parameter where the ship file states them.
+    """
+
+    effect: Effect
+    ship: Ship
+    starts: tuple[float, ...] = ()
+    fixed: tuple[tuple[str, float], ...] = ()
+    only_run: int | None = None
+    stated: tuple[tuple[float, float], ...] = ()
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Its parameters, without those that are fixed."""
+        quantities = [quantity.of(self.ship) for quantity in self.effect.parameters]
+        if self.stated:
+            return tuple(
+                scaled(quantity.name, sd, mean=value)
+                for quantity, (value, sd) in zip(quantities, self.stated, strict=True)
+            )
+        free = [quantity for quantity in quantities if quantity.name not in dict(self.fixed)]
+        starts = self.starts or (0.0,) * len(free)
+        return tuple(
+            of_prior(quantity.name, quantity.prior, start=start)
+            for quantity, start in zip(free, starts, strict=True)
+        )
+
+    def acts_in(self, run: int) -> bool:
+        """Tell whether it does anything in a run."""
+        return self.only_run is None or self.only_run == run
+
+    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
+        """Return what the effect does in a run."""
+        return self.effect.action(frame, *self.all_values(values))
+
+    def all_values(self, values: Sequence[float]) -> list[float]:
+        """
+        Return the values of all parameters, the fixed ones too.
+        """
+        fixed, free = dict(self.fixed), iter(values)
+        return [fixed[q.name] if q.name in fixed else next(free) for q in self.effect.parameters]
+
+
+@dataclass(frozen=True)
+class BaselineTerm:
+    """
+    What is not known of the baseline, as far as its file says.
+
+    Attributes
+    ----------
+    ship
+    top_m_s
+        Highest speed of the runs.
+    run_down_change_s
+        By how much the thrust of each run is known to run down more slowly
+        than the ship file says.
+    run_down_sd_s
+        Of the thrust; 0: known.
+    """
+
+    ship: Ship
+    top_m_s: float
+    run_down_change_s: tuple[float, ...]
+    run_down_sd_s: float
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Scales of its parts, its shape, n_r, run-down."""
+        base = self.ship.baseline
+        assert base is not None
+        if isinstance(base, CoefficientBaseline):
+            scales = {'friction': base.relative_sd.friction, 'wave': base.relative_sd.wave}
+        else:
+            scales = {'resistance': base.relative_sd}
+        found = [scaled(name, sd, tail=Tail.STUDENT) for name, sd in scales.items()]
+        found += [scaled(f'shape {k}', SHAPE_SD) for k in range(_SHAPES)]
+        found.append(scaled('n_r', self.ship.added_mass.sd))
+        found.append(scaled('run-down', self.run_down_sd_s))
+        return tuple(found)
+
+    def acts_in(self, run: int) -> bool:
+        """Tell that the ship is the same in all runs."""
+        return True
+
+    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
+        """Return the departure from the stated baseline."""
+        *scales, n_r, run_down_s = values
+        return Action(
+            resistance=(lambda speed: self._departure(speed, np.array(scales)),),
+            n_r_change=n_r,
+            run_down_change_s=self.run_down_change_s[run] + run_down_s,
+        )
+
+    def _departure(self, speed_m_s: Float64, scales: Float64) -> Float64:
+        result: Float64 = scales @ _parts(self.ship, self.top_m_s, speed_m_s.tobytes())
+        return result
+
+
+@lru_cache(maxsize=8)
+def _parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
+    """Return what each scale and shape of a baseline adds [N], (p, n); kept, as speeds recur."""
+    speed_m_s = np.frombuffer(speeds)
+    total = ship.resistance_n(speed_m_s)
+    parts = [total]
+    if isinstance(ship.baseline, CoefficientBaseline):
+        viscous = viscous_n(ship, speed_m_s)
+        parts = [viscous, total - ship.air_drag_n(speed_m_s) - viscous]
+    return np.vstack([*parts, total * hats(speed_m_s / top_m_s, _SHAPES)])
+
+
+@dataclass(frozen=True)
+class ForceTerm:
+    """
+    Any smooth resistance beyond the baseline, as a function of the speed.
+    """
+
+    ship: Ship
+    top_m_s: float
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Its sizes about some speeds [N]."""
+        sd = _FORCE_SD * float(self.ship.resistance_n(self.top_m_s))
+        return tuple(scaled(f'force {k}', sd) for k in range(_DISCREPANCIES))
+
+    def acts_in(self, run: int) -> bool:
+        """Tell that it acts in all runs."""
+        return True
+
+    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
+        """Return the extra resistance."""
+        sizes = np.array(values)
+
+        def extra(speed_m_s: Float64) -> Float64:
+            result: Float64 = sizes @ _bumps(self.top_m_s, speed_m_s.tobytes())
+            return result
+
+        return Action(resistance=(extra,))
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """
+    What one column of a simulation predicts of a run.
+
+    Attributes
+    ----------
+    along, across : (n,), (k,)
+        Rows.
+    speed, over_ground : (m,)
+        Speed through water, and velocity along the heading over ground, at the
+        times of the observation.
+    distance : (m,)
+        Over ground, along the heading.
+    """
+
+    along: Float64
+    across: Float64
+    speed: Float64
+    over_ground: Float64
+    distance: Float64
+
+
+@dataclass(frozen=True)
+class FormTerm:
+    """
+    How far an effect may depart from its formula, smoothly over the run.
+
+    Attributes
+    ----------
+    term
+        The effect.
+    sd
+        Relative.
+    """
+
+    term: EffectTerm
+    sd: float
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Departures about some times, relative to the trace of the effect."""
+        return tuple(scaled(f'form {k}', self.sd) for k in range(_FORMS))
+
+    def columns(
+        self, seen: Observation, trace: tuple[Float64, Float64]
+    ) -> tuple[Float64, Float64]:
+        """Return (4, n) of the rows along and (4, k) of those across, per unit value."""
+        after = np.clip((seen.time_s - seen.lead_in_s) / seen.duration_s, 0.0, 1.0)
+        bumps = hats(after, _FORMS)
+        along = bumps[:, seen.along.at] * trace[0]
+        if seen.across is None:
+            return along, np.zeros((_FORMS, 0))
+        return along, bumps[:, seen.across.at] * trace[1]
+
+
+class RowTerm(Protocol):
+    """A part that adds to what is measured."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """What it leaves open."""
+
+    def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
+        """Return (p, n) of the rows along and (p, k) of those across, per unit value."""
+
+
+@dataclass(frozen=True)
+class PlaceTerm:
+    """
+    Where a run began, on which heading, and when the engine stopped.
+    """
+
+    run: int
+    heading_sd_rad: float
+    stop_sd_s: float
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Place [m], heading [rad] and stop [s]."""
+        return (
+            scaled('ahead', 1.0, tail=Tail.FLAT),
+            scaled('to port', 1.0, tail=Tail.FLAT),
+            scaled('heading', self.heading_sd_rad),
+            scaled('stop', self.stop_sd_s),
+        )
+
+    def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
+        """Return (4, n) and (4, k)."""
+        along, across = _nothing(seen, 4)
+        if run != self.run:
+            return along, across
+        kind, at = seen.along.rows.kind, seen.along.at
+        position = kind == POSITION
+        along[0, position] = 1.0
+        after = seen.time_s >= seen.lead_in_s
+        slowing = np.where(after, np.gradient(base.speed, seen.time_s), 0.0)
+        gained = np.where(after, base.over_ground[0] - base.over_ground, 0.0)
+        along[3] = np.where(position, gained[at], -slowing[at])
+        if seen.across is not None:
+            across[1] = 1.0
+            across[2] = base.distance[seen.across.at]
+        return along, across
+
+
+@dataclass(frozen=True)
+class SpeedErrorTerm:
+    """
+    Any smooth error of the log, or of radar and GNSS, as a function of time.
+    """
+
+    run: int
+    of_log: bool
+    speed_m_s: float
+
+    @cached_property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Its sizes about some times [m/s]."""
+        sd = _SPEED_SD * self.speed_m_s
+        what = 'log' if self.of_log else 'radar'
+        return tuple(scaled(f'{what} {k}', sd) for k in range(_DISCREPANCIES))
+
+    def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
+        """Return (6, n) and (6, k)."""
+        along, across = _nothing(seen, _DISCREPANCIES)
+        if run != self.run:
+            return along, across
+        # one for the lead-in, the others over the coastdown
+        after = (seen.time_s - seen.lead_in_s) / seen.duration_s
+        error = hats(np.clip(after, 0.0, 1.0), _DISCREPANCIES)
+        kind, at = seen.along.rows.kind, seen.along.at
+        if self.of_log:
+            along[:, kind == LOG] = error[:, at[kind == LOG]]
+            return along, across
+        along[:, kind == OVER_GROUND] = error[:, at[kind == OVER_GROUND]]
+        steps = 0.5 * (error[:, 1:] + error[:, :-1]) * np.diff(seen.time_s)
+        way = np.concatenate([np.zeros((_DISCREPANCIES, 1)), np.cumsum(steps, axis=1)], axis=1)
+        along[:, kind == POSITION] = way[:, at[kind == POSITION]]
+        return along, across
+
+
+@lru_cache(maxsize=8)
+def _bumps(top_m_s: float, speeds: bytes) -> Float64:
+    return hats(np.frombuffer(speeds) / top_m_s, _DISCREPANCIES)
+
+
+def _nothing(seen: Observation, unknowns: int) -> tuple[Float64, Float64]:
+    across = 0 if seen.across is None else len(seen.across)
+    return np.zeros((unknowns, len(seen.along))), np.zeros((unknowns, across))
+
+
+def hats(x: Float64, count: int) -> Float64:
+    """
+    Return smooth bumps that add up to 1, (count, n), at x in 0 .. 1.
+
+    Beyond 1 the last one stays at its end.
+    """
+    degree = 3
+    inner = np.linspace(0.0, 1.0, count - degree + 1)
+    knots = np.concatenate([np.zeros(degree), inner, np.ones(degree)])
+    flat = np.clip(np.asarray(x, np.float64), 0.0, 1.0).reshape(-1)
+    table = BSpline.design_matrix(flat, knots, degree).toarray()
+    return np.ascontiguousarray(table.T).reshape(count, *np.shape(x))
+
+
+def scope_runs(effect: Effect, runs: int) -> tuple[int | None, ...]:
+    """
+    Return where an effect may be: in all runs, or in any single one.
+    """
+    if effect.scope is Scope.RUN and runs > 1:
+        return (None, *range(runs))
+    return (None,)

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+From fits to a verdict: a name only where the data can tell.
+
+Evidence names; a smooth discrepancy that a name does not explain takes the name
+back; what nothing in a record can tell apart stays a set.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.result import Candidate, Verdict
+
+CERTAIN = 0.9  # probability from which an effect is named
+QUIET = 0.1  # of nothing missing, from which nothing is said
+_SET = 0.99  # of the candidates
+_LACK_NATS = 5.0  # of evidence that something smooth besides must gain
+_LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """
+    Hypotheses with their probabilities.
+
+    Attributes
+    ----------
+    best
+        Best fit of each: by the names, or by what is unnamed.
+    probability
+        Of each name or pair (none: nothing is missing), and of '?' (unnamed).
+    """
+
+    best: dict[tuple[str, ...], Fit]
+    probability: dict[tuple[str, ...], float]
+
+    @property
+    def nothing(self) -> float:
+        """Probability that nothing is missing."""
+        return self.probability[()]
+
+    @property
+    def unnamed(self) -> float:
+        """Probability of something without a name."""
+        return self.probability.get(UNNAMED, 0.0)
+
+    def named(self) -> list[tuple[str, ...]]:
+        """
+        Return what has a name, or is nothing, most probable first.
+        """
+        names = [names for names in self.probability if names != UNNAMED]
+        return sorted(names, key=lambda names: -self.probability[names])
+
+
+UNNAMED = ('?',)
+
+
+def weigh(fits: Sequence[Fit]) -> Weighed:
+    """
+    Give hypotheses their probabilities.
+
+    Parameters
+    ----------
+    fits
+        Several of the same names differ in where the fit began, of which the
+        best counts, or in a choice.
+    """
+    best: dict[tuple[str, ...], Fit] = {}
+    modes: dict[tuple[str, ...], dict[tuple[object, ...], float]] = {}
+    for fit in fits:
+        key = UNNAMED if fit.hypothesis.discrepancy else fit.hypothesis.names
+        if key not in best or fit.log_evidence > best[key].log_evidence:
+            best[key] = fit
+        mode = _mode(fit)
+        found = modes.setdefault(key, {})
+        found[mode] = max(found.get(mode, -math.inf), fit.log_evidence)
+    keys = list(modes)
+    log = np.array([float(logsumexp(list(modes[key].values()))) for key in keys])
+    probability = np.exp(log - logsumexp(log))
+    return Weighed(best, dict(zip(keys, probability.tolist(), strict=True)))
+
+
+def _mode(fit: Fit) -> tuple[object, ...]:
+    """Return what tells a mode apart from others of the same names."""
+    terms = fit.hypothesis.terms
+    return (
+        fit.hypothesis.discrepancy,
+        *((getattr(term, 'fixed', ()), getattr(term, 'only_run', None)) for term in terms),
+    )
+
+
+def lacks(fit: Fit, with_more: Sequence[Fit], *, nats: float = _LACK_NATS) -> bool:
+    """
+    Tell whether a name leaves more than noise.
+
+    Parameters
+    ----------
+    with_more
+        The same with something smooth besides.
+    nats
+        Of evidence that this must gain.
+    """
+    rows = fit.best.rows
+    if fit.chi2_per_row > 1.0 + _LACK_SD * math.sqrt(2.0 / rows) + _LACK_SLACK:
+        return True
+    return any(more.log_likelihood > fit.log_likelihood + nats for more in with_more)
+
+
+def decide(
+    weighed: Weighed, *, lacking: bool, inseparable: Sequence[frozenset[str]]
+) -> tuple[Verdict, tuple[Candidate, ...]]:
+    """
+    Return verdict and candidates.
+
+    Parameters
+    ----------
+    lacking
+        The best name leaves something unexplained.
+    inseparable
+        Effects that no record can tell apart.
+    """
+    candidates = _smallest(weighed)
+    first = weighed.named()[0]
+    if weighed.nothing >= QUIET:
+        return Verdict.NONE, candidates
+    if lacking or weighed.unnamed > 0.5:
+        return Verdict.UNKNOWN, candidates
+    alone = not any(set(first) & group for group in inseparable)
+    if alone and weighed.probability[first] >= CERTAIN:
+        return Verdict.NAMED, candidates
+    if weighed.unnamed > 1.0 - CERTAIN and len(candidates) == 1:
+        return Verdict.UNKNOWN, candidates
+    return Verdict.ONE_OF, candidates
+
+
+def _smallest(weighed: Weighed) -> tuple[Candidate, ...]:
+    """Return the fewest names that hold almost all of what has a name."""
+    total = 1.0 - weighed.unnamed
+    found: list[Candidate] = []
+    held = 0.0
+    for names in weighed.named():
+        found.append(Candidate(names, weighed.probability[names]))
+        held += weighed.probability[names]
+        if held >= _SET * total:
+            break
+    return tuple(found)

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A hidden effect is named, added to the ship, and then no longer missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose, with_effects
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation.effects import parse
+
+SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
+PARAMETERS = Parameters()
+LEAD_IN_S, COAST_S = 1800.0, 1500.0
+
+
+def run(*effects: str, heading_rad: float = 0.3, seed: int = 1) -> CoastRun:
+    """Simulate a coastdown and read it with sensors."""
+    scenario = Scenario(
+        speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=COAST_S, heading_rad=heading_rad
+    )
+    truth = simulate(SHIP, scenario, effects=[parse(text) for text in effects], reference_rad=0.3)
+    sensors = standard_sensors(rate_hz=1.0, noise=1.0, inputs=STANDARD_INPUTS)
+    block = sense(truth, sensors, seed=seed)
+    first = int(block.stamp_ns.min())
+    stop = first + round(LEAD_IN_S * 1e9)
+    window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
+    return CoastRun(f'{effects}', window)
+
+
+def test_nothing_hidden_nothing_said() -> None:
+    found = diagnose([run()], SHIP, PARAMETERS)
+    assert found.verdict is Verdict.NONE
+    assert found.effects == ()
+    assert found.before.chi2_per_sample < 1.2
+
+
+@pytest.mark.parametrize(
+    ('effect', 'name', 'parameter', 'value'),
+    [
+        ('current=0.3', 'current', 'along_track_m_s', 0.3),
+        ('log_scale=0.05', 'log_scale', 'factor', 0.05),
+    ],
+)
+def test_what_is_hidden_is_named_and_then_no_longer_missing(
+    effect: str, name: str, parameter: str, value: float
+) -> None:
+    runs = [run(effect, seed=1), run(effect, heading_rad=0.3 + 3.14159, seed=2)]
+    found = diagnose(runs, SHIP, PARAMETERS)
+    assert found.verdict is Verdict.NAMED
+    assert [each.name for each in found.effects] == [name]
+    size = found.effects[0].parameters[parameter]
+    assert abs(size.value - value) < 3.0 * size.sd
+    assert found.after is not None and found.held_out_after is not None
+    assert found.after.chi2_per_sample < 0.5 * found.before.chi2_per_sample
+    assert found.held_out_after.chi2_per_sample < 1.2
+    again = diagnose(runs, with_effects(SHIP, found.effects), PARAMETERS)
+    assert again.verdict is Verdict.NONE
