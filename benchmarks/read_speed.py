@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-How fast bags are read into arrays, beside other readers of Python.
+How fast bags are read into arrays, beside other readers of Python, and replayed.
 
-TwistWithCovarianceStamped and PoseWithCovarianceStamped, 5 to 2, zstd. Processor
-time of one process, best of several rounds, the readers in turn; peers that are
-slow read a part of the messages. The limit is what decompression and checksum of
-the chunks cost alone. Needs `make peers`.
+TwistWithCovarianceStamped and PoseWithCovarianceStamped, 5 to 2, zstd, of a ship
+that sails steadily and coasts down once in 1.4 million messages. Processor time of
+one process, best of several rounds, the readers in turn; peers that are slow read
+a part of the messages. The limit is what decompression and checksum of the chunks
+cost alone. Growth up to 10 million messages, each length in a process of its own.
+Needs `make peers`; takes four minutes on an idle machine.
 """
 
 from __future__ import annotations
 
 import argparse
-import resource
 import struct
 import subprocess
 import sys
@@ -19,6 +20,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -26,14 +28,17 @@ import zstandard
 from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
+from numpy.typing import NDArray
 
-from shipdrag_ros.bags import BagWriter, open_runs
+from shipdrag_ros.bags import BagWriter, open_runs, replay
 from shipdrag_ros.messages import encode, types
 from shipdrag_ros.samples import Block, Channel
 
 SEED = 1
 ROUNDS = 3
 PEER_MESSAGES = 35_000
+STEADY_M_S = 8.0
+EVERY_S = 1e5
 START_NS = 1_700_000_000_000_000_000
 TWIST, POSE = types.TWIST_WITH_COVARIANCE, types.POSE_WITH_COVARIANCE
 
@@ -42,6 +47,7 @@ def write(path: Path, messages: int) -> Path:
     """
     Write a bag of noisy readings at 10 and 4 Hz, five of speed to two of position.
     """
+    ship = files('shipdrag_ros') / 'data' / 'vitus_bering.yaml'
     rng = np.random.default_rng(SEED)
     n = messages // 7
     speed_ns = START_NS + np.arange(5 * n) * 100_000_000
@@ -49,20 +55,34 @@ def write(path: Path, messages: int) -> Path:
     topics = np.repeat([0, 1], [5 * n, 2 * n])
     stamps = np.concatenate([speed_ns, position_ns])
     values = np.zeros((7 * n, 2))
-    values[: 5 * n, 0] = rng.normal(8.0, 0.05, 5 * n)
-    values[5 * n :] = rng.normal(0.0, 1000.0, (2 * n, 2))
+    time_s = np.arange(5 * n) * 0.1
+    speed = speed_m_s(time_s)
+    values[: 5 * n, 0] = speed + rng.normal(0.0, 0.05, 5 * n)
+    values[5 * n :, 0] = np.interp(np.arange(2 * n) * 0.25, time_s, np.cumsum(speed) * 0.1)
+    values[5 * n :] += rng.normal(0.0, 10.0, (2 * n, 2))
     received = stamps + rng.integers(10**6, 10**7, 7 * n)
     kinds = (
         _Kind(Channel.SPEED_THROUGH_WATER, [0.0025, np.nan]),
         _Kind(Channel.POSITION, [100.0, 100.0]),
     )
     with BagWriter(path) as bag:
+        bag.attach('ship.yaml', ship.read_text())
         for place in np.argsort(received, kind='stable').tolist():
             stamp_ns, log_ns = int(stamps[place]), int(received[place])
             kind = kinds[topics[place]]
             payload = kind.payload(stamp_ns, values[place].tolist())
             bag.write(kind.topic, kind.type, payload, log_ns=log_ns, publish_ns=stamp_ns)
     return path
+
+
+def speed_m_s(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    Return 8 m/s, but for 1200 s of coasting and 300 s of starting again now and then.
+    """
+    coasting_s = time_s % EVERY_S - (EVERY_S - 2000.0)
+    glide = STEADY_M_S / (1.0 + np.clip(coasting_s, 0.0, 1200.0) / 400.0)
+    again = np.clip((coasting_s - 1200.0) / 300.0, 0.0, 1.0)
+    return glide + again * (STEADY_M_S - glide)
 
 
 class _Kind:
@@ -189,34 +209,57 @@ def compare(messages: int, folder: Path) -> None:
     print(f'{100 * mine / best[limit]:.0f} % of the limit')
 
 
+def replayed(path: Path) -> int:
+    """Find and estimate its coastdowns; return their number."""
+    (run,) = open_runs([path])
+    return len(replay(run).coastdowns)
+
+
 def show_growth(messages: int, folder: Path) -> None:
     """
     Print time and memory for bags of several sizes, each in a process of its own.
     """
     rows = []
-    for n in (messages // 4, messages, messages * 4):
+    for n in (messages // 28, messages // 7, messages):
         n -= n % 7
         path = write(folder / f'{n}.mcap', n)
         said = subprocess.run(
             [sys.executable, __file__, '--measure', str(path)],
             check=True,
-            timeout=280,
+            timeout=900,
             capture_output=True,
             text=True,
         ).stdout.split()
-        rows.append((n, float(said[0]), float(said[1])))
-        print(f'{n:>9} messages: {1e9 * rows[-1][1] / n:.0f} ns each, peak {rows[-1][2]:.0f} MB')
+        read_s, read_mb, replay_s, replay_mb, coastdowns = map(float, said)
+        rows.append((n, read_s, replay_s))
+        print(
+            f'{n:>9} messages, {path.stat().st_size / 1e6:4.0f} MB: read in '
+            f'{1e9 * read_s / n:.0f} ns each, peak {read_mb:.0f} MB; replayed in '
+            f'{1e9 * replay_s / n:.0f} ns each, {coastdowns:.0f} coastdowns, '
+            f'peak {replay_mb:.0f} MB; replay at {100 * read_s / replay_s:.0f} % of reading',
+            flush=True,
+        )
         path.unlink()
-    counts, taken, _ = np.log(np.array(rows)).T
-    print(f'slope of log time on log messages {np.polyfit(counts, taken, 1)[0]:.3f}')
+    counts, reading, replaying = np.log(np.array(rows)).T
+    for name, taken in (('reading', reading), ('replay', replaying)):
+        print(f'{name}: log time over log messages {np.polyfit(counts, taken, 1)[0]:.3f}')
 
 
 def measure(path: Path) -> None:
     """
-    Print best time [s] and peak memory [MB] of reading one bag.
+    Print best time [s] and peak memory [MB] of reading and of replaying one bag.
+
+    And how many coastdowns were found.
     """
-    taken = min(seconds(ours, path)[0] for _ in range(3))
-    print(taken, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)
+    ours(path)  # loads compiled code
+    print(min(seconds(ours, path)[0] for _ in range(3)), _peak_mb())
+    taken = [seconds(replayed, path) for _ in range(2)]
+    print(min(taken)[0], _peak_mb(), taken[0][1])
+
+
+def _peak_mb() -> float:
+    """Peak of this process; `getrusage` would tell that of the one that started it."""
+    return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]) / 1e3
 
 
 PEERS = (stream_reader, rosbags, mcap_ros2_fast, mcap_ros2, rclpy)
@@ -237,6 +280,7 @@ def main() -> None:
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--messages', type=int, default=1_400_000)
+    parser.add_argument('--growth', type=int, default=10_000_000, help='messages at most')
     parser.add_argument('--measure', type=Path, help='a bag of which to print time and memory')
     options = parser.parse_args()
     if options.measure is not None:
@@ -248,7 +292,7 @@ def main() -> None:
     )
     with tempfile.TemporaryDirectory() as folder:
         compare(messages, Path(folder))
-        show_growth(messages // 4, Path(folder))
+        show_growth(options.growth, Path(folder))
 
 
 if __name__ == '__main__':

@@ -290,8 +290,9 @@ class _LooseMessages:
         self._times.append(log_ns)
         self._end = place.end
         if self._end - self._offset > _SEGMENT_BYTES:
+            offset = self._offset
             self.close()
-            release(data)
+            release(data, offset, self._end)
 
     def close(self) -> None:
         if self._times:

@@ -203,7 +203,7 @@ def _records(data: mmap, segment: Segment) -> bytes:
     if first.opcode == Opcode.CHUNK:
         return unpack_chunk(data, first)[1]
     records = data[segment.offset : segment.end]
-    release(data)
+    release(data, segment.offset, segment.end)
     return records
 
 

@@ -41,6 +41,7 @@ Buffer = bytes | mmap
 
 # an opcode and a length, then the content
 HEAD = struct.Struct('<BQ')
+_RELEASE_BYTES = 1 << 24
 FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
 MESSAGE_HEAD = struct.Struct('<HIQQ')
 """Channel, sequence, log time [ns], publish time [ns]."""
@@ -165,7 +166,7 @@ def unpack_chunk(data: Buffer, place: Place) -> tuple[str, bytes]:
     try:
         size, stated, compression, at, length = chunk_fields(data, place.start, place.end)
         packed = data[at : min(at + length, place.end)]
-        release(data)
+        release(data, place.offset, place.end)
         records = decompress(compression, packed, size)
     except UNPACKING_ERRORS as error:
         raise DamagedRecord(f'the chunk at byte {place.offset} is damaged: {error}') from error
@@ -224,13 +225,13 @@ def decompress(compression: str, packed: bytes, size: int) -> bytes:
     return records
 
 
-def release(data: Buffer) -> None:
+def release(data: Buffer, start: int, end: int) -> None:
     """
-    Give back the memory of what was read of a mapped file.
+    Give back the memory of a mapped file now and then, after a span was read.
 
     The system would do so when it is short, but until then it counts as ours.
     """
-    if isinstance(data, mmap):
+    if isinstance(data, mmap) and start // _RELEASE_BYTES != end // _RELEASE_BYTES:
         data.madvise(MADV_DONTNEED)
 
 
