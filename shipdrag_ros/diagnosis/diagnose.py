@@ -66,7 +66,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         If a run has too few samples.
     """
     seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
-    library = Library(ship, seen)
+    library = Library(ship, seen, seen[0].heading_rad)
     nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
     named = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
     unnamed = [library.with_discrepancy(library.nothing, c) for c in library.channels()]

@@ -51,15 +51,19 @@ class Library:
     ship
         As its file states it.
     seen
+    reference_rad
+        Heading of the first of all runs, along which effects of the earth are
+        stated.
     """
 
     ship: Ship
     seen: tuple[Observation, ...]
+    reference_rad: float
 
     @cached_property
     def problem(self) -> Problem:
         """What all share."""
-        return Problem(replace(self.ship, effects=()), self.seen)
+        return Problem(replace(self.ship, effects=()), self.seen, self.reference_rad)
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:

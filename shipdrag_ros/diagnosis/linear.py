@@ -173,10 +173,13 @@ class Problem:
         Without effects: those that its file states are terms.
     seen
         The runs.
+    reference_rad
+        Heading of the first of all runs.
     """
 
     ship: Ship
     seen: tuple[Observation, ...]
+    reference_rad: float
 
     @cached_property
     def frames(self) -> tuple[Frame, ...]:
@@ -190,7 +193,7 @@ class Problem:
                     duration_s=run.duration_s,
                     heading_rad=run.heading_rad,
                 ),
-                self.seen[0].heading_rad,
+                self.reference_rad,
             )
             for run in self.seen
         )

@@ -56,7 +56,8 @@ def test_what_is_hidden_is_named_and_then_no_longer_missing(
     assert [each.name for each in found.effects] == [name]
     size = found.effects[0].parameters[parameter]
     assert abs(size.value - value) < 3.0 * size.sd
-    assert found.after is not None and found.held_out_after is not None
+    assert found.after is not None
+    assert found.held_out_after is not None
     assert found.after.chi2_per_sample < 0.5 * found.before.chi2_per_sample
     assert found.held_out_after.chi2_per_sample < 1.2
     again = diagnose(runs, with_effects(SHIP, found.effects), PARAMETERS)
