@@ -169,7 +169,8 @@ class _Check:
         facts = self.facts
         match found.opcode:
             case Opcode.MESSAGE:
-                self._message(data, found, offset)
+                channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, found.start)
+                self._messages(channel, [log_ns], offset)
             case Opcode.MESSAGE_INDEX:
                 self._message_index(found)
             case Opcode.SCHEMA | Opcode.CHANNEL if data is not self._data or not facts.ended:
@@ -197,10 +198,6 @@ class _Check:
         if kind in self._told:
             self._damages.add(found.offset, kind, DamageKind.DUPLICATE)
         self._told.add(kind)
-
-    def _message(self, data: Buffer, found: Found, offset: int) -> None:
-        channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, found.start)
-        self._messages(channel, [log_ns], offset)
 
     def _messages(self, channel: int, log_ns: list[int], offset: int) -> None:
         self.facts.count(channel, log_ns)
@@ -277,7 +274,7 @@ class _Check:
             return
         channel, length = _INDEX_HEAD.unpack_from(self._data, found.start)
         start = found.start + _INDEX_HEAD.size
-        stated = np.frombuffer(self._data[start : start + length], np.int64).reshape(-1, 2)
+        stated = np.frombuffer(self._data[start : start + length], '<i8').reshape(-1, 2)
         self._chunk.indexes[found.offset] = channel
         self._chunk.index_bytes += found.end - found.offset
         if channel in self._indexed:

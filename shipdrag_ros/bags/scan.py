@@ -37,6 +37,7 @@ GARBAGE = 0
 _HEAD = re.compile(rb'[\x01-\x0f](?=.{4}\0{4})', re.DOTALL)
 _PRIVATE = 0x80
 _POSSIBLE_BYTES = 1 << 40
+_VOUCHED_TIMES = 4  # of its size; overlapping records, made on purpose, would cost its square
 _SOUGHT_BYTES = 1 << 20  # but for those with a body; so that chance costs little
 _NEAR_NS = 3600 * 10**9
 _CHAIN = 3
@@ -90,6 +91,7 @@ class Scanner:
 
     channels: set[int] = field(default_factory=set)
     _log_ns: int | None = None
+    _to_vouch: int = 0  # bytes that may still be read only to vouch for a length
 
     def walk(
         self, data: Buffer, start: int, end: int, *, in_chunk: bool = False
@@ -107,6 +109,7 @@ class Scanner:
             Only kinds that may stand in a chunk are taken for records.
         """
         kinds = _IN_CHUNK if in_chunk else KNOWN
+        self._to_vouch += _VOUCHED_TIMES * (end - start)
         at = start
         held: Found | None = None
         while at < end:
@@ -180,10 +183,12 @@ class Scanner:
 
     def _is_unwitnessed(self, data: Buffer, held: Found) -> bool:
         """Say whether nothing vouches for the length of a record that nothing follows."""
-        vouched = held.opcode == Opcode.ATTACHMENT and attachment_agrees(
-            data, held.start, held.end
-        )
-        return held.damage is None and not vouched
+        if held.damage is not None:
+            return False
+        if held.opcode != Opcode.ATTACHMENT or self._to_vouch < 0:
+            return True
+        self._to_vouch -= held.end - held.start
+        return not attachment_agrees(data, held.start, held.end)
 
     def _sought_in(self, data: Buffer, at: int, end: int, kinds: frozenset[int]) -> frozenset[int]:
         """Return the kinds that may follow a record; what is in a chunk does not."""

@@ -19,7 +19,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from shipdrag_ros.bags import Run, check, info, open_runs, recover
+from shipdrag_ros.bags import Run, check, info, open_runs, recover, scan
 from shipdrag_ros.bags.records import HEAD, MAGIC
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
@@ -270,3 +270,23 @@ def test_lengths_of_2_to_the_60_are_named_and_take_no_memory(tmp_path: Path) -> 
     for opcode, found in zip(opcodes, named, strict=True):
         assert (Opcode(opcode).name.lower(), 'length') in found
     assert grown < 100 * MIB
+
+
+def test_overlapping_attachments_are_not_read_again_and_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # each claims to reach over thousands of others
+    length = 50_000
+    head = bytes(24) + struct.pack('<Q', length - 36) + b'abc'
+    content = MAGIC + record(Opcode.ATTACHMENT, head, length) * 4000
+    path = tmp_path / 'trap.mcap'
+    path.write_bytes(content)
+    read = []
+
+    def counted(data: Any, start: int, end: int) -> bool:
+        read.append(end - start)
+        return False
+
+    monkeypatch.setattr(scan, 'attachment_agrees', counted)
+    assert not check([path])[0].sound
+    assert 0 < sum(read) <= 4 * len(content) + length
