@@ -106,6 +106,7 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
     return float(time_s[0])
 
 
+@njit(cache=True)
 def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
     """
     Return means over `BIN_S` of a record that is steady or moves evenly.
@@ -120,21 +121,30 @@ def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
     time_s, value, count : (b,)
     """
     # outliers are told from what is near in time: the record may drift
-    away = value - np.interp(time_s, *_medians(time_s, value))
-    typical = _MAD_TO_SD * float(np.median(np.abs(away)))
-    keep = np.abs(away) <= _OUTLIER * typical
+    edges = _parts(time_s, 2.0 * _BLOCK_S)
+    near = np.interp(time_s, block_medians(time_s, edges), block_medians(value, edges))
+    away = np.abs(value - near)
+    keep = away <= _OUTLIER * _MAD_TO_SD * np.median(away)
     time_s, value = time_s[keep], value[keep]
-    number = np.floor((time_s - time_s[0]) / BIN_S)
-    first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
-    count = np.diff(np.concatenate([first, [len(time_s)]]))
-    return (
-        np.add.reduceat(time_s, first) / count,
-        np.add.reduceat(value, first) / count,
-        count,
-    )
+    edges = _parts(time_s, BIN_S)
+    count = np.diff(edges)
+    mean_s, mean = np.empty(len(count)), np.empty(len(count))
+    for i in range(len(count)):
+        mean_s[i] = time_s[edges[i] : edges[i + 1]].mean()
+        mean[i] = value[edges[i] : edges[i + 1]].mean()
+    return mean_s, mean, count
 
 
-def _medians(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
-    number = np.floor((time_s - time_s[0]) / (2.0 * _BLOCK_S))
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1, [len(time_s)]])
-    return block_medians(time_s, edges), block_medians(value, edges)
+@njit(cache=True)
+def _parts(time_s: Float64, length_s: float) -> Int64:
+    """Return where each part of a length begins, and the end of the last."""
+    edges = np.zeros(len(time_s) + 1, np.int64)
+    last, number = 0, 0.0
+    for i in range(len(time_s)):
+        here = np.floor((time_s[i] - time_s[0]) / length_s)
+        if here != number:
+            number = here
+            last += 1
+            edges[last] = i
+    edges[last + 1] = len(time_s)
+    return edges[: last + 2]
