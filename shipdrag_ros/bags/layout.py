@@ -37,7 +37,7 @@ _FIELDS: dict[int, str] = {
     Opcode.DATA_END: '4',
 }
 KNOWN = frozenset((Opcode.MESSAGE, *_FIELDS))
-NAMES: dict[int, str] = {int(opcode): opcode.name.lower() for opcode in Opcode}
+_NAMES: dict[int, str] = {int(opcode): opcode.name.lower() for opcode in Opcode}
 _NAME_BYTES = 1 << 16  # no name is longer
 _ENTRY_BYTES = {'i': 16, 'c': 10}
 _UINT32 = struct.Struct('<I')
@@ -48,7 +48,7 @@ def name(opcode: int) -> str:
     """
     Return the name of a kind of record, `chunk_index` for instance.
     """
-    return NAMES.get(opcode, 'unknown')
+    return _NAMES.get(opcode, 'unknown')
 
 
 def fits(data: Buffer, opcode: int, start: int, end: int) -> bool:

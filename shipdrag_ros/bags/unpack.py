@@ -28,7 +28,6 @@ from shipdrag_ros.errors import BagError
 
 _FILE_RATIO = 4096
 _PIECE_BYTES = 256  # packed; so that little is unpacked at once, and little lost at a damage
-_COPY_BYTES = 1 << 16
 _FRAMES = {b'\x28\xb5\x2f\xfd': 'zstd', b'\x04\x22\x4d\x18': 'lz4'}
 _FRAME_SEARCH_BYTES = 64
 
