@@ -137,4 +137,4 @@ def _wanders(speed: Series) -> bool:
     waves = np.cos(np.pi / bins * np.outer(number, np.arange(bins) + 0.5))
     power = 2.0 / bins * float(((waves * away).sum(axis=1) ** 2).sum())
     limit = len(number) + _BY_CHANCE * math.sqrt(2.0 * len(number))
-    return power > limit * white_sd(speed.value) ** 2
+    return bool(power > limit * white_sd(speed.value) ** 2)
