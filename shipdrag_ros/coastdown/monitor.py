@@ -261,7 +261,7 @@ class Monitor:
         stamp_ns = int(watch.update_ns[0])
         watch.update_ns[0] = self._grid_ns(next_stamp_ns)
         try:
-            window = self._window(stamp_ns, before_ns=0)
+            window = self._window(stamp_ns, before_ns=self._steady_ns)
             return Update(stamp_ns, self._estimator(window, self._ship, self._parameters))
         except EstimationError as error:
             return NoEstimate(stamp_ns, str(error))
