@@ -2,9 +2,9 @@
 """
 Error and coverage of r(v) beside other ways to differentiate, on the same simulated records.
 
-Prints Markdown; `--write` puts it into docs/accuracy.md, and the short table into README.md.
-All of it takes half an hour of a processor: `--parts FOLDER` keeps what is done, goes on from
-there, and with `--group` does a part only.
+Prints Markdown; `--write` puts it into docs/accuracy_beside_peers.md, and the short table into
+README.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps what is done, goes
+on from there, and with `--group` does a part only.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / 'docs' / 'accuracy.md'
+PAGE = ROOT / 'docs' / 'accuracy_beside_peers.md'
 README = ROOT / 'README.md'
 BEGIN, END = '<!-- beside peers -->', '<!-- end beside peers -->'
 HULLS = (CARGO, TANKER, YACHT)
@@ -434,7 +434,7 @@ def main() -> None:
     parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
     parser.add_argument('--n', type=int, choices=COUNTS, nargs='+', default=list(COUNTS))
     parser.add_argument('--hull', choices=[hull.name for hull in HULLS], help='this one alone')
-    parser.add_argument('--write', action='store_true', help='docs/accuracy.md and README.md')
+    parser.add_argument('--write', action='store_true', help='the page and README.md')
     parser.add_argument('--jobs', type=int, default=1, help='processes')
     parser.add_argument('--parts', type=Path, metavar='FOLDER', help='keep and reuse what is done')
     parser.add_argument('--group', choices=list(GROUPS), help='fill the parts with this one alone')
