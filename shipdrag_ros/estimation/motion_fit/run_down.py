@@ -14,7 +14,7 @@ from shipdrag_ros.ship import Ship
 _BAND = (0.08, 0.92)  # of the fall of the shaft speed from which its decay is found
 _FALLEN = 0.8  # of the steady shaft speed: at more the engine was not stopped
 _EARLIEST_S = 300.0  # before the onset as found
-_SOON = (5.0, 10.0)  # after the fall, in half-lives
+_SOON = (8.0, 16.0)  # after the fall, in half-lives
 _ROUNDS = 3
 _LEAST_SD = 0.01  # of the run-down, relative: no shaft falls exactly so
 ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the fit finds it
