@@ -11,14 +11,17 @@ from shipdrag_ros.diagnosis.result import (
     Verdict,
     Where,
 )
+from shipdrag_ros.diagnosis.traces import Compared, Trace
 
 __all__ = [
     'Advice',
     'Candidate',
     'CoastRun',
+    'Compared',
     'Diagnosis',
     'Gap',
     'Named',
+    'Trace',
     'Verdict',
     'Where',
     'diagnose',

@@ -16,6 +16,7 @@ from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import Advice, Candidate, Diagnosis, Named, Verdict
 from shipdrag_ros.diagnosis.terms import EffectTerm
+from shipdrag_ros.diagnosis.traces import traces
 from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, weigh
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
@@ -86,6 +87,9 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     )
     as_stated = frozen(library)
     missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.hypothesis.names)
+    explained = best if missing else nothing
+    if verdict is Verdict.UNKNOWN:
+        explained = max(smooth, key=lambda one: one.log_likelihood)
     return Diagnosis(
         verdict=verdict,
         effects=_named(best, weighed) if verdict is Verdict.NAMED else (),
@@ -100,6 +104,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         held_out_after=held_out(library, best) if missing else None,
         baseline='stated',
         best=_named(best, weighed),
+        traces=traces(library.problem, as_stated.best, explained.best),
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from shipdrag_ros.diagnosis.traces import Trace
 from shipdrag_ros.ship.sections import Uncertain
 
 
@@ -120,6 +121,10 @@ class Diagnosis:
         Effects of the most probable candidate, named or not.
     notes
         For the reader.
+    traces
+        Each run, measured and simulated: before, and after the effects of `best`
+        are added; after where nothing is missing: the baseline moved as far as
+        the runs ask for; where it is unknown: with something smooth instead.
     """
 
     verdict: Verdict
@@ -136,3 +141,4 @@ class Diagnosis:
     baseline: str
     best: tuple[Named, ...] = ()
     notes: tuple[str, ...] = ()
+    traces: tuple[Trace, ...] = ()
