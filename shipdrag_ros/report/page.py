@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One page for one result: a file that carries its pictures and needs no network."""
+"""The page of a replay."""
 
 from __future__ import annotations
 
@@ -7,21 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from shipdrag_ros import __version__
 from shipdrag_ros.coastdown.events import Coastdown
 from shipdrag_ros.report import cells, pictures, words
 from shipdrag_ros.report.cells import Table
+from shipdrag_ros.report.document import Picture, write_page
 from shipdrag_ros.report.hulls import Ranking
 from shipdrag_ros.report.run import RunResult
 from shipdrag_ros.report.together import together
-
-
-@dataclass(frozen=True)
-class _Picture:
-    uri: str
-    caption: str
 
 
 @dataclass(frozen=True)
@@ -29,7 +21,7 @@ class _Coastdown:
     heading: str
     sentence: str
     facts: Table
-    pictures: tuple[_Picture, ...]
+    pictures: tuple[Picture, ...]
     curve: Table | None
     notes: tuple[str, ...]
 
@@ -49,7 +41,7 @@ class _Together:
     """Hulls compared, or several coastdowns of one ship."""
 
     table: Table
-    picture: _Picture
+    picture: Picture
     notes: tuple[str, ...]
 
 
@@ -66,22 +58,15 @@ def write_report(path: Path, runs: Sequence[RunResult], *, ranking: Ranking | No
     ranking
         The hulls compared, where that was asked for.
     """
-    environment = Environment(
-        loader=PackageLoader('shipdrag_ros.report', '.'),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     names = list(dict.fromkeys(run.ship.name for run in runs))
-    text = environment.get_template('page.html').render(
+    write_page(
+        path,
+        'page.html',
         title='Resistance from coastdowns: ' + ', '.join(names),
-        version=__version__,
         runs=[_run(run) for run in runs],
         hulls=None if ranking is None else _hulls(ranking),
         combined=_combined(runs) if ranking is None else None,
     )
-    path.write_text(text.lstrip(), encoding='utf-8')
 
 
 def _run(run: RunResult) -> _Run:
@@ -100,26 +85,22 @@ def _run(run: RunResult) -> _Run:
 
 def _coastdown(number: int, coastdown: Coastdown, run: RunResult) -> _Coastdown:
     estimate = coastdown.estimate
-    drawn: tuple[_Picture, ...] = ()
+    drawn: tuple[Picture, ...] = ()
     curve: Table | None = None
     if estimate is not None:
         drawn = (
-            _Picture(
-                pictures.data_uri(
-                    pictures.resistance_picture(
-                        estimate, mass_kg=run.ship.mass_kg, truth=run.truth
-                    )
-                ),
+            Picture.of(
+                pictures.resistance_picture(estimate, mass_kg=run.ship.mass_kg, truth=run.truth),
                 'Specific resistance against speed, with its band of two standard deviations; '
                 'shaded: where it may be used.',
             ),
-            _Picture(
-                pictures.data_uri(pictures.track_picture(estimate)),
+            Picture.of(
+                pictures.track_picture(estimate),
                 'What was measured, the fit, and what is left between them. Left-overs that '
                 'wave slowly, instead of scattering, are not in the band.',
             ),
-            _Picture(
-                pictures.data_uri(pictures.order_picture(estimate)),
+            Picture.of(
+                pictures.order_picture(estimate),
                 'Residual variance against the number of coefficients; the smallest number on '
                 'the plateau is chosen.',
             ),
@@ -147,8 +128,8 @@ def _combined(runs: Sequence[RunResult]) -> _Together | None:
     ]
     return _Together(
         table=cells.combined_table(combined),
-        picture=_Picture(
-            pictures.data_uri(pictures.combined_picture(combined, curves)),
+        picture=Picture.of(
+            pictures.combined_picture(combined, curves),
             'Specific resistance of all coastdowns together, with its band of two standard '
             'deviations.',
         ),
@@ -159,8 +140,8 @@ def _combined(runs: Sequence[RunResult]) -> _Together | None:
 def _hulls(ranking: Ranking) -> _Together:
     return _Together(
         table=cells.ranking_table(ranking),
-        picture=_Picture(
-            pictures.data_uri(pictures.comparison_picture(ranking.hulls)),
+        picture=Picture.of(
+            pictures.comparison_picture(ranking.hulls),
             'Specific resistance against Froude number, each hull inside its valid range.',
         ),
         notes=ranking.notes,

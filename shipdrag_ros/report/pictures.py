@@ -44,7 +44,7 @@ _HULLS = (
     (SKY, (0, (1, 1))),
 )
 
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     'font.family': 'DejaVu Sans',  # comes with matplotlib: the same picture everywhere
     'font.size': 9,
     'axes.grid': True,
@@ -60,7 +60,7 @@ _STYLE: dict[Any, Any] = {
 _MANY_POINTS = 500  # above this dots are drawn as pixels, or the page grows by megabytes
 _PIXELS_PER_INCH = 200
 
-_TRACK_LABELS = {
+TRACK_LABELS = {
     'speed_through_water': ('Speed through water', 'm/s'),
     'speed_over_ground': ('Speed over ground', 'm/s'),
     'position': ('Distance along the track', 'm'),
@@ -74,7 +74,7 @@ def track_picture(estimate: Estimate) -> Figure:
     Time counts from the first stamp of the window.
     """
     columns = len(estimate.tracks)
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 4.2), layout='constrained')
         axes = figure.subplots(2, columns, sharex=True, squeeze=False, height_ratios=(2, 1))
         for column, (name, track) in enumerate(estimate.tracks.items()):
@@ -83,7 +83,7 @@ def track_picture(estimate: Estimate) -> Figure:
 
 
 def _draw_track(top: Axes, bottom: Axes, name: str, track: Track, start_ns: int) -> None:
-    label, unit = _TRACK_LABELS.get(name, (name, ''))
+    label, unit = TRACK_LABELS.get(name, (name, ''))
     time_s = (track.time_ns - start_ns) * 1e-9
     dots: dict[str, Any] = {
         'linestyle': 'none',
@@ -125,7 +125,7 @@ def order_picture(estimate: Estimate) -> Figure:
     panels = [panel for panel in panels if np.any(np.isfinite(panel[1]))]
     if len(panels) == 2:  # one input: its variance is that of the problem
         panels = panels[1:]
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 2.6), layout='constrained')
         axes = figure.subplots(1, max(len(panels), 1), squeeze=False)[0]
         for axis, (label, variance) in zip(axes, panels):
@@ -159,7 +159,7 @@ def resistance_picture(
     truth
         The curve of the simulation, where the record is simulated.
     """
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 4.6), layout='constrained')
         axis = figure.subplots()
         valid = estimate.valid_curve
@@ -206,7 +206,7 @@ def comparison_picture(hulls: Sequence[Hull]) -> Figure:
     """
     Draw r(Fr) of several hulls, each inside its valid range.
     """
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 4.6), layout='constrained')
         axis = figure.subplots()
         for number, hull in enumerate(hulls):
@@ -228,7 +228,7 @@ def combined_picture(combined: Combined, runs: Sequence[ResistanceCurve]) -> Fig
     """
     Draw the one r(v) of several coastdowns over what each gave by itself.
     """
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 4.2), layout='constrained')
         axis = figure.subplots()
         for number, curve in enumerate(runs):
@@ -252,7 +252,7 @@ def data_uri(figure: Figure) -> str:
     Return a figure as an SVG that a page can carry in itself.
     """
     buffer = io.BytesIO()
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         # without a date the same data give the same bytes
         figure.savefig(buffer, format='svg', dpi=_PIXELS_PER_INCH, metadata={'Date': None})
     return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')
@@ -262,7 +262,7 @@ def save(figure: Figure, path: Path) -> None:
     """
     Write a figure to a file; its ending gives the format.
     """
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure.savefig(path, dpi=_PIXELS_PER_INCH)
 
 
