@@ -71,7 +71,10 @@ def outputs() -> str:
         [f'`~/{topic.name}`', _short(topic.type), _OUTPUT_MEANING[topic.name]]
         for topic in OUTPUT_TOPICS
     ]
-    diagnostics = 'state, health of each input, the latest figures; 1 Hz on steady time'
+    diagnostics = (
+        'state, health of each input, the latest figures, what the last coastdown says is '
+        'missing in the model; 1 Hz on steady time'
+    )
     rows.append(['`/diagnostics`', 'diagnostic_msgs/DiagnosticArray', diagnostics])
     return _table(['topic', 'type', 'meaning'], rows)
 

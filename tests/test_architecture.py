@@ -28,8 +28,8 @@ FLOORS = {
     'messages': 5,
     'bags': 6,
     'report': 7,
-    'node': 7,
-    'cli': 8,
+    'node': 8,
+    'cli': 9,
 }
 ROS = {
     'rclpy',

@@ -193,6 +193,14 @@ class Monitor:
         """
         return self._stop_at_last_sample(EndedBy.RECORD_END)
 
+    def ended_window(self, ended: Coastdown) -> Window:
+        """
+        Cut the whole of a coastdown that has just ended, and the record before it.
+
+        What is older than `history_ns` may be missing; after a reset all is.
+        """
+        return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - self._steady_ns)
+
     def _fresh(self, tally: Tally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
 
@@ -271,6 +279,10 @@ class Monitor:
         assert self._onset is not None
         start_ns = max(self._onset.start_ns, end_ns - self._window_ns)
         first_ns = start_ns - before_ns if start_ns == self._onset.start_ns else start_ns
+        return self._cut(start_ns, end_ns, first_ns)
+
+    def _cut(self, start_ns: int, end_ns: int, first_ns: int) -> Window:
+        """Cut a window, with the record from `first_ns` on before it."""
         kept = since(
             self._memory.store,
             first_ns,

@@ -13,10 +13,14 @@ from collections.abc import Mapping, Sequence
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from shipdrag_ros.coastdown import InputHealth
+from shipdrag_ros.diagnosis import Diagnosis, Verdict
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
+from shipdrag_ros.report.diagnosis_words import advice, sentence
 from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.simulation.effects import LIBRARY
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -153,6 +157,48 @@ def estimate_status(estimate: Estimate | None) -> DiagnosticStatus:
             **{f'samples of {name} [1]': count for name, count in estimate.samples.items()},
         },
     )
+
+
+def diagnosis_status(status: DiagnosisStatus) -> DiagnosticStatus:
+    """
+    Say what is missing in the model by the last coastdown, or why that cannot be said.
+    """
+    values: dict[str, object] = {'state': status.state.value}
+    if status.coastdown is not None:
+        values |= {
+            'start of the coastdown [ns]': status.coastdown.start_ns,
+            'end of the coastdown [ns]': status.coastdown.end_ns,
+        }
+    if status.found is None:
+        level = WARN if status.state is DiagnosisState.FAILED else OK
+        text = status.state.value
+        return _status(
+            'diagnosis', level, f'{text}: {status.reason}' if status.reason else text, values
+        )
+    found = status.found
+    level = OK if found.verdict is Verdict.NONE else WARN
+    return _status('diagnosis', level, sentence(found), values | _figures(found))
+
+
+def _figures(found: Diagnosis) -> dict[str, object]:
+    """Return the figures of a diagnosis."""
+    values: dict[str, object] = {
+        'verdict': found.verdict.value,
+        'probability that nothing is missing [1]': found.nothing,
+        'probability of something without a name [1]': found.unnamed,
+    }
+    for candidate in found.candidates:
+        if candidate.names:
+            values[f'probability of {" + ".join(candidate.names)} [1]'] = candidate.probability
+    for effect in found.effects:
+        for quantity in LIBRARY[effect.name].parameters:
+            size, unit = effect.parameters[quantity.name], quantity.unit or '1'
+            values[f'{effect.name}, {quantity.name} [{unit}]'] = size.value
+            values[f'standard deviation of {effect.name}, {quantity.name} [{unit}]'] = size.sd
+    values['mean square of whitened residuals, before [1]'] = found.before.chi2_per_sample
+    if found.after is not None:
+        values['mean square of whitened residuals, after [1]'] = found.after.chi2_per_sample
+    return values | {f'advice {i}': line for i, line in enumerate(advice(found), start=1)}
 
 
 def _status(

@@ -27,6 +27,7 @@ from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
 from shipdrag_ros.node import diagnostics
+from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder, RecordingState
@@ -36,7 +37,7 @@ from shipdrag_ros.ship import Ship
 
 NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
-DIAGNOSE_S = 1.0
+DIAGNOSTICS_S = 1.0
 INACTIVE = 'the node is not active'
 
 
@@ -67,12 +68,14 @@ class CoastdownNode(LifecycleNode):
         self._recorder: Recorder | None = None
         self._recording_level = DiagnosticStatus.OK
         self._session: Session | None = None
+        self._diagnosing: Diagnosing | None = None
+        self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
         self._outputs: dict[str, Publisher] = {}
         self._survive_illegal_transitions()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
-        self.create_timer(DIAGNOSE_S, self._diagnose, clock=steady)
+        self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
         self.create_timer(LOOK_S, self._look, clock=steady)
         for name, action in (
             ('start_recording', self._start_recording),
@@ -102,6 +105,7 @@ class CoastdownNode(LifecycleNode):
         End what is running and destroy the node; ROS may be gone already.
         """
         self._deactivate('the process ends')
+        self._end_diagnosing()
         self.destroy_node()
 
     # lifecycle
@@ -164,6 +168,7 @@ class CoastdownNode(LifecycleNode):
             raise ShipFileError('ship_file', ["is '', expected the path of a ship file"])
         self._ship = Ship.load(settings.ship_file)
         self._settings = settings
+        self._diagnosing = Diagnosing(self._ship, settings.parameters, enabled=settings.diagnose)
         self._outputs = {
             topic.under(self.get_fully_qualified_name()): self._publisher(topic)
             for topic in OUTPUT_TOPICS
@@ -185,6 +190,7 @@ class CoastdownNode(LifecycleNode):
     def _activate(self) -> None:
         assert self._ship is not None
         assert self._settings is not None
+        assert self._diagnosing is not None
         monitor = Monitor(self._ship, self._settings.parameters)
         self._recorder = Recorder(
             Path(self._settings.output_directory),
@@ -199,6 +205,7 @@ class CoastdownNode(LifecycleNode):
             self._recorder,
             publish=self._send,
             node=self.get_fully_qualified_name(),
+            ended=self._diagnosing.begin,
         )
         if self._settings.record:
             self._recorder.start()
@@ -212,8 +219,14 @@ class CoastdownNode(LifecycleNode):
             session.finish()
             self.get_logger().info(f'{why}; {session.recorder.status().text}')
 
+    def _end_diagnosing(self) -> None:
+        if self._diagnosing is not None:
+            self._diagnosing.close()
+            self._diagnosing = None
+
     def _release(self) -> None:
         self._deactivate('released')
+        self._end_diagnosing()
         for topic in self._input_topics:
             topic.close()
         for publisher in self._outputs.values():
@@ -254,7 +267,7 @@ class CoastdownNode(LifecycleNode):
         for topic in self._input_topics:
             topic.look()
 
-    def _diagnose(self) -> None:
+    def _publish_diagnostics(self) -> None:
         for topic in self._input_topics:
             topic.tick()
         monitor = None if self._session is None else self._session.monitor
@@ -282,6 +295,12 @@ class CoastdownNode(LifecycleNode):
             self._log_recording(message.status[-1])
         if self._session is not None:
             message.status.append(diagnostics.estimate_status(self._session.latest))
+        if self._diagnosing is not None:
+            found = self._diagnosing.status
+            message.status.append(diagnostics.diagnosis_status(found))
+            if found is not self._diagnosed:
+                self._diagnosed = found
+                self.get_logger().info(f'diagnosis: {message.status[-1].message}')
         self._diagnostics.publish(message)
 
     def _log_recording(self, status: DiagnosticStatus) -> None:

@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Event, Update
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event, Update
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
     Decoded,
@@ -28,6 +29,7 @@ from shipdrag_ros.node.ring import RawMessage
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]
+Ended = Callable[[Coastdown, Window], None]
 
 
 class Session:
@@ -42,6 +44,9 @@ class Session:
         Called with every message out.
     node
         Full name of the node.
+    ended
+        Called after each coastdown with all of its samples; not after one that
+        a reset ended, which has dropped them.
 
     Attributes
     ----------
@@ -50,13 +55,20 @@ class Session:
     """
 
     def __init__(
-        self, monitor: Monitor, recorder: Recorder, *, publish: Publish, node: str
+        self,
+        monitor: Monitor,
+        recorder: Recorder,
+        *,
+        publish: Publish,
+        node: str,
+        ended: Ended | None = None,
     ) -> None:
         self.monitor = monitor
         self.recorder = recorder
         self.latest: Estimate | None = None
         self._publish = publish
         self._node = node
+        self._ended = ended
         self._arrival_ns = 0
 
     def receive(self, source: Source, payload: bytes, now_ns: int) -> Decoded:
@@ -126,6 +138,12 @@ class Session:
                 self.latest = event.estimate
             for message in outputs(event, node=self._node):
                 self._send(message)
+            if (
+                self._ended is not None
+                and isinstance(event, Coastdown)
+                and event.ended_by is not EndedBy.RESET
+            ):
+                self._ended(event, self.monitor.ended_window(event))
 
     def _send(self, message: OutputMessage) -> None:
         self._publish(message)

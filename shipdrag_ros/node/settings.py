@@ -60,6 +60,12 @@ OWN: tuple[Setting, ...] = (
         high=604800.0,
     ),
     Setting('autostart', True, 'configure and activate without being asked to'),
+    Setting(
+        'diagnose',
+        True,
+        'name the effect that is missing in the model after each coastdown, in a process of its '
+        'own, if the ship file has a baseline',
+    ),
 )
 TYPES: tuple[Setting, ...] = tuple(
     Setting(
@@ -105,6 +111,7 @@ class NodeSettings:
     part_size_bytes: int
     part_duration_s: float
     autostart: bool
+    diagnose: bool
     types: Mapping[str, str]
     parameters: Parameters
 

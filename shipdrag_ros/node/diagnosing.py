@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Diagnosis of coastdowns beside the node, each in a process of its own.
+
+A diagnosis is seconds of compiled code, in which no callback of the same process
+could run. A process that ends with it takes no memory between coastdowns, and
+whatever goes wrong in it stops no estimate.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from enum import Enum
+from threading import Lock
+
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
+
+LIMIT_S = 900.0  # the first diagnosis of a machine compiles
+_NICE = 10  # estimates come first
+
+
+class DiagnosisState(Enum):
+    """How far the diagnosis of the last coastdown is."""
+
+    OFF = 'off'
+    IMPOSSIBLE = 'impossible'
+    NONE_YET = 'none yet'
+    RUNNING = 'running'
+    DONE = 'done'
+    FAILED = 'failed'
+
+
+@dataclass(frozen=True)
+class DiagnosisStatus:
+    """
+    Where the diagnosis stands.
+
+    Attributes
+    ----------
+    state
+    reason
+        Why there is none.
+    coastdown
+        The one that it is of, None before the first.
+    found
+        None unless done.
+    """
+
+    state: DiagnosisState
+    reason: str = ''
+    coastdown: Coastdown | None = None
+    found: Diagnosis | None = None
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What a process is given."""
+
+    run: CoastRun
+    ship: Ship
+    parameters: Parameters
+
+
+class Diagnosing:
+    """
+    Coastdowns diagnosed one after the other, while the caller goes on.
+
+    Parameters
+    ----------
+    ship
+        Without a baseline none is possible, and the status says so.
+    enabled
+        False: only tells that it is off.
+    """
+
+    def __init__(self, ship: Ship, parameters: Parameters, *, enabled: bool) -> None:
+        self._ship = ship
+        self._parameters = parameters
+        self._queue = ThreadPoolExecutor(max_workers=1, thread_name_prefix='diagnosis')
+        self._lock = Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._closed = False
+        self._status = DiagnosisStatus(DiagnosisState.NONE_YET)
+        if not enabled:
+            self._status = DiagnosisStatus(DiagnosisState.OFF, 'the parameter diagnose is false')
+        elif ship.baseline is None:
+            reason = 'the ship file has no baseline; add `baseline` to it'
+            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason)
+        self._possible = self._status.state is DiagnosisState.NONE_YET
+
+    @property
+    def status(self) -> DiagnosisStatus:
+        """Of the last coastdown."""
+        return self._status
+
+    def begin(self, coastdown: Coastdown, window: Window) -> None:
+        """
+        Diagnose a coastdown after those that wait; returns at once.
+        """
+        if not self._possible:
+            return
+        if coastdown.estimate is None:
+            reason = f'the coastdown gave no estimate: {coastdown.failure}'
+            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason, coastdown)
+            return
+        self._status = DiagnosisStatus(DiagnosisState.RUNNING, coastdown=coastdown)
+        task = _Task(CoastRun('the coastdown', window), self._ship, self._parameters)
+        self._queue.submit(self._diagnose, task, self._status)
+
+    def close(self) -> None:
+        """
+        End what runs and drop what waits.
+        """
+        with self._lock:
+            self._closed = True
+            if self._process is not None:
+                self._process.kill()
+        self._queue.shutdown(cancel_futures=True)
+
+    def _diagnose(self, task: _Task, running: DiagnosisStatus) -> None:
+        """Wait for a process, in a thread."""
+        try:
+            found = self._answer(task)
+        except (OSError, subprocess.SubprocessError, pickle.UnpicklingError) as error:
+            self._status = replace(running, state=DiagnosisState.FAILED, reason=str(error))
+            return
+        if isinstance(found, Diagnosis):
+            self._status = replace(running, state=DiagnosisState.DONE, found=found)
+        else:
+            self._status = replace(running, state=DiagnosisState.IMPOSSIBLE, reason=found)
+
+    def _answer(self, task: _Task) -> Diagnosis | str:
+        """Return what a process says; str: why it can say nothing."""
+        with self._lock:
+            if self._closed:
+                return 'the node has ended'
+            self._process = subprocess.Popen(
+                [sys.executable, '-c', f'from {__name__} import main; main()'],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                start_new_session=True,  # the signal that ends the node is not for it
+            )
+        try:
+            answer, complaint = self._process.communicate(pickle.dumps(task), timeout=LIMIT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.communicate()
+            raise
+        if self._process.returncode != 0:
+            last = complaint.decode(errors='replace').strip().rpartition('\n')[2]
+            raise subprocess.SubprocessError(f'exit {self._process.returncode}: {last}')
+        found = pickle.loads(answer)
+        assert isinstance(found, Diagnosis | str)
+        return found
+
+
+def main() -> None:
+    """
+    Diagnose what comes from stdin, and write the result, or why there is none, to stdout.
+    """
+    os.nice(_NICE)
+    task = pickle.load(sys.stdin.buffer)
+    assert isinstance(task, _Task)
+    try:
+        answer: Diagnosis | str = diagnose([task.run], task.ship, task.parameters)
+    except ShipdragError as error:
+        answer = str(error)
+    sys.stdout.buffer.write(pickle.dumps(answer))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""After a coastdown the node says what is missing in the model, and goes on meanwhile."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipdrag_ros.bags import coast_windows, open_runs, replay
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisState, DiagnosisStatus
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.report.diagnosis_words import sentence
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation.effects import parse
+
+SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
+LEAD_IN_S, COAST_S = 900.0, 900.0
+SETTINGS = {
+    'steady_s': 600.0,
+    'slope_window_s': 30.0,
+    'confirm_s': 60.0,
+    'data_stop_s': 20.0,
+    'update_s': 30.0,
+}
+PARAMETERS = Parameters.from_mapping(SETTINGS, subject='test')
+SHIP = Ship.load(SHIP_FILE)
+SPEED = 120.0  # times as fast as life
+WITHIN_S = 400.0  # the first diagnosis of a machine compiles
+
+
+def record(*effects: str) -> Block:
+    """A coastdown, and a heading that goes on after the speeds have ceased."""
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=LEAD_IN_S, duration_s=COAST_S)
+    truth = simulate(SHIP, scenario, effects=[parse(text) for text in effects])
+    block = sense(truth, standard_sensors(rate_hz=1.0, inputs=STANDARD_INPUTS), seed=1)
+    silent_ns = int(block.receive_ns[0]) + round((LEAD_IN_S + COAST_S - 60.0) * 1e9)
+    return block[(block.receive_ns < silent_ns) | (block.channel == Channel.HEADING)]
+
+
+def values_of(status: Any) -> dict[str, str]:
+    return {item.key: item.value for item in status.values}
+
+
+def coastdown_of(block: Block) -> tuple[Coastdown, Window]:
+    monitor = Monitor(SHIP, PARAMETERS)
+    (ended,) = (event for event in monitor.update(block) if isinstance(event, Coastdown))
+    return ended, monitor.ended_window(ended)
+
+
+def result_of(diagnosing: Diagnosing) -> DiagnosisStatus:
+    end = time.monotonic() + WITHIN_S
+    while (status := diagnosing.status).state is DiagnosisState.RUNNING:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    diagnosing.close()
+    return status
+
+
+@pytest.mark.parametrize(
+    ('settings', 'ship', 'state', 'reason'),
+    [
+        ({'diagnose': False}, SHIP_FILE, 'off', 'the parameter diagnose is false'),
+        ({}, None, 'impossible', 'has no baseline'),
+        ({}, SHIP_FILE, 'none yet', 'none yet'),
+    ],
+)
+def test_node_says_whether_it_can_diagnose(
+    start_node: Any,
+    diagnostics: Any,
+    settings: dict[str, Any],
+    ship: Path,
+    state: str,
+    reason: str,
+) -> None:
+    chosen = {} if ship is None else {'ship_file': str(ship)}
+    start_node(**chosen, **settings, record=False)
+    status = diagnostics.wait_for('diagnosis', reason)
+    assert values_of(status)['state'] == state
+    assert status.level == b'\x00'
+
+
+def test_node_names_what_is_missing_as_the_verb_does(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+) -> None:
+    node = start_node(ship_file=str(SHIP_FILE), use_sim_time=True, **SETTINGS)
+    block = record('current=0.5')
+    peer.player.connect(block)
+    peer.player.play(block, speed=SPEED)
+
+    def verdict() -> Any:
+        status = diagnostics.of('diagnosis')
+        return status if status is not None and 'verdict' in values_of(status) else None
+
+    status = peer.spin_until(verdict, within_s=WITHIN_S)
+    assert 'Missing in the model: current' in status.message
+    assert node.stop() == 0
+
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    result = replay(*open_runs([bag]))
+    assert result.recorded.first_difference is None
+    assert result.recorded.compared == result.recorded.identical > 60
+    ((_, window),) = coast_windows(result)
+    found = diagnose([CoastRun('', window)], result.ship, result.parameters)
+    assert status.message == sentence(found)
+    assert status.level == b'\x01'
+    values = values_of(status)
+    size = found.effects[0].parameters['along_track_m_s']
+    assert values['current, along_track_m_s [m/s]'] == f'{size.value:.6g}'
+    assert values['standard deviation of current, along_track_m_s [m/s]'] == f'{size.sd:.6g}'
+    assert values['verdict'] == 'named'
+    assert 'diagnosis: Missing in the model: current' in node.log
+
+
+def test_monitor_hands_out_what_a_replay_reads_again() -> None:
+    block = record()
+    ended, window = coastdown_of(block)
+    assert window.before is not None
+    whole = Window.from_block(
+        block,
+        ended.start_ns,
+        ended.end_ns,
+        before_ns=ended.start_ns - round(PARAMETERS.steady_s * 1e9),
+    )
+    for one, other in ((window, whole), (window.before, whole.before)):
+        for name in STANDARD_INPUTS:
+            assert len(getattr(one, name)) > 500
+            assert (getattr(one, name).value == getattr(other, name).value).all()
+
+
+def test_nothing_hidden_gives_no_warning() -> None:
+    diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
+    diagnosing.begin(*coastdown_of(record()))
+    assert diagnosing.status.state is DiagnosisState.RUNNING
+    status = result_of(diagnosing)
+    assert status.found is not None
+    assert status.found.verdict is Verdict.NONE
+
+
+def test_too_little_steady_record_is_told() -> None:
+    ended, window = coastdown_of(record())
+    diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
+    diagnosing.begin(ended, replace(window, before=None))
+    status = result_of(diagnosing)
+    assert status.state is DiagnosisState.IMPOSSIBLE
+    assert '0 s of steady sailing' in status.reason
+
+
+def test_coastdown_without_estimate_is_not_diagnosed() -> None:
+    ended, window = coastdown_of(record())
+    diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
+    diagnosing.begin(replace(ended, estimate=None, failure='withdrawn: 1 %'), window)
+    status = result_of(diagnosing)
+    assert status.state is DiagnosisState.IMPOSSIBLE
+    assert 'withdrawn: 1 %' in status.reason
+
+
+def test_process_that_dies_is_a_failure_that_harms_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sys, 'executable', '/bin/false')
+    diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
+    diagnosing.begin(*coastdown_of(record()))
+    status = result_of(diagnosing)
+    assert status.state is DiagnosisState.FAILED
+    assert 'exit 1' in status.reason
+
+
+def test_end_of_the_node_does_not_wait_for_a_diagnosis() -> None:
+    diagnosing = Diagnosing(SHIP, PARAMETERS, enabled=True)
+    ended, window = coastdown_of(record())
+    for _ in range(3):
+        diagnosing.begin(ended, window)
+    time.sleep(0.5)
+    start = time.monotonic()
+    diagnosing.close()
+    assert time.monotonic() - start < 2.0  # a diagnosis takes longer
