@@ -2,6 +2,7 @@
 """Which effect is missing where model and data disagree."""
 
 from shipdrag_ros.diagnosis.diagnose import CoastRun, diagnose, with_effects
+from shipdrag_ros.diagnosis.legs import SailingRecord
 from shipdrag_ros.diagnosis.result import (
     Advice,
     Candidate,
@@ -11,6 +12,7 @@ from shipdrag_ros.diagnosis.result import (
     Verdict,
     Where,
 )
+from shipdrag_ros.diagnosis.sailing import diagnose_sailing
 from shipdrag_ros.diagnosis.traces import Compared, Trace
 
 __all__ = [
@@ -21,9 +23,11 @@ __all__ = [
     'Diagnosis',
     'Gap',
     'Named',
+    'SailingRecord',
     'Trace',
     'Verdict',
     'Where',
     'diagnose',
+    'diagnose_sailing',
     'with_effects',
 ]

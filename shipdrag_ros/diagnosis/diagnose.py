@@ -96,7 +96,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         candidates=candidates,
         nothing=weighed.nothing,
         unnamed=weighed.unnamed,
-        would_decide=_advice(candidates) if verdict is Verdict.ONE_OF else (),
+        would_decide=advised(candidates) if verdict is Verdict.ONE_OF else (),
         where=None if verdict is Verdict.NONE else where(library, as_stated, smooth),
         before=gap_of(library.problem, as_stated.best),
         after=gap_of(library.problem, best.best) if missing else None,
@@ -173,8 +173,10 @@ def _inseparable(library: Library) -> list[frozenset[str]]:
     ]
 
 
-def _advice(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
-    """Return what tells the candidates apart, what serves most pairs of them first."""
+def advised(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
+    """
+    Return what tells candidates apart, what serves most pairs of them first.
+    """
     votes: dict[str, float] = {}
     for one, other in combinations(candidates, 2):
         for a in one.names:

@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A sailing record as legs: means over short stretches on one course at one speed.
+
+Neither baseline nor ship is needed to hold a log against the way made good over
+ground. Where samples are missing, or the vessel turns, stops or changes speed,
+means of the two are not of the same motion: those stretches are left out and
+counted.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from shipdrag_ros.diagnosis.noise import bin_means
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel, Float64, Int64
+
+LEAST_LEGS = 8
+_LEG_S, _MOST_LEGS = 60.0, 300  # a record longer than so many legs has longer ones
+_SAMPLES = 6  # of the slower input in a leg; a leg is as long as that needs
+_SHARE = 0.5  # of the samples that a leg should hold, below which it has a dropout
+_YAW_SD_RAD = 0.1  # of the heading within a leg: at 0.1 the way made good is 0.5 % short
+_STRAIGHT = 0.99  # way made good over that of the halves of a leg, where there is no heading
+_NEAR_S = 10.0  # of the end of a leg are the positions that tell where it is
+_STOPPED = 0.25  # of the usual speed
+_UNSTEADY = 0.15  # of the speed, between the halves of a leg
+_OUTLIER = 5.0  # robust standard deviations
+_MAD_TO_SD = 1.4826
+
+
+class Left(StrEnum):
+    """Why a stretch is left out."""
+
+    DROPOUT = 'dropout'
+    TURN = 'turn'
+    STOP = 'stop'
+    UNSTEADY = 'unsteady'
+
+
+class Direction(StrEnum):
+    """How the direction of a leg is known."""
+
+    TRACK = 'track over ground'
+    HEADING = 'heading'
+    UNKNOWN = 'unknown'
+
+
+@dataclass(frozen=True)
+class SailingRecord:
+    """
+    A record of any sailing.
+
+    Attributes
+    ----------
+    name
+        For the user.
+    block
+        Accepted samples in arrival order.
+    """
+
+    name: str
+    block: Block
+
+
+@dataclass(frozen=True)
+class Legs:
+    """
+    Legs of one or several records, in ascending time within each.
+
+    Attributes
+    ----------
+    record : (n,)
+        Number of the record of each leg.
+    time_s : (n,)
+        Middle of each, from the start of its record.
+    log_m_s, ground_m_s : (n,)
+        Mean speed by the log, and over ground.
+    direction_rad : (n,)
+        From east, anticlockwise; 0 where unknown.
+    direction
+        How it is known.
+    length_s
+        Of the longest leg.
+    geodetic
+        Whether all ways over ground are from latitude and longitude.
+    left_out
+        Stretches that are not legs, by reason.
+    """
+
+    record: Int64
+    time_s: Float64
+    log_m_s: Float64
+    ground_m_s: Float64
+    direction_rad: Float64
+    direction: Direction
+    length_s: float
+    geodetic: bool
+    left_out: Mapping[Left, int]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @classmethod
+    def of(cls, records: Sequence[SailingRecord], parameters: Parameters) -> Legs:
+        """
+        Cut records into legs.
+
+        Raises
+        ------
+        DiagnosisError
+            If they have no log, nothing over ground, or too few even stretches.
+        """
+        cut = [_Cut(record, parameters) for record in records]
+        found = [leg for one in cut for leg in one.legs()]
+        left = Counter({why: sum(one.left[why] for one in cut) for why in Left})
+        usual = float(np.median([leg.ground_m_s for leg in found])) if found else 0.0
+        number = {id(leg): j for j, one in enumerate(cut) for leg in one.found}
+        moving = [leg for leg in found if min(leg.ground_m_s, leg.log_m_s) > _STOPPED * usual]
+        left[Left.STOP] += len(found) - len(moving)
+        if len(moving) < LEAST_LEGS:
+            names = ', '.join(repr(record.name) for record in records)
+            raise DiagnosisError(
+                f'{names}: {len(moving)} stretches of even sailing (left out: {told(left)}), '
+                f'at least {LEAST_LEGS} of {_LEG_S:.0f} s are needed to hold the log against '
+                'the way over ground: give a longer record'
+            )
+        known = {leg.direction for leg in moving}
+        return cls(
+            np.array([number[id(leg)] for leg in moving]),
+            np.array([leg.time_s for leg in moving]),
+            np.array([leg.log_m_s for leg in moving]),
+            np.array([leg.ground_m_s for leg in moving]),
+            np.array([leg.direction_rad for leg in moving]),
+            known.pop() if len(known) == 1 else Direction.HEADING,
+            max(one.length_s for one in cut),
+            all(one.geodetic for one in cut),
+            {why: count for why, count in left.items() if count},
+        )
+
+    def __getitem__(self, part: Int64) -> Legs:
+        return replace(
+            self,
+            record=self.record[part],
+            time_s=self.time_s[part],
+            log_m_s=self.log_m_s[part],
+            ground_m_s=self.ground_m_s[part],
+            direction_rad=self.direction_rad[part],
+        )
+
+    def through_water(self, current_m_s: tuple[float, float]) -> Float64:
+        """
+        Return the speed through water [m/s] that a current east, north leaves, (n,).
+        """
+        east, north = current_m_s
+        cos, sin = np.cos(self.direction_rad), np.sin(self.direction_rad)
+        ahead, to_port = east * cos + north * sin, north * cos - east * sin
+        if self.direction is Direction.TRACK:
+            return np.hypot(self.ground_m_s - ahead, to_port)
+        # the vessel points where it heads, and its track is set to the side
+        return np.sqrt(np.maximum(self.ground_m_s**2 - to_port**2, 0.0)) - ahead
+
+
+def told(left_out: Mapping[Left, int]) -> str:
+    """
+    Return what is left out, in words.
+    """
+    return ', '.join(f'{why} {count}' for why, count in left_out.items() if count) or 'nothing'
+
+
+@dataclass(frozen=True)
+class _Leg:
+    time_s: float
+    log_m_s: float
+    ground_m_s: float
+    direction_rad: float
+    direction: Direction
+
+
+class _Cut:
+    """One record on its way to legs."""
+
+    def __init__(self, record: SailingRecord, parameters: Parameters) -> None:
+        block = record.block
+        if len(block) == 0:
+            raise DiagnosisError(f'{record.name!r} has no accepted sample: give another record')
+        start_ns, end_ns = int(block.stamp_ns.min()), int(block.stamp_ns.max())
+        try:
+            window = Window.from_block(block, start_ns, end_ns)
+        except ValueError as error:
+            raise DiagnosisError(
+                f'{record.name!r}: a clock was set within the record ({error}): cut it there'
+            ) from error
+        by_place = len(window.position) >= min(_SAMPLES, 1 + len(window.speed_over_ground))
+        ground = window.position if by_place else window.speed_over_ground
+        if len(window.speed_through_water) < _SAMPLES or len(ground) < _SAMPLES:
+            raise DiagnosisError(
+                f'{record.name!r} has no coastdown, and {len(window.speed_through_water)} '
+                f'speeds through water beside {len(ground)} positions or speeds over ground: '
+                'give a coastdown (engine stopped after steady sailing), or a record of sailing '
+                'with both a log and positions'
+            )
+        sent = block.channel
+        degrees = np.count_nonzero(sent == Channel.POSITION_GEODETIC)
+        self.geodetic = by_place and degrees > np.count_nonzero(sent == Channel.POSITION)
+        self.by_place = by_place
+        self.log = _Timed.of(window.speed_through_water, start_ns)
+        self.ground = _Timed.of(ground, start_ns)
+        self.heading = _Timed.of(window.heading, start_ns)
+        self.compass = parameters.heading_convention == 'compass'
+        span_s = (end_ns - start_ns) * 1e-9
+        step_s = max(self.log.step_s, self.ground.step_s)
+        self.length_s = max(_LEG_S, span_s / _MOST_LEGS, _SAMPLES * step_s)
+        self.edges = np.arange(0.0, span_s, self.length_s)
+        self.left: Counter[Left] = Counter()
+        self.found: list[_Leg] = []
+
+    def legs(self) -> list[_Leg]:
+        """Return the legs, and count the rest."""
+        for start_s in self.edges:
+            leg = self._leg(float(start_s))
+            if isinstance(leg, Left):
+                self.left[leg] += 1
+            else:
+                self.found.append(leg)
+        return self.found
+
+    def _leg(self, start_s: float) -> _Leg | Left:
+        log, ground, heading = (
+            each.part(start_s, start_s + self.length_s)
+            for each in (self.log, self.ground, self.heading)
+        )
+        for part, whole in ((log, self.log), (ground, self.ground)):
+            if len(part) < max(_SHARE * self.length_s / whole.step_s, 0.5 * _SAMPLES):
+                return Left.DROPOUT
+        turned = np.exp(1j * heading.value) if len(heading) else np.empty(0, complex)
+        yaw = complex(turned.mean()) if len(turned) else 1.0 + 0.0j
+        if abs(yaw) < math.exp(-0.5 * _YAW_SD_RAD**2):
+            return Left.TURN
+        middle = start_s + 0.5 * self.length_s
+        through, first, second = log.means(middle)
+        if through <= 0.0:
+            return Left.STOP
+        if abs(second - first) > _UNSTEADY * through:
+            return Left.UNSTEADY
+        if not self.by_place:
+            over, direction = ground.means(middle)[0], math.atan2(yaw.imag, yaw.real)
+            known = Direction.HEADING if len(heading) else Direction.UNKNOWN
+            if self.compass and len(heading):
+                direction = 0.5 * math.pi - direction
+            return _Leg(middle, through, over, direction, known)
+        near_s = max(_NEAR_S, 0.5 * _SAMPLES * self.ground.step_s)
+        edges = (start_s, middle, start_s + self.length_s)
+        places = [self.ground.part(at - near_s, at + near_s).at(at) for at in edges]
+        if not all(map(cmath.isfinite, places)):
+            return Left.DROPOUT
+        first_half, second_half = places[1] - places[0], places[2] - places[1]
+        way = places[2] - places[0]
+        if not len(heading) and abs(way) < _STRAIGHT * (abs(first_half) + abs(second_half)):
+            return Left.TURN
+        over = abs(way) / self.length_s
+        return _Leg(middle, through, over, cmath.phase(way), Direction.TRACK)
+
+
+@dataclass(frozen=True)
+class _Timed:
+    """Values at times from the start of the record [s]; places are complex."""
+
+    time_s: Float64
+    value: np.ndarray[tuple[int], np.dtype[np.float64 | np.complex128]]
+
+    @classmethod
+    def of(cls, series: Series, start_ns: int) -> _Timed:
+        value = series.value
+        flat = value if value.ndim == 1 else value[:, 0] + 1j * value[:, 1]
+        return cls(np.asarray((series.time_ns - start_ns) * 1e-9, np.float64), flat)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def step_s(self) -> float:
+        """The usual time between samples."""
+        return max(float(np.median(np.diff(self.time_s))), 1e-3)
+
+    def part(self, start_s: float, end_s: float) -> _Timed:
+        """Return the samples between two times."""
+        first, last = np.searchsorted(self.time_s, (start_s, end_s))
+        return _Timed(self.time_s[first:last], self.value[first:last])
+
+    def means(self, middle_s: float) -> tuple[float, float, float]:
+        """Return the mean of all, and of each half, without outliers."""
+        value = np.asarray(self.value, np.float64)
+        away = np.abs(value - np.median(value))
+        keep = away <= _OUTLIER * _MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
+        edges = np.array([-np.inf, middle_s, np.inf])
+        halves = bin_means(self.time_s[keep], value[keep], edges)[1]
+        return float(value[keep].mean()), float(halves[0]), float(halves[-1])
+
+    def at(self, time_s: float) -> complex:
+        """Return the value on a line through all, without outliers; NaN where they are few."""
+        after, value = self.time_s - time_s, np.asarray(self.value, np.complex128)
+        for _ in range(2):
+            if len(after) < 3 or after[0] > 0.0 or after[-1] < 0.0:
+                return complex(math.nan)
+            line = np.polynomial.polynomial.polyfit(after, np.array([value.real, value.imag]).T, 1)
+            place = complex(line[0, 0], line[0, 1])
+            away = np.abs(value - place - after * complex(line[1, 0], line[1, 1]))
+            keep = away <= _OUTLIER * np.median(away) + 1e-9
+            after, value = after[keep], value[keep]
+        return place
