@@ -33,6 +33,7 @@ VERBS = (
     Verb('node', 'node', 'the onboard node: estimates live and records'),
     Verb('replay', 'replay', 'the same estimator over bags, without ROS'),
     Verb('simulate', 'simulate', 'simulated coastdown with sensors, as a bag'),
+    Verb('baseline', 'baseline', 'learn the baseline, and how far runs scatter, from clean runs'),
     Verb('diagnose', 'diagnose', 'where model and data disagree, and which effect is missing'),
     Verb('import', 'import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
     Verb('info', 'info', 'what is in a bag'),

@@ -140,7 +140,9 @@ class BaselineTerm:
             scales = {'resistance': base.relative_sd}
         found = [scaled(name, sd, tail=Tail.STUDENT) for name, sd in scales.items()]
         found += [scaled(f'shape {k}', SHAPE_SD) for k in range(_SHAPES)]
-        found.append(scaled('n_r', self.ship.added_mass.sd))
+        # a retardation that is known stays so whatever n_r is
+        known = base.relative_sd_of == 'retardation'
+        found.append(scaled('n_r', 0.0 if known else self.ship.added_mass.sd))
         found.append(scaled('run-down', self.run_down_sd_s))
         return tuple(found)
 
@@ -150,21 +152,33 @@ class BaselineTerm:
 
     def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
         """Return the departure from the stated baseline."""
-        *scales, n_r, run_down_s = values
+        *given, n_r, run_down_s = values
+        scales = np.array(given)
+        base = self.ship.baseline
+        if isinstance(base, CoefficientBaseline) and base.relative_sd.correlation:
+            # the scale of the wave resistance is stated as if that of friction were right
+            rho, sd = base.relative_sd.correlation, base.relative_sd
+            scales[1] *= (1.0 - rho**2) ** 0.5
+            if sd.friction > 0.0:
+                scales[1] += rho * sd.wave / sd.friction * scales[0]
         return Action(
-            resistance=(lambda speed: self._departure(speed, np.array(scales)),),
+            resistance=(lambda speed: self._departure(speed, scales),),
             n_r_change=n_r,
             run_down_change_s=self.run_down_change_s[run] + run_down_s,
         )
 
     def _departure(self, speed_m_s: Float64, scales: Float64) -> Float64:
-        result: Float64 = scales @ _parts(self.ship, self.top_m_s, speed_m_s.tobytes())
+        result: Float64 = scales @ baseline_parts(self.ship, self.top_m_s, speed_m_s.tobytes())
         return result
 
 
 @lru_cache(maxsize=8)
-def _parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
-    """Return what each scale and shape of a baseline adds [N], (p, n); kept, as speeds recur."""
+def baseline_parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
+    """
+    Return what each scale and shape of a baseline adds [N], (p, n).
+
+    Kept, as speeds recur, hence the bytes of an array.
+    """
     speed_m_s = np.frombuffer(speeds)
     total = ship.resistance_n(speed_m_s)
     parts = [total]

@@ -17,11 +17,27 @@ from scipy.interpolate import PchipInterpolator
 
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.fields import Kind, Problems, declare, number, numbers, section, text
+from shipdrag_ros.ship.fields import (
+    Kind,
+    Problems,
+    choice,
+    declare,
+    number,
+    numbers,
+    section,
+    text,
+)
 
 # Below this the flow along the hull is laminar and the ITTC line, singular at 100, means
 # nothing: C_F is held, so that the resistance falls to 0 with the square of the speed.
 REYNOLDS_MIN = 1e5
+
+_KNOWN = declare(
+    choice('resistance', 'retardation'),
+    'what relative_sd is of; retardation, R / (mass (1 + n_r)), where coastdowns have shown it: '
+    'the error of n_r is no part of it',
+    default='resistance',
+)
 
 
 @dataclass(frozen=True)
@@ -32,6 +48,7 @@ class CoefficientSd:
 
     friction: float = declare(number(0.0, 1.0), 'of C_V as a whole, C_A included')
     wave: float = declare(number(0.0, 2.0), 'of C_W')
+    correlation: float = declare(number(-0.999, 0.999), 'of the two', default=0.0)
 
 
 @dataclass(frozen=True)
@@ -52,6 +69,7 @@ class CoefficientBaseline:
     )
     wave_coefficient: tuple[float, ...] = declare(numbers(0.0, 0.1), 'C_W, at each of wave_froude')
     relative_sd: CoefficientSd = declare(section(CoefficientSd), 'how well they are known')
+    relative_sd_of: str = _KNOWN
     source: str = declare(text(), 'where the figures come from', default='')
 
     @cached_property
@@ -89,6 +107,7 @@ class TableBaseline:
         numbers(0.0, 1e8, 'N'), 'resistance at each of speed_m_s'
     )
     relative_sd: float = declare(number(0.0, 1.0), 'relative standard deviation of the table')
+    relative_sd_of: str = _KNOWN
     source: str = declare(text(), 'where the figures come from', default='')
 
     @cached_property

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag baseline`: the baseline that clean runs show, and how far runs scatter."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.cli.arguments import add_json, bag, new_file, remap
+from shipdrag_ros.cli.diagnose import coasts_of
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, Learnt, learn_baseline
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.report.cells import Table
+from shipdrag_ros.ship import Ship
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Learn the baseline of a ship from clean runs: clean hull, calm deep water, no wind. '
+        'Writes the ship file with the baseline that they show, in the form that it has, and '
+        'how well it is known for a further run: what the runs leave open, and by how much they '
+        'differ from each other. Five runs tell that well; with one or two the stated '
+        'relative_sd is kept. Without a baseline in the ship file, r(v) of the runs is written '
+        'as a table.'
+    )
+    parser.add_argument('bags', nargs='+', type=bag, metavar='BAG', help='MCAP or rosbag2')
+    parser.add_argument(
+        '--ship',
+        required=True,
+        type=Path,
+        metavar='FILE',
+        help='ship file (YAML); the baseline in it is taken for what was known before',
+    )
+    parser.add_argument(
+        '-o',
+        '--out',
+        required=True,
+        type=new_file('.yaml'),
+        metavar='FILE',
+        help='ship file to write, with the learnt baseline',
+    )
+    parser.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        type=remap,
+        metavar='FROM:=TO',
+        help='hear topic FROM of the bag as input TO; may be given more than once',
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Learn, write and tell.
+    """
+    output = Output(options.json)
+    if options.out.resolve() == options.ship.resolve():
+        raise DiagnosisError(
+            f'{str(options.out)!r} is the ship file itself, with what was known before; '
+            'write to another file'
+        )
+    runs = open_runs(options.bags, remap=dict(options.remap))
+    coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship))
+    found = learn_baseline(coasts, ship, parameters)
+    options.out.write_text(found.ship.to_yaml(), encoding='utf-8')
+    _show(output, found)
+    output.log(f'ship file with the learnt baseline in {options.out}')
+    output.json(document(found, options.out))
+    return 0
+
+
+def document(found: Learnt, out: Path) -> dict[str, Any]:
+    """
+    Return the document of a learnt baseline.
+    """
+    return {
+        'runs': [
+            {
+                'name': each.name,
+                'factor': {'value': 1.0 + each.factor.value, 'sd': each.factor.sd},
+                'chi2_per_sample': each.chi2_per_row,
+            }
+            for each in found.runs
+        ],
+        'factors': {
+            name: {'value': value, 'sd': sd}
+            for name, value, sd in zip(
+                found.names, found.factors, np.sqrt(np.diag(found.covariance)), strict=True
+            )
+        },
+        'covariance': found.covariance,
+        'scatter': {
+            'value': found.scatter if len(found.runs) >= ENOUGH else None,
+            'low': found.scatter_low if len(found.runs) >= ENOUGH else None,
+            'high': found.scatter_high if len(found.runs) >= ENOUGH else None,
+        },
+        'relative_sd': {
+            'before': None
+            if found.stated_sd is None
+            else dict(zip(found.names, found.stated_sd, strict=True)),
+            'after': dict(zip(found.names, found.relative_sd, strict=True)),
+            'correlation': found.correlation,
+        },
+        'speed_m_s': found.speed_m_s,
+        'warnings': found.warnings,
+        'output': str(out),
+    }
+
+
+def _show(output: Output, found: Learnt) -> None:
+    low, high = found.speed_m_s
+    output.say(
+        f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '
+        f'{low:.2f} to {high:.2f} m/s.'
+    )
+    output.heading('Learnt over stated')
+    stated = found.stated_sd
+    rows = []
+    for i, name in enumerate(found.names):
+        before = '-' if stated is None else f'{stated[i]:.1%}'
+        sd = float(np.sqrt(found.covariance[i, i]))
+        after = f'{found.relative_sd[i]:.1%}'
+        rows.append((name, f'{found.factors[i]:.3f}', f'{sd:.3f}', before, after))
+    columns = ('', 'factor', 'sd', 'relative_sd before', 'relative_sd for a further run')
+    output.table(Table(columns, tuple(rows)))
+    if len(found.runs) >= ENOUGH:
+        output.say(
+            f'Runs scatter by {found.scatter:.1%} of their resistance '
+            f'({found.scatter_low:.1%} to {found.scatter_high:.1%}).'
+        )
+    if len(found.runs) > 1:
+        output.heading('Each run beside the others')
+        output.table(
+            Table(
+                ('', 'resistance', 'sd', 'chi2 a sample'),
+                tuple(
+                    (
+                        each.name,
+                        f'{each.factor.value:+.1%}',
+                        f'{each.factor.sd:.1%}',
+                        f'{each.chi2_per_row:.2f}',
+                    )
+                    for each in found.runs
+                ),
+            )
+        )
+    for warning in found.warnings:
+        output.say(f'WARNING: {warning}')

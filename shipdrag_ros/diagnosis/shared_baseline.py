@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A baseline that several runs share, as normal equations of its unknowns.
+
+Only r / (1 + n_r) shows in a coastdown: n_r is as the ship file states it, and
+what is learnt is the retardation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shipdrag_ros.diagnosis.diagnose import CoastRun
+from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.scatter import Normal, Shared, share
+from shipdrag_ros.diagnosis.terms import BaselineTerm, baseline_parts
+from shipdrag_ros.diagnosis.unknowns import Tail
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import CoefficientSd, Ship, TableBaseline
+
+_LEAST_SD = 0.005  # what is stated more surely is learnt all the same
+_POINTS = 60
+
+
+@dataclass(frozen=True)
+class SharedBaseline:
+    """
+    Runs, linear about a common fit.
+
+    Attributes
+    ----------
+    library
+    fitted
+        Nothing missing, all runs together.
+    names
+        Of the scales of the baseline; its shapes follow them.
+    unit : (q,)
+        Standard deviation of each shared unknown before the data.
+    normals
+        One a run, of z of the shared unknowns.
+    speed_m_s
+        Lowest and highest of all runs.
+    """
+
+    library: Library
+    fitted: Fit
+    names: tuple[str, ...]
+    unit: Float64
+    normals: tuple[Normal, ...]
+    speed_m_s: tuple[float, float]
+
+    @classmethod
+    def of(cls, runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> SharedBaseline:
+        """Fit the runs."""
+        ship = _opened(ship)
+        seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
+        library = Library(ship, seen, seen[0].heading_rad)
+        nothing = library.nothing
+        fitted = fit(library.problem, [nothing], [library.start(nothing)])[0]
+        if not np.isfinite(fitted.best.cost):
+            low, high = ship.baseline_range_m_s
+            raise DiagnosisError(
+                f'{len(runs)} run(s) cannot be fitted with a baseline stated from {low:.3g} to '
+                f'{high:.3g} m/s; state it over all speeds of the runs, or leave it out'
+            )
+        unknowns = nothing.terms[0].unknowns
+        # scales of the parts, then the shape; the rest is each run's own
+        scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.STUDENT]
+        shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
+        shared = [*scales, *shapes]
+        speeds = [library.problem.predict(j, fitted.best).speed for j in range(len(seen))]
+        return cls(
+            library,
+            fitted,
+            tuple(unknowns[i].name for i in scales),
+            np.array([unknowns[i].slope(0.0) for i in shared]),
+            tuple(_normal(fitted, j, shared) for j in range(len(seen))),
+            (
+                max(min(float(speed.min()) for speed in speeds), 0.0),
+                max(float(speed.max()) for speed in speeds),
+            ),
+        )
+
+    @property
+    def along(self) -> Float64:
+        """What a factor of 2 on a run does to z of the shared unknowns."""
+        whole = np.zeros(len(self.unit))
+        whole[: len(self.names)] = 1.0 / self.unit[: len(self.names)]
+        return whole
+
+    def shared(self, normals: Sequence[Normal]) -> Shared:
+        """Return what runs share, with the prior of the baseline."""
+        z = self.fitted.best.z[: len(self.unit)]
+        unknowns = self.fitted.hypothesis.unknowns[: len(self.unit)]
+        weight = np.array([unknown.weight(at) for unknown, at in zip(unknowns, z, strict=True)])
+        prior = Normal(np.diag(weight), -weight * z)
+        return share(normals, prior, self.along, usual_scatter=float(self.unit[0]))
+
+    def of_parts(self, shared: Shared) -> tuple[Float64, Float64]:
+        """
+        Return the departure of each part from what is stated, and its covariance.
+
+        The shape is counted in as far as the parts can follow it over the
+        speeds of the runs.
+        """
+        parts = self.relative_parts(np.linspace(*self.speed_m_s, _POINTS))
+        k = len(self.names)
+        follow = np.linalg.lstsq(parts[:k].T, parts[k:].T, rcond=None)[0]
+        onto = np.hstack([np.eye(k), follow]) * self.unit
+        return onto @ self.z(shared), onto @ shared.covariance @ onto.T
+
+    def relative_parts(self, speed_m_s: Float64) -> Float64:
+        """Return what each shared unknown adds to the resistance, relative, (q, n)."""
+        term = self.fitted.hypothesis.terms[0]
+        assert isinstance(term, BaselineTerm)
+        speed = np.maximum(speed_m_s, 1e-3 * term.top_m_s)
+        parts = baseline_parts(term.ship, term.top_m_s, speed.tobytes())
+        result: Float64 = parts / term.ship.resistance_n(speed)
+        return result
+
+    def z(self, shared: Shared) -> Float64:
+        """Return the shared unknowns."""
+        result: Float64 = self.fitted.best.z[: len(self.unit)] + shared.step
+        return result
+
+    def chi2_per_row(self, run: int) -> float:
+        """Return what a run's own factor on the baseline leaves."""
+        normal, left = self.normals[run], self.fitted.best.tables[run][0]
+        gained = float(self.along @ normal.fall) ** 2
+        gained /= float(self.along @ normal.matrix @ self.along)
+        return (float(left @ left) - gained) / len(left)
+
+
+def _opened(ship: Ship) -> Ship:
+    """Return a ship whose baseline may differ in all its parts, and in retardation alone."""
+    base = ship.baseline
+    assert base is not None
+    if isinstance(base, TableBaseline):
+        sd = max(base.relative_sd, _LEAST_SD)
+        return replace(ship, baseline=replace(base, relative_sd=sd, relative_sd_of='retardation'))
+    parts = CoefficientSd(
+        max(base.relative_sd.friction, _LEAST_SD), max(base.relative_sd.wave, _LEAST_SD)
+    )
+    return replace(ship, baseline=replace(base, relative_sd=parts, relative_sd_of='retardation'))
+
+
+def _normal(fitted: Fit, run: int, shared: list[int]) -> Normal:
+    """Return what a run tells of the shared unknowns, whatever its place and speed."""
+    best = fitted.best
+    table, unknowns = best.tables[run], best.hypothesis.unknowns
+    own = [
+        i
+        for i in range(len(best.z))
+        if i not in shared and np.any(table[1 + i])  # places of other runs are not in it
+    ]
+    rows = table[[1 + i for i in (*shared, *own)]]
+    matrix, fall = rows @ rows.T, rows @ table[0]
+    for place, i in enumerate(own, start=len(shared)):
+        if i < len(unknowns):  # the steady speeds have no prior
+            weight = unknowns[i].weight(best.z[i])
+            matrix[place, place] += weight
+            fall[place] -= weight * best.z[i]
+    return Normal.without(matrix, fall, len(shared))
