@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What is measured besides the motion: wind, depth, heading.
+What is measured besides the motion: wind, depth, shaft, heading.
 
 It strikes hypotheses out, or makes them sure: an anemometer that feels no wind
 speaks against a wind whatever the ship does.
@@ -9,9 +9,11 @@ speaks against a wind whatever the ship does.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.estimation.window import Series, Window
@@ -20,11 +22,35 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns
 
 _BIN_S = 60.0
-_WIND_SD_M_S = 0.6  # of a true wind found from an anemometer: the ship bends the flow
-_WIND_RELATIVE_SD = 0.05
+_WIND_SD_M_S, _WIND_RELATIVE_SD = 0.6, 0.05  # of a true wind: the ship bends the flow
 _DEPTH_SD = 0.03  # relative
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
 _YAW_SD_RAD = 0.03  # of a mean over a bin: a ship yaws in the waves
+_SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and all of them
+_TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
+_STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
+_FALL_RUN_DOWNS = 8.0  # after the stop; from then on the shaft tells of the propeller
+
+
+@dataclass(frozen=True)
+class Stop:
+    """
+    What the context is counted from.
+
+    Attributes
+    ----------
+    since_ns
+        Time 0 of the observation [ns].
+    lead_in_s
+        Time of the stop [s].
+    heading_rad, speed_m_s
+        In the lead-in.
+    """
+
+    since_ns: int
+    lead_in_s: float
+    heading_rad: float
+    speed_m_s: float
 
 
 @dataclass(frozen=True)
@@ -34,96 +60,135 @@ class Context:
 
     Attributes
     ----------
+    stop
     value : (c,)
-        Air ahead and to port [m/s], logarithm of the depth in draughts, yaw
-        from the first heading [rad].
+        Air ahead and to port [m/s], logarithm of the depth in draughts, shaft
+        speed over the steady one, whether it stands, yaw from the first heading
+        [rad].
     whitener : (c, c)
         Lower triangular.
-    at_wind, at_yaw : (w,), (h,)
-        Times of the observation that the rows of wind and yaw are nearest to.
-    has_depth
-        Whether there is a row of depth.
+    at_wind, at_shaft, at_yaw
+        Times of the observation that rows are nearest to.
+    draught_m
+        None where there is no row of depth.
+    turns
+        Whether the water is seen to turn the shaft.
     """
 
+    stop: Stop
     value: Float64
     whitener: Float64
-    at_wind: np.ndarray[tuple[int], np.dtype[np.intp]]
-    at_yaw: np.ndarray[tuple[int], np.dtype[np.intp]]
-    has_depth: bool
+    at_wind: NDArray[np.intp]
+    at_shaft: NDArray[np.intp]
+    at_yaw: NDArray[np.intp]
+    draught_m: float | None
+    turns: bool
 
     @classmethod
-    def of(
-        cls, window: Window, ship: Ship, since_ns: int, times: Float64, heading_rad: float
-    ) -> Context:
+    def of(cls, window: Window, ship: Ship, times: Float64, stop: Stop) -> Context:
         """
         Condense what a window holds.
 
         Parameters
         ----------
-        since_ns
-            Time 0 of the observation [ns].
         times : (m,)
             Of the observation [s].
         """
         edges = np.arange(0.0, times[-1] + _BIN_S, _BIN_S)
-        wind_s, wind = _binned(window, 'wind_apparent', since_ns, edges)
-        yaw_s, yaw = _binned(window, 'heading', since_ns, edges)
-        depth = _binned(window, 'depth', since_ns, edges)[1]
-        has_depth = len(depth) > 0 and ship.draught_m is not None
+        wind_s, wind = _binned(window, 'wind_apparent', stop, edges)
+        yaw_s, yaw = _binned(window, 'heading', stop, edges)
+        depth = _binned(window, 'depth', stop, edges)[1]
+        shaft_s, shaft, turns = _shaft(window, ship, stop, edges)
         values = [wind[:, 0], wind[:, 1]]
         blocks = [_wind_covariance(wind[:, i]) for i in range(2)]
-        if has_depth:
-            assert ship.draught_m is not None
-            draughts = float(np.median(depth)) / ship.draught_m
+        draught_m = ship.draught_m if len(depth) else None
+        if draught_m is not None:
+            draughts = float(np.median(depth)) / draught_m
             values.append(np.log([min(draughts, _DEEP_DRAUGHTS)]))
             blocks.append(np.array([[_DEPTH_SD**2]]))
-        values.append(np.angle(np.exp(1j * (yaw[:, 0] - heading_rad))) if len(yaw) else yaw[:, 0])
+        if len(shaft):
+            values += [shaft, np.array([0.0])]
+            blocks.append(np.eye(len(shaft)) * _SHAFT_SD**2 + _SHAFT_OFF_SD**2)
+            blocks.append(np.eye(1))
+        values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
         blocks.append(np.eye(len(yaw)) * _YAW_SD_RAD**2)
+        last = len(times) - 1
         return cls(
+            stop,
             np.concatenate(values),
             _whitener(blocks),
-            np.searchsorted(times, wind_s).clip(max=len(times) - 1),
-            np.searchsorted(times, yaw_s).clip(max=len(times) - 1),
-            has_depth,
+            np.searchsorted(times, wind_s).clip(max=last),
+            np.searchsorted(times, shaft_s).clip(max=last),
+            np.searchsorted(times, yaw_s).clip(max=last),
+            draught_m,
+            turns,
         )
 
     def __len__(self) -> int:
         return len(self.value)
 
-    def predict(
-        self,
-        ship: Ship,
-        heading_rad: float,
-        lead_in_s: float,
-        columns: Columns,
-        actions: list[Action],
-    ) -> Float64:
+    def predict(self, columns: Columns, actions: Sequence[Action]) -> Float64:
         """
         Return what columns predict, (k, c).
         """
-        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        cos, sin = math.cos(self.stop.heading_rad), math.sin(self.stop.heading_rad)
         velocity = columns.velocity_over_ground_m_s[:, self.at_wind]
         air = np.array([action.wind_m_s for action in actions])
         east, north = (air[:, None, :] - velocity).transpose(2, 0, 1)
         parts = [cos * east + sin * north, cos * north - sin * east]
-        if self.has_depth:
-            assert ship.draught_m is not None
-            depth = np.array([action.depth_m for action in actions]) / ship.draught_m
+        if self.draught_m is not None:
+            depth = np.array([action.depth_m for action in actions]) / self.draught_m
             parts.append(np.log(np.clip(depth, 1.0, _DEEP_DRAUGHTS))[:, None])
-        after = columns.time_s[self.at_yaw] - lead_in_s
+        if len(self.at_shaft):
+            parts += self._shafts(columns, actions)
+        after = columns.time_s[self.at_yaw] - self.stop.lead_in_s
         yaw = np.zeros((len(actions), len(after)))
         for i, action in enumerate(actions):
             for turn in action.turns:
                 yaw[i] += turn.rate_rad_s * np.clip(after - turn.start_s, 0.0, turn.duration_s)
         return np.concatenate([*parts, yaw], axis=1)
 
+    def _shafts(self, columns: Columns, actions: Sequence[Action]) -> list[Float64]:
+        """Return shaft speeds over the steady one, and how odd it is that the shaft stands."""
+        after = columns.time_s[self.at_shaft] - self.stop.lead_in_s
+        speed = columns.speed_through_water_m_s[:, self.at_shaft]
+        stall, free, fraction, decay_s = np.array(
+            [(a.stall_m_s, a.free_shaft, a.residual_fraction, a.residual_decay_s) for a in actions]
+        ).T[:, :, None]
+        turned = free * speed / self.stop.speed_m_s * (speed > stall)
+        if not self.turns:
+            turned[stall[:, 0] == 0.0] = 0.0
+        driven = fraction * np.exp(-after / np.maximum(decay_s, 1e-3))
+        odd = np.where(stall == 0.0, 0.0 if self.turns else _STANDS_SD, 0.0)
+        return [turned + (1.0 - turned) * driven, odd]
 
-def _binned(window: Window, name: str, since_ns: int, edges: Float64) -> tuple[Float64, Float64]:
+
+def _shaft(
+    window: Window, ship: Ship, stop: Stop, edges: Float64
+) -> tuple[Float64, Float64, bool]:
+    """Return times and values of the shaft after its run-down, and whether the water turns it."""
+    nothing = np.empty(0), np.empty(0), False
+    if window.before is None or len(window.before.shaft) == 0:
+        return nothing
+    steady = float(np.median(np.abs(window.before.shaft.value)))
+    run_down_s = ship.propulsion.run_down_s if ship.propulsion else _BIN_S
+    fallen_s = stop.lead_in_s + _FALL_RUN_DOWNS * run_down_s
+    time_s, value = _binned(window, 'shaft', stop, edges)
+    late = time_s > fallen_s
+    if steady <= 0.0 or not late.any():
+        return nothing
+    shaft = value[late, 0] / steady
+    # soon after the fall, before it may stall
+    turns = bool(np.median(shaft[:3]) > _TURNS)
+    return time_s[late], shaft, turns
+
+
+def _binned(window: Window, name: str, stop: Stop, edges: Float64) -> tuple[Float64, Float64]:
     """Return times and mean values, (b,) and (b, columns)."""
     parts: list[Series] = [getattr(window, name)]
     if window.before is not None:
         parts.insert(0, getattr(window.before, name))
-    time_s = np.concatenate([(part.time_ns - since_ns) * 1e-9 for part in parts])
+    time_s = np.concatenate([(part.time_ns - stop.since_ns) * 1e-9 for part in parts])
     value = np.concatenate([np.atleast_2d(part.value.T).T for part in parts])
     inside = (time_s >= edges[0]) & (time_s < edges[-1]) & np.isfinite(value).all(axis=1)
     if name == 'heading':
@@ -135,7 +200,7 @@ def _binned(window: Window, name: str, since_ns: int, edges: Float64) -> tuple[F
 
 
 def _wind_covariance(values: Float64) -> Float64:
-    """A constant error of the true wind, and what the bins scatter."""
+    """Return a constant error of the true wind, and what the bins scatter."""
     n = len(values)
     if n == 0:
         return np.zeros((0, 0))
@@ -144,7 +209,7 @@ def _wind_covariance(values: Float64) -> Float64:
     return np.eye(n) * scatter**2 + constant
 
 
-def _whitener(blocks: list[Float64]) -> Float64:
+def _whitener(blocks: Sequence[Float64]) -> Float64:
     size = sum(len(block) for block in blocks)
     whole = np.zeros((size, size))
     place = 0

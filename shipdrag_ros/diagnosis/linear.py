@@ -236,9 +236,7 @@ class Problem:
         plans = [self._plan(run, h, z, batch) for h, z in zip(hypotheses, at, strict=True)]
         columns = self._simulate(run, batch)
         predicted = _predicted(seen, columns)
-        context = seen.context.predict(
-            self.ship, seen.heading_rad, seen.lead_in_s, columns, batch.actions
-        )
+        context = seen.context.predict(columns, batch.actions)
         return [
             self._table(run, hypothesis, z, plan, predicted, context)
             for hypothesis, z, plan in zip(hypotheses, at, plans, strict=True)

@@ -14,9 +14,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from shipdrag_ros.diagnosis.context import Context
+from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.diagnosis.noise import Damping, bin_means, learn, whiten
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
@@ -144,11 +145,15 @@ class Observation:
         for input_, found in series.items():
             sd, time = record.white_sd[input_], seconds[input_]
             if input_ != 'position':
-                parts.append(_condensed(time, found.value, edges, sd, KINDS[input_]))
+                keep = _kept(found.value, sd)
+                part = _condensed(time[keep], found.value[keep], edges, sd, KINDS[input_])
+                parts.append(part)
                 continue
             east, north = (found.value - found.value[0]).T
-            parts.append(_condensed(time, cos * east + sin * north, edges, sd, POSITION))
-            across.append(_condensed(time, cos * north - sin * east, edges, sd, POSITION))
+            ahead, to_port = cos * east + sin * north, cos * north - sin * east
+            keep = _kept(ahead, sd) & _kept(to_port, sd)
+            parts.append(_condensed(time[keep], ahead[keep], edges, sd, POSITION))
+            across.append(_condensed(time[keep], to_port[keep], edges, sd, POSITION))
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
         learnt = _Learner(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
@@ -164,7 +169,7 @@ class Observation:
             speed,
             learnt.measured(parts, times),
             learnt.measured(across, times) if across else None,
-            Context.of(window, ship, since_ns, times, heading_rad),
+            Context.of(window, ship, times, Stop(since_ns, lead_in_s, heading_rad, speed)),
         )
 
 
@@ -244,11 +249,15 @@ def _edges(lead_in_s: float, end_s: float) -> Float64:
     return np.concatenate([[-1.0], steady, lead_in_s + np.cumsum(widths)])
 
 
-def _condensed(time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int) -> _Part:
-    """Average over bins, without what stands out from its neighbours."""
+def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
+    """Tell what does not stand out from its neighbours."""
     away = np.abs(value - median_filter(value, _NEIGHBOURS, mode='nearest'))
-    keep = away <= _OUTLIER * max(sd, float(np.median(away)))
-    when, mean, count = bin_means(time_s[keep], value[keep], edges)
+    keep: NDArray[np.bool_] = away <= _OUTLIER * max(sd, float(np.median(away)))
+    return keep
+
+
+def _condensed(time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int) -> _Part:
+    when, mean, count = bin_means(time_s, value, edges)
     return _Part(when, kind, mean, sd**2 / count)
 
 

@@ -27,6 +27,7 @@ from shipdrag_ros.simulation.effect import Effect, Frame, Scope
 from shipdrag_ros.simulation.hydrodynamics import viscous_n
 
 SHAPE_SD = 0.01  # of a baseline's form, beyond what its coefficients can follow
+FREE_SHAFT, FREE_SHAFT_SD = 0.5, 0.15  # shaft speed of a free propeller over that under power
 _SHAPES = 5
 _DISCREPANCIES = 6
 _FORMS = 4
@@ -144,6 +145,7 @@ class BaselineTerm:
         known = base.relative_sd_of == 'retardation'
         found.append(scaled('n_r', 0.0 if known else self.ship.added_mass.sd))
         found.append(scaled('run-down', self.run_down_sd_s))
+        found.append(scaled('free shaft', FREE_SHAFT_SD, mean=FREE_SHAFT))
         return tuple(found)
 
     def acts_in(self, run: int) -> bool:
@@ -152,7 +154,7 @@ class BaselineTerm:
 
     def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
         """Return the departure from the stated baseline."""
-        *given, n_r, run_down_s = values
+        *given, n_r, run_down_s, free_shaft = values
         scales = np.array(given)
         base = self.ship.baseline
         if isinstance(base, CoefficientBaseline) and base.relative_sd.correlation:
@@ -165,6 +167,7 @@ class BaselineTerm:
             resistance=(lambda speed: self._departure(speed, scales),),
             n_r_change=n_r,
             run_down_change_s=self.run_down_change_s[run] + run_down_s,
+            free_shaft=free_shaft,
         )
 
     def _departure(self, speed_m_s: Float64, scales: Float64) -> Float64:

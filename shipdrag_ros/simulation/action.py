@@ -56,8 +56,12 @@ class Action:
         The ship's mass is larger by this fraction, its resistance is not.
     turns
         On top of the scenario's.
-    windmill_above_m_s
-        Above this speed through water the flow keeps the shaft turning.
+    stall_m_s
+        Above this speed through water the flow turns the propeller, below it
+        stands; 0: as the baseline has it.
+    free_shaft
+        Shaft speed of the baseline's free propeller, over that under power at
+        the same speed of the ship, where it is seen to turn.
     depth_m
         Depth of the water, where it is less than the scenario's.
     log_factor, log_offset_m_s
@@ -84,7 +88,8 @@ class Action:
     n_r_change: float = 0.0
     mass_fraction: float = 0.0
     turns: tuple[Turn, ...] = ()
-    windmill_above_m_s: float = inf
+    stall_m_s: float = 0.0
+    free_shaft: float = 0.0
     depth_m: float = inf
     log_factor: float = 0.0
     log_offset_m_s: float = 0.0
@@ -128,6 +133,6 @@ _ADD: dict[str, Callable[[Any, Any], Any]] = {
     'wave_force_n': _sum_of_vectors,
     'current_m_s': _sum_of_vectors,
     'current_change_m_s': _sum_of_vectors,
-    'windmill_above_m_s': min,
+    'stall_m_s': max,
     'depth_m': min,
 }

@@ -254,6 +254,7 @@ def _shaft_rad_s(
     if action.residual_fraction:
         residual = scenario.shaft_fraction(time, run_down_s=action.residual_decay_s)
         fraction += action.residual_fraction * (residual - fraction)
-    turned = _WINDMILLING * speed / scenario.speed_m_s * (speed > action.windmill_above_m_s)
+    turns = (speed > action.stall_m_s) if action.stall_m_s > 0.0 else np.zeros(len(speed))
+    turned = _WINDMILLING * speed / scenario.speed_m_s * turns
     # an engine that turns the shaft faster, or astern, is stronger than the flow
     return scenario.shaft_rad_s * np.where(np.abs(fraction) < turned, turned, fraction)

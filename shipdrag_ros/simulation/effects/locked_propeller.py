@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
@@ -15,7 +17,7 @@ def _act(frame: Frame, drag_coefficient: float) -> Action:
     def resistance(speed: Float64) -> Float64:
         return drag_n(frame.ship, area, speed)
 
-    return Action(resistance=(resistance,))
+    return Action(resistance=(resistance,), stall_m_s=inf)
 
 
 EFFECT = Effect(

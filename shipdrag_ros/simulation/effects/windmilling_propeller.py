@@ -31,7 +31,7 @@ def _act(frame: Frame, drag_coefficient: float, stall_speed_m_s: float) -> Actio
         force: Float64 = drag_n(frame.ship, 1.0, speed) * area
         return force
 
-    return Action(resistance=(resistance,), windmill_above_m_s=stall_speed_m_s)
+    return Action(resistance=(resistance,), stall_m_s=stall_speed_m_s)
 
 
 EFFECT = Effect(
