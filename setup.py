@@ -39,7 +39,7 @@ setup(
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
     package_data={
         PACKAGE: ['py.typed', 'data/*'],
-        f'{PACKAGE}.report': ['*.html'],
+        f'{PACKAGE}.report': ['*.html', '*.json'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),

@@ -14,8 +14,9 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose, with_effects
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report.cells import Table
-from shipdrag_ros.report.diagnosis_words import advice, sentence
+from shipdrag_ros.report import diagnosis_cells, diagnosis_words
+from shipdrag_ros.report.diagnosis_page import write_diagnosis
+from shipdrag_ros.report.diagnosis_score import Score
 from shipdrag_ros.ship import Ship
 
 
@@ -43,6 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='write a ship file with the effect added, where one is named',
     )
     parser.add_argument(
+        '--report',
+        type=new_file('.html'),
+        metavar='FILE.html',
+        help='write the diagnosis with its pictures to one HTML file',
+    )
+    parser.add_argument(
         '--remap',
         action='append',
         default=[],
@@ -62,7 +69,10 @@ def run(options: argparse.Namespace) -> int:
     runs = open_runs(options.bags, remap=dict(options.remap))
     coasts, ship, parameters = coasts_of(output, runs, given)
     found = diagnose(coasts, ship, parameters)
-    _show(output, found, coasts)
+    _show(output, found)
+    if options.report is not None:
+        write_diagnosis(options.report, found, ship, score=Score.published())
+        output.log(f'report in {options.report}')
     if options.write is not None and found.verdict is Verdict.NAMED:
         text = with_effects(ship, found.effects).to_yaml()
         options.write.write_text(text, encoding='utf-8')
@@ -108,51 +118,21 @@ def coasts_of(
     return coasts, ship, parameters
 
 
-def _show(output: Output, found: Diagnosis, coasts: Sequence[CoastRun]) -> None:
-    output.say(sentence(found))
-    if found.verdict is not Verdict.NONE or found.nothing < 1.0:
-        rows = [
-            (' + '.join(candidate.names) or 'nothing missing', f'{candidate.probability:.3f}')
-            for candidate in found.candidates
-        ]
-        output.heading('Probabilities')
-        output.table(Table(('', 'probability'), tuple(rows)))
-    for effect in found.effects:
-        output.heading(effect.name)
-        output.table(
-            Table(
-                ('', 'value', 'sd'),
-                tuple(
-                    (name, f'{value.value:.4g}', f'{value.sd:.2g}')
-                    for name, value in effect.parameters.items()
-                ),
-            )
-        )
-    output.heading(f'Gap between model and data, {len(coasts)} run(s)')
-    gaps = {
-        'before': found.before,
-        'after': found.after,
-        'before, each run predicted from the others': found.held_out_before,
-        'after, each run predicted from the others': found.held_out_after,
-    }
-    output.table(
-        Table(
-            ('', 'speed rms [m/s]', 'position rms [m]', 'chi2 a sample'),
-            tuple(
-                (
-                    name,
-                    _number(gap.rms_speed_m_s, '.3f'),
-                    _number(gap.rms_position_m, '.1f'),
-                    _number(gap.chi2_per_sample, '.2f'),
-                )
-                for name, gap in gaps.items()
-                if gap is not None
-            ),
-        )
-    )
-    for line in advice(found):
-        output.say(line)
-
-
-def _number(value: float | None, form: str) -> str:
-    return '-' if value is None else format(value, form)
+def _show(output: Output, found: Diagnosis) -> None:
+    output.say(diagnosis_words.sentence(found))
+    if found.where is not None:
+        output.say(f'Model and data disagree {diagnosis_words.place(found)}.')
+    for note in found.notes:
+        output.say(note)
+    output.heading('How probable')
+    output.table(diagnosis_cells.probabilities(found))
+    if found.effects:
+        output.heading('How large; sd is one standard deviation')
+        output.table(diagnosis_cells.parameters(found.effects))
+    output.heading('Gap between model and data')
+    output.table(diagnosis_cells.gaps(found))
+    advice = diagnosis_words.advice(found)
+    if advice:
+        output.heading('What would decide')
+    for line in advice:
+        output.say(f'  {line}')

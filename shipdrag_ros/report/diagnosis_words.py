@@ -4,8 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis import Candidate, Diagnosis, Verdict
+from shipdrag_ros.diagnosis import Candidate, Diagnosis, Named, Verdict
+from shipdrag_ros.report.words import plus_minus
+from shipdrag_ros.ship import Baseline, CoefficientBaseline, Uncertain
+from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.simulation.effects import LIBRARY
 
 _CHANNELS = {
     'log': 'in the speed log',
@@ -13,6 +18,8 @@ _CHANNELS = {
     'log_radar': 'between log and radar, which of them cannot be told',
     'force': 'in the force on the ship',
 }
+NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
+_LEAST = 0.001  # probability that is told
 
 
 def sentence(found: Diagnosis) -> str:
@@ -20,52 +27,162 @@ def sentence(found: Diagnosis) -> str:
     Return the verdict in a sentence.
     """
     match found.verdict:
-        case Verdict.NONE:
+        case Verdict.NONE if found.nothing >= 0.5:
             return (
                 'Model and data agree: nothing is missing that these runs could show '
-                f'(probability {found.nothing:.2f}).'
+                f'(probability {probability(found.nothing)}).'
             )
-        case Verdict.NAMED:
-            sizes = ', '.join(
-                f'{effect.name} ({_sizes(effect.parameters)})' for effect in found.effects
+        case Verdict.NONE:
+            other, share = max(
+                (
+                    (each.words, each.probability)
+                    for each in answers(found)
+                    if each.words != NOTHING
+                ),
+                key=lambda answer: answer[1],
             )
             return (
-                f'Missing in the model: {sizes}, probability {found.effects[0].probability:.3f}.'
+                f'No effect can be named: {other} is the likeliest ({probability(share)}), but a '
+                'baseline that is further off than stated would explain these runs as well '
+                f'({probability(found.nothing)}).'
+            )
+        case Verdict.NAMED:
+            sizes = ' and '.join(_sized(effect) for effect in found.effects)
+            return (
+                f'Missing in the model: {sizes}; probability '
+                f'{probability(found.effects[0].probability)}.'
             )
         case Verdict.ONE_OF:
-            one_of = _listed(found.candidates)
-            return f'Missing is one of {one_of}; these runs cannot tell them apart.'
+            return (
+                f'Missing is one of these: {_listed(found.candidates)}. These runs cannot tell '
+                'them apart.'
+            )
         case Verdict.UNKNOWN:
-            return f'Something is missing that is none of the known effects, {_place(found)}.'
+            return f'Something is missing that is none of the known effects, {place(found)}.'
 
 
 def advice(found: Diagnosis) -> list[str]:
     """
     Return what would decide, a line each.
     """
-    lines = []
-    for each in found.would_decide:
-        known = '' if each.probability is None else f' (would decide in {each.probability:.0%})'
-        lines.append(f'What would decide: {each.measure}{known}')
-    return lines
+    return [
+        each.measure
+        + (
+            ''
+            if each.probability is None
+            else f': would decide in {each.probability:.0%} of cases'
+        )
+        for each in found.would_decide
+    ]
 
 
-def _sizes(parameters: object) -> str:
-    assert isinstance(parameters, dict)
-    return ', '.join(f'{name} {v.value:.3g} ± {v.sd:.1g}' for name, v in parameters.items())
-
-
-def _listed(candidates: Sequence[Candidate]) -> str:
-    return '; '.join(
-        f'{" + ".join(each.names) or "nothing"} ({each.probability:.2f})' for each in candidates
-    )
-
-
-def _place(found: Diagnosis) -> str:
+def place(found: Diagnosis) -> str:
+    """
+    Say where model and data disagree.
+    """
     if found.where is None:
-        return 'somewhere'
+        return 'nowhere'
     where = found.where
     return (
         f'{_CHANNELS[where.channel]}, {where.time_s[0]:.0f} to {where.time_s[1]:.0f} s after the '
         f'stop, at {where.speed_m_s[0]:.1f} to {where.speed_m_s[1]:.1f} m/s'
+    )
+
+
+def added(found: Diagnosis) -> str:
+    """
+    Say what the model after has that the one before has not.
+    """
+    match found.verdict:
+        case Verdict.NONE:
+            return 'with the baseline moved to fit'
+        case Verdict.UNKNOWN:
+            return 'with an unknown, smooth disturbance'
+        case _:
+            return f'with {names_text([effect.name for effect in found.best])}'
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A possible answer, and how probable it is."""
+
+    words: str
+    probability: float
+
+
+def answers(found: Diagnosis) -> tuple[Answer, ...]:
+    """
+    Return the candidates, then nothing and something unnamed, and what is left.
+    """
+    told = [Answer(names_text(each.names), each.probability) for each in found.candidates]
+    if all(each.names for each in found.candidates):
+        told.append(Answer(NOTHING, found.nothing))
+    told.append(Answer(UNNAMED, found.unnamed))
+    others = 1.0 - sum(each.probability for each in told)
+    return (*told, Answer(OTHERS, others)) if others >= _LEAST else tuple(told)
+
+
+def names_text(names: Sequence[str]) -> str:
+    """
+    Name effects; none: nothing is missing.
+    """
+    return ' + '.join(name.replace('_', ' ') for name in names) or NOTHING
+
+
+def probability(value: float) -> str:
+    """
+    Return a probability; what is all but certain is not said to be certain.
+    """
+    if value > 1.0 - _LEAST:
+        return f'> {100.0 - 100.0 * _LEAST:g} %'
+    return f'{100.0 * value:.1f} %' if value >= _LEAST else f'< {100.0 * _LEAST:g} %'
+
+
+def baseline(found: Baseline) -> str:
+    """
+    Say where a baseline comes from, and how well it is stated to be known.
+    """
+    source = found.source or 'of unstated source'
+    if isinstance(found, CoefficientBaseline):
+        sd = found.relative_sd
+        known = f'friction ± {200.0 * sd.friction:g} %, wave ± {200.0 * sd.wave:g} %'
+    else:
+        known = f'± {200.0 * found.relative_sd:g} %'
+    return f'{source}: {known} (two standard deviations, as stated)'
+
+
+def size(quantity: Quantity, found: Uncertain) -> str:
+    """
+    Return a value with two standard deviations; what was a choice has none.
+    """
+    for word, value in quantity.words.items():
+        if value == found.value:
+            return word
+    if found.sd == 0.0:
+        return f'{found.value:g} {quantity.unit}'.rstrip()
+    text = plus_minus(found.value, 2.0 * found.sd)
+    return f'({text}) {quantity.unit}' if quantity.unit else text
+
+
+def quantity_text(quantity: Quantity) -> str:
+    """
+    Name a parameter without its unit.
+    """
+    suffix = quantity.unit.lower().replace('/', '_').replace('^', '')
+    name = quantity.name.removesuffix(f'_{suffix}') if suffix else quantity.name
+    return name.replace('_', ' ')
+
+
+def _sized(effect: Named) -> str:
+    """Return an effect with its sizes."""
+    sizes = ', '.join(
+        f'{quantity_text(quantity)} {size(quantity, effect.parameters[quantity.name])}'
+        for quantity in LIBRARY[effect.name].parameters
+    )
+    return f'{names_text([effect.name])} ({sizes})'
+
+
+def _listed(candidates: Sequence[Candidate]) -> str:
+    return ', '.join(
+        f'{names_text(each.names)} ({probability(each.probability)})' for each in candidates
     )

@@ -64,6 +64,7 @@ TRACK_LABELS = {
     'speed_through_water': ('Speed through water', 'm/s'),
     'speed_over_ground': ('Speed over ground', 'm/s'),
     'position': ('Distance along the track', 'm'),
+    'position_across': ('Distance to port of the track', 'm'),
 }
 
 

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a diagnosis, for whoever runs the ship."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shipdrag_ros.diagnosis import Diagnosis
+from shipdrag_ros.report import diagnosis_cells, diagnosis_pictures, words
+from shipdrag_ros.report import diagnosis_words as told
+from shipdrag_ros.report.diagnosis_score import Score
+from shipdrag_ros.report.document import Picture, write_page
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import LIBRARY
+
+
+def write_diagnosis(path: Path, found: Diagnosis, ship: Ship, *, score: Score | None) -> None:
+    """
+    Write a diagnosis as one HTML file.
+
+    Parameters
+    ----------
+    path
+        The file; an existing one is replaced.
+    found
+        What the runs gave.
+    ship
+        That they were held against.
+    score
+        Of the method on hidden data; None: it was not scored.
+    """
+    assert ship.baseline is not None  # there is no diagnosis without
+    after = told.added(found)
+    write_page(
+        path,
+        'diagnosis.html',
+        title=f'What is missing in the model of {ship.name or "the ship"}',
+        ship=words.ship_line(ship),
+        runs=', '.join(trace.name for trace in found.traces),
+        sentence=told.sentence(found),
+        probabilities=Picture.of(
+            diagnosis_pictures.probability_picture(told.answers(found)),
+            'How probable each answer is.',
+        ),
+        effects=tuple(LIBRARY[effect.name] for effect in found.best),
+        parameters=diagnosis_cells.parameters(found.best),
+        named=bool(found.effects),
+        where=None if found.where is None else told.place(found),
+        gaps=diagnosis_cells.gaps(found),
+        motions=tuple(
+            Picture.of(
+                diagnosis_pictures.motion_picture(trace, after=after),
+                f'{trace.name}: measured and simulated, and the difference between them. Inside '
+                'the band is what noise alone may do.',
+            )
+            for trace in found.traces
+        ),
+        residuals=Picture.of(
+            diagnosis_pictures.residual_picture(found.traces, after=after),
+            'What each model leaves unexplained, in standard deviations of the noise. Of good '
+            'ones 19 in 20 lie inside the band, without order.',
+        ),
+        advice=told.advice(found),
+        notes=found.notes,
+        noise=diagnosis_cells.noise(found.traces),
+        steady=', '.join(f'{trace.lead_in_s / 60.0:.0f} min' for trace in found.traces),
+        baseline=told.baseline(ship.baseline),
+        stated=', '.join(effect.name for effect in ship.effects),
+        score=score,
+    )
