@@ -5,23 +5,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.advice import advice
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, where
 from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.result import Advice, Candidate, Diagnosis, Named, Verdict
+from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
 from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, weigh
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
-from shipdrag_ros.simulation.effects import deciders
 
 _PAIRED = 4  # most probable names that pairs are tried with
 _PAIRS = 8  # that are fitted to the end
@@ -82,9 +81,11 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         weighed = weigh([nothing, *found])
         best = weighed.best[weighed.named()[0]]
         more = _with_more(library, best, smooth)
-    verdict, candidates = decide(
-        weighed, lacking=lacks(best, more), inseparable=_inseparable(library)
-    )
+    never = _inseparable(library)
+    verdict, candidates = decide(weighed, lacking=lacks(best, more), inseparable=never)
+    would_decide: tuple[Advice, ...] = ()
+    if verdict is Verdict.ONE_OF:
+        would_decide = advice(library, weighed, candidates, inseparable=never)
     as_stated = frozen(library)
     missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.hypothesis.names)
     explained = best if missing else nothing
@@ -96,7 +97,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         candidates=candidates,
         nothing=weighed.nothing,
         unnamed=weighed.unnamed,
-        would_decide=advised(candidates) if verdict is Verdict.ONE_OF else (),
+        would_decide=would_decide,
         where=None if verdict is Verdict.NONE else where(library, as_stated, smooth),
         before=gap_of(library.problem, as_stated.best),
         after=gap_of(library.problem, best.best) if missing else None,
@@ -171,20 +172,3 @@ def _inseparable(library: Library) -> list[frozenset[str]]:
         for other, measures in one.look_alikes.items()
         if not measures
     ]
-
-
-def advised(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
-    """
-    Return what tells candidates apart, what serves most pairs of them first.
-    """
-    votes: dict[str, float] = {}
-    for one, other in combinations(candidates, 2):
-        for a in one.names:
-            for b in other.names:
-                if a == b:
-                    continue
-                for measure in deciders(a, b):
-                    weight = one.probability * other.probability
-                    votes[measure.value] = votes.get(measure.value, 0.0) + weight
-    ranked = sorted(votes, key=lambda measure: -votes[measure])
-    return tuple(Advice(measure, None) for measure in ranked)
