@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 from scipy.special import logsumexp
 
-from shipdrag_ros.diagnosis.diagnose import advised
+from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.result import Diagnosis, Gap, Named, Verdict, Where
 from shipdrag_ros.diagnosis.sailing_model import SMOOTH, LegFit, LegModel
@@ -82,7 +82,7 @@ def diagnose_sailing(records: Sequence[SailingRecord], parameters: Parameters) -
         candidates=candidates,
         nothing=weighed.nothing,
         unnamed=weighed.unnamed,
-        would_decide=advised(candidates) if verdict is Verdict.ONE_OF else (),
+        would_decide=declared(candidates) if verdict is Verdict.ONE_OF else (),
         where=None if verdict is Verdict.NONE else _where(legs, best),
         before=_gap(fits[()]),
         after=_gap(best) if missing else None,
