@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, weigh
+from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, weigh
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
@@ -82,7 +82,12 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         best = weighed.best[weighed.named()[0]]
         more = _with_more(library, best, smooth)
     never = _inseparable(library)
-    verdict, candidates = decide(weighed, lacking=lacks(best, more), inseparable=never)
+    alarm = weighed.nothing < QUIET and bool(best.hypothesis.names)
+    predicted = held_out(library, best) if alarm else None
+    lacking = lacks(best, more) or (
+        predicted is not None and misses(predicted.chi2_per_sample, best.best.rows)
+    )
+    verdict, candidates = decide(weighed, lacking=lacking, inseparable=never)
     would_decide: tuple[Advice, ...] = ()
     if verdict is Verdict.ONE_OF:
         would_decide = advice(library, weighed, candidates, inseparable=never)
@@ -102,7 +107,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         before=gap_of(library.problem, as_stated.best),
         after=gap_of(library.problem, best.best) if missing else None,
         held_out_before=held_out(library, None),
-        held_out_after=held_out(library, best) if missing else None,
+        held_out_after=predicted if missing else None,
         baseline='stated',
         best=_named(best, weighed),
         traces=traces(library.problem, as_stated.best, explained.best),

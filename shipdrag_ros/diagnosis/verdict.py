@@ -107,10 +107,16 @@ def lacks(fit: Fit, with_more: Sequence[Fit], *, nats: float = _LACK_NATS) -> bo
     nats
         Of evidence that this must gain.
     """
-    rows = fit.best.rows
-    if fit.chi2_per_row > 1.0 + _LACK_SD * math.sqrt(2.0 / rows) + _LACK_SLACK:
+    if misses(fit.chi2_per_row, fit.best.rows):
         return True
     return any(more.log_likelihood > fit.log_likelihood + nats for more in with_more)
+
+
+def misses(chi2_per_row: float, rows: int) -> bool:
+    """
+    Tell whether what is left is more than noise, as well as that is known.
+    """
+    return chi2_per_row > 1.0 + _LACK_SD * math.sqrt(2.0 / rows) + _LACK_SLACK
 
 
 def decide(
