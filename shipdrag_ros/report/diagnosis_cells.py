@@ -48,9 +48,9 @@ def gaps(found: Diagnosis) -> Table:
     """
     named = words.names_text([effect.name for effect in found.best])
     known = {
-        'model as stated': found.before,
+        words.model(found): found.before,
         f'with {named}': found.after,
-        'each run predicted, model as stated': found.held_out_before,
+        f'each run predicted, {words.model(found)}': found.held_out_before,
         f'each run predicted, with {named} learnt from the others': found.held_out_after,
     }
     rows = [

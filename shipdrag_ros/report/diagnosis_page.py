@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.diagnosis import Diagnosis
+from shipdrag_ros.diagnosis import Diagnosis, Trace
 from shipdrag_ros.report import diagnosis_cells, diagnosis_pictures, words
 from shipdrag_ros.report import diagnosis_words as told
 from shipdrag_ros.report.diagnosis_score import Score
@@ -29,7 +30,6 @@ def write_diagnosis(path: Path, found: Diagnosis, ship: Ship, *, score: Score | 
     score
         Of the method on hidden data; None: it was not scored.
     """
-    assert ship.baseline is not None  # there is no diagnosis without
     after = told.added(found)
     write_page(
         path,
@@ -55,16 +55,20 @@ def write_diagnosis(path: Path, found: Diagnosis, ship: Ship, *, score: Score | 
             )
             for trace in found.traces
         ),
-        residuals=Picture.of(
-            diagnosis_pictures.residual_picture(found.traces, after=after),
-            'What each model leaves unexplained, in standard deviations of the noise. Of good '
-            'ones 19 in 20 lie inside the band, without order.',
-        ),
+        residuals=_residuals(found.traces, after) if found.traces else None,
         advice=told.advice(found),
         notes=found.notes,
         noise=diagnosis_cells.noise(found.traces),
         steady=', '.join(f'{trace.lead_in_s / 60.0:.0f} min' for trace in found.traces),
-        baseline=told.baseline(ship.baseline),
+        baseline=told.baseline(found, ship),
         stated=', '.join(effect.name for effect in ship.effects),
         score=score,
+    )
+
+
+def _residuals(traces: Sequence[Trace], after: str) -> Picture:
+    return Picture.of(
+        diagnosis_pictures.residual_picture(traces, after=after),
+        'What each model leaves unexplained, in standard deviations of the noise. Of good ones '
+        '19 in 20 lie inside the band, without order.',
     )

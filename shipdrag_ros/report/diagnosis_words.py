@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from shipdrag_ros.diagnosis import Candidate, Diagnosis, Named, Verdict
 from shipdrag_ros.report.words import plus_minus
-from shipdrag_ros.ship import Baseline, CoefficientBaseline, Uncertain
+from shipdrag_ros.ship import CoefficientBaseline, Ship, Uncertain
 from shipdrag_ros.simulation.effect import Quantity
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -65,15 +65,11 @@ def advice(found: Diagnosis) -> list[str]:
     """
     Return what would decide, a line each.
     """
-    return [
-        each.measure
-        + (
-            ''
-            if each.probability is None
-            else f': would decide in {each.probability:.0%} of cases'
-        )
-        for each in found.would_decide
-    ]
+    lines = []
+    for each in found.would_decide:
+        known = '' if each.probability is None else f': would decide in {each.probability:.0%}'
+        lines.append(each.measure + known)
+    return lines
 
 
 def place(found: Diagnosis) -> str:
@@ -83,10 +79,24 @@ def place(found: Diagnosis) -> str:
     if found.where is None:
         return 'nowhere'
     where = found.where
+    since = 'of the record' if found.baseline == 'none' else 'after the stop'
     return (
-        f'{_CHANNELS[where.channel]}, {where.time_s[0]:.0f} to {where.time_s[1]:.0f} s after the '
-        f'stop, at {where.speed_m_s[0]:.1f} to {where.speed_m_s[1]:.1f} m/s'
+        f'{_CHANNELS[where.channel]}, {where.time_s[0]:.0f} to {where.time_s[1]:.0f} s {since}, '
+        f'at {where.speed_m_s[0]:.1f} to {where.speed_m_s[1]:.1f} m/s'
     )
+
+
+def model(found: Diagnosis) -> str:
+    """
+    Say what the runs were held against.
+    """
+    match found.baseline:
+        case 'none':
+            return 'log as it is'
+        case 'fitted_here':
+            return 'a form fitted to these runs'
+        case _:
+            return 'model as stated'
 
 
 def added(found: Diagnosis) -> str:
@@ -138,17 +148,21 @@ def probability(value: float) -> str:
     return f'{100.0 * value:.1f} %' if value >= _LEAST else f'< {100.0 * _LEAST:g} %'
 
 
-def baseline(found: Baseline) -> str:
+def baseline(found: Diagnosis, ship: Ship) -> str:
     """
-    Say where a baseline comes from, and how well it is stated to be known.
+    Say where the baseline comes from, and how well it is stated to be known.
     """
-    source = found.source or 'of unstated source'
-    if isinstance(found, CoefficientBaseline):
-        sd = found.relative_sd
+    if found.baseline == 'none':
+        return 'no baseline was needed: log and way over ground are held against each other'
+    given = ship.baseline
+    if found.baseline == 'fitted_here' or given is None:
+        return 'none is stated: a form of the resistance was fitted to these runs'
+    if isinstance(given, CoefficientBaseline):
+        sd = given.relative_sd
         known = f'friction ± {200.0 * sd.friction:g} %, wave ± {200.0 * sd.wave:g} %'
     else:
-        known = f'± {200.0 * found.relative_sd:g} %'
-    return f'{source}: {known} (two standard deviations, as stated)'
+        known = f'± {200.0 * given.relative_sd:g} %'
+    return f'{given.source or "of unstated source"}; {known} (two standard deviations, as stated)'
 
 
 def size(quantity: Quantity, found: Uncertain) -> str:
