@@ -65,11 +65,12 @@ def advice(found: Diagnosis) -> list[str]:
     """
     Return what would decide, a line each.
     """
-    lines = []
-    for each in found.would_decide:
-        known = '' if each.probability is None else f': would decide in {each.probability:.0%}'
-        lines.append(each.measure + known)
-    return lines
+    return [
+        each.measure
+        if each.probability is None
+        else f'{each.measure}; decides with probability {probability(each.probability)}'
+        for each in found.would_decide
+    ]
 
 
 def place(found: Diagnosis) -> str:
