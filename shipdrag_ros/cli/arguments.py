@@ -98,6 +98,21 @@ def new_file(ending: str) -> Callable[[str], Path]:
     return read
 
 
+def unused_file(ending: str) -> Callable[[str], Path]:
+    """
+    Return a reader of the path of a file to write that does not exist yet.
+    """
+    in_a_folder = new_file(ending)
+
+    def read(text: str) -> Path:
+        path = in_a_folder(text)
+        if path.exists():
+            raise argparse.ArgumentTypeError(f'{text!r} exists; choose another name or remove it')
+        return path
+
+    return read
+
+
 def _check_folder(path: Path) -> None:
     """Refuse now, not when the work is done."""
     if not path.parent.is_dir():
