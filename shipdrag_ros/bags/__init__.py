@@ -13,6 +13,7 @@ from shipdrag_ros.bags.playback import InputCounts, ReplayResult, replay
 from shipdrag_ros.bags.reader import open_runs
 from shipdrag_ros.bags.recover import Recovery, recover
 from shipdrag_ros.bags.run import Inputs, ResetMark, Run, TopicInfo
+from shipdrag_ros.bags.sailing import accepted_samples
 from shipdrag_ros.bags.summary import BagInfo, info
 from shipdrag_ros.bags.writer import BagWriter, Compression
 
@@ -34,6 +35,7 @@ __all__ = [
     'ResetMark',
     'Run',
     'TopicInfo',
+    'accepted_samples',
     'check',
     'coast_windows',
     'import_csv',

@@ -7,11 +7,21 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.bags import Run, coast_windows, open_runs, replay
+from shipdrag_ros.bags import Run, accepted_samples, coast_windows, open_runs, replay
+from shipdrag_ros.bags.playback import SHIP_FILE
 from shipdrag_ros.cli import diagnose_json
-from shipdrag_ros.cli.arguments import add_json, bag, new_file, remap
+from shipdrag_ros.cli.arguments import add_json, bag, new_file, number, remap, unused_file
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose, with_effects
+from shipdrag_ros.diagnosis import (
+    CoastRun,
+    Diagnosis,
+    SailingRecord,
+    Verdict,
+    diagnose,
+    diagnose_fitted,
+    diagnose_sailing,
+    with_effects,
+)
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report import diagnosis_cells, diagnosis_words
@@ -28,7 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'Hold coastdowns against the baseline of the ship file and name the effect that is '
         'missing: a name only where the data can tell, the smallest set and what would decide '
         'where they cannot, "unknown" with a place where it is none of them. Coastdowns of all '
-        'bags are taken together; effects of the earth are stated along the first one.'
+        'bags are taken together; effects of the earth are stated along the first one. Without '
+        'a baseline a form of the resistance is fitted to the runs. In a record without a '
+        'coastdown the log is held against the way over ground, for which neither baseline nor '
+        'ship file is needed.'
     )
     parser.add_argument('bags', nargs='+', type=bag, metavar='BAG', help='MCAP or rosbag2')
     parser.add_argument(
@@ -39,15 +52,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--write',
-        type=new_file('.yaml'),
+        type=unused_file('.yaml'),
         metavar='FILE',
-        help='write a ship file with the effect added, where one is named',
+        help='write a ship file with the effect added, where one is named; an existing file is '
+        'not overwritten',
     )
     parser.add_argument(
         '--report',
         type=new_file('.html'),
         metavar='FILE.html',
         help='write the diagnosis with its pictures to one HTML file',
+    )
+    parser.add_argument(
+        '--window',
+        nargs=2,
+        type=number(0.0, unit='s'),
+        metavar=('START', 'END'),
+        help='the coastdown [s from the start of each bag], without looking for one',
     )
     parser.add_argument(
         '--remap',
@@ -67,13 +88,18 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     given = None if options.ship is None else Ship.load(options.ship)
     runs = open_runs(options.bags, remap=dict(options.remap))
-    coasts, ship, parameters = coasts_of(output, runs, given)
-    found = diagnose(coasts, ship, parameters)
+    window = None if options.window is None else tuple(options.window)
+    found, ship = _diagnosed(output, runs, given, window)
+    if ship is None and (options.report is not None or options.write is not None):
+        raise DiagnosisError(
+            f'no ship file is attached to {runs[0].name!r}, and --report and --write need one; '
+            'give it with --ship FILE'
+        )
     _show(output, found)
-    if options.report is not None:
+    if options.report is not None and ship is not None:
         write_diagnosis(options.report, found, ship, score=Score.published())
         output.log(f'report in {options.report}')
-    if options.write is not None and found.verdict is Verdict.NAMED:
+    if options.write is not None and ship is not None and found.verdict is Verdict.NAMED:
         text = with_effects(ship, found.effects).to_yaml()
         options.write.write_text(text, encoding='utf-8')
         output.log(f'ship file with the effect in {options.write}')
@@ -81,6 +107,30 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'nothing is named, so {options.write} is not written')
     output.json(diagnose_json.document(found))
     return 0
+
+
+def _diagnosed(
+    output: Output,
+    runs: Sequence[Run],
+    given: Ship | None,
+    window: tuple[float, float] | None,
+) -> tuple[Diagnosis, Ship | None]:
+    """Diagnose by what the records hold, and return the ship if one is known."""
+    if given is None and window is None and not any(SHIP_FILE in run.attachments for run in runs):
+        return _sailing(runs), None
+    coasts, ship, parameters = _found(output, runs, given, window)
+    if not coasts:
+        return _sailing(runs), ship
+    if ship.baseline is None:
+        return diagnose_fitted(coasts, ship), ship
+    return diagnose(coasts, ship, parameters), ship
+
+
+def _sailing(runs: Sequence[Run]) -> Diagnosis:
+    """Hold the logs against the ways over ground."""
+    read = [(run.name, *accepted_samples(run)) for run in runs]
+    records = [SailingRecord(name, block) for name, block, _ in read]
+    return diagnose_sailing(records, read[0][2])
 
 
 def coasts_of(
@@ -99,22 +149,35 @@ def coasts_of(
     DiagnosisError
         If there is none.
     """
-    coasts: list[CoastRun] = []
-    ship, parameters = given, None
-    for each in runs:
-        with output.progress(f'replaying {each.name}') as progress:
-            result = replay(each, ship=ship, progress=progress)
-        ship, parameters = ship or result.ship, parameters or result.parameters
-        windows = coast_windows(result)
-        for number, (_, window) in enumerate(windows, start=1):
-            name = each.name if len(windows) == 1 else f'{each.name}, coastdown {number}'
-            coasts.append(CoastRun(name, window))
-    if ship is None or parameters is None or not coasts:
+    coasts, ship, parameters = _found(output, runs, given, None)
+    if not coasts:
         names = ', '.join(repr(each.name) for each in runs)
         raise DiagnosisError(
             f'no coastdown in {names}: give a record in which the engine was stopped after '
             'steady sailing; `shipdrag replay` shows what was found'
         )
+    return coasts, ship, parameters
+
+
+def _found(
+    output: Output,
+    runs: Sequence[Run],
+    given: Ship | None,
+    window: tuple[float, float] | None,
+) -> tuple[list[CoastRun], Ship, Parameters]:
+    """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
+    coasts: list[CoastRun] = []
+    ship, parameters = given, None
+    for each in runs:
+        with output.progress(f'replaying {each.name}') as progress:
+            result = replay(each, ship=ship, window=window, progress=progress)
+        ship, parameters = ship or result.ship, parameters or result.parameters
+        windows = coast_windows(result)
+        for place, (_, found) in enumerate(windows, start=1):
+            name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
+            coasts.append(CoastRun(name, found))
+    assert ship is not None
+    assert parameters is not None
     return coasts, ship, parameters
 
 

@@ -2,6 +2,7 @@
 """Which effect is missing where model and data disagree."""
 
 from shipdrag_ros.diagnosis.diagnose import CoastRun, diagnose, with_effects
+from shipdrag_ros.diagnosis.fitted_baseline import diagnose_fitted
 from shipdrag_ros.diagnosis.legs import SailingRecord
 from shipdrag_ros.diagnosis.result import (
     Advice,
@@ -28,6 +29,7 @@ __all__ = [
     'Verdict',
     'Where',
     'diagnose',
+    'diagnose_fitted',
     'diagnose_sailing',
     'with_effects',
 ]

@@ -206,8 +206,8 @@ class _Cut:
             raise DiagnosisError(
                 f'{record.name!r} has no coastdown, and {len(window.speed_through_water)} '
                 f'speeds through water beside {len(ground)} positions or speeds over ground: '
-                'give a coastdown (engine stopped after steady sailing), or a record of sailing '
-                'with both a log and positions'
+                'give a coastdown (engine stopped after steady sailing), say with --window where '
+                'it is, or give a record of sailing with both a log and positions'
             )
         sent = block.channel
         degrees = np.count_nonzero(sent == Channel.POSITION_GEODETIC)

@@ -109,6 +109,8 @@ def added(found: Diagnosis) -> str:
             return 'with the baseline moved to fit'
         case Verdict.UNKNOWN:
             return 'with an unknown, smooth disturbance'
+        case _ if not found.best:
+            return 'with a constant part besides'
         case _:
             return f'with {names_text([effect.name for effect in found.best])}'
 
