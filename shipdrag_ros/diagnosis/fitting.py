@@ -20,6 +20,7 @@ from shipdrag_ros.diagnosis.unknowns import Tail
 from shipdrag_ros.samples import Float64
 
 _ITERATIONS = 12
+_ANEW = (0, 3)  # iterations in which all derivatives are found anew
 _CONVERGED = 0.02  # fall of -2 ln posterior
 _DAMPING = 1e-2
 _HOPELESS = 1e4  # damping
@@ -77,8 +78,9 @@ def fit(
     """
     states = [_State(h, z.copy()) for h, z in zip(hypotheses, starts, strict=True)]
     active = states
-    for _ in range(iterations):
-        points = problem.linearise([s.hypothesis for s in active], [s.trial for s in active])
+    for number in range(iterations):
+        near = [None if number in _ANEW else s.best for s in active]
+        points = problem.linearise([s.hypothesis for s in active], [s.trial for s in active], near)
         for state, point in zip(active, points, strict=True):
             state.take(point)
         active = [state for state in active if not state.done]

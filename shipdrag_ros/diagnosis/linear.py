@@ -17,7 +17,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.noise import apply
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.terms import FormTerm, Predicted, RowTerm, Term
+from shipdrag_ros.diagnosis.terms import BaselineTerm, FormTerm, Predicted, RowTerm, Term
 from shipdrag_ros.diagnosis.unknowns import Unknown
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
@@ -198,14 +198,29 @@ class Problem:
             for run in self.seen
         )
 
-    def linearise(self, hypotheses: Sequence[Hypothesis], at: Sequence[Float64]) -> list[Linear]:
+    def linearise(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        at: Sequence[Float64],
+        near: Sequence[Linear | None] | None = None,
+    ) -> list[Linear]:
         """
         Return the whitened rows of each hypothesis about some unknowns.
+
+        Parameters
+        ----------
+        near
+            The same about unknowns near by: the derivatives by what is known
+            well beforehand, the baseline, are taken from there.
         """
-        runs = [self._run(j, hypotheses, at) for j in range(len(self.seen))]
+        before = near or [None] * len(hypotheses)
+        runs = [self._run(j, hypotheses, at, before) for j in range(len(self.seen))]
         return [
             Linear(
-                hypothesis, z, tuple(run[i][0] for run in runs), tuple(run[i][1] for run in runs)
+                hypothesis,
+                z,
+                tuple(run[i][0] for run in runs),
+                tuple(run[i][1] for run in runs),
             )
             for i, (hypothesis, z) in enumerate(zip(hypotheses, at, strict=True))
         ]
@@ -230,19 +245,33 @@ class Problem:
         )
 
     def _run(
-        self, run: int, hypotheses: Sequence[Hypothesis], at: Sequence[Float64]
+        self,
+        run: int,
+        hypotheses: Sequence[Hypothesis],
+        at: Sequence[Float64],
+        near: Sequence[Linear | None],
     ) -> list[tuple[Float64, Float64]]:
         batch, seen = _Batch(), self.seen[run]
-        plans = [self._plan(run, h, z, batch) for h, z in zip(hypotheses, at, strict=True)]
+        plans = [
+            self._plan(run, h, z, batch, known=before is not None)
+            for h, z, before in zip(hypotheses, at, near, strict=True)
+        ]
         columns = self._simulate(run, batch)
         predicted = _predicted(seen, columns)
         context = seen.context.predict(columns, batch.actions)
-        return [
-            self._table(run, hypothesis, z, plan, predicted, context)
-            for hypothesis, z, plan in zip(hypotheses, at, plans, strict=True)
-        ]
+        found = []
+        for hypothesis, z, plan, before in zip(hypotheses, at, plans, near, strict=True):
+            table, residual = self._table(run, hypothesis, z, plan, predicted, context)
+            if before is not None:
+                kept = [1 + unknown for unknown in _known(hypothesis)]
+                table[kept] = before.tables[run][kept]
+            found.append((table, residual))
+        return found
 
-    def _plan(self, run: int, hypothesis: Hypothesis, z: Float64, batch: _Batch) -> _Plan:
+    def _plan(
+        self, run: int, hypothesis: Hypothesis, z: Float64, batch: _Batch, *, known: bool = False
+    ) -> _Plan:
+        skipped = set(_known(hypothesis)) if known else set()
         frame = self.frames[run]
         speed = float(z[len(hypothesis.unknowns) + run])
         acting = [
@@ -262,7 +291,7 @@ class Problem:
                 without[id(term)] = batch.add(others, speed)
             for k, unknown in enumerate(term.unknowns):
                 value = unknown.value(z[place + k] + _STEP_Z)
-                if value != values[k]:
+                if value != values[k] and place + k not in skipped:
                     stepped = [*values[:k], value, *values[k + 1 :]]
                     column = batch.add(others + term.action(frame, run, stepped), speed)
                     steps.append((place + k, column, _STEP_Z))
@@ -310,6 +339,16 @@ class Problem:
                 table[:, n : n + k] = apply(seen.across.whitener, table[:, n : n + k])
             table[:, n + k :] = apply(seen.context.whitener, table[:, n + k :])
         return table, residual
+
+
+def _known(hypothesis: Hypothesis) -> list[int]:
+    """Return the unknowns of the baseline, which stay near where they were."""
+    return [
+        place + k
+        for part, place in hypothesis.parts
+        if isinstance(part, BaselineTerm)
+        for k in range(len(part.unknowns))
+    ]
 
 
 def _predicted(seen: Observation, columns: Columns) -> list[Predicted]:
