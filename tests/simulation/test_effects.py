@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Air, ConstantAddedMass, Propeller, Ship, TableBaseline
 from shipdrag_ros.simulation import STOP, EngineOrder, Scenario, Sensor, Truth, sense, simulate
-from shipdrag_ros.simulation.effects import parse
+from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import find, parse
 
 CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
 AT_ONCE = replace(CARGO, propulsion=None)
@@ -178,6 +179,12 @@ def test_shallow_water_is_read_by_the_echo_sounder_and_grows_the_added_mass():
     form = 3.77 + 1.14 * 21.6 / 8.6 - 0.233 * 150 / 8.6 - 3.43 * 20200 / (150 * 21.6 * 8.6)
     expected = CARGO.n_r(4.0) * form / (12.0 / 8.6 - 1.0) ** 1.3
     np.testing.assert_allclose(truth.action.n_r_change, expected, rtol=1e-9)
+
+
+def test_a_depth_below_the_keel_that_a_fit_tries_is_as_shallow_as_can_be():
+    effect, frame = find('shallow_water'), Frame(CARGO, SCENARIO, 0.0)
+    tried, least = (effect.action(frame, depth).n_r_change for depth in (7.0, 1.2 * 8.6))
+    np.testing.assert_allclose(tried, least, rtol=1e-9)
 
 
 def test_deep_water_is_not_shallow():

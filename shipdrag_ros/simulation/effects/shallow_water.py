@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from shipdrag_ros.samples import Float64
@@ -21,6 +23,7 @@ from shipdrag_ros.simulation.hydrodynamics import viscous_n
 
 _DEEP_LENGTHS = 0.3  # of depth: no sinkage is added from there on
 _FROUDE_MAX = 0.85  # of depth; above it the sinkage formula is meaningless
+_CLEARANCE_MIN = 0.2  # in draughts, under the keel: a fit may try less than is accepted
 _GROWTH_MAX = 0.05  # of the displaced volume
 
 
@@ -63,8 +66,8 @@ def _added_mass_ratio(ship: Ship, depth_m: float) -> float:
     """Return surge added mass over that in deep water; never below 1."""
     breadth, draught = ship.breadth_m or np.nan, ship.draught_m or np.nan
     form = 3.77 + 1.14 * breadth / draught - 0.233 * ship.length_m / draught - 3.43 * _block(ship)
-    clearance: float = depth_m / draught - 1.0
-    return 1.0 + max(form, 0.0) / float(clearance**1.3)
+    clearance = max(depth_m / draught - 1.0, _CLEARANCE_MIN)
+    return 1.0 + max(form, 0.0) / math.pow(clearance, 1.3)
 
 
 def _block(ship: Ship) -> float:
