@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is advised is simulated, ranked, and decides where it is predicted to."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation.effect import Measure
+from shipdrag_ros.simulation.effects import parse
+
+SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
+LEAD_IN_S, COAST_S = 1200.0, 1200.0
+MOTION = ('speed_through_water', 'position')
+HEADING_RAD = 0.3
+
+
+def run(effect: str, *more: str, heading_rad: float = HEADING_RAD, seed: int = 1) -> CoastRun:
+    scenario = Scenario(
+        speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=COAST_S, heading_rad=heading_rad
+    )
+    truth = simulate(SHIP, scenario, effects=[parse(effect)], reference_rad=HEADING_RAD)
+    block = sense(truth, standard_sensors(rate_hz=0.5, inputs=(*MOTION, *more)), seed=seed)
+    first = int(block.stamp_ns.min())
+    stop = first + round(LEAD_IN_S * 1e9)
+    window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
+    return CoastRun(effect, window)
+
+
+def resolves(found: Diagnosis) -> dict[Measure, float | None]:
+    return {Measure(each.measure): each.probability for each in found.would_decide}
+
+
+@pytest.fixture(scope='module')
+def current() -> Diagnosis:
+    """A weak current, seen in one run, which may be an offset of the log as well."""
+    return diagnose([run('current=0.06')], SHIP, Parameters())
+
+
+def test_reciprocal_run_is_advised_for_a_current_and_names_it(current: Diagnosis) -> None:
+    assert current.verdict is Verdict.ONE_OF
+    assert current.would_decide[0].measure == Measure.RECIPROCAL_RUN
+    probability = current.would_decide[0].probability
+    assert probability is not None
+    assert probability > 0.8
+    back = run('current=0.06', heading_rad=HEADING_RAD + math.pi, seed=2)
+    after = diagnose([run('current=0.06'), back], SHIP, Parameters())
+    assert [effect.name for effect in after.effects] == ['current']
+    assert after.would_decide == ()
+
+
+def test_advice_is_ranked_and_its_probabilities_are_some(current: Diagnosis) -> None:
+    known = [each for each in resolves(current).values() if each is not None]
+    assert known == sorted(known, reverse=True)
+    assert all(0.0 <= each <= 1.0 for each in known)
+
+
+def test_echo_sounder_would_name_shallow_water_as_often_as_it_is_shallow() -> None:
+    found = diagnose([run('shallow_water=12')], SHIP, Parameters())
+    assert found.verdict is Verdict.ONE_OF
+    (shallow,) = (each for each in found.candidates if each.names == ('shallow_water',))
+    predicted = resolves(found)[Measure.DEPTH]
+    assert predicted is not None
+    # an echo sounder excludes one candidate only, and leaves the others as they were
+    assert abs(predicted - shallow.probability) < 0.05
+    after = diagnose([run('shallow_water=12', 'depth')], SHIP, Parameters())
+    assert [effect.name for effect in after.effects] == ['shallow_water']
+    assert resolves(found)[Measure.WITHOUT_CABLE] is None
+
+
+def test_what_is_measured_already_is_not_advised(current: Diagnosis) -> None:
+    assert Measure.RADAR not in resolves(current)
+    with_wind = diagnose([run('current=0.06', 'wind_apparent')], SHIP, Parameters())
+    assert with_wind.verdict is Verdict.ONE_OF
+    assert Measure.WIND not in resolves(with_wind)
