@@ -87,7 +87,8 @@ class Library:
             max(run.run_down_sd_s for run in self.seen),
         )
         places = tuple(
-            PlaceTerm(j, run.heading_sd_rad, run.stop_sd_s) for j, run in enumerate(self.seen)
+            PlaceTerm(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None)
+            for j, run in enumerate(self.seen)
         )
         given: list[Term] = [
             EffectTerm(

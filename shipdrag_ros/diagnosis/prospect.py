@@ -178,7 +178,7 @@ def _transferred(hypothesis: Hypothesis, run: Observation) -> Hypothesis:
     kept: list[Term] = [replace(baseline, run_down_change_s=baseline.run_down_change_s[:1])]
     kept += [term for term in others if not _of_single_run(term)]
     forms = tuple(form for form in hypothesis.forms if not _of_single_run(form.term))
-    place = PlaceTerm(0, run.heading_sd_rad, run.stop_sd_s)
+    place = PlaceTerm(0, run.heading_sd_rad, run.stop_sd_s, run.across is not None)
     return Hypothesis(hypothesis.names, tuple(kept), (place,), forms)
 
 

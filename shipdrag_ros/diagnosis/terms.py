@@ -14,6 +14,7 @@ from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
 
 from shipdrag_ros.diagnosis.observation import Observation
@@ -291,26 +292,43 @@ class RowTerm(Protocol):
 @dataclass(frozen=True)
 class PlaceTerm:
     """
-    Where a run began, on which heading, and when the engine stopped.
+    What is a run's own: where it began, its heading, when the engine stopped.
+
+    Attributes
+    ----------
+    run
+    heading_sd_rad, stop_sd_s
+    scatter
+        Of the resistance from run to run, relative.
+
+    Notes
+    -----
+    A coastdown under 1 + c times the resistance is the same motion, 1 + c
+    times as fast in time.
     """
 
     run: int
     heading_sd_rad: float
     stop_sd_s: float
+    scatter: float
+    has_positions: bool
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Place [m], heading [rad] and stop [s]."""
+        """Place [m], heading [rad], stop [s] and factor on the resistance, - 1."""
+        # where no row shows it, a place with a prior leaves the evidence as it is
+        tail = Tail.FLAT if self.has_positions else Tail.NORMAL
         return (
-            scaled('ahead', 1.0, tail=Tail.FLAT),
-            scaled('to port', 1.0, tail=Tail.FLAT),
+            scaled('ahead', 1.0, tail=tail),
+            scaled('to port', 1.0, tail=tail),
             scaled('heading', self.heading_sd_rad),
             scaled('stop', self.stop_sd_s),
+            scaled('factor', self.scatter),
         )
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (4, n) and (4, k)."""
-        along, across = _nothing(seen, 4)
+        """Return (5, n) and (5, k)."""
+        along, across = _nothing(seen, 5)
         if run != self.run:
             return along, across
         kind, at = seen.along.rows.kind, seen.along.at
@@ -320,6 +338,9 @@ class PlaceTerm:
         slowing = np.where(after, np.gradient(base.speed, seen.time_s), 0.0)
         gained = np.where(after, base.over_ground[0] - base.over_ground, 0.0)
         along[3] = np.where(position, gained[at], -slowing[at])
+        since = np.maximum(seen.time_s - seen.lead_in_s, 0.0)
+        way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
+        along[4] = np.where(position, (since * base.speed - way)[at], (since * slowing)[at])
         if seen.across is not None:
             across[1] = 1.0
             across[2] = base.distance[seen.across.at]
