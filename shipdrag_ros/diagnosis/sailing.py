@@ -28,6 +28,7 @@ from shipdrag_ros.simulation.effects import find
 _NAMES = ('current', 'log_offset', 'log_scale', 'radar_scale')
 _SCALES = frozenset(('log_scale', 'radar_scale'))
 _SET_APART = frozenset(('current', 'log_offset'))
+_BENT = ('log_offset', 'log_scale', SMOOTH)
 _NOTHING, _ONE, _PAIR, _UNNAMED = 0.5, 0.38, 0.04, 0.08  # probabilities before the data
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a leg above 1
@@ -66,7 +67,7 @@ def diagnose_sailing(records: Sequence[SailingRecord], parameters: Parameters) -
     names = [name for name in _NAMES if not (legs.geodetic and name == 'radar_scale')]
     pairs = [pair for pair in combinations(names, 2) if set(pair) != _SCALES]
     hypotheses = [(), *((name,) for name in names), *pairs]
-    fits = {each: model.fit(each) for each in (*hypotheses, (SMOOTH,))}
+    fits = {each: model.fit(each) for each in (*hypotheses, _BENT)}
     weighed = Weighed({}, _probabilities(fits, len(names), len(pairs)))
     best = fits[weighed.named()[0]]
     inseparable = [_SCALES] if 'radar_scale' in names else []
@@ -110,13 +111,13 @@ def _probabilities(
     """Return the probability of each hypothesis."""
     log = []
     for hypothesis, fit in fits.items():
-        if hypothesis == (SMOOTH,):
+        if hypothesis == _BENT:
             before = _UNNAMED
         else:
             before = (_NOTHING, _ONE / names, _PAIR / pairs)[len(hypothesis)]
         log.append(fit.log_evidence + math.log(before))
     probability = np.exp(np.array(log) - logsumexp(log)).tolist()
-    keys = [UNNAMED if each == (SMOOTH,) else each for each in fits]
+    keys = [UNNAMED if each == _BENT else each for each in fits]
     return dict(zip(keys, probability, strict=True))
 
 

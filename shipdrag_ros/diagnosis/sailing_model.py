@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.terms import hats
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
 
-SMOOTH = 'smooth'  # any smooth error of the log, as a function of the speed
+SMOOTH = 'smooth'  # an error of the log that bends with the speed, without a name
 _SMOOTHS, _SMOOTH_SD = 6, 0.05  # of them, of the highest speed
 _SCALE_TOLERANCE = 0.005  # that a log in order has
 _CURRENT_TOLERANCE_M_S = 0.04  # steady current that is not worth a word
@@ -125,8 +125,12 @@ class LegModel:
 
     @cached_property
     def _bumps(self) -> Float64:
-        top = float(self.legs.ground_m_s.max())
-        return hats(self.legs.ground_m_s / top, _SMOOTHS)
+        """What neither a scale nor an offset is, (6, n)."""
+        speed = self.legs.ground_m_s
+        bumps = hats(speed / speed.max(), _SMOOTHS).T
+        line = np.array([np.ones(len(speed)), speed]).T
+        found: Float64 = (bumps - line @ np.linalg.lstsq(line, bumps, rcond=1e-6)[0]).T
+        return found
 
     def prior_sd(self, names: tuple[str, ...]) -> Float64:
         """
