@@ -23,6 +23,7 @@ from shipdrag_ros.simulation import Action, Columns
 
 _BIN_S = 60.0
 _WIND_SD_M_S, _WIND_RELATIVE_SD = 0.6, 0.05  # of a true wind: the ship bends the flow
+_GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
 _DEPTH_SD = 0.03  # relative
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
 _YAW_SD_RAD = 0.03  # of a mean over a bin: a ship yaws in the waves
@@ -204,7 +205,7 @@ def _wind_covariance(values: Float64) -> Float64:
     n = len(values)
     if n == 0:
         return np.zeros((0, 0))
-    scatter = max(float(np.median(np.abs(np.diff(values)))), 0.1) if n > 1 else 0.3
+    scatter = max(_GUSTY * float(np.median(np.abs(np.diff(values)))), 0.1) if n > 1 else 0.3
     constant = _WIND_SD_M_S**2 + (_WIND_RELATIVE_SD * float(np.abs(values).max())) ** 2
     return np.eye(n) * scatter**2 + constant
 

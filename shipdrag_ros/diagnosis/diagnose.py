@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, weigh
+from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, mode_of, weigh
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
@@ -25,6 +25,7 @@ from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
 _PAIRED = 4  # most probable names that pairs are tried with
 _PAIRS = 8  # that are fitted to the end
 _SCREENING = 3  # iterations
+_STARTS = 2  # of each hypothesis that are fitted to the end
 _AT_ODDS = 2.0  # nats that something unnamed gains, from which pairs are tried
 
 
@@ -70,9 +71,11 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
     named = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
     unnamed = [library.with_discrepancy(library.nothing, c) for c in library.channels()]
-    both = [*named, *unnamed]
-    found = fit(library.problem, both, [library.start(h, nothing) for h in both])
-    smooth = found[len(named) :]
+    likely = _likeliest_starts(library, named, nothing)
+    both = [*(one.hypothesis for one in likely), *unnamed]
+    starts = [*(one.best.z for one in likely), *(library.start(h, nothing) for h in unnamed)]
+    found = fit(library.problem, both, starts)
+    smooth = found[len(likely) :]
     weighed = weigh([nothing, *found])
     best = weighed.best[weighed.named()[0]]
     more = _with_more(library, best, smooth)
@@ -120,6 +123,17 @@ def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
     """
     added = tuple(StatedEffect(effect.name, dict(effect.parameters)) for effect in effects)
     return replace(ship, effects=(*ship.effects, *added))
+
+
+def _likeliest_starts(library: Library, hypotheses: Sequence[Hypothesis], near: Fit) -> list[Fit]:
+    """Begin to fit from everywhere, and keep the best starts of each hypothesis."""
+    starts = [library.start(hypothesis, near) for hypothesis in hypotheses]
+    begun = fit(library.problem, hypotheses, starts, iterations=_SCREENING)
+    begun.sort(key=lambda one: -one.log_evidence)
+    kept: dict[tuple[object, ...], list[Fit]] = {}
+    for one in begun:
+        kept.setdefault((one.hypothesis.names, mode_of(one)), []).append(one)
+    return [one for ones in kept.values() for one in ones[:_STARTS]]
 
 
 def _with_more(library: Library, best: Fit, smooth: Sequence[Fit]) -> list[Fit]:

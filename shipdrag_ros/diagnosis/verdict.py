@@ -78,7 +78,7 @@ def weigh(fits: Sequence[Fit]) -> Weighed:
         key = UNNAMED if fit.hypothesis.discrepancy else fit.hypothesis.names
         if key not in best or fit.log_evidence > best[key].log_evidence:
             best[key] = fit
-        mode = _mode(fit)
+        mode = mode_of(fit)
         found = modes.setdefault(key, {})
         found[mode] = max(found.get(mode, -math.inf), fit.log_evidence)
     keys = list(modes)
@@ -87,8 +87,10 @@ def weigh(fits: Sequence[Fit]) -> Weighed:
     return Weighed(best, dict(zip(keys, probability.tolist(), strict=True)))
 
 
-def _mode(fit: Fit) -> tuple[object, ...]:
-    """Return what tells a mode apart from others of the same names."""
+def mode_of(fit: Fit) -> tuple[object, ...]:
+    """
+    Return what tells a mode apart from others of the same names.
+    """
     terms = fit.hypothesis.terms
     return (
         fit.hypothesis.discrepancy,

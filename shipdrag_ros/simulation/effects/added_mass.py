@@ -19,7 +19,7 @@ EFFECT = Effect(
             name='n_r_change',
             unit='',
             meaning='added to n_r at every speed',
-            prior=normal(0.06),
+            prior=normal(0.15),
             low=-0.5,
             high=2.0,
         ),

@@ -19,7 +19,7 @@ EFFECT = Effect(
             name='fraction',
             unit='',
             meaning="by which the mass is larger; the resistance [N] stays the baseline's",
-            prior=normal(0.08),
+            prior=normal(0.12),
             low=-0.5,
             high=1.0,
         ),
