@@ -310,8 +310,8 @@ class PlaceTerm:
     run: int
     heading_sd_rad: float
     stop_sd_s: float
-    scatter: float
     has_positions: bool
+    scatter: float = 0.0
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
