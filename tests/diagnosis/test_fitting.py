@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Evidence by Laplace's method against integrals done by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from shipdrag_ros.diagnosis.fitting import fit
+from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
+from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, scaled
+from shipdrag_ros.samples import Float64
+
+
+@dataclass(frozen=True)
+class OneSize:
+    """A part with one unknown."""
+
+    unknowns: tuple[Unknown, ...]
+
+
+@dataclass(frozen=True)
+class Straight:
+    """Rows that depend on a size evenly: what a problem is made of, without a ship."""
+
+    value: Float64
+    slope: Float64
+
+    def linearise(
+        self, hypotheses: list[Hypothesis], at: list[Float64], near: object = None
+    ) -> list[Linear]:
+        """Return residual and slope."""
+        found = []
+        for hypothesis, z in zip(hypotheses, at, strict=True):
+            residual = self.value - self.slope * z[0]
+            found.append(Linear(hypothesis, z, (np.array([residual, self.slope]),), (residual,)))
+        return found
+
+
+@pytest.mark.parametrize('tail', [Tail.NORMAL, Tail.HALF])
+@pytest.mark.parametrize('size', [-3.0, -0.5, 0.0, 0.4, 3.0])
+def test_the_evidence_is_the_integral_over_the_prior(tail: Tail, size: float) -> None:
+    rng = np.random.default_rng(3)
+    slope = rng.standard_normal(20)
+    value = size * slope + rng.standard_normal(20)
+    unknown = scaled('size', 1.0, tail=tail)
+    hypothesis = Hypothesis(('one',), (OneSize((unknown,)),), ())  # type: ignore[arg-type]
+    found = fit(Straight(value, slope), [hypothesis], [np.array([0.2])])[0]  # type: ignore[arg-type]
+
+    def density(z: float) -> float:
+        left = value - slope * z
+        return float(np.exp(-0.5 * (left @ left) - 0.5 * z * z)) / np.sqrt(2.0 * np.pi)
+
+    low = 0.0 if tail is Tail.HALF else -9.0
+    whole = quad(density, low, 9.0, epsabs=0.0, points=[0.0, size])[0]
+    expected = np.log(whole * (2.0 if tail is Tail.HALF else 1.0))
+    assert found.log_evidence == pytest.approx(expected, abs=1e-6)
+    if tail is Tail.HALF:
+        assert found.best.z[0] >= 0.0
+
+
+def test_the_covariance_is_that_of_least_squares() -> None:
+    rng = np.random.default_rng(4)
+    slope = rng.standard_normal(50)
+    problem = Straight(slope + rng.standard_normal(50), slope)
+    flat = Hypothesis((), (OneSize((scaled('a', 1.0, tail=Tail.FLAT),)),), ())  # type: ignore[arg-type]
+    found = fit(problem, [flat], [np.array([5.0])])[0]  # type: ignore[arg-type]
+    assert found.best.z[0] == pytest.approx(slope @ problem.value / (slope @ slope), rel=1e-9)
+    assert found.covariance[0, 0] == pytest.approx(1.0 / (slope @ slope), rel=1e-9)
+
+
+def test_what_cannot_be_simulated_has_no_evidence() -> None:
+    problem = Straight(np.full(5, np.nan), np.ones(5))
+    one = Hypothesis(('one',), (OneSize((scaled('a', 1.0),)),), ())  # type: ignore[arg-type]
+    assert fit(problem, [one], [np.zeros(1)])[0].log_evidence == -np.inf  # type: ignore[arg-type]

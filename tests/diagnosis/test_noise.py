@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Coloured noise: whitened exactly, and learnt from a steady record."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shipdrag_ros.diagnosis.noise import Colour, Damping, apply, bin_means, learn, whiten
+from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
+
+TIMES_S = np.array([90.0, 600.0, 50.0, 40.0])
+
+
+def gauss_markov(time: np.ndarray, sd: float, time_s: float) -> np.ndarray:
+    """Return the covariance of a Gauss-Markov process of first order."""
+    return sd**2 * np.exp(-np.abs(time[:, None] - time[None, :]) / time_s)
+
+
+def whitener(rows: Rows, variance: np.ndarray, colour: Colour) -> np.ndarray:
+    """Return the matrix that whitens rows of a ship that answers slowly."""
+    n = len(rows.time_s)
+    table = np.eye(n)
+    whiten(rows, variance, colour, Damping(np.full(n, 2e-3), np.full(n, 1.05)), table)
+    return table.T
+
+
+@pytest.mark.parametrize(('kind', 'which'), [(LOG, 2), (POSITION, 3)])
+def test_the_colour_of_a_sensor_is_whitened_exactly(kind: int, which: int) -> None:
+    time = np.cumsum(np.random.default_rng(1).uniform(0.5, 40.0, 60))
+    rows = Rows(time, np.full(60, kind), np.zeros(60))
+    size = np.zeros(4)
+    size[which] = 0.7
+    variance = np.full(60, 0.3)
+    found = whitener(rows, variance, Colour(size, TIMES_S))
+    covariance = gauss_markov(time, 0.7, TIMES_S[which]) + 0.3 * np.eye(60)
+    np.testing.assert_allclose(found @ covariance @ found.T, np.eye(60), rtol=0, atol=1e-10)
+    assert np.all(np.triu(found, 1) == 0.0)
+
+
+def test_water_that_moves_shifts_positions_by_its_integral() -> None:
+    time = np.arange(0.0, 600.0, 5.0)
+    n = len(time)
+    rows = Rows(time, np.full(n, POSITION), np.zeros(n))
+    found = whitener(rows, np.full(n, 1.0), Colour(np.array([0.0, 0.2, 0.0, 0.0]), TIMES_S))
+    # dense: the integral of a fine process
+    fine = np.arange(0.0, 595.1, 1.0)
+    weights = np.array([[max(min(t - f, 1.0), 0.0) for f in fine] for t in time])
+    covariance = weights @ gauss_markov(fine + 0.5, 0.2, 600.0) @ weights.T + np.eye(n)
+    np.testing.assert_allclose(found @ covariance @ found.T, np.eye(n), rtol=0, atol=0.02)
+
+
+def test_a_gust_moves_the_ship_and_its_position() -> None:
+    """Of 400 simulated records (seed 2) the squares of whitened residuals have mean 1 +- 0.05."""
+    rng = np.random.default_rng(2)
+    step, rate, inertia, sd, time_s = 0.5, 2e-3, 1.05, 1e-3, 90.0
+    steps = np.arange(0.0, 1200.0, step)
+    gust = np.empty((400, len(steps)))
+    gust[:, 0] = sd * rng.standard_normal(400)
+    decay = np.exp(-step / time_s)
+    for i in range(1, len(steps)):
+        gust[:, i] = decay * gust[:, i - 1] + sd * np.sqrt(1 - decay**2) * rng.standard_normal(400)
+    # long before, so that the speed is in its stationary state
+    speed = np.zeros(400)
+    for _ in range(2):
+        for i in range(len(steps)):
+            speed += step * (gust[:, i] / inertia - rate * speed)
+    path = np.zeros(400)
+    seen = []
+    for i in range(len(steps)):
+        if i % 40 == 0:
+            seen.append(path + rng.standard_normal(400) * 0.5)
+        path = path + step * speed
+        speed = speed + step * (gust[:, i] / inertia - rate * speed)
+    rows = Rows(steps[::40], np.full(len(seen), POSITION), np.zeros(len(seen)))
+    table = np.array(seen).T.copy()
+    n = len(seen)
+    colour = Colour(np.array([sd, 0.0, 0.0, 0.0]), np.array([time_s, 1.0, 1.0, 1.0]))
+    whiten(rows, np.full(n, 0.25), colour, Damping(np.full(n, rate), np.full(n, inertia)), table)
+    # the first rows show whether the beginning is stationary; the chain above is only nearly so
+    assert np.mean(table[:, 5:] ** 2) == pytest.approx(1.0, abs=0.05)
+
+
+def test_sizes_are_learnt_from_a_steady_record() -> None:
+    """N = 20, seeds 0..19: the median of learnt over true sd is within 0.6 .. 1.6."""
+    ratios = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        time = np.arange(0.0, 1800.0, 15.0)
+        n = len(time)
+        colour = np.linalg.cholesky(gauss_markov(time, 0.05, 50.0) + 1e-12 * np.eye(n))
+        log = 6.0 + colour @ rng.standard_normal(n) + 0.01 * rng.standard_normal(n)
+        rows = Rows(time, np.full(n, LOG), log)
+        found = learn(rows, np.full(n, 1e-4), damping_1_s=2e-3, inertia=1.05)
+        # a gust and an error of the log leave the same trace in a log alone
+        n_rate = 2e-3
+        by_gust = found.size[0] / 1.05 / np.sqrt(n_rate * (n_rate + 1.0 / found.time_s[0]))
+        ratios.append(np.hypot(found.size[2], by_gust) / 0.05)
+    assert 0.6 < np.median(ratios) < 1.6
+
+
+@given(st.integers(1, 30), st.integers(1, 5), st.integers(0, 1000))
+def test_apply_is_a_product_of_matrices(n: int, lines: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    lower = np.tril(rng.standard_normal((n, n)))
+    table = rng.standard_normal((lines, n))
+    np.testing.assert_allclose(apply(lower, table), table @ lower.T, rtol=1e-12, atol=1e-12)
+
+
+@given(st.lists(st.floats(0.0, 99.0), min_size=1, max_size=50))
+def test_bins_hold_the_mean_of_what_falls_into_them(times: list[float]) -> None:
+    time = np.array(times)
+    value = np.column_stack([2.0 * time, time**2])
+    edges = np.arange(0.0, 101.0, 10.0)
+    found_s, found, count = bin_means(time, value, edges)
+    assert count.sum() == len(time)
+    np.testing.assert_allclose(found[:, 0], 2.0 * found_s, rtol=1e-9, atol=1e-9)
+    for mean_s, mean, number in zip(found_s, found, count, strict=True):
+        inside = np.searchsorted(edges, time) == np.searchsorted(edges, mean_s)
+        if number == inside.sum():
+            np.testing.assert_allclose(mean[1], (time[inside] ** 2).mean(), rtol=1e-9, atol=1e-9)

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A name only where the data can tell."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
+from shipdrag_ros.diagnosis.result import Verdict
+from shipdrag_ros.diagnosis.verdict import decide, lacks, misses, weigh
+
+TWINS = [frozenset(('added_mass', 'displacement'))]
+
+
+def fitted(
+    *names: str, evidence: float, discrepancy: str = '', chi2: float = 100.0, rows: int = 100
+) -> Fit:
+    """Return a fit with some evidence."""
+    hypothesis = Hypothesis(names, (), (), discrepancy=discrepancy)
+    white = np.full((1, rows), math.sqrt(chi2 / rows))
+    return Fit(Linear(hypothesis, np.zeros(0), (white,), (white[0],)), np.zeros((0, 0)), evidence)
+
+
+def verdict(*fits: Fit, lacking: bool = False) -> Verdict:
+    """Decide on fits."""
+    return decide(weigh(fits), lacking=lacking, inseparable=TWINS)[0]
+
+
+def test_one_that_stands_out_is_named() -> None:
+    fits = fitted(evidence=-9.0), fitted('current', evidence=0.0), fitted('wind', evidence=-5.0)
+    assert verdict(*fits) is Verdict.NAMED
+
+
+def test_two_that_are_alike_stay_a_set_of_both() -> None:
+    fits = fitted(evidence=-9.0), fitted('fouling', evidence=0.0), fitted('cable', evidence=-0.3)
+    found, candidates = decide(weigh(fits), lacking=False, inseparable=TWINS)
+    assert found is Verdict.ONE_OF
+    assert [each.names for each in candidates] == [('fouling',), ('cable',)]
+    assert sum(each.probability for each in candidates) >= 0.99
+
+
+def test_no_alarm_while_nothing_may_be_missing() -> None:
+    assert verdict(fitted(evidence=-2.0), fitted('current', evidence=0.0)) is Verdict.NONE
+    assert verdict(fitted(evidence=-2.5), fitted('current', evidence=0.0)) is Verdict.NAMED
+
+
+def test_what_leaves_more_than_noise_is_unknown() -> None:
+    fits = fitted(evidence=-50.0), fitted('current', evidence=0.0)
+    assert verdict(*fits, lacking=True) is Verdict.UNKNOWN
+    unnamed = fitted(evidence=8.0, discrepancy='force')
+    assert verdict(*fits, unnamed) is Verdict.UNKNOWN
+
+
+def test_twins_are_never_named_alone() -> None:
+    fits = fitted(evidence=-50.0), fitted('added_mass', evidence=0.0)
+    assert verdict(*fits) is Verdict.ONE_OF
+
+
+def test_several_starts_of_a_hypothesis_count_once() -> None:
+    once = weigh([fitted(evidence=0.0), fitted('current', evidence=0.0)])
+    twice = weigh([fitted(evidence=0.0), *[fitted('current', evidence=0.0)] * 3])
+    assert once.probability == twice.probability
+
+
+def test_something_smooth_besides_takes_a_name_back() -> None:
+    name = fitted('current', evidence=0.0)
+    assert not lacks(name, [fitted('current', evidence=4.0, discrepancy='log')])
+    assert lacks(name, [fitted('current', evidence=6.0, discrepancy='log')])
+    assert lacks(fitted('current', evidence=0.0, chi2=200.0), [])
+
+
+@pytest.mark.parametrize(('rows', 'limit'), [(100, 1.77), (400, 1.48)])
+def test_what_is_more_than_noise_depends_on_the_number_of_rows(rows: int, limit: float) -> None:
+    assert misses(limit + 0.01, rows)
+    assert not misses(limit - 0.01, rows)
