@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From bags to the missing effect, to a ship file that has it, to a model that agrees."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.cli import main
+from shipdrag_ros.ship import Ship
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def simulated(path: Path, ship_file: Path, *arguments: str) -> Path:
+    """Write a coastdown after half an hour of steady sailing."""
+    line = ['simulate', '--ship', str(ship_file), '-o', str(path), '--lead-in', '1800']
+    assert main([*line, *arguments]) == 0
+    return path
+
+
+@pytest.fixture(scope='module')
+def in_current(ship_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run in a current that the ship file does not state."""
+    path = tmp_path_factory.mktemp('current') / 'out.mcap'
+    return simulated(path, ship_file, '--effect', 'current=0.4', '--seed', '1')
+
+
+def test_the_example_of_the_readme_works_as_typed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (ROOT / 'README.md').read_text(encoding='utf-8')
+    part = text[text.index('**What is missing in the model?**') :]
+    typed = re.findall(r'^    \.venv/bin/shipdrag (.*?)(?: {2,}#.*)?$', part, flags=re.MULTILINE)
+    (tmp_path / 'config').symlink_to(ROOT / 'config')
+    monkeypatch.chdir(tmp_path)
+    said = []
+    for line in typed[:4]:
+        assert main(line.split()) == 0, line
+        said.append(capsys.readouterr().out)
+    assert said[2].startswith('Missing in the model: current (along track (0.')
+    assert 'each run predicted, with current learnt from the others' in said[2]
+    assert said[3].startswith('Model and data agree')
+    assert said[2].split(';')[0] in Path('diagnosis.html').read_text(encoding='utf-8')
+
+    # what was written is a ship to sail, and the bag carries it
+    (stated,) = Ship.load(Path('ship_now.yaml')).effects
+    along = stated.parameters['along_track_m_s']
+    assert abs(along.value - 0.4) < 3.0 * along.sd
+    sea = simulated(tmp_path / 'sea.mcap', Path('ship_now.yaml'), '--seed', '5')
+    capsys.readouterr()
+    assert main(['diagnose', str(sea)]) == 0
+    assert capsys.readouterr().out.startswith('Model and data agree')
+
+
+def test_the_result_reads_well_and_says_the_same_to_the_machine(
+    in_current: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(['diagnose', str(in_current), '--json', str(tmp_path / 'found.json')]) == 0
+    said = capsys.readouterr().out
+    found = json.loads((tmp_path / 'found.json').read_text())
+    assert found['verdict'] == 'named'
+    (effect,) = found['effects']
+    assert effect['name'] == 'current'
+    assert found['gap']['before']['chi2_per_sample'] > 3.0
+    assert found['gap']['after']['chi2_per_sample'] < 1.2
+    assert said.startswith('Missing in the model: current (along track (0.')
+    for words in (
+        'How probable',
+        'something without a name',
+        f'{effect["parameters"]["along_track_m_s"]["value"]:.4g}',
+        'velocity of the water along the heading of the first run',
+        'Gap between model and data',
+        f'{found["gap"]["before"]["rms_position_m"]:.1f}',
+        'with current',
+    ):
+        assert words in said, words
+    assert 'predicted' not in said  # from one run nothing is
+
+
+def test_the_log_alone_is_enough_and_nothing_named_is_not_written(
+    ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clean = simulated(tmp_path / 'clean.mcap', ship_file, '--inputs', 'speed_through_water')
+    capsys.readouterr()
+    written = tmp_path / 'ship.yaml'
+    assert main(['diagnose', str(clean), '--write', str(written)]) == 0
+    captured = capsys.readouterr()
+    assert captured.out.startswith('Model and data agree')
+    assert 'is not written' in captured.err
+    assert not written.exists()
+
+
+def test_too_little_steady_sailing_is_an_error(
+    ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = simulated(tmp_path / 'short.mcap', ship_file, '--lead-in', '120')
+    assert main(['diagnose', str(short)]) == 1
+    assert 's of steady sailing before the stop' in capsys.readouterr().err
+
+
+def test_neither_a_coastdown_nor_enough_sailing_is_an_error(
+    steady_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['diagnose', str(steady_bag)]) == 1
+    assert 'give a longer record' in capsys.readouterr().err
+
+
+def test_a_ship_without_baseline_gets_no_force_named(
+    in_current: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare, page = tmp_path / 'bare.yaml', tmp_path / 'bare.html'
+    bare.write_text('name: Bare\nlength_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
+    line = ['diagnose', str(in_current), '--ship', str(bare), '--report', str(page)]
+    assert main(line) == 0
+    assert 'the ship file has no baseline' in capsys.readouterr().out
+    assert 'was fitted to these runs' in page.read_text(encoding='utf-8')
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        (('--write', 'ship.yaml'), 'exists'),
+        (('--write', 'new.txt'), 'ends in .yaml'),
+        (('--report', 'page.pdf'), 'ends in .html'),
+    ],
+)
+def test_files_are_checked_before_the_work(
+    arguments: tuple[str, str],
+    said: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'ship.yaml').write_text('precious')
+    with pytest.raises(SystemExit) as stopped:
+        main(['diagnose', 'a.mcap', *arguments])
+    assert stopped.value.code == 2
+    assert said in capsys.readouterr().err
+    assert (tmp_path / 'ship.yaml').read_text() == 'precious'
