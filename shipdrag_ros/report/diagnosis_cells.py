@@ -11,6 +11,9 @@ from shipdrag_ros.diagnosis import Compared, Diagnosis, Named, Trace
 from shipdrag_ros.report import diagnosis_words as words
 from shipdrag_ros.report.cells import Table
 from shipdrag_ros.report.pictures import TRACK_LABELS
+from shipdrag_ros.report.words import plus_minus
+from shipdrag_ros.ship import Uncertain
+from shipdrag_ros.simulation.effect import Quantity
 from shipdrag_ros.simulation.effects import LIBRARY
 
 
@@ -32,8 +35,7 @@ def parameters(effects: Sequence[Named]) -> Table:
         (
             effect.name,
             quantity.name,
-            f'{effect.parameters[quantity.name].value:.4g}',
-            f'{effect.parameters[quantity.name].sd:.2g}',
+            *_figures(quantity, effect.parameters[quantity.name]),
             quantity.meaning,
         )
         for effect in effects
@@ -46,7 +48,9 @@ def gaps(found: Diagnosis) -> Table:
     """
     Show how far model and data are apart.
     """
-    named = words.names_text([effect.name for effect in found.best])
+    named = 'a constant part'  # where no effect has a size
+    if found.best:
+        named = words.names_text([effect.name for effect in found.best])
     known = {
         words.model(found): found.before,
         f'with {named}': found.after,
@@ -80,6 +84,14 @@ def noise(traces: Sequence[Trace]) -> Table:
     ]
     heads = ('', 'sd in steady sailing', 'at the end', 'left over before', 'left over after')
     return Table(heads, tuple(rows))
+
+
+def _figures(quantity: Quantity, found: Uncertain) -> tuple[str, str]:
+    """Return value and sd, as the sd deserves; what was a choice has none."""
+    if found.sd == 0.0:
+        return words.size(quantity, found), '-'
+    value, _, sd = plus_minus(found.value, found.sd).partition(' ± ')
+    return value, sd
 
 
 def _noise(compared: Compared) -> tuple[str, ...]:

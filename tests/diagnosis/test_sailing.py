@@ -214,8 +214,9 @@ def test_stops_and_dropouts_are_left_out_and_counted() -> None:
     found = diagnose_sailing([SailingRecord('sailing', kept)], PARAMETERS)
     assert 'dropout 11' in found.notes[0]  # the ten, and the last, which has no end
     assert 'stop' in found.notes[0]
-    assert found.verdict is Verdict.NAMED
-    assert abs(found.effects[0].parameters['factor'].value + 0.06) < 0.02
+    assert 'outlier 1' in found.notes[0]  # the jump after the stop
+    assert [effect.name for effect in found.best] == ['log_scale']
+    assert abs(found.best[0].parameters['factor'].value + 0.06) < 0.02
 
 
 def test_records_are_taken_together() -> None:
