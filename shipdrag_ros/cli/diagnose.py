@@ -90,13 +90,13 @@ def run(options: argparse.Namespace) -> int:
     runs = open_runs(options.bags, remap=dict(options.remap))
     window = None if options.window is None else tuple(options.window)
     found, ship = _diagnosed(output, runs, given, window)
-    if ship is None and (options.report is not None or options.write is not None):
+    if ship is None and options.write is not None:
         raise DiagnosisError(
-            f'no ship file is attached to {runs[0].name!r}, and --report and --write need one; '
-            'give it with --ship FILE'
+            f'no ship file is attached to {runs[0].name!r}, and --write needs one; give it with '
+            '--ship FILE'
         )
     _show(output, found)
-    if options.report is not None and ship is not None:
+    if options.report is not None:
         write_diagnosis(options.report, found, ship, score=Score.published())
         output.log(f'report in {options.report}')
     if options.write is not None and ship is not None and found.verdict is Verdict.NAMED:

@@ -15,7 +15,9 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 
 
-def write_diagnosis(path: Path, found: Diagnosis, ship: Ship, *, score: Score | None) -> None:
+def write_diagnosis(
+    path: Path, found: Diagnosis, ship: Ship | None, *, score: Score | None
+) -> None:
     """
     Write a diagnosis as one HTML file.
 
@@ -26,7 +28,7 @@ def write_diagnosis(path: Path, found: Diagnosis, ship: Ship, *, score: Score | 
     found
         What the runs gave.
     ship
-        That they were held against.
+        That they were held against; None: a record of sailing, without a ship file.
     score
         Of the method on hidden data; None: it was not scored.
     """
@@ -34,8 +36,8 @@ def write_diagnosis(path: Path, found: Diagnosis, ship: Ship, *, score: Score | 
     write_page(
         path,
         'diagnosis.html',
-        title=f'What is missing in the model of {ship.name or "the ship"}',
-        ship=words.ship_line(ship),
+        title='What is missing in the model' + (f' of {ship.name}' if ship and ship.name else ''),
+        ship='' if ship is None else words.ship_line(ship),
         runs=', '.join(trace.name for trace in found.traces),
         sentence=told.sentence(found),
         probabilities=Picture.of(
@@ -61,7 +63,7 @@ def write_diagnosis(path: Path, found: Diagnosis, ship: Ship, *, score: Score | 
         noise=diagnosis_cells.noise(found.traces),
         steady=', '.join(f'{trace.lead_in_s / 60.0:.0f} min' for trace in found.traces),
         baseline=told.baseline(found, ship),
-        stated=', '.join(effect.name for effect in ship.effects),
+        stated='' if ship is None else ', '.join(effect.name for effect in ship.effects),
         score=score,
     )
 

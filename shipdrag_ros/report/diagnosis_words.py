@@ -20,6 +20,7 @@ _CHANNELS = {
 }
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
 _LEAST = 0.001  # probability that is told
+_WORTH_A_WORD = 0.01
 
 
 def sentence(found: Diagnosis) -> str:
@@ -53,8 +54,10 @@ def sentence(found: Diagnosis) -> str:
                 f'{probability(found.effects[0].probability)}.'
             )
         case Verdict.ONE_OF:
+            unnamed = f', or {UNNAMED} ({probability(found.unnamed)})'
             return (
-                f'Missing is one of these: {_listed(found.candidates)}. These runs cannot tell '
+                f'Missing is one of these: {_listed(found.candidates)}'
+                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot tell '
                 'them apart.'
             )
         case Verdict.UNKNOWN:
@@ -151,13 +154,13 @@ def probability(value: float) -> str:
     return f'{100.0 * value:.1f} %' if value >= _LEAST else f'< {100.0 * _LEAST:g} %'
 
 
-def baseline(found: Diagnosis, ship: Ship) -> str:
+def baseline(found: Diagnosis, ship: Ship | None) -> str:
     """
     Say where the baseline comes from, and how well it is stated to be known.
     """
     if found.baseline == 'none':
         return 'no baseline was needed: log and way over ground are held against each other'
-    given = ship.baseline
+    given = None if ship is None else ship.baseline
     if found.baseline == 'fitted_here' or given is None:
         return 'none is stated: a form of the resistance was fitted to these runs'
     if isinstance(given, CoefficientBaseline):

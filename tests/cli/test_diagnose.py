@@ -72,7 +72,7 @@ def test_the_result_reads_well_and_says_the_same_to_the_machine(
     for words in (
         'How probable',
         'something without a name',
-        f'{effect["parameters"]["along_track_m_s"]["value"]:.4g}',
+        f'{effect["parameters"]["along_track_m_s"]["value"]:.4f}',
         'velocity of the water along the heading of the first run',
         'Gap between model and data',
         f'{found["gap"]["before"]["rms_position_m"]:.1f}',

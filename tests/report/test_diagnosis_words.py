@@ -71,6 +71,11 @@ def diagnosis(
             'tell them apart.',
         ),
         (
+            diagnosis(Verdict.ONE_OF, (('waves',), 0.3), (('wind',), 0.2), unnamed=0.5),
+            'Missing is one of these: waves (30.0 %), wind (20.0 %), or something without a name '
+            '(50.0 %). These runs cannot tell them apart.',
+        ),
+        (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),
             'Something is missing that is none of the known effects, in the force on the ship, 12 '
             'to 900 s after the stop, at 3.0 to 7.5 m/s.',
@@ -106,5 +111,8 @@ def test_tables_leave_out_what_is_not_there() -> None:
     found = diagnosis(Verdict.NAMED, (('fouling',), 0.9995), effects=(FOULING,))
     assert diagnosis_cells.gaps(found).rows == (('model as stated', '0.200', '-', '20.00'),)
     (row,) = diagnosis_cells.parameters(found.effects).rows
-    assert row[:4] == ('fouling', 'friction_factor', '0.4013', '0.012')
+    assert row[:4] == ('fouling', 'friction_factor', '0.401', '0.012')
+    size, side = diagnosis_cells.parameters([WAVES]).rows
+    assert size[2:4] == ('51200', '3000')
+    assert side[2:4] == ('astern', '-')
     assert diagnosis_cells.noise(found.traces).rows == ()
