@@ -32,13 +32,18 @@ needs_data = pytest.mark.skipif(
 @pytest.fixture(scope='module')
 def script() -> ModuleType:
     """The script that prints the page's figures."""
+    return loaded('real_records')
+
+
+def loaded(name: str) -> ModuleType:
+    """Load a script."""
     folder = ROOT / 'benchmarks'
-    spec = importlib.util.spec_from_file_location('real_records', folder / 'real_records.py')
+    spec = importlib.util.spec_from_file_location(name, folder / f'{name}.py')
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.path.insert(0, str(folder))
-    sys.modules['real_records'] = module  # where dataclasses look for it
+    sys.modules[name] = module  # where dataclasses look for it
     try:
         spec.loader.exec_module(module)
     finally:
@@ -147,3 +152,45 @@ def test_the_ferry_path_and_the_ship_at_rest(
     np.testing.assert_allclose(curve.resistance_m_s2[0], 0.0046, rtol=0.05)
     fitted = slow.estimate.tracks['speed_through_water'].fitted
     np.testing.assert_allclose(fitted.min(), -0.016, rtol=0.0, atol=0.001)
+
+
+@pytest.fixture(scope='module')
+def diagnoses(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What `diagnose --json` says of the yacht's log and of the model ship."""
+    script = loaded('real_diagnosis')
+    out, data = tmp_path_factory.mktemp('diagnoses'), Path(os.environ['SHIPDRAG_DATA'])
+    return {name: script.diagnosed(name, data=data, out=out) for name in script.RECORDS}
+
+
+@needs_data
+def test_the_log_of_the_yacht_has_a_scale_error(diagnoses: dict[str, Any]) -> None:
+    found = diagnoses['yacht, 3.5 h of sailing']
+    assert found['verdict'] == 'named'
+    assert found['baseline'] == 'none'
+    (effect,) = found['effects']
+    assert effect['name'] == 'log_scale'
+    # measured by others: the log reads 0.946 +- 0.02 of the speed over ground
+    np.testing.assert_allclose(
+        effect['parameters']['factor']['value'], -0.054, rtol=0.0, atol=0.02
+    )
+    value, sd = (effect['parameters']['factor'][key] for key in ('value', 'sd'))
+    assert f'{value:.3f} ± {sd:.3f} (one standard deviation)' in PAGE
+    assert any(note.startswith('why not current') for note in found['notes'])
+    gap = found['gap']
+    assert gap['held_out_before'] is None
+    assert gap['held_out_after'] is None
+    assert gap['before']['rms_position_m'] is None
+    assert gap['after']['chi2_per_sample'] < 1.1 < gap['before']['chi2_per_sample']
+
+
+@needs_data
+def test_the_coast_of_the_model_ship_is_answered_with_a_set(diagnoses: dict[str, Any]) -> None:
+    found = diagnoses['model ship, 26 s of coasting']
+    assert found['verdict'] == 'one_of'
+    assert found['baseline'] == 'fitted_here'
+    assert found['effects'] == []
+    names = {tuple(each['names']) for each in found['candidates']}
+    assert names == {('current',), ('waves',), ('wind',), ('log_offset',)}
+    assert 'a run on the reciprocal heading' in found['would_decide']
+    before, after = (1000.0 * found['gap'][when]['rms_speed_m_s'] for when in ('before', 'after'))
+    np.testing.assert_allclose([before, after], [6.1, 0.8], rtol=0.05, atol=0.05)
