@@ -130,7 +130,7 @@ def _show(output: Output, found: Learnt) -> None:
         sd = float(np.sqrt(found.covariance[i, i]))
         after = f'{found.relative_sd[i]:.1%}'
         rows.append((name, f'{found.factors[i]:.3f}', f'{sd:.3f}', before, after))
-    columns = ('', 'factor', 'sd', 'relative_sd before', 'relative_sd for a further run')
+    columns = ('', 'factor', 'sd', 'relative_sd before', 'after')
     output.table(Table(columns, tuple(rows)))
     if len(found.runs) >= ENOUGH:
         output.say(

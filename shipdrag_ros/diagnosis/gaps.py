@@ -12,6 +12,7 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Linear, Problem
 from shipdrag_ros.diagnosis.result import Gap, Where
+from shipdrag_ros.diagnosis.terms import PlaceTerm
 from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION
 from shipdrag_ros.samples import Float64
 
@@ -47,7 +48,12 @@ def frozen(library: Library) -> Fit:
     """
     Fit where and how fast the runs began, the ship being as its file states it.
     """
-    as_stated = replace(library.nothing, terms=library.nothing.terms[1:])
+    nothing = library.nothing
+    places = tuple(
+        replace(term, scatter=0.0) if isinstance(term, PlaceTerm) else term
+        for term in nothing.row_terms
+    )
+    as_stated = replace(nothing, terms=nothing.terms[1:], row_terms=places)
     return fit(library.problem, [as_stated], [library.start(as_stated)])[0]
 
 

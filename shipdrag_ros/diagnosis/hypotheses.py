@@ -86,8 +86,9 @@ class Library:
             tuple(run.run_down_s - stated for run in self.seen),
             max(run.run_down_sd_s for run in self.seen),
         )
+        scatter = self.ship.baseline.run_scatter
         places = tuple(
-            PlaceTerm(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None)
+            PlaceTerm(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None, scatter)
             for j, run in enumerate(self.seen)
         )
         given: list[Term] = [

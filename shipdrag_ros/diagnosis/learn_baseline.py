@@ -72,7 +72,8 @@ class Learnt:
         Standard deviation of the resistance from run to run, relative: median,
         16 and 84 %.
     relative_sd : (k,)
-        As the learnt baseline states it: a further run differs by both.
+        As the learnt baseline states it, beside the scatter: a further run
+        differs by both.
     stated_sd : (k,)
         As before; None where nothing was stated.
     speed_m_s
@@ -135,16 +136,19 @@ def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters)
     enough = len(runs) >= ENOUGH
     mean, covariance = problem.of_parts(everything)
     stated = _stated_sd(begun)
-    sd_of_all = covariance + everything.scatter**2
+    assert begun.baseline is not None
+    absolute = np.sqrt(np.diag(covariance))
+    correlation = float(covariance[0, -1] / (absolute[0] * absolute[-1]))
+    scatter = everything.scatter if enough else begun.baseline.run_scatter
     if not enough:
-        # the prior is all that is known of how runs differ
-        size = np.maximum(1.0, stated / np.sqrt(np.diag(covariance)))
-        sd_of_all = covariance * np.outer(size, size)
-    absolute = np.sqrt(np.diag(sd_of_all))
+        # how far a further run may be off is known by what was stated alone
+        absolute = np.maximum(absolute, stated)
     relative_sd = absolute / (1.0 + mean)
-    correlation = float(sd_of_all[0, -1] / (absolute[0] * absolute[-1]))
     source = _source(everything, len(runs), problem.speed_m_s, begun)
-    base = _scaled(problem, everything, mean, relative_sd, correlation, source)
+    base = replace(
+        _scaled(problem, everything, mean, relative_sd, correlation, source),
+        run_scatter=_rounded(scatter),
+    )
     learnt = replace(ship, baseline=base)
     found = tuple(
         CleanRun(run.name, each, problem.chi2_per_row(j))

@@ -140,15 +140,15 @@ class SharedBaseline:
 
 def _opened(ship: Ship) -> Ship:
     """Return a ship whose baseline may differ in all its parts, and in retardation alone."""
-    base = ship.baseline
-    assert base is not None
+    assert ship.baseline is not None
+    base = replace(ship.baseline, relative_sd_of='retardation', run_scatter=0.0)
     if isinstance(base, TableBaseline):
         sd = max(base.relative_sd, _LEAST_SD)
-        return replace(ship, baseline=replace(base, relative_sd=sd, relative_sd_of='retardation'))
+        return replace(ship, baseline=replace(base, relative_sd=sd))
     parts = CoefficientSd(
         max(base.relative_sd.friction, _LEAST_SD), max(base.relative_sd.wave, _LEAST_SD)
     )
-    return replace(ship, baseline=replace(base, relative_sd=parts, relative_sd_of='retardation'))
+    return replace(ship, baseline=replace(base, relative_sd=parts))
 
 
 def _normal(fitted: Fit, run: int, shared: list[int]) -> Normal:

@@ -38,6 +38,11 @@ _KNOWN = declare(
     'the error of n_r is no part of it',
     default='resistance',
 )
+_SCATTER = declare(
+    number(0.0, 1.0),
+    'by how much single runs differ, relative: sd of the resistance from run to run',
+    default=0.0,
+)
 
 
 @dataclass(frozen=True)
@@ -70,6 +75,7 @@ class CoefficientBaseline:
     wave_coefficient: tuple[float, ...] = declare(numbers(0.0, 0.1), 'C_W, at each of wave_froude')
     relative_sd: CoefficientSd = declare(section(CoefficientSd), 'how well they are known')
     relative_sd_of: str = _KNOWN
+    run_scatter: float = _SCATTER
     source: str = declare(text(), 'where the figures come from', default='')
 
     @cached_property
@@ -108,6 +114,7 @@ class TableBaseline:
     )
     relative_sd: float = declare(number(0.0, 1.0), 'relative standard deviation of the table')
     relative_sd_of: str = _KNOWN
+    run_scatter: float = _SCATTER
     source: str = declare(text(), 'where the figures come from', default='')
 
     @cached_property

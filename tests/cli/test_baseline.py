@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag baseline`, from bags to a ship file that other verbs take."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.cli import main
+from shipdrag_ros.ship import Ship, TableBaseline
+
+
+@pytest.fixture(scope='module')
+def bags(ship_file: Path, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    folder = tmp_path_factory.mktemp('clean')
+    made = []
+    for seed, heading in ((1, '0'), (2, '3.1416')):
+        made.append(str(folder / f'{seed}.mcap'))
+        line = ['simulate', '--ship', str(ship_file), '-o', made[-1], '--speed', '8']
+        assert main([*line, '--lead-in', '900', '--heading', heading, '--seed', str(seed)]) == 0
+    return made
+
+
+def test_learns_from_two_bags_what_simulate_and_diagnose_take(
+    bags: list[str], ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / 'learnt.yaml'
+    capsys.readouterr()
+    assert main(['baseline', *bags, '--ship', str(ship_file), '-o', str(out), '--json']) == 0
+    shown = capsys.readouterr()
+    found = json.loads(shown.out)
+    assert [run['name'] for run in found['runs']] == ['1.mcap', '2.mcap']
+    for part in ('friction', 'wave'):
+        factor = found['factors'][part]
+        assert abs(factor['value'] - 1.0) < 3.0 * factor['sd']
+    assert found['scatter']['value'] is None
+    assert found['relative_sd']['before'] == {'friction': 0.02, 'wave': 0.1}
+    assert 'WARNING: 2 run(s) do not tell how runs differ' in shown.err
+    assert Ship.load(out).baseline != Ship.load(ship_file).baseline
+    assert main(['diagnose', bags[0], '--ship', str(out), '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['verdict'] == 'none'
+    bag = tmp_path / 'again.mcap'
+    assert main(['simulate', '--ship', str(out), '-o', str(bag), '--duration', '60']) == 0
+
+
+def test_a_ship_without_a_baseline_gets_a_table(
+    bags: list[str], ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare, out = tmp_path / 'bare.yaml', tmp_path / 'learnt.yaml'
+    stated = Ship.load(ship_file)
+    bare.write_text(
+        f'length_m: {stated.length_m}\ndisplaced_volume_m3: {stated.displaced_volume_m3}\n'
+    )
+    assert main(['baseline', *bags, '--ship', str(bare), '-o', str(out)]) == 0
+    assert 'the ship file states no baseline' in capsys.readouterr().out
+    assert isinstance(Ship.load(out).baseline, TableBaseline)
+
+
+def test_refuses_to_write_over_the_ship_file(
+    bags: list[str], ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    same = tmp_path / 'ship.yaml'
+    same.write_text(ship_file.read_text())
+    assert main(['baseline', *bags, '--ship', str(same), '-o', str(same)]) == 1
+    assert 'write to another file' in capsys.readouterr().err
+
+
+def test_a_record_without_a_coastdown_is_refused(
+    steady_bag: Path, ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / 'learnt.yaml'
+    assert main(['baseline', str(steady_bag), '--ship', str(ship_file), '-o', str(out)]) == 1
+    assert 'no coastdown' in capsys.readouterr().err
+    assert not out.exists()

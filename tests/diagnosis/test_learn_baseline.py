@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A baseline is learnt from clean runs, and a diagnosis is the better for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
+from shipdrag_ros.diagnosis.learn_baseline import Learnt, learn_baseline
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship, TableBaseline
+from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation.effects import parse
+
+SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
+PARAMETERS = Parameters()
+LEAD_IN_S = 1800.0
+TRUE = np.array([1.04, 0.85])  # friction and wave over what is stated, 2 sd and 1.5 sd off
+SCATTER = 0.01
+
+
+def scaled(friction: float, wave: float) -> Ship:
+    """Return a ship with other coefficients than the file states."""
+    base = SHIP.baseline
+    assert isinstance(base, CoefficientBaseline)
+    return replace(
+        SHIP,
+        baseline=replace(
+            base,
+            form_factor=friction * (1.0 + base.form_factor) - 1.0,
+            correlation_allowance=friction * base.correlation_allowance,
+            wave_coefficient=tuple(wave * c for c in base.wave_coefficient),
+        ),
+    )
+
+
+def coast(ship: Ship, *effects: str, seed: int, heading_rad: float = 0.3) -> CoastRun:
+    """Simulate a coastdown and read it with sensors."""
+    scenario = Scenario(
+        speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=1500.0, heading_rad=heading_rad
+    )
+    truth = simulate(ship, scenario, effects=[parse(text) for text in effects], reference_rad=0.3)
+    sensors = standard_sensors(rate_hz=1.0, noise=1.0, inputs=STANDARD_INPUTS)
+    block = sense(truth, sensors, seed=seed)
+    first = int(block.stamp_ns.min())
+    stop = first + round(LEAD_IN_S * 1e9)
+    window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
+    return CoastRun(f'run {seed}', window)
+
+
+def clean_runs(count: int, *, seed: int) -> list[CoastRun]:
+    """Simulate clean runs, on alternating headings, that differ by their scatter."""
+    rng = np.random.default_rng(seed)
+    return [
+        coast(
+            scaled(*(TRUE * (1.0 + SCATTER * rng.standard_normal()))),
+            seed=100 * seed + k,
+            heading_rad=0.3 + math.pi * (k % 2),
+        )
+        for k in range(count)
+    ]
+
+
+@cache
+def learnt(count: int, seed: int = 1) -> Learnt:
+    return learn_baseline(clean_runs(count, seed=seed), SHIP, PARAMETERS)
+
+
+def test_covers_the_truth() -> None:
+    # 32 seeds of 5 runs each, 2 parts: within 2 sd in 90 % of 64 or more; a t of 4 degrees of
+    # freedom, which 5 runs give, is so in 88 %, and fewer than 50 of 64 then come by chance in 1 %
+    away = []
+    for seed in range(32):
+        found = learnt(5, seed)
+        away.append((found.factors - TRUE) / np.sqrt(np.diag(found.covariance)))
+    assert int((np.abs(away) < 2.0).sum()) >= 50
+    assert 0.5 * SCATTER < np.median([learnt(5, seed).scatter for seed in range(32)]) < 2 * SCATTER
+
+
+def test_the_ship_file_holds_what_was_learnt() -> None:
+    found = learnt(5)
+    base, stated = found.ship.baseline, SHIP.baseline
+    assert isinstance(base, CoefficientBaseline)
+    assert isinstance(stated, CoefficientBaseline)
+    friction, wave = found.factors
+    for reynolds in np.array([1e7, 1e9]):
+        assert base.viscous(reynolds) == pytest.approx(friction * stated.viscous(reynolds))
+    np.testing.assert_allclose(
+        base.wave_coefficient, wave * np.array(stated.wave_coefficient), rtol=1e-6
+    )
+    assert base.run_scatter == pytest.approx(found.scatter, rel=1e-6)
+    assert base.relative_sd.friction < 0.5 * stated.relative_sd.friction
+    assert base.relative_sd_of == 'retardation'
+    assert '5 clean runs' in base.source
+    assert Ship.from_yaml(found.ship.to_yaml(), subject='learnt') == found.ship
+
+
+def test_two_runs_keep_the_stated_sd_and_say_so() -> None:
+    found = learnt(2)
+    base = found.ship.baseline
+    assert isinstance(base, CoefficientBaseline)
+    assert base.relative_sd.friction * found.factors[0] == pytest.approx(0.02, rel=1e-5)
+    assert base.run_scatter == 0.0
+    assert any('still holds' in warning for warning in found.warnings)
+
+
+def test_a_run_that_is_not_clean_is_named() -> None:
+    runs = [*clean_runs(5, seed=2), coast(scaled(*TRUE), 'fouling=0.6', seed=999)]
+    found = learn_baseline(runs, SHIP, PARAMETERS)
+    assert [warning for warning in found.warnings if warning.startswith('run 999 stands out')]
+    assert not [w for w in learnt(5).warnings if 'stands out' in w]
+
+
+def test_without_a_stated_baseline_r_is_written_as_a_table() -> None:
+    bare = replace(SHIP, baseline=None)
+    found = learn_baseline(clean_runs(3, seed=3), bare, PARAMETERS)
+    base = found.ship.baseline
+    assert isinstance(base, TableBaseline)
+    assert found.stated_sd is None
+    speed = np.linspace(3.0, 7.5, 9)
+    np.testing.assert_allclose(
+        found.ship.resistance_n(speed), scaled(*TRUE).resistance_n(speed), rtol=0.05
+    )
+    assert any('states no baseline' in warning for warning in found.warnings)
+
+
+def test_fouling_that_the_stated_baseline_hides_is_seen_against_the_learnt_one() -> None:
+    fouled = [coast(scaled(*TRUE), 'fouling=0.2', seed=77)]
+    assert diagnose(fouled, SHIP, PARAMETERS).verdict is Verdict.NONE
+    found = diagnose(fouled, learnt(5).ship, PARAMETERS)
+    assert found.verdict in (Verdict.NAMED, Verdict.ONE_OF)
+    assert ('fouling',) in [each.names for each in found.candidates]
+
+
+def test_runs_that_scatter_raise_no_alarm_against_the_learnt_baseline() -> None:
+    pair = [
+        coast(scaled(*(1.015 * TRUE)), seed=78),
+        coast(scaled(*(0.985 * TRUE)), seed=79, heading_rad=0.3 + math.pi),
+    ]
+    found = learnt(5).ship
+    assert found.baseline is not None
+    without = replace(found, baseline=replace(found.baseline, run_scatter=0.0))
+    assert diagnose(pair, found, PARAMETERS).verdict is Verdict.NONE
+    assert diagnose(pair, without, PARAMETERS).verdict is not Verdict.NONE
+
+
+def test_what_is_stated_of_friction_and_wave_together_counts() -> None:
+    # friction and wave that err against each other leave their sum known
+    base = scaled(*TRUE).baseline
+    assert isinstance(base, CoefficientBaseline)
+    run = [coast(scaled(1.1 * TRUE[0], 1.3 * TRUE[1]), seed=80)]
+    chance = []
+    for correlation in (-0.95, 0.95):
+        sd = CoefficientSd(friction=0.05, wave=0.15, correlation=correlation)
+        ship = replace(SHIP, baseline=replace(base, relative_sd=sd))
+        chance.append(diagnose(run, ship, PARAMETERS).nothing)
+    assert chance[0] < 0.5 * chance[1]
+
+
+def test_needs_a_run() -> None:
+    with pytest.raises(DiagnosisError, match='no run'):
+        learn_baseline([], SHIP, PARAMETERS)
