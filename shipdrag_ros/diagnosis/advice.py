@@ -28,7 +28,7 @@ from shipdrag_ros.diagnosis.prospect import (
     resolving,
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
-from shipdrag_ros.diagnosis.verdict import Weighed
+from shipdrag_ros.diagnosis.verdict import UNNAMED, Weighed
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Block, Channel
@@ -73,22 +73,25 @@ def advice(
     Notes
     -----
     The probability is that the candidate which is the truth is certain after the
-    measurement, averaged over the candidates; None where it is not simulated.
+    measurement, averaged over the candidates and something unnamed, which never
+    is; None where it is not simulated.
     """
-    kept = [
-        each
-        for each in candidates
-        if np.isfinite(weighed.best[each.names].covariance).all()
-        and math.isfinite(weighed.best[each.names].log_evidence)
-    ][:_MOST]
-    fits = [weighed.best[each.names] for each in kept]
-    share = np.array([each.probability for each in kept])
-    share /= share.sum()
-    possible = [
-        0.0 if any(set(each.names) & group for group in inseparable) else 1.0 for each in kept
+    rivals = [*((each.names, each.probability) for each in candidates[:_MOST])]
+    if UNNAMED in weighed.best:
+        rivals.append((UNNAMED, weighed.unnamed))
+    # one that could not be fitted is none
+    rivals = [
+        (names, probability)
+        for names, probability in rivals
+        if np.isfinite(weighed.best[names].covariance).all()
     ]
+    fits = [weighed.best[names] for names, _ in rivals]
+    share = np.array([probability for _, probability in rivals])
+    share /= share.sum()
+    never = {*UNNAMED, *(name for group in inseparable for name in group)}
+    possible = [float(never.isdisjoint(names)) for names, _ in rivals]
     found: list[Advice] = []
-    for measure in (*_RUNS, *_INSTRUMENTS):
+    for measure in (*_RUNS, *_INSTRUMENTS) if len(fits) > 1 else ():
         if _measured(measure, library.seen):
             continue
         settings, setting = _settings(measure, library, fits)

@@ -17,7 +17,13 @@ from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.linear import Hypothesis, Problem
 from shipdrag_ros.diagnosis.observation import Measured, Observation
-from shipdrag_ros.diagnosis.terms import BaselineTerm, EffectTerm, PlaceTerm, Term
+from shipdrag_ros.diagnosis.terms import (
+    BaselineTerm,
+    EffectTerm,
+    PlaceTerm,
+    SpeedErrorTerm,
+    Term,
+)
 from shipdrag_ros.diagnosis.verdict import CERTAIN
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effect import Scope
@@ -81,7 +87,7 @@ def of_another_run(problem: Problem, fits: Sequence[Fit], run: Observation) -> l
     run
         Values of its rows are 0. What belonged to a single run is not in it.
     """
-    there = [_transferred(one.hypothesis, run) for one in fits]
+    there = [_transferred(one.hypothesis) for one in fits]
     at, before = [], []
     for one, hypothesis in zip(fits, there, strict=True):
         kept = _places(one.hypothesis, hypothesis)
@@ -171,15 +177,22 @@ def empty(measured: Measured) -> Measured:
     return replace(measured, rows=rows._replace(value=np.zeros(len(rows.value))))
 
 
-def _transferred(hypothesis: Hypothesis, run: Observation) -> Hypothesis:
+def _transferred(hypothesis: Hypothesis) -> Hypothesis:
     """Return a hypothesis about some runs as one about another one alone."""
     baseline, *others = hypothesis.terms
     assert isinstance(baseline, BaselineTerm)
     kept: list[Term] = [replace(baseline, run_down_change_s=baseline.run_down_change_s[:1])]
     kept += [term for term in others if not _of_single_run(term)]
     forms = tuple(form for form in hypothesis.forms if not _of_single_run(form.term))
-    place = PlaceTerm(0, run.heading_sd_rad, run.stop_sd_s, run.across is not None)
-    return Hypothesis(hypothesis.names, tuple(kept), (place,), forms)
+    # others of the same kind: where the first run began, and what was amiss with a sensor in
+    # it, is not known of the next
+    of_first = (
+        term
+        for term in hypothesis.row_terms
+        if isinstance(term, PlaceTerm | SpeedErrorTerm) and term.run == 0
+    )
+    rows = tuple(replace(term) for term in of_first)
+    return Hypothesis(hypothesis.names, tuple(kept), rows, forms)
 
 
 def _of_single_run(term: Term) -> bool:
