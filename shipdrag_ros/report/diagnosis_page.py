@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.diagnosis import Diagnosis, Trace
+from shipdrag_ros.diagnosis import Diagnosis, Trace, Verdict
 from shipdrag_ros.report import diagnosis_cells, diagnosis_pictures, words
 from shipdrag_ros.report import diagnosis_words as told
 from shipdrag_ros.report.diagnosis_score import Score
@@ -30,9 +30,10 @@ def write_diagnosis(
     ship
         That they were held against; None: a record of sailing, without a ship file.
     score
-        Of the method on hidden data; None: it was not scored.
+        Of coastdowns held against a stated baseline, on hidden data; None: not scored.
     """
     after = told.added(found)
+    shown = () if found.verdict is Verdict.UNKNOWN else found.best
     write_page(
         path,
         'diagnosis.html',
@@ -44,8 +45,8 @@ def write_diagnosis(
             diagnosis_pictures.probability_picture(told.answers(found)),
             'How probable each answer is.',
         ),
-        effects=tuple(LIBRARY[effect.name] for effect in found.best),
-        parameters=diagnosis_cells.parameters(found.best),
+        effects=tuple(LIBRARY[effect.name] for effect in shown),
+        parameters=diagnosis_cells.parameters(shown),
         named=bool(found.effects),
         where=None if found.where is None else told.place(found),
         gaps=diagnosis_cells.gaps(found),
@@ -64,7 +65,7 @@ def write_diagnosis(
         steady=', '.join(f'{trace.lead_in_s / 60.0:.0f} min' for trace in found.traces),
         baseline=told.baseline(found, ship),
         stated='' if ship is None else ', '.join(effect.name for effect in ship.effects),
-        score=score,
+        score=score if found.baseline == 'stated' else None,
     )
 
 

@@ -61,7 +61,11 @@ def sentence(found: Diagnosis) -> str:
                 'them apart.'
             )
         case Verdict.UNKNOWN:
-            return f'Something is missing that is none of the known effects, {place(found)}.'
+            first = found.candidates[0]
+            why = ''
+            if first.names and found.unnamed < first.probability:
+                why = f' The likeliest of them, {names_text(first.names)}, leaves more than noise.'
+            return f'Something is missing that is none of the known effects, {place(found)}.{why}'
 
 
 def advice(found: Diagnosis) -> list[str]:

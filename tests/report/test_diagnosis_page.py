@@ -98,6 +98,12 @@ def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., A
     assert 'Of the most probable candidate' in page.text
 
 
+def test_what_is_unknown_has_no_size(found: Diagnosis, written: Callable[..., Any]) -> None:
+    page = written(replace(found, verdict=Verdict.UNKNOWN, effects=()))
+    assert 'How large it is' not in page.text
+    assert 'none of the known effects' in page.text
+
+
 def test_a_record_without_coastdown_has_a_page_without_traces(
     found: Diagnosis, written: Callable[..., Any]
 ) -> None:
@@ -107,7 +113,9 @@ def test_a_record_without_coastdown_has_a_page_without_traces(
     assert 'compared on 40 legs' in page.text
     assert 'no baseline was needed' in page.text
     assert 's of the record' in page.text
-    fitted = written(replace(sailing, baseline='fitted_here'))
+    # the score is of another method
+    fitted = written(replace(sailing, baseline='fitted_here'), score=SCORE)
+    assert 'not scored' in fitted.text
     assert 'a form of the resistance was fitted to these runs' in fitted.text
 
 

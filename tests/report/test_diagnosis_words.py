@@ -80,6 +80,12 @@ def diagnosis(
             'Something is missing that is none of the known effects, in the force on the ship, 12 '
             'to 900 s after the stop, at 3.0 to 7.5 m/s.',
         ),
+        (
+            diagnosis(Verdict.UNKNOWN, (('wind',), 0.98)),
+            'Something is missing that is none of the known effects, in the force on the ship, 12 '
+            'to 900 s after the stop, at 3.0 to 7.5 m/s. The likeliest of them, wind, leaves more '
+            'than noise.',
+        ),
     ],
 )
 def test_a_verdict_in_a_sentence(found: Diagnosis, said: str) -> None:
