@@ -31,7 +31,7 @@ def test_learns_from_two_bags_what_simulate_and_diagnose_take(
     assert main(['baseline', *bags, '--ship', str(ship_file), '-o', str(out), '--json']) == 0
     shown = capsys.readouterr()
     found = json.loads(shown.out)
-    assert [run['name'] for run in found['runs']] == ['1.mcap', '2.mcap']
+    assert [run['name'] for run in found['runs']] == bags
     for part in ('friction', 'wave'):
         factor = found['factors'][part]
         assert abs(factor['value'] - 1.0) < 3.0 * factor['sd']
