@@ -86,7 +86,6 @@ class Coast:
         when, mean, count = bin_means(time, series.value, edges)
         top = int(np.argmax(mean))  # until then the thrust has not run down
         yaw = window.heading.value
-        heading = math.atan2(float(np.sin(yaw).mean()), float(np.cos(yaw).mean()))
         if len(mean) - top < _LEAST_ROWS:
             raise DiagnosisError(
                 f'{run.name}: the speed is highest {when[top]:.0f} s after the begin and there '
@@ -97,7 +96,7 @@ class Coast:
             when[top:],
             mean[top:],
             (max(white_sd(series.value), 1e-4 * float(mean[top])) / np.sqrt(count))[top:],
-            heading if len(yaw) else math.nan,
+            float(np.angle(np.exp(1j * yaw).mean())) if len(yaw) else math.nan,
             float(np.ptp(np.unwrap(yaw))) if len(yaw) else 0.0,
         )
 

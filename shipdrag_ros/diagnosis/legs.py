@@ -30,8 +30,8 @@ _LEG_S, _MOST_LEGS = 60.0, 300  # a record longer than so many legs has longer o
 _SAMPLES = 6  # of the slower input in a leg; a leg is as long as that needs
 _SHARE = 0.5  # of the samples that a leg should hold, below which it has a dropout
 _YAW_SD_RAD = 0.1  # of the heading within a leg: at 0.1 the way made good is 0.5 % short
-_STRAIGHT = 0.99  # way made good over that of the halves of a leg, where there is no heading
-_NEAR_S = 10.0  # of the end of a leg are the positions that tell where it is
+_STRAIGHT = 0.99  # way made good over that of half legs, where there is no heading
+_NEAR_S = 10.0  # of a time are the positions that tell where the vessel was
 _STOPPED = 0.25  # of the usual speed
 _UNSTEADY = 0.15  # of the speed, between the halves of a leg
 _OUTLIER = 5.0  # robust standard deviations
@@ -220,6 +220,7 @@ class _Cut:
         span_s = (end_ns - start_ns) * 1e-9
         step_s = max(self.log.step_s, self.ground.step_s)
         self.length_s = max(_LEG_S, span_s / _MOST_LEGS, _SAMPLES * step_s)
+        self.near_s = max(_NEAR_S, 0.5 * _SAMPLES * self.ground.step_s)
         self.edges = np.arange(0.0, span_s, self.length_s)
         self.left: Counter[Left] = Counter()
         self.found: list[_Leg] = []
@@ -235,10 +236,9 @@ class _Cut:
         return self.found
 
     def _leg(self, start_s: float) -> _Leg | Left:
-        log, ground, heading = (
-            each.part(start_s, start_s + self.length_s)
-            for each in (self.log, self.ground, self.heading)
-        )
+        end_s = start_s + self.length_s
+        log, ground = self.log.part(start_s, end_s), self.ground.part(start_s, end_s)
+        heading = self.heading.part(start_s - self.near_s, end_s + self.near_s)
         for part, whole in ((log, self.log), (ground, self.ground)):
             if len(part) < max(_SHARE * self.length_s / whole.step_s, 0.5 * _SAMPLES):
                 return Left.DROPOUT
@@ -258,17 +258,21 @@ class _Cut:
             if self.compass and len(heading):
                 direction = 0.5 * math.pi - direction
             return _Leg(middle, through, over, direction, known)
-        near_s = max(_NEAR_S, 0.5 * _SAMPLES * self.ground.step_s)
-        edges = (start_s, middle, start_s + self.length_s)
-        places = [self.ground.part(at - near_s, at + near_s).at(at) for at in edges]
-        if not all(map(cmath.isfinite, places)):
+        half_s = 0.5 * self.length_s
+        places = [self._place(start_s + k * half_s) for k in range(-1, 4)]
+        if not all(map(cmath.isfinite, places[1:4])):
             return Left.DROPOUT
-        first_half, second_half = places[1] - places[0], places[2] - places[1]
-        way = places[2] - places[0]
-        if not len(heading) and abs(way) < _STRAIGHT * (abs(first_half) + abs(second_half)):
+        way = places[3] - places[1]
+        # a turn just beyond its ends would put them wrong
+        ways = np.diff([place for place in places if cmath.isfinite(place)])
+        if not len(heading) and abs(ways.sum()) < _STRAIGHT * np.abs(ways).sum():
             return Left.TURN
         over = abs(way) / self.length_s
         return _Leg(middle, through, over, cmath.phase(way), Direction.TRACK)
+
+    def _place(self, time_s: float) -> complex:
+        """Return where the vessel was, by positions around that time."""
+        return self.ground.part(time_s - self.near_s, time_s + self.near_s).at(time_s)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`diagnose` of records without a coastdown, and of a ship without a baseline."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.cli import main
+from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+
+MODEL = 'length_m: 1.1\ndisplaced_volume_m3: 0.015\nadded_mass: {model: constant, value: 0.1}\n'
+GAPS = {'before', 'after', 'held_out_before', 'held_out_after'}
+
+
+def bag(path: Path, time_s: Float64, **values: Float64) -> Path:
+    """Write inputs, sampled at the same times."""
+    stamps = np.round(time_s * 1e9).astype(np.int64) + 10**18
+    blocks = [Block.of(Channel[name.upper()], stamps, value) for name, value in values.items()]
+    with BagWriter(path) as writer:
+        writer.write_samples(in_arrival_order(blocks))
+    return path
+
+
+@pytest.fixture
+def sailing(tmp_path: Path) -> Path:
+    """An hour up and down, at two speeds, with a log that reads 7 % too little."""
+    rng = np.random.default_rng(1)
+    time = np.arange(3600.0)
+    leg = (time // 600.0).astype(int)
+    speed = np.where(leg % 3 == 0, 3.0, 6.0) + 0.1 * np.sin(time / 200.0)
+    east = np.where(leg % 2 == 0, speed, -speed)
+    place = np.array([np.cumsum(east), np.zeros(len(time))]).T
+    place += rng.normal(0.0, 1.0, place.shape)
+    log = 0.93 * speed + rng.normal(0.0, 0.05, len(time))
+    return bag(tmp_path / 'sailing.mcap', time, speed_through_water=log, position=place)
+
+
+def test_without_coastdown_and_ship_file_log_and_positions_are_compared(
+    sailing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = tmp_path / 'diagnosis.json'
+    assert main(['diagnose', str(sailing), '--json', str(document)]) == 0
+    found = json.loads(document.read_text())
+    assert found['baseline'] == 'none'
+    assert found['candidates'][0]['names'] == ['log_scale']
+    assert set(found['gap']) == GAPS
+    assert found['gap']['held_out_before'] is None
+    assert found['gap']['before']['rms_position_m'] is None
+    assert 'no coastdown is used' in capsys.readouterr().out
+
+
+def test_what_needs_a_ship_file_says_so(
+    sailing: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / 'ship.yaml'
+    assert main(['diagnose', str(sailing), '--write', str(out)]) == 1
+    assert '--write needs one' in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_without_coastdown_and_positions_it_says_what_to_give(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    time = np.arange(3600.0)
+    log = 4.0 + 0.1 * np.sin(time / 200.0)
+    path = bag(tmp_path / 'log.mcap', time, speed_through_water=log)
+    assert main(['diagnose', str(path)]) == 1
+    error = capsys.readouterr().err
+    assert 'ERROR: ' in error
+    assert 'has no coastdown' in error
+    assert '--window' in error
+
+
+def test_a_window_of_a_ship_without_baseline_is_fitted(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 35.0, 0.1)
+    after = np.maximum(time - 5.0, 0.0)
+    # v' = -0.1 v - 0.004 after 5 s of steady speed: it comes to rest, and goes astern
+    speed = (0.25 + 0.04) * np.exp(-0.1 * after) - 0.04 + rng.normal(0.0, 0.001, len(time))
+    path = bag(tmp_path / 'model.mcap', time, speed_through_water=speed)
+    ship, document = tmp_path / 'model.yaml', tmp_path / 'diagnosis.json'
+    ship.write_text(MODEL)
+    line = ['diagnose', str(path), '--ship', str(ship), '--window', '5', '35']
+    page = tmp_path / 'page.html'
+    assert main([*line, '--json', str(document), '--report', str(page)]) == 0
+    found = json.loads(document.read_text())
+    assert found['baseline'] == 'fitted_here'
+    assert found['verdict'] == 'one_of'
+    assert found['effects'] == []
+    assert page.exists()
