@@ -38,6 +38,7 @@ from shipdrag_ros.simulation.effects import LIBRARY, find
 
 DISCREPANCIES = ('force', 'log', 'radar')
 _NOTHING, _ONE, _PAIR, _UNNAMED = 0.5, 0.38, 0.04, 0.08  # probabilities before the data
+_EVERYWHERE = (-1.5, -0.8, 0.0, 0.8)  # z of what may be anywhere
 _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find from 0
 
 
@@ -187,6 +188,8 @@ def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:
     shape = quantity.prior.shape
     if first:
         return {Shape.HALF_NORMAL: (0.3,), Shape.LOG_NORMAL: _APART}.get(shape, (0.0,))
+    if shape is Shape.UNIFORM:
+        return _EVERYWHERE
     return (0.0,) if shape is Shape.NORMAL else _APART
 
 

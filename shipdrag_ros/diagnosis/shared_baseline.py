@@ -72,7 +72,7 @@ class SharedBaseline:
             )
         unknowns = nothing.terms[0].unknowns
         # scales of the parts, then the shape; the rest is each run's own
-        scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.STUDENT]
+        scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.WIDE]
         shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
         shared = [*scales, *shapes]
         speeds = [library.problem.predict(j, fitted.best).speed for j in range(len(seen))]

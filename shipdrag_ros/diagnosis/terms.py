@@ -140,7 +140,7 @@ class BaselineTerm:
             scales = {'friction': base.relative_sd.friction, 'wave': base.relative_sd.wave}
         else:
             scales = {'resistance': base.relative_sd}
-        found = [scaled(name, sd, tail=Tail.STUDENT) for name, sd in scales.items()]
+        found = [scaled(name, sd, tail=Tail.WIDE) for name, sd in scales.items()]
         found += [scaled(f'shape {k}', SHAPE_SD) for k in range(_SHAPES)]
         # a retardation that is known stays so whatever n_r is
         known = base.relative_sd_of == 'retardation'

@@ -13,11 +13,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from scipy.special import ndtr
+import numpy as np
+from scipy.special import expit, ndtr
 
 from shipdrag_ros.simulation.effect import Prior, Shape
 
-_STUDENT = 4.0  # degrees of freedom of the priors of the baseline
+_WORSE, _HOW_OFTEN = 3.0, 0.1  # times worse than stated that a baseline is, in so many cases
 
 
 class Tail(Enum):
@@ -25,7 +26,7 @@ class Tail(Enum):
 
     NORMAL = auto()
     HALF = auto()  # twice the normal one, of z >= 0
-    STUDENT = auto()  # t, 4 degrees of freedom: a baseline may be worse than stated
+    WIDE = auto()  # a baseline may be three times worse than stated, but hardly more
     FLAT = auto()  # the data alone decide
 
 
@@ -58,8 +59,8 @@ class Unknown:
         """
         if self.tail is Tail.FLAT:
             return 0.0
-        if self.tail is Tail.STUDENT:
-            return (_STUDENT + 1.0) * math.log1p(z * z / _STUDENT)
+        if self.tail is Tail.WIDE:
+            return z * z - 2.0 * float(np.logaddexp(0.0, _odds(z)))
         return z * z
 
     def weight(self, z: float) -> float:
@@ -68,9 +69,15 @@ class Unknown:
         """
         if self.tail is Tail.FLAT:
             return 0.0
-        if self.tail is Tail.STUDENT:
-            return (_STUDENT + 1.0) / (_STUDENT + z * z)
+        if self.tail is Tail.WIDE:
+            return 1.0 - float(expit(_odds(z))) * (1.0 - 1.0 / _WORSE**2)
         return 1.0
+
+
+def _odds(z: float) -> float:
+    """Return the logarithm of the odds that a baseline that is z off is worse than stated."""
+    before = math.log(_HOW_OFTEN / (_WORSE * (1.0 - _HOW_OFTEN)))
+    return before + 0.5 * z * z * (1.0 - 1.0 / _WORSE**2)
 
 
 def scaled(name: str, sd: float, *, mean: float = 0.0, tail: Tail = Tail.NORMAL) -> Unknown:
