@@ -210,7 +210,9 @@ class CoastdownNode(LifecycleNode):
         if self._settings.record:
             self._recorder.start()
         self._session.note_lifecycle('active', self._now_ns())
-        self.get_logger().info(f'active; {self._recorder.status().text}')
+        recording = self._recorder.status()
+        self.get_logger().info(f'active; {recording.text}')
+        self._log_recording(diagnostics.recording_status(recording))
 
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
