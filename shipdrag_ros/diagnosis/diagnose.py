@@ -90,6 +90,8 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     lacking = lacks(best, more) or (
         predicted is not None and misses(predicted.chi2_per_sample, best.best.rows)
     )
+    if lacking and alarm:
+        weighed = weighed.doubted()
     verdict, candidates = decide(weighed, lacking=lacking, inseparable=never)
     would_decide: tuple[Advice, ...] = ()
     if verdict is Verdict.ONE_OF:

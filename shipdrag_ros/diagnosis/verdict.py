@@ -51,6 +51,18 @@ class Weighed:
         """Probability of something without a name."""
         return self.probability.get(UNNAMED, 0.0)
 
+    def doubted(self) -> Weighed:
+        """
+        Return the same where the best name leaves more than noise.
+
+        Something without a name is then as probable as one must be to be named.
+        """
+        if self.unnamed >= CERTAIN:
+            return self
+        share = (1.0 - CERTAIN) / (1.0 - self.unnamed)
+        scaled = {names: share * p for names, p in self.probability.items()}
+        return Weighed(self.best, {**scaled, UNNAMED: CERTAIN})
+
     def named(self) -> list[tuple[str, ...]]:
         """
         Return what has a name, or is nothing, most probable first.

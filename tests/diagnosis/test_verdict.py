@@ -55,6 +55,15 @@ def test_what_leaves_more_than_noise_is_unknown() -> None:
     assert verdict(*fits, unnamed) is Verdict.UNKNOWN
 
 
+def test_a_doubted_name_gives_way_to_something_unnamed() -> None:
+    sure = weigh([fitted(evidence=-50.0), fitted('current', evidence=0.0)])
+    doubted = sure.doubted()
+    assert doubted.unnamed == pytest.approx(0.9)
+    assert doubted.probability[('current',)] == pytest.approx(0.1)
+    assert sum(doubted.probability.values()) == pytest.approx(1.0)
+    assert doubted.doubted() is doubted
+
+
 def test_twins_are_never_named_alone() -> None:
     fits = fitted(evidence=-50.0), fitted('added_mass', evidence=0.0)
     assert verdict(*fits) is Verdict.ONE_OF
