@@ -133,7 +133,7 @@ def test_without_a_stated_baseline_r_is_written_as_a_table() -> None:
 
 
 def test_fouling_that_the_stated_baseline_hides_is_seen_against_the_learnt_one() -> None:
-    fouled = [coast(scaled(*TRUE), 'fouling=0.2', seed=77)]
+    fouled = [coast(scaled(*TRUE), 'fouling=0.12', seed=77)]
     assert diagnose(fouled, SHIP, PARAMETERS).verdict is Verdict.NONE
     found = diagnose(fouled, learnt(5).ship, PARAMETERS)
     assert found.verdict in (Verdict.NAMED, Verdict.ONE_OF)
