@@ -110,7 +110,8 @@ def _field_end(data: Buffer, field: str, at: int, end: int) -> int:
         data[start:stop].decode()
     elif field == 'm':
         while start < stop:
-            start = _field_end(data, 't', start, stop)
+            # a key, and its value
+            start = _field_end(data, 't', _field_end(data, 't', start, stop), stop)
     elif field in _ENTRY_BYTES and length % _ENTRY_BYTES[field]:
         raise _DoesNotFit
     return stop

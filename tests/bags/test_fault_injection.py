@@ -340,6 +340,16 @@ def test_the_first_chunk_lost_its_topics_are_those_of_the_summary(
     assert {m.topic.rpartition('_')[0] for m in saved.doubtful} == {'/unknown_channel'}
 
 
+def test_a_key_without_its_value_is_damage(samples: dict[str, Sample], tmp_path: Path) -> None:
+    for first in range(0, 600, 3):
+        content = bytearray(samples['zstd'].content)
+        content[first : first + 300] = bytes(300)
+        path = tmp_path / f'{first}.mcap'
+        path.write_bytes(content)
+        with suppress(ShipdragError):
+            recover(path, path.with_name(f'{first}_saved.mcap'))
+
+
 @settings(
     max_examples=150,
     deadline=None,

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.messages import TOPICS, Source, Unreadable, decode
@@ -110,6 +110,9 @@ def test_what_rclpy_sends_is_decoded_the_same(
     reference: Any, source: Source, stamp_ns: int, frame: str, numbers: list[float]
 ) -> None:
     serialization = pytest.importorskip('rclpy.serialization')
+    # the largest of 32 bits are refused by rclpy's own messages, whose limit is rounded down
+    large = [x for x in numbers if np.isfinite(x) and abs(x) > 3.4e38]
+    assume(not (large and source.type == 'sensor_msgs/msg/Range'))
     package, _, name = source.type.split('/')
     kind = getattr(importlib.import_module(f'{package}.msg'), name)
     ours = reference.serialize(
