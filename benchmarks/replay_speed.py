@@ -48,6 +48,7 @@ def main() -> None:
             (Compression.ZSTD, 2, HOUR_S),
             (Compression.ZSTD, 20, HOUR_S),
             (Compression.ZSTD, 1, 48 * HOUR_S),
+            (Compression.ZSTD, 15, 48 * HOUR_S),
         ):
             truth = simulate(
                 ship,

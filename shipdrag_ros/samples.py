@@ -129,6 +129,29 @@ class Block:
         )
 
     @classmethod
+    def of_samples(cls, samples: Sequence[tuple[int, int, int, float, float]]) -> Block:
+        """
+        Build a block of single samples.
+
+        Parameters
+        ----------
+        samples
+            Channel, stamp and arrival [ns], and two values each; the variances
+            are unknown.
+        """
+        if not samples:
+            return cls.empty()
+        channel, stamp_ns, receive_ns, a, b = zip(*samples, strict=True)
+        value = np.array([a, b], np.float64).T
+        return cls(
+            np.array(channel, np.uint8),
+            np.array(stamp_ns, np.int64),
+            np.array(receive_ns, np.int64),
+            np.ascontiguousarray(value),
+            np.full(value.shape, np.nan),
+        )
+
+    @classmethod
     def of(
         cls,
         channel: Channel,

@@ -16,7 +16,6 @@ from fractions import Fraction
 from math import isfinite
 from pathlib import Path
 
-import numpy as np
 import yaml
 
 from shipdrag_ros.bags.columns import InputColumns, TimeColumn
@@ -272,17 +271,7 @@ class _Record:
     def pop(self) -> Block:
         """Return the samples taken since the last time."""
         samples, self._samples = self._samples, []
-        if not samples:
-            return Block.empty()
-        channel, stamp_ns, receive_ns, a, b = zip(*samples, strict=True)
-        value = np.array([a, b], np.float64).T
-        return Block(
-            np.array(channel, np.uint8),
-            np.array(stamp_ns, np.int64),
-            np.array(receive_ns, np.int64),
-            np.ascontiguousarray(value),
-            np.full(value.shape, np.nan),
-        )
+        return Block.of_samples(samples)
 
     def result(self, table: Table) -> ImportResult:
         """Sum up; ImportDataError if there is nothing."""

@@ -11,8 +11,6 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from shipdrag_ros.bags.csv_import import Rejected
 from shipdrag_ros.bags.nmea_clock import GAP_NS, Clock, Moment
 from shipdrag_ros.bags.nmea_log import Sentence
@@ -108,17 +106,7 @@ class Record:
         Return the samples taken since the last time.
         """
         samples, self._samples = self._samples, []
-        if not samples:
-            return Block.empty()
-        channel, stamp_ns, receive_ns, a, b = zip(*samples, strict=True)
-        value = np.array([a, b], np.float64).T
-        return Block(
-            np.array(channel, np.uint8),
-            np.array(stamp_ns, np.int64),
-            np.array(receive_ns, np.int64),
-            np.ascontiguousarray(value),
-            np.full(value.shape, np.nan),
-        )
+        return Block.of_samples(samples)
 
     def _time(self, sentence: Sentence) -> int | None:
         """Return the time of a sentence, None if only the next one tells; NoValue if none."""

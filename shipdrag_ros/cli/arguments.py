@@ -61,6 +61,20 @@ def number(
     return read
 
 
+def add_remap(parser: argparse.ArgumentParser) -> None:
+    """
+    Add `--remap FROM:=TO`.
+    """
+    parser.add_argument(
+        '--remap',
+        action='append',
+        default=[],
+        type=remap,
+        metavar='FROM:=TO',
+        help='hear topic FROM of the bag as input TO; may be given more than once',
+    )
+
+
 def remap(text: str) -> tuple[str, str]:
     """
     Read `from:=to`.

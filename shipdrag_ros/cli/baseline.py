@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli.arguments import add_json, bag, new_file, remap
+from shipdrag_ros.cli.arguments import add_json, add_remap, bag, new_file
 from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, Learnt, learn_baseline
@@ -47,14 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE',
         help='ship file to write, with the learnt baseline',
     )
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        type=remap,
-        metavar='FROM:=TO',
-        help='hear topic FROM of the bag as input TO; may be given more than once',
-    )
+    add_remap(parser)
     add_json(parser)
 
 

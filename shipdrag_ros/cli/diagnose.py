@@ -10,7 +10,7 @@ from pathlib import Path
 from shipdrag_ros.bags import Run, accepted_samples, coast_windows, open_runs, replay
 from shipdrag_ros.bags.playback import SHIP_FILE
 from shipdrag_ros.cli import diagnose_json
-from shipdrag_ros.cli.arguments import add_json, bag, new_file, number, remap, unused_file
+from shipdrag_ros.cli.arguments import add_json, add_remap, bag, new_file, number, unused_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.diagnosis import (
     CoastRun,
@@ -70,14 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar=('START', 'END'),
         help='the coastdown [s from the start of each bag], without looking for one',
     )
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        type=remap,
-        metavar='FROM:=TO',
-        help='hear topic FROM of the bag as input TO; may be given more than once',
-    )
+    add_remap(parser)
     add_json(parser)
 
 

@@ -7,7 +7,7 @@ import argparse
 from typing import Any
 
 from shipdrag_ros.bags import BagInfo, info, open_runs
-from shipdrag_ros.cli.arguments import add_json, bag, remap
+from shipdrag_ros.cli.arguments import add_json, add_remap, bag
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.report import words
 from shipdrag_ros.report.cells import Table
@@ -24,14 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'bags', nargs='+', type=bag, metavar='BAG', help='MCAP file or rosbag2 directory'
     )
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        type=remap,
-        metavar='FROM:=TO',
-        help='hear topic FROM of the bag as input TO; may be given more than once',
-    )
+    add_remap(parser)
     add_json(parser)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from shipdrag_ros.bags import Run, open_runs, replay
 from shipdrag_ros.cli import replay_json, replay_text
-from shipdrag_ros.cli.arguments import add_json, bag, new_file, number, remap
+from shipdrag_ros.cli.arguments import add_json, add_remap, bag, new_file, number
 from shipdrag_ros.cli.output import Output, json_text
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters
@@ -62,14 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='estimate from this part [s from the start of the bag], without looking for a '
         'coastdown',
     )
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        type=remap,
-        metavar='FROM:=TO',
-        help='hear topic FROM of the bag as input TO; may be given more than once',
-    )
+    add_remap(parser)
     parser.add_argument(
         '--compare',
         action='store_true',
