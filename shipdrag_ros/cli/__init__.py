@@ -39,6 +39,7 @@ VERBS = (
     Verb('info', 'info', 'what is in a bag'),
     Verb('check', 'check', 'is a bag sound'),
     Verb('recover', 'recover', 'save what is whole in a damaged bag'),
+    Verb('cable', 'cable', 'drag of a towed cable, and the line that may replace it'),
 )
 
 USER_ERROR = 1

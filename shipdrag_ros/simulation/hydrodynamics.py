@@ -43,9 +43,16 @@ def viscous_n(ship: Ship, speed_m_s: Float64) -> Float64:
 
 def drag_n(ship: Ship, drag_area_m2: float, speed_m_s: Float64) -> Float64:
     """
+    Return 0.5 rho A v^2 [N] in the water of a ship.
+    """
+    return quadratic_n(ship.water.density_kg_m3, drag_area_m2, speed_m_s)
+
+
+def quadratic_n(density_kg_m3: float, drag_area_m2: float, speed_m_s: Float64) -> Float64:
+    """
     Return 0.5 rho A v^2 [N].
     """
-    return 0.5 * ship.water.density_kg_m3 * drag_area_m2 * speed_m_s**2
+    return 0.5 * density_kg_m3 * drag_area_m2 * speed_m_s**2
 
 
 def disc_area_m2(ship: Ship) -> float:

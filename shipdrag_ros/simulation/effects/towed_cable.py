@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.cable import ROPES, QuadraticDrag
 from shipdrag_ros.simulation.effect import (
     AREAS,
     Effect,
@@ -14,14 +14,11 @@ from shipdrag_ros.simulation.effect import (
     Scope,
     log_normal,
 )
-from shipdrag_ros.simulation.hydrodynamics import drag_n
 
 
 def _act(frame: Frame, drag_area_m2: float) -> Action:
-    def resistance(speed: Float64) -> Float64:
-        return drag_n(frame.ship, drag_area_m2, speed)
-
-    return Action(resistance=(resistance,))
+    drag = QuadraticDrag(drag_area_m2, frame.ship.water.density_kg_m3)
+    return Action(resistance=(drag.force_n,))
 
 
 EFFECT = Effect(
@@ -31,7 +28,8 @@ EFFECT = Effect(
         Quantity(
             name='drag_area_m2',
             unit='m^2',
-            meaning='C0 l d of length and diameter; C0 = 0.01..0.04 for ropes',
+            meaning='C0 l d of length and diameter (`shipdrag cable`); '
+            f'C0 = {ROPES[0]:g}..{ROPES[1]:g} for ropes',
             prior=log_normal(2e-3, 0.8),
             low=0.0,
             high=0.5,
