@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Compiled integration of steered ships, one column a set of derivatives.
+
+Sensitivity takes hundreds of manoeuvres that differ in a number or two: they
+are columns of one call.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from shipdrag_ros.samples import Float64
+
+STATES = 7  # of a path: u, v, r, x, y, heading, rudder
+State = tuple[float, float, float, float, float, float, float]
+
+
+class Hull(NamedTuple):
+    """
+    What all columns share.
+
+    Attributes
+    ----------
+    length_m, speed_m_s
+    surge_inertia
+        m' - X'udot.
+    sway_by_y, sway_by_n, yaw_by_y, yaw_by_n
+        Inverse of the inertia in sway and yaw.
+    limit_rad, rate_rad_s, lag_s
+        Rudder machine.
+    """
+
+    length_m: float
+    speed_m_s: float
+    surge_inertia: float
+    sway_by_y: float
+    sway_by_n: float
+    yaw_by_y: float
+    yaw_by_n: float
+    limit_rad: float
+    rate_rad_s: float
+    lag_s: float
+
+
+class Helm(NamedTuple):
+    """
+    What the helmsman does: both manoeuvres are one rule.
+
+    Attributes
+    ----------
+    order_rad
+        Size of each order.
+    reverse_rad
+        Heading at which the order changes sides; infinite: never.
+    first
+        1: first to starboard, -1: to port.
+    attentive
+        True: the order changes at the very moment; else at the next look.
+    step_s
+        Of the integration.
+    """
+
+    order_rad: float
+    reverse_rad: float
+    first: float
+    attentive: bool
+    step_s: float
+
+
+@njit(cache=True)
+def _accelerations(
+    hull: Hull, c: Float64, du: float, v: float, r: float, d: float
+) -> tuple[float, float, float]:
+    """
+    Return du/dt, dv/dt, dr/dt in SI.
+
+    `du` is the change of speed; `c` the derivatives in the order of `FORM`.
+    """
+    square = (hull.speed_m_s + du) ** 2 + v * v
+    speed = np.sqrt(square)
+    u, v, r = du / speed, v / speed, r * hull.length_m / speed
+    vv, uu, dd = v * v, u * u, d * d
+    surge = (
+        u * (c[0] + u * (c[1] + u * c[2]))
+        + vv * c[3]
+        + r * (r * c[4] + v * c[7])
+        + dd * (c[5] + u * c[6])
+        + v * d * (c[8] + u * c[9])
+    )
+    sway = (
+        v * (c[10] + vv * c[12] + u * c[14])
+        + r * (c[11] + vv * c[13] + u * c[15])
+        + d * (c[16] + dd * c[17] + u * c[18] + uu * c[19] + v * d * c[20] + vv * c[21])
+        + (c[22] + u * c[23] + uu * c[24])
+    )
+    yaw = (
+        v * (c[25] + vv * c[27] + u * c[29])
+        + r * (c[26] + vv * c[28] + u * c[30])
+        + d * (c[31] + dd * c[32] + u * c[33] + uu * c[34] + v * d * c[35] + vv * c[36])
+        + (c[37] + u * c[38] + uu * c[39])
+    )
+    force = square / hull.length_m
+    return (
+        force * surge / hull.surge_inertia,
+        force * (hull.sway_by_y * sway + hull.sway_by_n * yaw),
+        force / hull.length_m * (hull.yaw_by_y * sway + hull.yaw_by_n * yaw),
+    )
+
+
+@njit(cache=True)
+def _rudder_rate(hull: Hull, ordered: float, d: float) -> float:
+    rate = (ordered - d) / hull.lag_s
+    return float(min(max(rate, -hull.rate_rad_s), hull.rate_rad_s))
+
+
+@njit(cache=True)
+def _step(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> State:
+    """Return the state a step later."""
+    du, v, r, x, y, heading, d = state
+    e = 0.5 * h
+    du1, v1, r1 = _accelerations(hull, c, du, v, r, d)
+    d1 = _rudder_rate(hull, ordered, d)
+    du2, v2, r2 = _accelerations(hull, c, du + e * du1, v + e * v1, r + e * r1, d + e * d1)
+    d2 = _rudder_rate(hull, ordered, d + e * d1)
+    du3, v3, r3 = _accelerations(hull, c, du + e * du2, v + e * v2, r + e * r2, d + e * d2)
+    d3 = _rudder_rate(hull, ordered, d + e * d2)
+    du4, v4, r4 = _accelerations(hull, c, du + h * du3, v + h * v3, r + h * r3, d + h * d3)
+    d4 = _rudder_rate(hull, ordered, d + h * d3)
+    # no force depends on the place: the midpoint rule is good enough, and cheap
+    middle = heading + e * (r + 0.5 * e * r1)
+    ahead, abeam = hull.speed_m_s + du + e * du2, v + e * v2
+    cos, sin = np.cos(middle), np.sin(middle)
+    return (
+        du + h * (du1 + 2.0 * (du2 + du3) + du4) / 6.0,
+        v + h * (v1 + 2.0 * (v2 + v3) + v4) / 6.0,
+        r + h * (r1 + 2.0 * (r2 + r3) + r4) / 6.0,
+        x + h * (ahead * cos - abeam * sin),
+        y + h * (ahead * sin + abeam * cos),
+        heading + h * (r + h * (r1 + r2 + r3) / 6.0),
+        d + h * (d1 + 2.0 * (d2 + d3) + d4) / 6.0,
+    )
+
+
+@njit(cache=True)
+def _reached(before: State, after: State, heading: float, h: float) -> float:
+    """Return the part of a step after which a heading is reached."""
+    low, high = 0.0, 1.0
+    gain = after[5] - before[5]
+    start, end = h * before[2], h * after[2]
+    rises = gain > 0.0
+    for _ in range(50):
+        p = 0.5 * (low + high)
+        # cubic through headings and yaw rates at both ends
+        q = 1.0 - p
+        at = before[5] + p * p * (3.0 - 2.0 * p) * gain + p * q * (q * start - p * end)
+        if (at >= heading) == rises:
+            high = p
+        else:
+            low = p
+    return high
+
+
+@njit(cache=True)
+def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Float64) -> None:
+    """Fill the path (n, STATES) of one ship, with so many looks between two rows."""
+    state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    side = helm.first
+    order = min(helm.order_rad, hull.limit_rad)
+    for row in range(len(path)):
+        for i in range(STATES):
+            path[row, i] = state[i]
+        if row == len(path) - 1:
+            break
+        for _ in range(looks):
+            if side * state[5] >= helm.reverse_rad:
+                side = -side
+            for _ in range(steps):
+                # the derivatives count a rudder that turns the ship to port positive
+                after = _step(hull, c, state, -side * order, helm.step_s)
+                if helm.attentive and side * after[5] >= helm.reverse_rad:
+                    p = _reached(state, after, side * helm.reverse_rad, helm.step_s)
+                    state = _step(hull, c, state, -side * order, p * helm.step_s)
+                    side = -side
+                    after = _step(hull, c, state, -side * order, (1.0 - p) * helm.step_s)
+                state = after
+
+
+@njit(cache=True)
+def follow_columns(
+    hull: Hull, helm: Helm, derivatives: Float64, steps: int, looks: int, paths: Float64
+) -> None:
+    """
+    Follow ships from steady sailing through one manoeuvre.
+
+    Parameters
+    ----------
+    derivatives : (k, 40)
+        In the order of `FORM`.
+    steps
+        Of the integration between two looks of the helmsman.
+    looks
+        Of the helmsman between two rows of a path.
+    paths : (k, n, STATES)
+        Filled with u, v, r, x, y, heading and rudder angle, u the change of
+        speed; SI.
+
+    Notes
+    -----
+    Runge-Kutta of fourth order.
+    """
+    for column in range(len(derivatives)):
+        _follow(hull, helm, derivatives[column], steps, looks, paths[column])

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Manoeuvres by name, and the figures that published ones have."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.simulation.manoeuvring import (
+    Side,
+    advance_m,
+    mariner,
+    overshoots_rad,
+    parse,
+    steer,
+    tactical_diameter_m,
+    turn,
+    zigzag,
+)
+
+SHIP = mariner()
+
+
+@pytest.mark.parametrize(
+    ('angle', 'to_starboard', 'to_port'), [(15, 6.79, 5.61), (20, 7.79, 6.35), (25, 8.85, 7.01)]
+)
+def test_zigzags_overshoot_as_published_values_let_them(angle, to_starboard, to_port):
+    # first to starboard, the helmsman looks every 0.1 s; a look is worth 0.1 degrees, and the
+    # largest to each side is meant: of 15/15 to starboard the third
+    manoeuvre = zigzag(angle)
+    over = np.degrees(overshoots_rad(steer(SHIP, manoeuvre)[0], manoeuvre))
+    assert max(over[::2]) == pytest.approx(to_starboard, abs=0.06)
+    assert max(over[1::2]) == pytest.approx(to_port, abs=0.06)
+
+
+def test_a_turning_circle_is_as_wide_as_published_values_make_it():
+    motion = steer(SHIP, turn(35.0))[0]
+    assert tactical_diameter_m(motion, turn(35.0)) == pytest.approx(1029.0, abs=1.0)
+    # 566 m count from half a second after the order, 3.9 m later
+    half_a_second_m = motion.position_m[1, 0]
+    assert advance_m(motion, turn(35.0)) - half_a_second_m == pytest.approx(566.0, abs=1.0)
+
+
+def test_to_port_the_ship_turns_wider():
+    wide = turn(35.0, first=Side.PORT)
+    motion = steer(SHIP, wide)[0]
+    assert motion.position_m[100, 1] < 0.0
+    assert 1029.0 < tactical_diameter_m(motion, wide) < 1100.0
+    assert 566.0 < advance_m(motion, wide) < 620.0
+
+
+def test_overshoots_are_of_the_motion_between_its_samples():
+    manoeuvre = zigzag(20.0)
+    coarse = overshoots_rad(steer(SHIP, manoeuvre)[0], manoeuvre)
+    fine = overshoots_rad(steer(SHIP, manoeuvre, sample_s=0.1, samples=6000)[0], manoeuvre)
+    np.testing.assert_allclose(coarse, fine[: len(coarse)], rtol=0, atol=1e-5)
+
+
+def test_a_ship_that_does_not_turn_as_far_has_no_figure():
+    short = steer(SHIP, turn(10.0), samples=20)[0]
+    assert np.isnan(advance_m(short, turn(10.0)))
+    assert np.isnan(tactical_diameter_m(short, turn(10.0)))
+    assert len(overshoots_rad(steer(SHIP, zigzag(15.0), samples=20)[0], zigzag(15.0))) == 0
+
+
+@pytest.mark.parametrize('manoeuvre', [zigzag(15.0), zigzag(7.5), turn(35.0)])
+def test_names_are_read_back(manoeuvre):
+    assert parse(manoeuvre.name) == manoeuvre
+
+
+@pytest.mark.parametrize(
+    'text', ['zigzag', 'zigzag:', 'spiral:10', 'turn:0', 'turn:91', 'zigzag:nan', 'turn:ten', '']
+)
+def test_other_names_are_refused(text):
+    with pytest.raises(SimulationError, match=r'expected zigzag:ANGLE or turn:ANGLE'):
+        parse(text)
