@@ -42,6 +42,10 @@ class ParameterError(ProblemsError):
     """Parameters that are unknown, of the wrong type or out of range."""
 
 
+class DataError(ProblemsError):
+    """A table of measurements to which nothing can be fitted."""
+
+
 class BagError(ShipdragError):
     """A bag that cannot be read or written."""
 

@@ -102,18 +102,23 @@ class OrderTable:
         chance[np.isinf(self.f[1:])] = 0.0
         return np.concatenate([[np.nan], chance])
 
-    def plateau(self) -> int:
+    def plateau(self, *, significance: float | None = None) -> int:
         """
         Return the row of the smallest fit in the plateau of s^2.
+
+        Parameters
+        ----------
+        significance
+            A step less probable than this counts; `SIGNIFICANCE` where not given.
 
         Notes
         -----
         S1 compares neighbours of s^2, S5 raises the degree while the fall is
         substantial. As a test: the smallest fit of which neither of the next
-        `NEIGHBOURS` steps has p < `SIGNIFICANCE`. s^2 falls where F > 1; the
+        `NEIGHBOURS` steps has p < `significance`. s^2 falls where F > 1; the
         test asks for more than chance gives.
         """
-        return int(np.argmax(self._settled))
+        return int(np.argmax(self._settled(significance or SIGNIFICANCE)))
 
     @property
     def plateau_order(self) -> int:
@@ -140,7 +145,7 @@ class OrderTable:
         `IMPLAUSIBLE`, is not the last one.
         """
         plausible = chdtrc(self.freedom, self.sse / variance) >= IMPLAUSIBLE
-        rows = np.flatnonzero(self._settled & plausible)
+        rows = np.flatnonzero(self._settled(SIGNIFICANCE) & plausible)
         return int(rows[0]) if len(rows) else None
 
     def is_below(self, row: int, variance: float) -> bool:
@@ -149,10 +154,9 @@ class OrderTable:
         """
         return bool(chdtr(self.freedom[row], self.sse[row] / variance) < IMPLAUSIBLE)
 
-    @cached_property
-    def _settled(self) -> NDArray[np.bool_]:
-        """(m,) No significant step follows soon; always so of the last fit."""
-        falls = np.concatenate([self.p[1:] < SIGNIFICANCE, np.zeros(NEIGHBOURS, np.bool_)])
+    def _settled(self, significance: float) -> NDArray[np.bool_]:
+        """Say of which fits no significant step follows soon; always so of the last."""
+        falls = np.concatenate([self.p[1:] < significance, np.zeros(NEIGHBOURS, np.bool_)])
         soon: NDArray[np.bool_] = np.any(
             [falls[i : i + len(self.sse)] for i in range(NEIGHBOURS)], axis=0
         )

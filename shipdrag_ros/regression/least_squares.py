@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Least squares on any columns, and what they determine at all.
+
+Columns of shape ratios and their products differ in size by orders, and often
+follow from each other. They are scaled before they are factored; what the data
+leave undetermined is kept apart, and not hidden in arbitrary coefficients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from shipdrag_ros.samples import Float64
+
+RANK_TOLERANCE = 1e-12  # a singular value this small beside the largest is rounding
+
+
+@dataclass(frozen=True)
+class LinearFit:
+    """
+    Coefficients fitted to columns, with what is known of them.
+
+    Attributes
+    ----------
+    coefficients : (p,)
+        The smallest, in scaled columns, where the data leave some open.
+    residuals : (n,)
+        Measured less fitted.
+    scale : (p,)
+        What each column was divided by.
+    singular : (p,)
+        Singular values of the scaled columns, descending.
+    directions : (p, p)
+        Row i: the combination of scaled columns that belongs to `singular[i]`.
+    rank
+        How many combinations of the coefficients the data determine.
+    leverages : (n,)
+        Of the data.
+    """
+
+    coefficients: Float64
+    residuals: Float64
+    scale: Float64
+    singular: Float64
+    directions: Float64
+    rank: int
+    leverages: Float64
+
+    @cached_property
+    def sse(self) -> float:
+        """Sum of squared residuals."""
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the residuals."""
+        return len(self.residuals) - self.rank
+
+    @property
+    def variance(self) -> float:
+        """s^2 of S1 (11); NaN without a degree of freedom."""
+        return self.sse / self.freedom if self.freedom else float('nan')
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the scaled columns; infinite where one vanishes."""
+        least = float(self.singular[-1])
+        return float(self.singular[0]) / least if least > 0.0 else float('inf')
+
+    @cached_property
+    def covariance(self) -> Float64:
+        """(p, p) Of the coefficients; of its determined part where `rank` < p."""
+        root = self._root / self.scale
+        product: Float64 = self.variance * (root.T @ root)
+        return product
+
+    def predict(self, columns: Float64) -> Float64:
+        """
+        Return fitted values of (m, p) columns.
+        """
+        values: Float64 = columns @ self.coefficients
+        return values
+
+    def leverage(self, columns: Float64) -> Float64:
+        """
+        Return x' (X'X)^+ x of (m, p) columns.
+
+        Notes
+        -----
+        Times s^2 it is the variance of the fitted value. Montgomery, Peck and
+        Vining, Introduction to Linear Regression Analysis, on hidden
+        extrapolation: beyond the largest of the data a prediction is one.
+        """
+        size: Float64 = np.sum((columns / self.scale @ self._root.T) ** 2, axis=1)
+        return size
+
+    def undetermined(self, columns: Float64) -> Float64:
+        """
+        Return which part, 0..1, of (m, p) columns the data leave open.
+
+        Any such part makes the value arbitrary.
+        """
+        scaled = columns / self.scale
+        open_part = scaled @ self.directions[self.rank :].T
+        size = np.maximum(np.linalg.norm(scaled, axis=1), np.finfo(np.float64).tiny)
+        share: Float64 = np.linalg.norm(open_part, axis=1) / size
+        return share
+
+    @cached_property
+    def _root(self) -> Float64:
+        """(rank, p) R with R'R the pseudo-inverse of the scaled products."""
+        root: Float64 = self.directions[: self.rank] / self.singular[: self.rank, None]
+        return root
+
+
+def least_squares(columns: Float64, values: Float64) -> LinearFit:
+    """
+    Fit coefficients to columns.
+
+    Parameters
+    ----------
+    columns : (n, p)
+        One column a coefficient.
+    values : (n,)
+        Measured.
+
+    Raises
+    ------
+    ValueError
+        If the sizes differ or something is not finite.
+
+    Notes
+    -----
+    QR of the columns scaled to length 1, then singular values of the small
+    triangle; the normal equations, which square the condition, are not formed.
+    """
+    if columns.ndim != 2 or columns.shape[:1] != values.shape or not columns.size:
+        raise ValueError(f'columns {columns.shape} and values {values.shape}, expected n x p, n')
+    if not (np.isfinite(columns).all() and np.isfinite(values).all()):
+        raise ValueError('columns or values are not all finite')
+    size = np.linalg.norm(columns, axis=0)
+    scale = np.where(size > 0.0, size, 1.0)
+    q, upper = np.linalg.qr(columns / scale)
+    left, some, directions = np.linalg.svd(upper, full_matrices=True)
+    singular = np.zeros(columns.shape[1])
+    singular[: len(some)] = some
+    rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
+    basis = q @ left[:, :rank]
+    onto = basis.T @ values
+    residuals = values - basis @ onto
+    # a second projection takes what rounding has left of the first
+    again = basis.T @ residuals
+    residuals -= basis @ again
+    solved = directions[:rank].T @ ((onto + again) / singular[:rank])
+    return LinearFit(
+        coefficients=solved / scale,
+        residuals=residuals,
+        scale=scale,
+        singular=singular,
+        directions=directions,
+        rank=rank,
+        leverages=np.sum(basis * basis, axis=1),
+    )

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Polynomials in several variables: compiled values, derivatives, raw powers.
+
+Variables are centred and scaled to [-1, 1] inside. Powers of raw degrees or
+Reynolds numbers would lose the digits that high degrees need.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import comb
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from shipdrag_ros.samples import Float64
+
+Powers = NDArray[np.int64]
+
+
+def terms_up_to(degree: int, most: Sequence[int]) -> Powers:
+    """
+    Return the powers of all terms up to a total degree.
+
+    Parameters
+    ----------
+    degree
+        Largest sum of the powers of a term.
+    most : (d,)
+        Largest power of each variable.
+
+    Returns
+    -------
+    (terms, d) int64
+        By ascending degree: those of a lower degree come first.
+    """
+    each = [range(min(degree, limit), -1, -1) for limit in most]
+    found = [powers for powers in product(*each) if sum(powers) <= degree]
+    return np.array(sorted(found, key=sum), np.int64).reshape(-1, len(most))
+
+
+@njit('f8[:, ::1](f8[:, ::1], i8[:, ::1], f8[::1])', cache=True)
+def _evaluate(points: Float64, powers: Powers, coefficients: Float64) -> Float64:
+    """Return value and derivatives, (m, 1 + d), at scaled points."""
+    count, variables = points.shape
+    highest = powers.max()
+    result = np.zeros((count, 1 + variables))
+    table = np.ones((variables, highest + 1))
+    for i in range(count):
+        for j in range(variables):
+            for k in range(highest):
+                table[j, k + 1] = table[j, k] * points[i, j]
+        for t in range(len(coefficients)):
+            term = coefficients[t]
+            for j in range(variables):
+                term *= table[j, powers[t, j]]
+            result[i, 0] += term
+            for j in range(variables):
+                power = powers[t, j]
+                if power > 0:
+                    slope = coefficients[t] * power * table[j, power - 1]
+                    for k in range(variables):
+                        if k != j:
+                            slope *= table[k, powers[t, k]]
+                    result[i, 1 + j] += slope
+    return result
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """
+    A polynomial in scaled variables z = (x - centre) / half.
+
+    Attributes
+    ----------
+    powers : (terms, d) int64
+        Of the scaled variables, in each term.
+    coefficients : (terms,)
+        Of the scaled terms.
+    centre, half : (d,)
+        Middle and half width of each variable.
+    """
+
+    powers: Powers
+    coefficients: Float64
+    centre: Float64
+    half: Float64
+
+    def __call__(self, points: Float64) -> Float64:
+        """
+        Return the values at (m, d) points.
+        """
+        values: Float64 = self._at(points)[:, 0].copy()
+        return values
+
+    def gradient(self, points: Float64) -> Float64:
+        """
+        Return the derivatives by each variable at (m, d) points; (m, d).
+        """
+        slopes: Float64 = self._at(points)[:, 1:] / self.half
+        return slopes
+
+    def _at(self, points: Float64) -> Float64:
+        scaled = np.ascontiguousarray((points - self.centre) / self.half)
+        result: Float64 = _evaluate(scaled, self.powers, self.coefficients)
+        return result
+
+    def raw(self) -> Float64:
+        """
+        Return the matrix from scaled coefficients to those of raw powers.
+
+        Returns
+        -------
+        (terms, terms)
+            Rows in the order of `powers`, now of the variables themselves.
+
+        Notes
+        -----
+        ((x - c) / h)^p = sum_k binomial(p, k) x^k (-c)^(p - k) / h^p.
+        """
+        result = np.zeros((len(self.powers), len(self.powers)))
+        for column, high in enumerate(self.powers):
+            for row, low in enumerate(self.powers):
+                if np.all(low <= high):
+                    result[row, column] = np.prod(
+                        [
+                            comb(p, k) * (-c) ** (p - k) / h**p
+                            for p, k, c, h in zip(
+                                high.tolist(), low.tolist(), self.centre, self.half
+                            )
+                        ]
+                    )
+        return result
+
+    def source(self, name: str, inputs: Sequence[str], note: str) -> str:
+        """
+        Return a plain Python function of this polynomial, as text.
+
+        Parameters
+        ----------
+        name
+            Of the function.
+        inputs : (d,)
+            Names of its arguments, floats or arrays.
+        note
+            A line for its docstring.
+
+        Notes
+        -----
+        Powers of each variable are computed once, then summed by terms.
+        """
+        lines = [f'def {name}({", ".join(inputs)}):', f'    """{note}"""']
+        for j, each in enumerate(inputs):
+            scaled = f'({each} - {float(self.centre[j])!r}) / {float(self.half[j])!r}'
+            lines.append(f'    _z{j}_1 = {scaled}')
+            lines += [
+                f'    _z{j}_{power} = _z{j}_{power - 1} * _z{j}_1'
+                for power in range(2, int(self.powers[:, j].max()) + 1)
+            ]
+        terms = [
+            ' * '.join(
+                [repr(float(value))]
+                + [f'_z{j}_{power}' for j, power in enumerate(powers) if power > 0]
+            )
+            for powers, value in zip(self.powers, self.coefficients)
+        ]
+        lines += ['    return (', *(f'        + {term}' for term in terms), '    )']
+        return '\n'.join(lines) + '\n'
+
+
+def monomials(scaled: Float64, powers: Powers) -> Float64:
+    """
+    Return the terms, (m, terms), at (m, d) scaled points.
+    """
+    columns: Float64 = np.prod(scaled[:, None, :] ** powers, axis=2)
+    return columns
