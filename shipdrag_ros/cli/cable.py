@@ -21,15 +21,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'speeds in which its tangent at V0 may replace it. C0 is that of a smooth cylinder of '
         'the same length over diameter, unless --rough or --c0 is given.'
     )
-    for name, meaning, unit in (
-        ('--length', 'length of the cable', 'm'),
-        ('--diameter', 'diameter of the cable', 'm'),
-        ('--speed', 'V0, the speed of towing', 'm/s'),
+    for name, meaning, unit, most in (
+        ('--length', 'length of the cable', 'm', 1e6),
+        ('--diameter', 'diameter of the cable', 'm', 10.0),
+        ('--speed', 'V0, the speed of towing', 'm/s', 40.0),
     ):
         parser.add_argument(
             name,
             required=True,
-            type=number(0.0, unit=unit, above=True),
+            type=number(0.0, most, unit=unit, above=True),
             metavar='V0' if name == '--speed' else 'M',
             help=f'{meaning} [{unit}]',
         )
@@ -44,14 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     surface.add_argument(
         '--c0',
-        type=number(0.0, above=True),
+        type=number(0.0, 10.0, above=True),
         metavar='X',
         dest='drag',
         help='C0 on length times diameter [-]; ropes have 0.01 to 0.04',
     )
     parser.add_argument(
         '--tolerance',
-        type=number(0.0, above=True),
+        type=number(0.0, 10.0, above=True),
         default=0.1,
         metavar='X',
         help='relative error that the tangent may have [-]',

@@ -159,7 +159,8 @@ class Cable:
             )
             if not (isinstance(value, Surface) or 0.0 < value < math.inf)
         ]
-        if not problems and not self.slenderness > SHORTEST and isinstance(self.drag, Surface):
+        known = problems or SHORTEST < self.slenderness < math.inf
+        if isinstance(self.drag, Surface) and not known:
             problems.append(
                 f'length over diameter is {self.slenderness:.4g}, and C0 of a {self.drag} one '
                 f'is known above {SHORTEST:g}; state C0 (--c0)'

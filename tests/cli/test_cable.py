@@ -91,7 +91,7 @@ def test_the_page_shows_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('name', ['--length', '--diameter', '--speed', '--c0', '--tolerance'])
-@pytest.mark.parametrize('value', ['0', '-1', 'nan', 'inf', 'x'])
+@pytest.mark.parametrize('value', ['0', '-1', 'nan', 'inf', '1e300', 'x'])
 def test_impossible_values_are_wrong_usage(
     name: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

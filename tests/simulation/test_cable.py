@@ -77,7 +77,9 @@ def test_a_longer_cable_has_a_smaller_coefficient_and_more_drag(surface, a, b):
 @FEW
 @given(slenderness=SLENDERNESS)
 def test_a_rough_cable_has_more(slenderness):
-    rough, smooth = (drag_coefficient(slenderness, surface) for surface in ('rough', 'smooth'))
+    rough, smooth = (
+        drag_coefficient(slenderness, surface) for surface in (Surface.ROUGH, Surface.SMOOTH)
+    )
     assert rough > smooth
 
 
@@ -219,6 +221,8 @@ def test_all_impossible_values_are_told_at_once():
         assert part in str(told.value)
     with pytest.raises(SimulationError, match='length_m is inf'):
         Cable(math.inf, 0.1, Surface.ROUGH)
+    with pytest.raises(SimulationError, match='length over diameter is inf'):
+        Cable(1e200, 1e-200, Surface.ROUGH)
 
 
 @SURFACE
