@@ -64,3 +64,7 @@ class SimulationError(ShipdragError):
 
 class DiagnosisError(ShipdragError):
     """Runs, or a ship file, from which no effect can be named."""
+
+
+class SensitivityError(ShipdragError):
+    """A question of what matters that cannot be answered."""
