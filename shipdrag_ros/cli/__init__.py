@@ -35,6 +35,7 @@ VERBS = (
     Verb('simulate', 'simulate', 'simulated coastdown with sensors, as a bag'),
     Verb('baseline', 'baseline', 'learn the baseline, and how far runs scatter, from clean runs'),
     Verb('diagnose', 'diagnose', 'where model and data disagree, and which effect is missing'),
+    Verb('residual', 'residual', 'residual resistance from ratios of the hull, guarded'),
     Verb('surface', 'surface', 'polynomial surface of coefficients, with the degree they show'),
     Verb('import', 'import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
     Verb('info', 'info', 'what is in a bag'),
