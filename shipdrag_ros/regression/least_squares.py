@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from shipdrag_ros.regression.triangle import triangle
 from shipdrag_ros.samples import Float64
 
 RANK_TOLERANCE = 1e-12  # a singular value this small beside the largest is rounding
@@ -144,18 +145,18 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
         raise ValueError('columns or values are not all finite')
     size = np.linalg.norm(columns, axis=0)
     scale = np.where(size > 0.0, size, 1.0)
-    q, upper = np.linalg.qr(columns / scale)
-    left, some, directions = np.linalg.svd(upper, full_matrices=True)
-    singular = np.zeros(columns.shape[1])
-    singular[: len(some)] = some
+    scaled = columns / scale
+    factor = triangle(np.column_stack([scaled, values]))
+    left, singular, directions = np.linalg.svd(factor[:-1, :-1])
     rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
-    basis = q @ left[:, :rank]
-    onto = basis.T @ values
-    residuals = values - basis @ onto
-    # a second projection takes what rounding has left of the first
-    again = basis.T @ residuals
-    residuals -= basis @ again
-    solved = directions[:rank].T @ ((onto + again) / singular[:rank])
+    root = directions[:rank] / singular[:rank, None]
+    solved = root.T @ (left[:, :rank].T @ factor[:-1, -1])
+    residuals = values - scaled @ solved
+    # a second time on what is left: rounding in it would look like a misfit
+    factor = triangle(np.column_stack([scaled, residuals]))
+    solved += root.T @ (left[:, :rank].T @ factor[:-1, -1])
+    residuals = values - scaled @ solved
+    basis = scaled @ root.T
     return LinearFit(
         coefficients=solved / scale,
         residuals=residuals,

@@ -27,7 +27,7 @@ def triangle(rows: Float64) -> Float64:
     Parameters
     ----------
     rows : (n, k)
-        At most 64 columns.
+        With more than 64 columns the last bit may depend on the threads of BLAS.
 
     Returns
     -------
@@ -39,14 +39,13 @@ def triangle(rows: Float64) -> Float64:
     Householder on blocks of rows, then on the stacked factors.
     """
     k = rows.shape[1]
-    if 2 * k > _BLOCK:
-        raise ValueError(f'{k} columns, expected at most {_BLOCK // 2}')
+    block = max(_BLOCK, 2 * k)
     householder: Any = np.linalg.qr  # numpy's types do not know that mode 'r' gives one array
-    while len(rows) > _BLOCK:
-        blocks = -(-len(rows) // _BLOCK)
-        padded = np.zeros((blocks * _BLOCK, k))
+    while len(rows) > block:
+        blocks = -(-len(rows) // block)
+        padded = np.zeros((blocks * block, k))
         padded[: len(rows)] = rows
-        rows = householder(padded.reshape(blocks, _BLOCK, k), mode='r').reshape(-1, k)
+        rows = householder(padded.reshape(blocks, block, k), mode='r').reshape(-1, k)
     if len(rows) < k:
         rows = np.concatenate([rows, np.zeros((k - len(rows), k))])
     factor: Float64 = householder(rows, mode='r')
