@@ -37,6 +37,7 @@ VERBS = (
     Verb('diagnose', 'diagnose', 'where model and data disagree, and which effect is missing'),
     Verb('residual', 'residual', 'residual resistance from ratios of the hull, guarded'),
     Verb('surface', 'surface', 'polynomial surface of coefficients, with the degree they show'),
+    Verb('sensitivity', 'sensitivity', 'which derivatives or values of a ship file matter'),
     Verb('import', 'import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
     Verb('info', 'info', 'what is in a bag'),
     Verb('check', 'check', 'is a bag sound'),

@@ -75,17 +75,16 @@ class Losses:
 
     @property
     def mean(self) -> Float64:
-        """Mean loss of each parameter over its changes that can be simulated (p,)."""
-        known = np.isfinite(self.table)
-        total = np.where(known, self.table, 0.0).sum(axis=1)
-        count = known.sum(axis=1)
-        return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+        """Mean loss of each parameter (p,), over the changes that all of them bear."""
+        common = np.isfinite(self.table).all(axis=0)
+        if not common.any():
+            return np.full(len(self.names), np.nan)
+        return np.asarray(self.table[:, common].mean(axis=1))
 
     @property
     def ranking(self) -> tuple[str, ...]:
-        """Names, the largest mean loss first; those without any are last."""
-        order = np.argsort(-np.nan_to_num(self.mean, nan=-1.0), kind='stable')
-        return tuple(self.names[i] for i in order)
+        """Names, the largest mean loss first."""
+        return tuple(self.names[i] for i in np.argsort(-self.mean, kind='stable'))
 
     def select(self, count: int) -> Selection:
         """
@@ -94,8 +93,14 @@ class Losses:
         Raises
         ------
         SensitivityError
-            If there are not so many.
+            If there are not so many, or no change can be simulated of all.
         """
+        if np.isnan(self.mean[0]):
+            lost = ~np.isfinite(self.table)
+            names = ', '.join(name for name, row in zip(self.names, lost) if row.any())
+            raise SensitivityError(
+                f'{names}: no change can be simulated of all parameters; choose a milder manoeuvre'
+            )
         if not 1 <= count <= len(self.names):
             raise SensitivityError(
                 f'keep is {count!r}, expected 1..{len(self.names)}, the number of parameters'

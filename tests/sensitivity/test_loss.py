@@ -102,18 +102,24 @@ def test_so_many_cannot_be_kept(count):
         losses(CHANGES).select(count)
 
 
-def test_what_cannot_be_simulated_is_left_out_and_ranks_last():
+def test_the_mean_is_over_changes_that_all_parameters_bear():
     def breaking(sets):
         motions = swinging(sets)
         motions[sets[:, 2] > 0.4] = np.nan
-        motions[sets[:, 0] != 2.0] = np.nan
         return motions
 
     found = vary(breaking, NAMES, VALUES, relative(NAMES, VALUES)).losses()
-    assert np.isnan(found.table[2]).tolist() == [False, False, True, False]
-    assert found.mean[2] == pytest.approx(np.nanmean(found.table[2]))
-    assert np.isnan(found.mean[0])
-    assert found.ranking[-1] == 'size'
+    assert np.argwhere(np.isnan(found.table)).tolist() == [[2, 2]]
+    np.testing.assert_allclose(found.mean, found.table[:, [0, 1, 3]].mean(axis=1))
+
+    def broken(sets):
+        motions = swinging(sets)
+        motions[sets[:, 0] != 2.0] = np.nan
+        return motions
+
+    lost = vary(broken, NAMES, VALUES, relative(NAMES, VALUES)).losses()
+    with pytest.raises(SensitivityError, match='size: no change can be simulated of all'):
+        lost.select(1)
 
 
 def test_a_step_that_is_not_a_number_is_not_made():
