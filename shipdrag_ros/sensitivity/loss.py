@@ -21,6 +21,7 @@ from shipdrag_ros.samples import Float64
 Simulator = Callable[[Float64], Float64]
 
 CHANGES = (0.1, -0.1, 0.5, -0.5)  # of a parameter, relative
+_ROUNDING = 1e-12
 
 
 class Norm(StrEnum):
@@ -228,11 +229,14 @@ def own_share(slopes: Float64) -> Float64:
     """
     size = np.linalg.norm(slopes, axis=1)
     seen = size > 0.0
-    unit = slopes[seen] / size[seen, None]
-    triangle = np.asarray(np.linalg.qr(unit.T, mode='r'), np.float64)
     shares = np.zeros(len(slopes))
-    for place, i in enumerate(np.flatnonzero(seen)):
-        others = np.delete(triangle, place, axis=1)
-        mixture = np.linalg.lstsq(others, triangle[:, place], rcond=None)[0]
-        shares[i] = np.linalg.norm(triangle[:, place] - others @ mixture)
+    if seen.any():
+        unit = slopes[seen] / size[seen, None]
+        triangle = np.asarray(np.linalg.qr(unit.T, mode='r'), np.float64)
+        # 1 over the square of a share is the diagonal of the inverse of what unit responses have
+        # in common; directions below the rounding of their sums are no directions
+        _, found, axes = np.linalg.svd(triangle)
+        lengths = np.full(len(axes), _ROUNDING * found[0])
+        lengths[: len(found)] = np.maximum(found, lengths[0])
+        shares[seen] = 1.0 / np.linalg.norm(axes.T / lengths, axis=1)
     return shares

@@ -146,8 +146,13 @@ def test_slopes_are_those_of_opposite_steps():
 def test_own_share_of_known_vectors():
     x, y, z = np.eye(3)
     shares = own_share(np.array([x, x + y, 5.0 * z, 0.0 * x]))
-    np.testing.assert_allclose(shares, [np.sqrt(0.5), np.sqrt(0.5), 1.0, 0.0], atol=1e-12)
-    np.testing.assert_allclose(own_share(np.array([x, -2.0 * x, y])), [0.0, 0.0, 1.0], atol=1e-12)
+    np.testing.assert_allclose(shares, [np.sqrt(0.5), np.sqrt(0.5), 1.0, 0.0], atol=1e-11)
+    np.testing.assert_allclose(own_share(np.array([x, -2.0 * x, y])), [0.0, 0.0, 1.0], atol=1e-11)
+
+    # more parameters than numbers: each is a mixture of the others
+    crowded = own_share(np.array([x[:2], y[:2], (x + y)[:2]]))
+    np.testing.assert_allclose(crowded, 0.0, atol=1e-11)
+    np.testing.assert_array_equal(own_share(np.zeros((2, 5))), 0.0)
 
 
 @settings(max_examples=30, deadline=None)
