@@ -2,7 +2,7 @@
 """Residual resistance from shape: the forms of S4, and where they may not be used."""
 
 from shipdrag_ros.residual.baseline import with_residual
-from shipdrag_ros.residual.fit import AUTO, ResidualFit, fit_residual, leave_hulls_out
+from shipdrag_ros.residual.fit import AUTO, ResidualFit, fit_form, fit_residual, leave_hulls_out
 from shipdrag_ros.residual.forms import FORMS, Form
 from shipdrag_ros.residual.hulls import OPTIONAL, REQUIRED, Hulls
 
@@ -14,6 +14,7 @@ __all__ = [
     'Form',
     'Hulls',
     'ResidualFit',
+    'fit_form',
     'fit_residual',
     'leave_hulls_out',
     'with_residual',

@@ -47,6 +47,8 @@ class ResidualFit:
         Hull of the data in the form's ratios.
     spread
         By what factor hulls that were left out miss their standard deviation.
+    left_out
+        Mean square error on them; infinite where the others foretell none.
     notes
         What a reader must know, a sentence each.
     """
@@ -57,6 +59,7 @@ class ResidualFit:
     fit: LinearFit
     domain: Domain
     spread: float
+    left_out: float
     notes: tuple[str, ...]
 
     @property
@@ -144,13 +147,13 @@ def fit_residual(hulls: Hulls, values: Float64, *, form: str) -> ResidualFit:
     S4 (1) to (3), least squares with scaled columns.
     """
     if form != AUTO:
-        return _fit(FORMS[form], hulls, values)[0]
+        return fit_form(FORMS[form], hulls, values)
     fits = [
-        _fit(each, hulls, values)
+        fit_form(each, hulls, values)
         for each in FORMS.values()
         if hulls.lcb is not None or not each.needs_lcb
     ]
-    return min(fits, key=lambda pair: (pair[1], pair[0].fit.variance))[0]
+    return min(fits, key=lambda found: (found.left_out, found.fit.variance))
 
 
 def leave_hulls_out(form: Form, hulls: Hulls, values: Float64) -> tuple[Float64, Float64, Float64]:
@@ -182,8 +185,10 @@ def leave_hulls_out(form: Form, hulls: Hulls, values: Float64) -> tuple[Float64,
     return error, sd, leverage
 
 
-def _fit(form: Form, hulls: Hulls, values: Float64) -> tuple[ResidualFit, float]:
-    """Fit one form; return it with its mean square error on hulls left out."""
+def fit_form(form: Form, hulls: Hulls, values: Float64) -> ResidualFit:
+    """
+    Fit any form that is linear in its coefficients; see `fit_residual`.
+    """
     fit = least_squares(form.columns(hulls), values)
     if fit.freedom < 1:
         raise DataError(
@@ -197,7 +202,7 @@ def _fit(form: Form, hulls: Hulls, values: Float64) -> tuple[ResidualFit, float]
     error, sd, _ = leave_hulls_out(form, hulls, values)
     known = np.isfinite(error) & (sd > 0.0)
     hulls_known = len(np.unique(hulls.groups()[known]))
-    spread = 1.0
+    spread, left_out = 1.0, float('inf')
     notes = []
     if fit.rank < len(fit.coefficients):
         notes.append(
@@ -206,6 +211,7 @@ def _fit(form: Form, hulls: Hulls, values: Float64) -> tuple[ResidualFit, float]
         )
     if hulls_known >= _ENOUGH:
         spread = max(1.0, float(np.sqrt(np.mean((error[known] / sd[known]) ** 2))))
+        left_out = float(np.mean(error[known] ** 2))
     else:
         notes.append(
             'How far a new hull is off is not known: too few hulls can be foretold from the '
@@ -220,8 +226,13 @@ def _fit(form: Form, hulls: Hulls, values: Float64) -> tuple[ResidualFit, float]
             f'{hulls.contradictions} row(s) state C_B and slenderness that contradict each '
             'other; both are used as they are.'
         )
-    found = ResidualFit(
-        form, hulls, count, fit, Domain.of(form.variables, form.place(hulls)), spread, tuple(notes)
+    return ResidualFit(
+        form=form,
+        hulls=hulls,
+        count=count,
+        fit=fit,
+        domain=Domain.of(form.variables, form.place(hulls)),
+        spread=spread,
+        left_out=left_out,
+        notes=tuple(notes),
     )
-    score = float(np.mean(error[known] ** 2)) if hulls_known >= _ENOUGH else np.inf
-    return found, score
