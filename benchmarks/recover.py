@@ -11,7 +11,8 @@ told as `partly`. `false` are messages in the sound bag that nobody wrote: witho
 checksum a flipped payload cannot be told. Seed 1.
 
 Then bags of 50 000 to 400 000 messages: process CPU time, best of two, and the growth of
-the memory in a process of its own.
+the memory in a process of its own; and that growth on bags of 10, 50 and 200 MB, sound and
+with a bit flipped in the middle.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from shipdrag_ros.samples import Block, Channel, in_arrival_order
 SEED = 1
 MESSAGES = 400
 SECTOR_BYTES = 512
+PAYLOAD_BYTES = 4000
 START_NS = 1_700_000_000 * 10**9
 WRITERS: dict[str, dict[str, Any]] = {
     'zstd': {'compression': CompressionType.ZSTD, 'chunk_size': 4096},
@@ -289,6 +291,34 @@ def cost(sizes: tuple[int, ...], folder: Path) -> None:
         print(f'{"":10}' + ''.join(f'{each:12}' for each in megabytes[name]) + '  MB more')
 
 
+def memory(sizes_mb: tuple[int, ...], folder: Path) -> None:
+    """Print by how much the memory grows, by the size of the bag."""
+    rng = random.Random(SEED)
+    print(f'\n{"MB more":20}' + ''.join(f'{size:>12}' for size in sizes_mb) + '  MB')
+    rows: dict[str, list[int]] = {}
+    for size_mb in sizes_mb:
+        path = folder / f'{size_mb}_mb.mcap'
+        with BagWriter(path) as bag:
+            for number in range(size_mb * 10**6 // PAYLOAD_BYTES):
+                log_ns = START_NS + number * 10**6
+                payload = rng.randbytes(PAYLOAD_BYTES)
+                bag.write(
+                    '/cloud', 'std_msgs/msg/String', payload, log_ns=log_ns, publish_ns=log_ns
+                )
+        for state in ('sound', 'damaged'):
+            if state == 'damaged':
+                with path.open('r+b') as file:
+                    file.seek(size_mb * 10**6 // 2)
+                    byte = file.read(1)[0]
+                    file.seek(-1, 1)
+                    file.write(bytes([byte ^ 1]))
+            for name, use in (('check', _look), ('recover', _save)):
+                rows.setdefault(f'{name}, {state}', []).append(_measured(use, path)[1])
+        path.unlink()
+    for name, grown in rows.items():
+        print(f'{name:20}' + ''.join(f'{each:12}' for each in grown))
+
+
 def _read(path: Path) -> None:
     for run in open_runs([path]):
         for _ in run.inputs():
@@ -299,10 +329,15 @@ def _check(path: Path) -> None:
     assert check([path])[0].sound
 
 
+def _look(path: Path) -> None:
+    check([path])
+
+
 def _save(path: Path) -> None:
-    output = path.with_suffix('.saved.mcap')
-    recover(path, output)
-    output.unlink()
+    result = recover(path, path.with_suffix('.saved.mcap'))
+    result.output.unlink()
+    if result.quarantine is not None:
+        result.quarantine.unlink()
 
 
 def _measured(use: Callable[[Path], Any], path: Path) -> tuple[float, int]:
@@ -326,7 +361,7 @@ def _measured(use: Callable[[Path], Any], path: Path) -> tuple[float, int]:
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
     parser.add_argument('--quick', action='store_true', help='few damages, small bags')
     quick = parser.parse_args().quick
@@ -334,6 +369,7 @@ def main() -> None:
         salvage(2 if quick else 15, Path(name))
         _read_once(Path(name))
         cost((5000, 10_000) if quick else (50_000, 100_000, 200_000, 400_000), Path(name))
+        memory((10, 50) if quick else (10, 50, 200), Path(name))
 
 
 def _read_once(folder: Path) -> None:

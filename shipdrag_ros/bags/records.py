@@ -150,7 +150,9 @@ def checksum(data: Buffer, start: int, end: int) -> int:
     """
     value = 0
     for at in range(start, end, _PIECE_BYTES):
-        value = zlib.crc32(data[at : min(at + _PIECE_BYTES, end)], value)
+        piece_end = min(at + _PIECE_BYTES, end)
+        value = zlib.crc32(data[at:piece_end], value)
+        release(data, at, piece_end)
     return value
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
@@ -31,6 +32,7 @@ from shipdrag_ros.bags.records import (
 from shipdrag_ros.bags.salvaged_bag import SalvagedBag
 from shipdrag_ros.bags.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
 from shipdrag_ros.bags.unpack import opened, unpack_chunk_partly
+from shipdrag_ros.bags.whole_chunk import read_whole
 from shipdrag_ros.errors import BagError
 
 # with one of these, or none, the record itself is whole
@@ -212,6 +214,8 @@ class _Salvage:
         elif kind is None:
             trust = Trust.READ
         records = unpacked.records
+        if kind is None and self._take_whole(records, trust):
+            return
         used = 0
         for found in self._scanner.walk(records, 0, len(records), in_chunk=True):
             if found.damage is not None and trust is not Trust.DOUBTFUL:
@@ -223,6 +227,23 @@ class _Salvage:
                 self._record(records, found, believed, chunk.offset)
         packed = chunk.end - chunk.start - unpacked.unread
         self.lost += unpacked.unread + packed * (len(records) - used) // max(len(records), 1)
+
+    def _take_whole(self, records: bytes, trust: Trust) -> bool:
+        """Write all of a sound chunk at once; False where it has to be taken apart."""
+        whole = None if self._bag.message_compression else read_whole(records)
+        if whole is None:
+            return False
+        for found in whole.declarations:
+            if not self._learnt.add(found.read(records), trust):
+                return False
+        if not np.isin(whole.channel, list(self._learnt.channels)).all():
+            return False
+        for found in whole.declarations:
+            self._scanner.noted(records, found)
+        if len(whole.channel):
+            self._scanner.noted(records, whole.last_message(records))
+            self.sound.write_chunk(records, whole)
+        return True
 
     def _record(self, data: Buffer, found: Found, trust: Trust, offset: int) -> None:
         bag = self.doubtful if trust is Trust.DOUBTFUL else self.sound

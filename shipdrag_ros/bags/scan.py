@@ -26,6 +26,7 @@ from shipdrag_ros.bags.records import (
     Buffer,
     attachment_agrees,
     read_record,
+    release,
 )
 
 MAGIC_PLACE = -1
@@ -118,6 +119,7 @@ class Scanner:
                 held, here = self._damaged(data, at, end, kinds, held)
             if held is not None:
                 yield self.noted(data, held)
+                release(data, held.offset, held.end)
             held, at = here, here.end
         if held is not None:
             yield self.noted(data, held)

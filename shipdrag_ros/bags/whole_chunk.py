@@ -14,7 +14,7 @@ import numpy as np
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
-from shipdrag_ros.bags.layout import fits
+from shipdrag_ros.bags.layout import fills
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import HEAD, MESSAGE_HEAD
 from shipdrag_ros.bags.scan import Found
@@ -41,6 +41,14 @@ class WholeChunk(NamedTuple):
     entries: Int64
     declarations: tuple[Found, ...]
 
+    def last_message(self, records: bytes) -> Found:
+        """
+        Return the last message, of which there must be one.
+        """
+        at = int(self.entries[-1, 1])
+        start = at + HEAD.size
+        return Found(Opcode.MESSAGE, at, start, start + HEAD.unpack_from(records, at)[1])
+
 
 def read_whole(records: bytes) -> WholeChunk | None:
     """
@@ -63,7 +71,7 @@ def _is_in_place(records: bytes, found: Found, messages: Messages) -> bool:
     """Say whether a record is a schema, or a channel before its messages."""
     if found.opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
         return False
-    if not fits(records, found.opcode, found.start, found.end):
+    if not fills(records, found.opcode, found.start, found.end):
         return False
     number = int.from_bytes(records[found.start : found.start + 2], 'little')
     of_channel = messages.start[messages.channel == number]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import random
 import resource
 import struct
 from collections.abc import Callable, Sequence
@@ -14,12 +15,13 @@ import lz4.frame
 import pytest
 import zstandard
 from mcap.opcode import Opcode
+from mcap.reader import make_reader
 from mcap.writer import IndexType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from shipdrag_ros.bags import Run, check, info, open_runs, recover, scan
+from shipdrag_ros.bags import BagWriter, Run, check, info, open_runs, recover, scan
 from shipdrag_ros.bags.records import HEAD, MAGIC
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
@@ -222,9 +224,8 @@ HEADER = record(Opcode.HEADER, struct.pack('<I4sI', 4, b'ros2', 0))
 END = record(Opcode.DATA_END, bytes(4)) + record(Opcode.FOOTER, bytes(20)) + MAGIC
 
 
-def use_everything(folder: Path, contents: Sequence[bytes], results: Any) -> None:
-    """Check, recover, tell and read files; put what was found, and the memory that took."""
-    before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+def use_everything(folder: Path, contents: Sequence[bytes]) -> list[set[tuple[str, str]]]:
+    """Check, recover, tell and read files; return what was found."""
     named = []
     for number, content in enumerate(contents):
         path = folder / f'{number}.mcap'
@@ -234,17 +235,28 @@ def use_everything(folder: Path, contents: Sequence[bytes], results: Any) -> Non
         for run in open_runs([path]):
             info(run)
             list(run.inputs())
-    after_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    results.put((named, (after_kib - before_kib) << 10))
+    return named
 
 
 def used(folder: Path, *contents: bytes) -> tuple[list[set[tuple[str, str]]], int]:
-    """Use files in a process of its own."""
+    """Use files in a process of its own; return what was found, and the memory it took."""
+    return in_a_process(lambda: use_everything(folder, contents))
+
+
+def in_a_process(use: Callable[[], Any]) -> tuple[Any, int]:
+    """Return a result, and by how many bytes the memory of a process of its own grew."""
     context = multiprocessing.get_context('fork')
     results = context.Queue()
-    process = context.Process(target=use_everything, args=(folder, contents, results))
+
+    def run() -> None:
+        before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        found = use()
+        after_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        results.put((found, (after_kib - before_kib) << 10))
+
+    process = context.Process(target=run)
     process.start()
-    found: tuple[list[set[tuple[str, str]]], int] = results.get(timeout=60)
+    found: tuple[Any, int] = results.get(timeout=60)
     process.join(60)
     assert process.exitcode == 0
     return found
@@ -290,3 +302,61 @@ def test_overlapping_attachments_are_not_read_again_and_again(
     monkeypatch.setattr(scan, 'attachment_agrees', counted)
     assert not check([path])[0].sound
     assert 0 < sum(read) <= 4 * len(content) + length
+
+
+@pytest.mark.parametrize('damaged', [False, True])
+def test_a_large_bag_takes_no_more_memory_than_a_small_one(tmp_path: Path, damaged: bool) -> None:
+    rng = random.Random(1)
+    path = tmp_path / 'large.mcap'
+    with BagWriter(path) as bag:
+        for number in range(1500):
+            payload = rng.randbytes(64_000)
+            bag.write('/cloud', 'std_msgs/msg/String', payload, log_ns=number, publish_ns=number)
+    if damaged:
+        with path.open('r+b') as file:
+            file.seek(48 * MIB)
+            file.write(bytes(100))
+    (report,), of_check = in_a_process(lambda: check([path]))
+    result, of_recover = in_a_process(lambda: recover(path, tmp_path / 'saved.mcap'))
+    assert report.sound == (not damaged)
+    assert result.messages_recovered > 1400
+    assert path.stat().st_size > 90 * MIB
+    # a window of the file is held, 16 MiB, and a chunk in several states
+    assert max(of_check, of_recover) < 45 * MIB
+
+
+def test_topics_that_have_other_numbers_in_each_file_are_joined(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / 'split'
+    folder.mkdir()
+    written = set()
+    for part, topics in enumerate((('/a', '/b'), ('/b', '/c', '/a'))):
+        with (folder / f'split_{part}.mcap').open('wb') as file:
+            writer = Writer(file, chunk_size=200)
+            writer.start('ros2')
+            # one declared in the middle of a chunk, behind messages of another
+            for number, topic in enumerate(topics):
+                schema = writer.register_schema(f'x/msg/T{topic[1:]}', 'ros2msg', b'uint8 x')
+                channel = writer.register_channel(topic, 'cdr', schema)
+                for n in range(3 + 2 * number):
+                    log_ns = part * 1000 + number * 100 + n
+                    payload = f'{topic} {log_ns}'.encode()
+                    writer.add_message(channel, log_ns, payload, log_ns + 1, n)
+                    written.add((topic, f'x/msg/T{topic[1:]}', n, log_ns, log_ns + 1, payload))
+            writer.finish()
+    (folder / 'metadata.yaml').write_text(
+        'rosbag2_bagfile_information:\n  storage_identifier: mcap\n'
+        "  relative_file_paths: [split_0.mcap, split_1.mcap]\n  compression_mode: ''\n"
+    )
+    result = recover(folder, tmp_path / 'saved.mcap')
+    assert (result.damage, result.bytes_lost, result.quarantine) == ((), 0, None)
+    assert check([result.output])[0].damage == ()
+    with result.output.open('rb') as file:
+        reader = make_reader(file)
+        saved = {
+            (channel.topic, schema.name, m.sequence, m.log_time, m.publish_time, m.data)
+            for schema, channel, m in reader.iter_messages()
+        }
+        assert saved == written
+        assert reader.get_summary().statistics.channel_count == 3
