@@ -112,37 +112,62 @@ def _accelerations(
 
 
 @njit(cache=True)
-def _rudder_rate(hull: Hull, ordered: float, d: float) -> float:
-    rate = (ordered - d) / hull.lag_s
-    return float(min(max(rate, -hull.rate_rad_s), hull.rate_rad_s))
+def _rudder(hull: Hull, d: float, ordered: float, after_s: float) -> float:
+    """Return the angle some time later: it moves at its largest rate, then as a lag does."""
+    gap = ordered - d
+    nearest = hull.rate_rad_s * hull.lag_s
+    ramp_s = (abs(gap) - nearest) / hull.rate_rad_s
+    if after_s <= ramp_s:
+        return float(d + np.copysign(hull.rate_rad_s, gap) * after_s)
+    if ramp_s > 0.0:
+        return float(ordered - np.copysign(nearest, gap) * np.exp((ramp_s - after_s) / hull.lag_s))
+    return float(ordered - gap * np.exp(-after_s / hull.lag_s))
 
 
 @njit(cache=True)
 def _step(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> State:
-    """Return the state a step later."""
+    """Return the state a step later, in which the rudder moves smoothly."""
     du, v, r, x, y, heading, d = state
     e = 0.5 * h
+    middle_d, end_d = _rudder(hull, d, ordered, e), _rudder(hull, d, ordered, h)
     du1, v1, r1 = _accelerations(hull, c, du, v, r, d)
-    d1 = _rudder_rate(hull, ordered, d)
-    du2, v2, r2 = _accelerations(hull, c, du + e * du1, v + e * v1, r + e * r1, d + e * d1)
-    d2 = _rudder_rate(hull, ordered, d + e * d1)
-    du3, v3, r3 = _accelerations(hull, c, du + e * du2, v + e * v2, r + e * r2, d + e * d2)
-    d3 = _rudder_rate(hull, ordered, d + e * d2)
-    du4, v4, r4 = _accelerations(hull, c, du + h * du3, v + h * v3, r + h * r3, d + h * d3)
-    d4 = _rudder_rate(hull, ordered, d + h * d3)
-    # no force depends on the place: the midpoint rule is good enough, and cheap
-    middle = heading + e * (r + 0.5 * e * r1)
-    ahead, abeam = hull.speed_m_s + du + e * du2, v + e * v2
-    cos, sin = np.cos(middle), np.sin(middle)
+    du2, v2, r2 = _accelerations(hull, c, du + e * du1, v + e * v1, r + e * r1, middle_d)
+    du3, v3, r3 = _accelerations(hull, c, du + e * du2, v + e * v2, r + e * r2, middle_d)
+    du4, v4, r4 = _accelerations(hull, c, du + h * du3, v + h * v3, r + h * r3, end_d)
+    end_du = du + h * (du1 + 2.0 * (du2 + du3) + du4) / 6.0
+    end_v = v + h * (v1 + 2.0 * (v2 + v3) + v4) / 6.0
+    end_heading = heading + h * (r + h * (r1 + r2 + r3) / 6.0)
+    # no force depends on the place: Simpson's rule on the way
+    start = _over_ground(hull, du, v, heading)
+    middle = _over_ground(hull, du + e * du2, v + e * v2, heading + e * (r + 0.5 * e * r1))
+    end = _over_ground(hull, end_du, end_v, end_heading)
     return (
-        du + h * (du1 + 2.0 * (du2 + du3) + du4) / 6.0,
-        v + h * (v1 + 2.0 * (v2 + v3) + v4) / 6.0,
+        end_du,
+        end_v,
         r + h * (r1 + 2.0 * (r2 + r3) + r4) / 6.0,
-        x + h * (ahead * cos - abeam * sin),
-        y + h * (ahead * sin + abeam * cos),
-        heading + h * (r + h * (r1 + r2 + r3) / 6.0),
-        d + h * (d1 + 2.0 * (d2 + d3) + d4) / 6.0,
+        x + h * (start[0] + 4.0 * middle[0] + end[0]) / 6.0,
+        y + h * (start[1] + 4.0 * middle[1] + end[1]) / 6.0,
+        end_heading,
+        end_d,
     )
+
+
+@njit(cache=True)
+def _over_ground(hull: Hull, du: float, v: float, heading: float) -> tuple[float, float]:
+    cos, sin = np.cos(heading), np.sin(heading)
+    ahead = hull.speed_m_s + du
+    return ahead * cos - v * sin, ahead * sin + v * cos
+
+
+@njit(cache=True)
+def _advance(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> State:
+    """Return the state a time later, in two steps where the rudder leaves its largest rate."""
+    ramp_s = abs(ordered - state[6]) / hull.rate_rad_s - hull.lag_s
+    if 0.0 < ramp_s < h:
+        state = _step(hull, c, state, ordered, ramp_s)
+        h -= ramp_s
+    after: State = _step(hull, c, state, ordered, h)
+    return after
 
 
 @njit(cache=True)
@@ -180,12 +205,12 @@ def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Fl
                 side = -side
             for _ in range(steps):
                 # the derivatives count a rudder that turns the ship to port positive
-                after = _step(hull, c, state, -side * order, helm.step_s)
+                after = _advance(hull, c, state, -side * order, helm.step_s)
                 if helm.attentive and side * after[5] >= helm.reverse_rad:
                     p = _reached(state, after, side * helm.reverse_rad, helm.step_s)
-                    state = _step(hull, c, state, -side * order, p * helm.step_s)
+                    state = _advance(hull, c, state, -side * order, p * helm.step_s)
                     side = -side
-                    after = _step(hull, c, state, -side * order, (1.0 - p) * helm.step_s)
+                    after = _advance(hull, c, state, -side * order, (1.0 - p) * helm.step_s)
                 state = after
 
 
@@ -210,7 +235,7 @@ def follow_columns(
 
     Notes
     -----
-    Runge-Kutta of fourth order.
+    Runge-Kutta of fourth order, each step between two kinks of the rudder.
     """
     for column in range(len(derivatives)):
         _follow(hull, helm, derivatives[column], steps, looks, paths[column])

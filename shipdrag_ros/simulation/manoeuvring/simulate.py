@@ -12,7 +12,7 @@ from shipdrag_ros.simulation.manoeuvring.manoeuvre import Manoeuvre
 from shipdrag_ros.simulation.manoeuvring.motion import Motions
 from shipdrag_ros.simulation.manoeuvring.ship import FORM, SteeredShip
 
-_STEP_S = 0.1  # of the integration; the rudder machine is the quickest part, with a second
+_STEP_S = 0.5  # of the integration; the rudder, quickest of all, is followed exactly
 
 
 def steer(
