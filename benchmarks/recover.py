@@ -11,8 +11,9 @@ told as `partly`. `false` are messages in the sound bag that nobody wrote: witho
 checksum a flipped payload cannot be told. Seed 1.
 
 Then bags of 50 000 to 400 000 messages: process CPU time, best of two, and the growth of
-the memory in a process of its own; and that growth on bags of 10, 50 and 200 MB, sound and
-with a bit flipped in the middle.
+the memory in a process of its own; the same time, in that of reading, for files as a finished
+recording leaves them, as a killed one does (three messages a chunk), and without chunks; and the
+growth of the memory on bags of 10, 50 and 200 MB, sound and with a bit flipped in the middle.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from shipdrag_ros.bags import BagWriter, check, open_runs, recover
+from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.bags.records import MAGIC, Place, unpack_chunk, walk
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode, types
@@ -291,6 +293,35 @@ def cost(sizes: tuple[int, ...], folder: Path) -> None:
         print(f'{"":10}' + ''.join(f'{each:12}' for each in megabytes[name]) + '  MB more')
 
 
+def kinds(n: int, folder: Path) -> None:
+    """Print the time of checking and recovering in that of reading, by how a file was written."""
+    finished, killed, loose = (folder / f'{kind}.mcap' for kind in ('finished', 'killed', 'loose'))
+    messages = list(encode(record(n)))
+    with BagWriter(finished) as bag, loose.open('wb') as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start('ros2')
+        channels: dict[str, int] = {}
+        for each in messages:
+            if each.topic not in channels:
+                text = types.definition(each.type).encode()
+                schema = writer.register_schema(each.type, 'ros2msg', text)
+                channels[each.topic] = writer.register_channel(each.topic, 'cdr', schema)
+            times = {'log_ns': each.log_ns, 'publish_ns': each.publish_ns}
+            bag.write(each.topic, each.type, each.payload, **times)
+            writer.add_message(channels[each.topic], each.log_ns, each.payload, each.publish_ns)
+        writer.finish()
+    growing = LiveFile(killed, recording_id='', part=0, attachments={})
+    for at in range(0, n, 3):
+        growing.append(messages[at : at + 3])
+    growing.sync()
+    print(f'\n{"of reading":12}{"read [s]":>12}{"check":>12}{"recover":>12}')
+    for path in (finished, killed, loose):
+        read, *others = (
+            min(_measured(use, path)[0] for _ in range(3)) for use in (_read, _look, _save)
+        )
+        print(f'{path.stem:12}{read:12.3f}' + ''.join(f'{each / read:12.1f}' for each in others))
+
+
 def memory(sizes_mb: tuple[int, ...], folder: Path) -> None:
     """Print by how much the memory grows, by the size of the bag."""
     rng = random.Random(SEED)
@@ -369,6 +400,7 @@ def main() -> None:
         salvage(2 if quick else 15, Path(name))
         _read_once(Path(name))
         cost((5000, 10_000) if quick else (50_000, 100_000, 200_000, 400_000), Path(name))
+        kinds(6000 if quick else 60_000, Path(name))
         memory((10, 50) if quick else (10, 50, 200), Path(name))
 
 

@@ -236,7 +236,7 @@ class _Salvage:
         for found in whole.declarations:
             if not self._learnt.add(found.read(records), trust):
                 return False
-        if not np.isin(whole.channel, list(self._learnt.channels)).all():
+        if not self._learnt.channels.keys() >= set(np.unique(whole.channel).tolist()):
             return False
         for found in whole.declarations:
             self._scanner.noted(records, found)

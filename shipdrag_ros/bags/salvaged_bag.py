@@ -219,6 +219,8 @@ class SalvagedBag:
 
 def _without(records: bytes, others: Sequence[Found], offset: Int64) -> tuple[bytes, Int64]:
     """Cut some records out; return what is left, and where the rest lies in it."""
+    if not others:
+        return records, offset
     starts = [0, *(found.end for found in others)]
     ends = [*(found.offset for found in others), len(records)]
     left = b''.join(records[start:end] for start, end in zip(starts, ends, strict=True))
