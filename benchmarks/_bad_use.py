@@ -49,6 +49,11 @@ def _simulate(*more: str) -> Callable[[Path], list[str]]:
     ]
 
 
+def _cable(*more: str) -> Callable[[Path], list[str]]:
+    """Tow a cable; the last of each option counts."""
+    return lambda folder: ['cable', '--length', '50', '--diameter', '0.1', '--speed', '3', *more]
+
+
 def _existing(folder: Path) -> list[str]:
     return ['simulate', '--ship', str(SHIP_FILE), '-o', _bag(folder)]
 
@@ -269,6 +274,20 @@ COMMANDS = (
     ),
     _use(
         'a negative duration', _simulate('--duration', '-5'), 2, "'-5', expected a number above 0"
+    ),
+    _use('a cable of no length', _cable('--length', '0'), 2, "'0', expected a number above 0"),
+    _use('NaN for a speed of towing', _cable('--speed', 'nan'), 2, "'nan', expected a number"),
+    _use(
+        'a cable that is too short',
+        _cable('--length', '1'),
+        1,
+        'length over diameter is 10, and C0 of a smooth one is known above 20; state C0 (--c0)',
+    ),
+    _use(
+        'a cable that is too long',
+        _cable('--length', '200'),
+        0,
+        'WARNING: length over diameter is 2000; the formula for a smooth cylinder does not hold',
     ),
 )
 NODE = (
