@@ -23,6 +23,7 @@ MIMICS = (
     'left: what of the effect such an error does not explain'
 )
 _LOOKS_ALIKE = 0.05  # of an effect is left
+_CLOSE = 0.1  # relative error
 _LARGE = 0.5  # relative error; beyond it only that it is larger is said
 
 
@@ -57,6 +58,14 @@ def notes(found: CoastStudy) -> tuple[str, ...]:
         f'{check.coast.scenario.speed_m_s:.2f} m/s is off by {check.speed_m_s:.3f} m/s and '
         f'{check.position_m:.1f} m (root mean square).',
     ]
+    certain = [one for one in found.importance if one.tolerable < _CLOSE]
+    others = [one.tolerable for one in found.importance if one.tolerable >= _CLOSE]
+    if certain and others:
+        close = ', '.join(f'{one.particular.key} {one.tolerable:.1%}' for one in certain)
+        said.append(
+            f'To be known as well as the stated uncertainties deserve: {close}; all else may be '
+            f'wrong by {_tolerable(min(others))}.'
+        )
     if alike:
         said.append(
             f'To within a twentieth of what they do, effects look like a wrong value: {alike}.'

@@ -259,12 +259,12 @@ def data_uri(figure: Figure) -> str:
     return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')
 
 
-def save(figure: Figure, path: Path) -> None:
+def save(figure: Figure, path: Path, *, pixels_per_inch: int = _PIXELS_PER_INCH) -> None:
     """
     Write a figure to a file; its ending gives the format.
     """
     with matplotlib.rc_context(STYLE):
-        figure.savefig(path, dpi=_PIXELS_PER_INCH)
+        figure.savefig(path, dpi=pixels_per_inch)
 
 
 def _draw_band(
