@@ -20,7 +20,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # matrices too small for thr
 
 import matplotlib
 import numpy as np
-from _markdown import table
+from _tables import table, write_csv
 from matplotlib.figure import Figure
 from numpy.polynomial.polynomial import polyval2d
 
@@ -34,6 +34,7 @@ from shipdrag_ros.samples import Float64
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'docs' / 's5_surfaces.md'
 PICTURES = ROOT / 'docs' / 'pictures'
+TABLE = ROOT / 'docs' / 'data' / 'c_x.csv'  # a draw to try the verb on
 NOISE = 1e-4
 GRIDS = (17, 13, 11, 9, 7, 6, 5)
 NOISES = (1e-4, 3e-4, 1e-3, 3e-3)
@@ -425,10 +426,10 @@ def main() -> None:
         '',
         'Kostyukov, Kulchenko, Gurenko: *Method of calculating the hydrodynamic coefficients of '
         'an AUV*. Written by',
-        '`benchmarks/s5_surfaces.py --write`. Try it on a table of your own:',
+        '`benchmarks/s5_surfaces.py --write`, which also makes the table to try it on:',
         '',
-        '    shipdrag surface DATA.csv --inputs alpha,beta --target c_x --report surface.html '
-        '--export c_x.py',
+        '    shipdrag surface docs/data/c_x.csv --inputs alpha,beta --target c_x '
+        '--report surface.html --export c_x.py',
         '',
         'The paper raises the degree while RMSE and SSE fall "substantially". That is S1\'s '
         'plateau of the residual variance, so the',
@@ -451,6 +452,9 @@ def main() -> None:
     print('\n'.join(lines))
     if options.write:
         PAGE.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        points = grid(17)
+        noisy = c_x(points) + NOISE * np.random.default_rng(SEED).normal(size=len(points))
+        write_csv(TABLE, (*ANGLES, 'c_x'), np.column_stack([points, noisy]))
         save(degree_picture(one), PICTURES / 's5_degrees.png')
         save(contour_picture(one, grid(17), 'c_x'), PICTURES / 's5_surface.png')
         save(power_picture(shares), PICTURES / 's5_power.png')
