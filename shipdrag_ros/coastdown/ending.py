@@ -50,7 +50,8 @@ def end_of(
     """
     start, width = coasting.start, tuning.slopes.width
     steady = coasting.shaft
-    if shaft_speed(bins, number) > parameters.shaft_stopped_fraction * steady:
+    shaft, stopped = shaft_speed(bins, number), parameters.shaft_stopped_fraction * steady
+    if shaft > stopped:
         return End(EndedBy.ENGINE, shaft_rose_at(bins, start, number, steady, width))
     turned = turned_at(bins, start, number, width, parameters.turn_rad)
     if turned is not None:
@@ -58,7 +59,11 @@ def end_of(
     slope, level, _ = line(bins, coasting.source, number, width)
     if level < tuning.speed_min:
         return End(EndedBy.SPEED, number)
-    return _departed(coasting, bins, tuning, parameters, number, slope, level)
+    end = _departed(coasting, bins, tuning, parameters, number, slope, level)
+    # where the shaft is seen to stand, it was not the engine
+    if end is not None and end.ended_by is EndedBy.ENGINE and shaft <= stopped:
+        return None
+    return end
 
 
 def _departed(

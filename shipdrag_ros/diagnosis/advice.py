@@ -95,7 +95,9 @@ def advice(
         if _measured(measure, library.seen):
             continue
         settings, setting = _settings(measure, library, fits)
-        if all(np.isfinite(one.slope).all() and len(one.mean) for way in settings for one in way):
+        if settings and all(
+            np.isfinite(one.slope).all() and len(one.mean) for way in settings for one in way
+        ):
             certain = resolving(settings, setting, share.tolist())
             found.append(Advice(measure.value, float(share @ (np.array(certain) * possible))))
     best = max((each.probability or 0.0 for each in found), default=0.0)
@@ -173,7 +175,7 @@ def _settings(
     turning = _contexts(measure, problem, library.ship, after=_TURNING)
     standing = _contexts(measure, problem, library.ship, after=_STANDING)
     if any(len(context.at_shaft) == 0 for context in (*turning, *standing)):
-        return [[]], []
+        return [], []
     where_turning, values = of_instrument(problem, fits, turning)
     where_standing, _ = of_instrument(problem, fits, standing)
     seen_to_stand = [int(np.median(value[:3]) <= _TURNS) for value in values]

@@ -15,18 +15,18 @@ from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict
+from shipdrag_ros.diagnosis.screening import promise
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
 from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, mode_of, weigh
+from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
 
 _PAIRED = 4  # most probable names that pairs are tried with
-_PAIRS = 8  # that are fitted to the end
-_SCREENING = 3  # iterations
-_STARTS = 2  # of each hypothesis that are fitted to the end
-_AT_ODDS = 2.0  # nats that something unnamed gains, from which pairs are tried
+_PAIRS = 12  # that are fitted
+_STARTS = 2  # of each hypothesis that are fitted
 
 
 @dataclass(frozen=True)
@@ -62,24 +62,27 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     Raises
     ------
     DiagnosisError
-        If the ship has no baseline, or a run too little steady record.
+        If the ship has no baseline, or no run enough steady record.
     EstimationError
-        If a run has too few samples.
+        If no run has enough samples.
+
+    Notes
+    -----
+    A run that has too little of either is left out, and a note says so.
     """
-    seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
+    seen, notes = _observed(runs, ship, parameters)
     library = Library(ship, seen, seen[0].heading_rad)
     nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
     named = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
     unnamed = [library.with_discrepancy(library.nothing, c) for c in library.channels()]
     likely = _likeliest_starts(library, named, nothing)
-    both = [*(one.hypothesis for one in likely), *unnamed]
-    starts = [*(one.best.z for one in likely), *(library.start(h, nothing) for h in unnamed)]
-    found = fit(library.problem, both, starts)
+    both = [*likely, *unnamed]
+    found = fit(library.problem, both, [library.start(h, nothing) for h in both])
     smooth = found[len(likely) :]
     weighed = weigh([nothing, *found])
     best = weighed.best[weighed.named()[0]]
     more = _with_more(library, best, smooth)
-    if weighed.nothing < QUIET and lacks(best, more, nats=_AT_ODDS):
+    if weighed.nothing < QUIET:
         found += _pairs(library, weighed)
         weighed = weigh([nothing, *found])
         best = weighed.best[weighed.named()[0]]
@@ -115,8 +118,26 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         held_out_after=predicted if missing else None,
         baseline='stated',
         best=_named(best, weighed),
+        notes=notes,
         traces=traces(library.problem, as_stated.best, explained.best),
     )
+
+
+def _observed(
+    runs: Sequence[CoastRun], ship: Ship, parameters: Parameters
+) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
+    """Return the runs that can be diagnosed, and why the others cannot."""
+    seen: list[Observation] = []
+    refused: dict[str, DiagnosisError | EstimationError] = {}
+    for run in runs:
+        try:
+            seen.append(Observation.of(run.window, ship, parameters, name=run.name))
+        except (DiagnosisError, EstimationError) as error:
+            refused[run.name] = error
+    if not seen:
+        name, reason = next(iter(refused.items()))
+        raise type(reason)(f'{name}: {reason}')
+    return tuple(seen), tuple(f'left out: {name}: {why}' for name, why in refused.items())
 
 
 def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
@@ -127,15 +148,17 @@ def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
     return replace(ship, effects=(*ship.effects, *added))
 
 
-def _likeliest_starts(library: Library, hypotheses: Sequence[Hypothesis], near: Fit) -> list[Fit]:
-    """Begin to fit from everywhere, and keep the best starts of each hypothesis."""
-    starts = [library.start(hypothesis, near) for hypothesis in hypotheses]
-    begun = fit(library.problem, hypotheses, starts, iterations=_SCREENING)
-    begun.sort(key=lambda one: -one.log_evidence)
-    kept: dict[tuple[object, ...], list[Fit]] = {}
-    for one in begun:
-        kept.setdefault((one.hypothesis.names, mode_of(one)), []).append(one)
-    return [one for ones in kept.values() for one in ones[:_STARTS]]
+def _likeliest_starts(
+    library: Library, hypotheses: Sequence[Hypothesis], near: Fit
+) -> list[Hypothesis]:
+    """Keep the most promising starts of each hypothesis."""
+    promised = promise(library.problem, near, hypotheses)
+    kept: dict[tuple[object, ...], list[Hypothesis]] = {}
+    for i in np.argsort(-promised):
+        found = kept.setdefault(mode_of(hypotheses[i]), [])
+        if len(found) < _STARTS:
+            found.append(hypotheses[i])
+    return [one for ones in kept.values() for one in ones]
 
 
 def _with_more(library: Library, best: Fit, smooth: Sequence[Fit]) -> list[Fit]:
@@ -149,21 +172,24 @@ def _with_more(library: Library, best: Fit, smooth: Sequence[Fit]) -> list[Fit]:
 def _pairs(library: Library, weighed: Weighed) -> list[Fit]:
     """Fit pairs of the likeliest names with all others."""
     first = [names for names in weighed.named() if names][:_PAIRED]
-    tried: dict[tuple[str, ...], tuple[Hypothesis, Fit]] = {}
+    tried: list[tuple[float, Hypothesis, Fit]] = []
     for names in first:
         base = weighed.best[names]
-        for effect in library.effects:
-            pair = tuple(sorted((*names, effect.name)))
-            if effect.name in names or pair in tried:
-                continue
-            for hypothesis in library.with_effect(base.hypothesis, effect):
-                tried[(*pair, str(len(tried)))] = hypothesis, base
-    hypotheses = [hypothesis for hypothesis, _ in tried.values()]
-    starts = [library.start(hypothesis, base) for hypothesis, base in tried.values()]
-    screened = fit(library.problem, hypotheses, starts, iterations=_SCREENING)
-    screened.sort(key=lambda one: -one.log_evidence)
-    kept = screened[:_PAIRS]
-    return fit(library.problem, [one.hypothesis for one in kept], [one.best.z for one in kept])
+        hypotheses = [
+            hypothesis
+            for effect in library.effects
+            if effect.name not in names
+            for hypothesis in library.with_effect(base.hypothesis, effect)
+        ]
+        promised = promise(library.problem, base, hypotheses).tolist()
+        tried += [(p, one, base) for p, one in zip(promised, hypotheses, strict=True)]
+    tried.sort(key=lambda one: -one[0])
+    kept: dict[tuple[object, ...], tuple[Hypothesis, Fit]] = {}
+    for _, hypothesis, base in tried:
+        if len(kept) < _PAIRS:
+            kept.setdefault(mode_of(hypothesis), (hypothesis, base))
+    starts = [library.start(hypothesis, base) for hypothesis, base in kept.values()]
+    return fit(library.problem, [hypothesis for hypothesis, _ in kept.values()], starts)
 
 
 def _named(best: Fit, weighed: Weighed) -> tuple[Named, ...]:

@@ -24,6 +24,7 @@ _ANEW = (0, 3)  # iterations in which all derivatives are found anew
 _CONVERGED = 0.02  # fall of -2 ln posterior
 _DAMPING = 1e-2
 _HOPELESS = 1e4  # damping
+_SMALL = 0.25  # of what has no name, in parts of its prior sd, where it is small
 
 
 @dataclass(frozen=True)
@@ -140,19 +141,37 @@ class _State:
         if not math.isfinite(best.cost):
             return failed
         matrix, fall = best.normal
+        covariance, log_evidence = self._laplace(matrix, fall, best.cost)
+        if not math.isfinite(log_evidence):
+            return failed
+        smooth = self.hypothesis.smooth
+        if smooth:
+            matrix, fall = matrix.copy(), fall.copy()
+            # what has no name may be large or small, either alike
+            more = _SMALL**-2 - 1.0
+            matrix[smooth, smooth] += more
+            fall[smooth] -= more * best.z[smooth]
+            cost = best.cost + more * float(best.z[smooth] @ best.z[smooth])
+            small = self._laplace(matrix, fall, cost)[1] - len(smooth) * math.log(_SMALL)
+            log_evidence = float(np.logaddexp(log_evidence, small)) - math.log(2.0)
+        return Fit(best, covariance, log_evidence + self.hypothesis.weight)
+
+    def _laplace(self, matrix: Float64, fall: Float64, cost: float) -> tuple[Float64, float]:
+        """Return covariance and log evidence of what is as good as normal."""
+        assert self.best is not None
         size = np.sqrt(np.diag(matrix))
         if not (size > 0.0).all():
-            return failed
+            return matrix, -math.inf
         scaled = matrix / np.outer(size, size)
         sign, log_det = np.linalg.slogdet(scaled)
         if sign <= 0.0:
-            return failed
+            return matrix, -math.inf
         covariance = np.linalg.inv(scaled) / np.outer(size, size)
         # where the fit is held at the end of a parameter, the best is beyond
         step = covariance @ fall
-        log_evidence = -0.5 * (best.cost - float(fall @ step))
+        log_evidence = -0.5 * (cost - float(fall @ step))
         log_evidence -= 0.5 * float(log_det) + float(np.log(size).sum())
         for i in np.flatnonzero(self._half):
-            beyond = (best.z[i] + step[i]) / math.sqrt(covariance[i, i])
+            beyond = (self.best.z[i] + step[i]) / math.sqrt(covariance[i, i])
             log_evidence += math.log(2.0) + float(log_ndtr(beyond))
-        return Fit(best, covariance, log_evidence + self.hypothesis.weight)
+        return covariance, log_evidence

@@ -107,6 +107,8 @@ def _predicted(others: Library, alone: Library, found: Fit) -> Linear:
     precision = np.linalg.pinv(learnt.covariance[:shared, :shared], hermitian=True)
     linear = alone.problem.linearise([here], [z])[0]
     for _ in range(_ROUNDS):
+        if not np.isfinite(linear.cost):
+            break
         matrix, fall = linear.normal
         for i, unknown in enumerate(here.unknowns[:shared]):
             matrix[i, i] -= unknown.weight(linear.z[i])

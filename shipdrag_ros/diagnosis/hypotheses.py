@@ -18,6 +18,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.linear import Hypothesis, Problem
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.prior import UNNAMED_ODDS, nothing_missing
 from shipdrag_ros.diagnosis.terms import (
     BaselineTerm,
     EffectTerm,
@@ -37,7 +38,6 @@ from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
 from shipdrag_ros.simulation.effects import LIBRARY, find
 
 DISCREPANCIES = ('force', 'log', 'radar')
-_NOTHING, _ONE, _PAIR, _UNNAMED = 0.5, 0.38, 0.04, 0.08  # probabilities before the data
 _EVERYWHERE = (-1.5, -0.8, 0.0, 0.8)  # z of what may be anywhere
 _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find from 0
 
@@ -105,7 +105,12 @@ class Library:
             )
             for effect in self.ship.effects
         ]
-        return Hypothesis((), (baseline, *given), places, weight=math.log(_NOTHING))
+        return Hypothesis(
+            (),
+            (baseline, *given),
+            places,
+            weight=math.log(nothing_missing(self.effects, places=len(DISCREPANCIES))),
+        )
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
         """
@@ -120,24 +125,32 @@ class Library:
         words = list(product(*((q.prior.first, q.prior.second) for q in choices)))
         runs = scope_runs(effect, len(self.seen))
         names = tuple(sorted((*base.names, effect.name)))
-        among = _ONE / len(self.effects)
-        if len(names) == 2:
-            among = _PAIR / math.comb(len(self.effects), 2)
-        weight = math.log(among / len(words) / len(runs))
+        log_odds = math.log(effect.odds)
+        weight = base.weight + log_odds - math.log(len(words) * len(runs))
         found = []
         for start, word, run in product(starts, words, runs):
             term = EffectTerm(effect, self.problem.ship, start, _named(choices, word), run)
             sd = effect.formula_sd
             forms = (*base.forms, FormTerm(term, sd)) if sd > 0.0 else base.forms
             terms = (*base.terms, term)
-            found.append(replace(base, names=names, terms=terms, forms=forms, weight=weight))
+            found.append(
+                replace(
+                    base,
+                    names=names,
+                    terms=terms,
+                    forms=forms,
+                    weight=weight,
+                    log_odds=base.log_odds + log_odds,
+                )
+            )
         return found
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """
         Return a hypothesis with something smooth and unnamed besides.
         """
-        found = replace(base, discrepancy=channel, weight=math.log(_UNNAMED / len(DISCREPANCIES)))
+        weight = base.weight + math.log(UNNAMED_ODDS)
+        found = replace(base, discrepancy=channel, weight=weight)
         if channel == 'force':
             top = 1.05 * max(run.speed_m_s for run in self.seen)
             return replace(found, terms=(*base.terms, ForceTerm(self.problem.ship, top)))

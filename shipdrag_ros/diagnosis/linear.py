@@ -17,7 +17,15 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.noise import apply
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.terms import BaselineTerm, FormTerm, Predicted, RowTerm, Term
+from shipdrag_ros.diagnosis.terms import (
+    BaselineTerm,
+    ForceTerm,
+    FormTerm,
+    Predicted,
+    RowTerm,
+    SpeedErrorTerm,
+    Term,
+)
 from shipdrag_ros.diagnosis.unknowns import Unknown
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
@@ -43,6 +51,8 @@ class Hypothesis:
         How far effects among the terms may depart from their formulas.
     weight
         Logarithm of the prior probability.
+    log_odds
+        Of the names before the data, over nothing, in whatever way they are there.
     discrepancy
         'force', 'log' or 'radar' where something smooth without a name is
         fitted besides; '' without.
@@ -53,6 +63,7 @@ class Hypothesis:
     row_terms: tuple[RowTerm, ...]
     forms: tuple[FormTerm, ...] = ()
     weight: float = 0.0
+    log_odds: float = 0.0
     discrepancy: str = ''
 
     @cached_property
@@ -69,6 +80,16 @@ class Hypothesis:
             found.append((part, place))
             place += len(part.unknowns)
         return tuple(found)
+
+    @cached_property
+    def smooth(self) -> list[int]:
+        """Places of the unknowns of what has no name."""
+        return [
+            place + k
+            for part, place in self.parts
+            if isinstance(part, ForceTerm | SpeedErrorTerm)
+            for k in range(len(part.unknowns))
+        ]
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -190,7 +211,8 @@ class Problem:
                 Scenario(
                     speed_m_s=run.speed_m_s,
                     lead_in_s=run.lead_in_s,
-                    duration_s=run.duration_s,
+                    # beyond the last row, whatever the difference is rounded to
+                    duration_s=run.duration_s + 1e-6,
                     heading_rad=run.heading_rad,
                 ),
                 self.reference_rad,
@@ -224,6 +246,40 @@ class Problem:
             )
             for i, (hypothesis, z) in enumerate(zip(hypotheses, at, strict=True))
         ]
+
+    def responses(
+        self, base: Linear, terms: Sequence[tuple[Term, Sequence[float]]]
+    ) -> list[Float64]:
+        """
+        Return what terms with given values, one at a time, would change in the whitened rows.
+
+        Returns
+        -------
+        list of (terms, rows)
+            Of each run; 0 where it cannot be simulated.
+        """
+        found = []
+        for j, (frame, seen) in enumerate(zip(self.frames, self.seen, strict=True)):
+            batch = _Batch()
+            speed = float(base.z[len(base.hypothesis.unknowns) + j])
+            acting = self._acting(j, base.hypothesis, base.z)
+            whole = sum((term.action(frame, j, values) for term, _, values in acting), Action())
+            batch.add(whole, speed)
+            for term, values in terms:
+                more = term.action(frame, j, values) if term.acts_in(j) else Action()
+                batch.add(whole + more, speed)
+            columns = self._simulate(j, batch)
+            context = seen.context.predict(columns, batch.actions)
+            rows = np.array(
+                [
+                    np.concatenate([each.along, each.across, of_context])
+                    for each, of_context in zip(_predicted(seen, columns), context, strict=True)
+                ]
+            )
+            change = rows[1:] - rows[0]
+            change[~np.isfinite(change).all(axis=1)] = 0.0
+            found.append(self._whitened(j, change))
+        return found
 
     def predict(self, run: int, linear: Linear) -> Predicted:
         """
@@ -274,11 +330,7 @@ class Problem:
         skipped = set(_known(hypothesis)) if known else set()
         frame = self.frames[run]
         speed = float(z[len(hypothesis.unknowns) + run])
-        acting = [
-            (term, place, [u.value(z[place + i]) for i, u in enumerate(term.unknowns)])
-            for term, (_, place) in zip(hypothesis.terms, hypothesis.parts)
-            if term.acts_in(run)
-        ]
+        acting = self._acting(run, hypothesis, z)
         actions = [term.action(frame, run, values) for term, _, values in acting]
         whole = sum(actions, Action())
         base = batch.add(whole, speed)
@@ -298,6 +350,16 @@ class Problem:
         column = batch.add(whole, speed + _STEP_M_S)
         steps.append((len(hypothesis.unknowns) + run, column, _STEP_M_S))
         return _Plan(base, steps, [without.get(id(form.term), base) for form in hypothesis.forms])
+
+    def _acting(
+        self, run: int, hypothesis: Hypothesis, z: Float64
+    ) -> list[tuple[Term, int, list[float]]]:
+        """Return what acts in a run, the places of its unknowns and their values."""
+        return [
+            (term, place, [u.value(z[place + i]) for i, u in enumerate(term.unknowns)])
+            for term, (_, place) in zip(hypothesis.terms, hypothesis.parts)
+            if term.acts_in(run)
+        ]
 
     def _table(
         self,
@@ -333,12 +395,20 @@ class Problem:
                 table[0] -= table[1 + at] * of_part.value(z[at])
                 table[1 + at] *= of_part.slope(z[at])
         residual = table[0].copy()
-        if np.isfinite(table).all():
-            table[:, :n] = apply(seen.along.whitener, table[:, :n])
-            if seen.across is not None:
-                table[:, n : n + k] = apply(seen.across.whitener, table[:, n : n + k])
-            table[:, n + k :] = apply(seen.context.whitener, table[:, n + k :])
-        return table, residual
+        return self._whitened(run, table), residual
+
+    def _whitened(self, run: int, table: Float64) -> Float64:
+        """Whiten lines of rows; as they are where one is not finite."""
+        if not np.isfinite(table).all():
+            return table
+        seen = self.seen[run]
+        n = len(seen.along)
+        k = 0 if seen.across is None else len(seen.across)
+        parts = [apply(seen.along.whitener, table[:, :n])]
+        if seen.across is not None:
+            parts.append(apply(seen.across.whitener, table[:, n : n + k]))
+        parts.append(apply(seen.context.whitener, table[:, n + k :]))
+        return np.hstack(parts)
 
 
 def _known(hypothesis: Hypothesis) -> list[int]:

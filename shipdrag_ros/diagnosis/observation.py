@@ -123,7 +123,7 @@ class Observation:
         record = Record.of(window, run_down, parameters)
         if record.steady_s < LEAST_S or window.before is None:
             raise DiagnosisError(
-                f'{name}: {record.steady_s:.0f} s of steady sailing before the stop, at least '
+                f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
                 f'{LEAST_S:.0f} s are needed to tell an effect from the noise: give a record '
                 'that begins earlier'
             )

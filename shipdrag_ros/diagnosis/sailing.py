@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
 
 from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
+from shipdrag_ros.diagnosis.prior import UNNAMED_ODDS, nothing_missing
 from shipdrag_ros.diagnosis.result import Diagnosis, Gap, Named, Verdict, Where
 from shipdrag_ros.diagnosis.sailing_model import SMOOTH, LegFit, LegModel
-from shipdrag_ros.diagnosis.verdict import UNNAMED, Weighed, decide
+from shipdrag_ros.diagnosis.verdict import UNNAMED, Weighed, decide, simplest
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Int64
 from shipdrag_ros.ship import Uncertain
@@ -29,7 +29,6 @@ _NAMES = ('current', 'log_offset', 'log_scale', 'radar_scale')
 _SCALES = frozenset(('log_scale', 'radar_scale'))
 _SET_APART = frozenset(('current', 'log_offset'))
 _BENT = ('log_offset', 'log_scale', SMOOTH)
-_NOTHING, _ONE, _PAIR, _UNNAMED = 0.5, 0.4, 0.02, 0.08  # probabilities before the data
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a leg above 1
 _OUTLIER = 5.0  # whitened
@@ -68,7 +67,7 @@ def diagnose_sailing(records: Sequence[SailingRecord], parameters: Parameters) -
     pairs = [pair for pair in combinations(names, 2) if set(pair) != _SCALES]
     hypotheses = [(), *((name,) for name in names), *pairs]
     fits = {each: model.fit(each) for each in (*hypotheses, _BENT)}
-    weighed = Weighed({}, _probabilities(fits, len(names), len(pairs)))
+    weighed = Weighed({}, _probabilities(fits, names))
     best = fits[weighed.named()[0]]
     inseparable = [_SCALES] if 'radar_scale' in names else []
     if legs.direction is Direction.UNKNOWN:
@@ -106,19 +105,19 @@ def _without_outliers(model: LegModel) -> tuple[Int64, Int64]:
 
 
 def _probabilities(
-    fits: dict[tuple[str, ...], LegFit], names: int, pairs: int
+    fits: dict[tuple[str, ...], LegFit], names: Sequence[str]
 ) -> dict[tuple[str, ...], float]:
     """Return the probability of each hypothesis."""
-    log = []
-    for hypothesis, fit in fits.items():
-        if hypothesis == _BENT:
-            before = _UNNAMED
-        else:
-            before = (_NOTHING, _ONE / names, _PAIR / pairs)[len(hypothesis)]
-        log.append(fit.log_evidence + math.log(before))
-    probability = np.exp(np.array(log) - logsumexp(log)).tolist()
-    keys = [UNNAMED if each == _BENT else each for each in fits]
-    return dict(zip(keys, probability, strict=True))
+    nothing = math.log(nothing_missing([find(name) for name in names], places=1))
+    log_odds: dict[tuple[str, ...], float] = {UNNAMED: math.log(UNNAMED_ODDS)}
+    for each in fits:
+        if each != _BENT:
+            log_odds[each] = sum(math.log(find(name).odds) for name in each)
+    log = {
+        each: fits[_BENT if each == UNNAMED else each].log_evidence + nothing + odds
+        for each, odds in log_odds.items()
+    }
+    return simplest(log, log_odds)
 
 
 def _lacks(best: LegFit, more: LegFit) -> bool:

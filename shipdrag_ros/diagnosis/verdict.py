@@ -9,18 +9,21 @@ back; what nothing in a record can tell apart stays a set.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
 
 from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.result import Candidate, Verdict
+from shipdrag_ros.diagnosis.terms import EffectTerm
 
 CERTAIN = 0.9  # probability from which an effect is named
 QUIET = 0.1  # of nothing missing, from which nothing is said
 _SET = 0.99  # of the candidates
+_BARE_MENTION = math.log(3.0)  # of evidence that is not worth more (Kass and Raftery 1995)
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
 
@@ -90,24 +93,56 @@ def weigh(fits: Sequence[Fit]) -> Weighed:
         key = UNNAMED if fit.hypothesis.discrepancy else fit.hypothesis.names
         if key not in best or fit.log_evidence > best[key].log_evidence:
             best[key] = fit
-        mode = mode_of(fit)
+        mode = mode_of(fit.hypothesis)
         found = modes.setdefault(key, {})
         found[mode] = max(found.get(mode, -math.inf), fit.log_evidence)
-    keys = list(modes)
-    log = np.array([float(logsumexp(list(modes[key].values()))) for key in keys])
-    probability = np.exp(log - logsumexp(log))
-    return Weighed(best, dict(zip(keys, probability.tolist(), strict=True)))
+    log = {key: float(logsumexp(list(found.values()))) for key, found in modes.items()}
+    return Weighed(best, simplest(log, {key: best[key].hypothesis.log_odds for key in log}))
 
 
-def mode_of(fit: Fit) -> tuple[object, ...]:
+def simplest(
+    log_evidence: Mapping[tuple[str, ...], float], log_odds: Mapping[tuple[str, ...], float]
+) -> dict[tuple[str, ...], float]:
     """
-    Return what tells a mode apart from others of the same names.
+    Return probabilities, where an effect that the data do not ask for is left out.
+
+    A record in which an effect cannot be seen speaks neither for nor against it.
+    What it leaves to a name with such an effect belongs to the name alone.
+
+    Parameters
+    ----------
+    log_evidence
+        Of names, prior included.
+    log_odds
+        Of names before the data, over nothing.
     """
-    terms = fit.hypothesis.terms
-    return (
-        fit.hypothesis.discrepancy,
-        *((getattr(term, 'fixed', ()), getattr(term, 'only_run', None)) for term in terms),
-    )
+    kept = dict(log_evidence)
+    asked = {names: log_evidence[names] - log_odds[names] for names in kept}
+    for names in sorted(log_evidence, key=lambda names: -len(names)):
+        fewer = [
+            other
+            for other in log_evidence
+            if len(other) == len(names) - 1 and set(other) < set(names) and names != UNNAMED
+        ]
+        if not fewer:
+            continue
+        alone = max(fewer, key=lambda other: asked[other])
+        if asked[names] <= asked[alone] + _BARE_MENTION:
+            kept[alone] = float(np.logaddexp(kept[alone], kept.pop(names)))
+    total = logsumexp(list(kept.values()))
+    return {names: math.exp(log - total) for names, log in kept.items()}
+
+
+def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
+    """
+    Return names, and what tells a mode apart from others of the same names.
+    """
+    ways = [
+        (term.effect.name, term.fixed, str(term.only_run))
+        for term in hypothesis.terms
+        if isinstance(term, EffectTerm)
+    ]
+    return (hypothesis.names, hypothesis.discrepancy, *sorted(ways))
 
 
 def lacks(fit: Fit, with_more: Sequence[Fit], *, nats: float = _LACK_NATS) -> bool:

@@ -296,6 +296,8 @@ class Effect:
         Context inputs that measure it, so that it is known not to be missing.
     formula_sd
         How far what the effect does may depart from its formula, relative.
+    odds
+        That it is missing in a model, before any data.
     look_alikes
         Effects of nearly the same trace, and what decides from each; nothing:
         no record can.
@@ -314,6 +316,7 @@ class Effect:
     struck_out_by: tuple[str, ...] = ()
     look_alikes: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
     formula_sd: float = 0.0
+    odds: float = 0.04
     needs: tuple[str, ...] = ()
 
     def missing(self, ship: Ship) -> tuple[str, ...]:

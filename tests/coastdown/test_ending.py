@@ -88,6 +88,18 @@ def test_an_engaged_engine_shows_in_the_shaft_at_once(
     assert 395.0 <= end_s(coastdown) <= 402.0
 
 
+def test_what_pushes_while_the_shaft_is_seen_to_stand_is_not_the_engine(
+    watch, record, sensors
+) -> None:
+    pushed = (STOP, EngineOrder(400.0, shaft=0.0, thrust=0.5))
+    with_shaft = (sensors['log'], sensors['shaft'])
+    coastdown = the_coastdown(watch(record(sensors=with_shaft, orders=pushed, duration_s=700.0)))
+    assert coastdown.ended_by is EndedBy.RECORD_END
+    # the speed alone cannot tell
+    coastdown = the_coastdown(watch(record(orders=pushed, duration_s=700.0)))
+    assert coastdown.ended_by is EndedBy.ENGINE
+
+
 def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn(watch, record, sensors) -> None:
     # stopped for 45 s only: confirmed by the shaft, and over before it has cost 5 % of the speed
     block = record(

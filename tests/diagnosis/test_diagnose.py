@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose, with_effects
+from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -19,16 +20,18 @@ PARAMETERS = Parameters()
 LEAD_IN_S, COAST_S = 1800.0, 1500.0
 
 
-def run(*effects: str, heading_rad: float = 0.3, seed: int = 1) -> CoastRun:
+def run(
+    *effects: str, heading_rad: float = 0.3, seed: int = 1, lead_in_s: float = LEAD_IN_S
+) -> CoastRun:
     """Simulate a coastdown and read it with sensors."""
     scenario = Scenario(
-        speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=COAST_S, heading_rad=heading_rad
+        speed_m_s=8.0, lead_in_s=lead_in_s, duration_s=COAST_S, heading_rad=heading_rad
     )
     truth = simulate(SHIP, scenario, effects=[parse(text) for text in effects], reference_rad=0.3)
     sensors = standard_sensors(rate_hz=1.0, noise=1.0, inputs=STANDARD_INPUTS)
     block = sense(truth, sensors, seed=seed)
     first = int(block.stamp_ns.min())
-    stop = first + round(LEAD_IN_S * 1e9)
+    stop = first + round(lead_in_s * 1e9)
     window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
     return CoastRun(f'{effects}', window)
 
@@ -38,6 +41,17 @@ def test_nothing_hidden_nothing_said() -> None:
     assert found.verdict is Verdict.NONE
     assert found.effects == ()
     assert found.before.chi2_per_sample < 1.2
+
+
+def test_a_run_that_tells_too_little_is_left_out_and_said_so() -> None:
+    found = diagnose([run(), run(seed=2, lead_in_s=120.0)], SHIP, PARAMETERS)
+    assert found.verdict is Verdict.NONE
+    assert found.held_out_before is None
+    assert len(found.notes) == 1
+    assert 'left out: ' in found.notes[0]
+    assert 'at least 300 s are needed' in found.notes[0]
+    with pytest.raises(DiagnosisError, match='at least 300 s are needed'):
+        diagnose([run(lead_in_s=120.0)], SHIP, PARAMETERS)
 
 
 @pytest.mark.parametrize(

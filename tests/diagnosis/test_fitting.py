@@ -11,6 +11,7 @@ from scipy.integrate import quad
 
 from shipdrag_ros.diagnosis.fitting import fit
 from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
+from shipdrag_ros.diagnosis.terms import ForceTerm
 from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, scaled
 from shipdrag_ros.samples import Float64
 
@@ -76,3 +77,26 @@ def test_what_cannot_be_simulated_has_no_evidence() -> None:
     problem = Straight(np.full(5, np.nan), np.ones(5))
     one = Hypothesis(('one',), (OneSize((scaled('a', 1.0),)),), ())  # type: ignore[arg-type]
     assert fit(problem, [one], [np.zeros(1)])[0].log_evidence == -np.inf  # type: ignore[arg-type]
+
+
+class OneForce(ForceTerm):
+    """Something unnamed of one unknown."""
+
+    unknowns = (scaled('force', 1.0),)  # type: ignore[assignment]
+
+
+def test_what_has_no_name_may_be_large_or_small() -> None:
+    rng = np.random.default_rng(4)
+    slope = 3.0 * rng.standard_normal(20)
+    value = 0.2 * slope + rng.standard_normal(20)
+    force = OneForce(None, 1.0)  # type: ignore[arg-type]
+    hypothesis = Hypothesis((), (force,), (), discrepancy='force')
+    found = fit(Straight(value, slope), [hypothesis], [np.array([0.0])])[0]  # type: ignore[arg-type]
+
+    def density(z: float) -> float:
+        left = value - slope * z
+        prior = 0.5 * np.exp(-0.5 * z * z) + 0.5 * np.exp(-0.5 * (z / 0.25) ** 2) / 0.25
+        return float(np.exp(-0.5 * (left @ left)) * prior) / np.sqrt(2.0 * np.pi)
+
+    whole = quad(density, -9.0, 9.0, epsabs=0.0, points=[0.0, 0.2])[0]
+    assert found.log_evidence == pytest.approx(np.log(whole), abs=1e-6)

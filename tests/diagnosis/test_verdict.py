@@ -11,7 +11,7 @@ import pytest
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
 from shipdrag_ros.diagnosis.result import Verdict
-from shipdrag_ros.diagnosis.verdict import decide, lacks, misses, weigh
+from shipdrag_ros.diagnosis.verdict import decide, lacks, misses, simplest, weigh
 
 TWINS = [frozenset(('added_mass', 'displacement'))]
 
@@ -67,6 +67,18 @@ def test_a_doubted_name_gives_way_to_something_unnamed() -> None:
 def test_twins_are_never_named_alone() -> None:
     fits = fitted(evidence=-50.0), fitted('added_mass', evidence=0.0)
     assert verdict(*fits) is Verdict.ONE_OF
+
+
+def test_an_effect_that_the_data_do_not_ask_for_is_left_to_what_is_simpler() -> None:
+    odds = {(): 0.0, ('a',): -3.0, ('b',): -3.0, ('a', 'b'): -6.0}
+    # a is asked for by 10 nats; b, and b beside a, by none
+    found = simplest({(): 0.0, ('a',): 7.0, ('b',): -3.0, ('a', 'b'): 4.0}, odds)
+    assert set(found) == {(), ('a',)}
+    assert found[()] == pytest.approx((1.0 + math.exp(-3.0)) / sum(map(math.exp, (0, 7, -3, 4))))
+    assert sum(found.values()) == pytest.approx(1.0)
+    # b beside a is asked for by 2 nats more than its odds
+    found = simplest({(): 0.0, ('a',): 7.0, ('b',): -3.0, ('a', 'b'): 6.0}, odds)
+    assert set(found) == {(), ('a',), ('a', 'b')}
 
 
 def test_several_starts_of_a_hypothesis_count_once() -> None:

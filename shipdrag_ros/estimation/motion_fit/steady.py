@@ -83,15 +83,18 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
     """
     if len(time_s) == 0:
         return np.inf
-    late = float(time_s[-1])
+    # the stop may be earlier than it was taken for: the last block tells nothing of the speed
+    late = settled = float(time_s[-1]) - _BLOCK_S
     last = np.searchsorted(time_s, late - 2.0 * _BLOCK_S, side='right')
-    level = np.median(speed[last:])
+    level = np.median(speed[last : np.searchsorted(time_s, late, side='right')])
     course = np.nan
+    late += _BLOCK_S
     while late - _BLOCK_S > time_s[0]:
         early = late - _BLOCK_S
         first = np.searchsorted(time_s, early, side='right')
         end = np.searchsorted(time_s, late, side='right')
-        if end > first and abs(np.median(speed[first:end]) - level) > _UNSTEADY * level:
+        differs = end > first and abs(np.median(speed[first:end]) - level) > _UNSTEADY * level
+        if differs and late <= settled:
             return late
         first = np.searchsorted(heading_s, early, side='right')
         end = np.searchsorted(heading_s, late, side='right')

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, half_normal
 
 
 def _act(frame: Frame, n_r_change: float) -> Action:
@@ -19,7 +19,8 @@ EFFECT = Effect(
             name='n_r_change',
             unit='',
             meaning='added to n_r at every speed',
-            prior=normal(0.15),
+            # n_r is small, and cannot be negative: it can hardly be less than stated
+            prior=half_normal(0.15),
             low=-0.5,
             high=2.0,
         ),
@@ -27,6 +28,7 @@ EFFECT = Effect(
     formula='(1 + n_r + n_r_change) du/dt = -r',
     source='S1 (1)',
     formula_sd=0.05,
+    odds=0.01,
     act=_act,
     look_alikes={'displacement': ()},
 )

@@ -29,6 +29,7 @@ EFFECT = Effect(
     '(1 + n_r) du/dt = ... - dc/dt',
     source='kinematics; Newton',
     formula_sd=0.3,
+    odds=0.02,
     act=_act,
     look_alikes={
         'log_scale': (Measure.RECIPROCAL_RUN,),

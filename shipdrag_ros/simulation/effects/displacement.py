@@ -27,5 +27,6 @@ EFFECT = Effect(
     formula='(1 + fraction) m (1 + n_r) du/dt = -R',
     source='Newton',
     formula_sd=0.05,
+    odds=0.01,
     act=_act,
 )

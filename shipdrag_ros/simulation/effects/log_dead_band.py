@@ -27,6 +27,7 @@ EFFECT = Effect(
     formula='u^2 / speed below it, u above: continuous, and nothing at rest',
     source='definition',
     formula_sd=0.25,
+    odds=0.02,
     act=_act,
     look_alikes={
         'windmilling_propeller': (Measure.RADAR, Measure.SHAFT),

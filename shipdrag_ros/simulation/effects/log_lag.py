@@ -27,6 +27,7 @@ EFFECT = Effect(
     formula='lag dy/dt = u - y',
     source='definition',
     formula_sd=0.1,
+    odds=0.02,
     act=_act,
     look_alikes={'time_offset': (Measure.FAST_CHANGE,)},
 )

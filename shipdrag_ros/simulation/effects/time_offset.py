@@ -26,5 +26,6 @@ EFFECT = Effect(
     ),
     formula='reading(t) = u(t - offset)',
     source='definition',
+    odds=0.02,
     act=_act,
 )
