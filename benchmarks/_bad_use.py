@@ -54,6 +54,10 @@ def _cable(*more: str) -> Callable[[Path], list[str]]:
     return lambda folder: ['cable', '--length', '50', '--diameter', '0.1', '--speed', '3', *more]
 
 
+def _sensitivity(*more: str) -> Callable[[Path], list[str]]:
+    return lambda folder: ['sensitivity', *more]
+
+
 def _existing(folder: Path) -> list[str]:
     return ['simulate', '--ship', str(SHIP_FILE), '-o', _bag(folder)]
 
@@ -288,6 +292,30 @@ COMMANDS = (
         _cable('--length', '200'),
         0,
         'WARNING: length over diameter is 2000; the formula for a smooth cylinder does not hold',
+    ),
+    _use(
+        'more derivatives than there are',
+        _sensitivity('--keep', '41'),
+        1,
+        'keep is 41, expected 1..40, the number of parameters',
+    ),
+    _use(
+        'a manoeuvre that is not known',
+        _sensitivity('--manoeuvre', 'spiral:15'),
+        1,
+        "manoeuvre 'spiral:15', expected zigzag:ANGLE or turn:ANGLE with 1..90 degrees of rudder",
+    ),
+    _use(
+        'a zigzag of a ship file',
+        _sensitivity('--ship', str(SHIP_FILE), '--manoeuvre', 'zigzag:15'),
+        1,
+        'expected coastdown or coastdown:SPEED [m/s]; for zigzag and turn leave out --ship',
+    ),
+    _use(
+        'a coastdown from more than the baseline knows',
+        _sensitivity('--ship', str(SHIP_FILE), '--manoeuvre', 'coastdown:30'),
+        1,
+        'the coastdown begins at 30 m/s, expected 2.131..9.974 m/s',
     ),
 )
 NODE = (
