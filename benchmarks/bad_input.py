@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 import _bad_bags
 import _bad_files
 import _bad_messages
+import _bad_tables
 import _bad_use
 from _bad_case import ROOT, Case, Seen, run
 
@@ -25,6 +26,7 @@ CASES: tuple[Case, ...] = (
     *_bad_bags.CASES,
     *_bad_files.CASES,
     *_bad_messages.CASES,
+    *_bad_tables.CASES,
     *_bad_use.CASES,
 )
 _BEGIN, _END = '<!-- bad input -->', '<!-- end bad input -->'

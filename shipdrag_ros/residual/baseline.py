@@ -13,6 +13,7 @@ from shipdrag_ros.residual.hulls import Hulls
 from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
 
 _POINTS = 15  # Froude numbers tried
+_VAGUE = 1.0  # of the value: a larger sd makes it no baseline
 _LARGEST = 0.1  # a coefficient above this is one in other units
 
 
@@ -58,10 +59,9 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
     found = fitted.predict(_hull(ship, ship.breadth_m, ship.draught_m, lcb).at(froude))
     rows = _longest([each.inside for each in found])
     if len(rows) < 2:
-        reasons = dict.fromkeys(reason for each in found for reason in each.reasons)
-        raise DataError(
-            f'{ship.name or "ship"}: the fit may not be used for this hull', list(reasons)
-        )
+        # of the Froude number that comes nearest to being accepted
+        reasons = min((each.reasons for each in found), key=len)
+        raise DataError(f'{ship.name or "ship"}: the fit may not be used for this hull', reasons)
     kept = [found[i] for i in rows]
     value = np.array([each.value for each in kept])
     if value.max() > _LARGEST:
@@ -73,6 +73,14 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
             ],
         )
     relative = float(np.max([each.sd / each.value for each in kept]))
+    if relative > _VAGUE:
+        raise DataError(
+            ship.name or 'ship file',
+            [
+                f'wave_coefficient: the sd is up to {relative:.2g} times the value, expected at '
+                f'most {_VAGUE:g}; the data do not tell it'
+            ],
+        )
     low, high = froude[rows[0]], froude[rows[-1]]
     return replace(
         ship,
@@ -81,7 +89,7 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
             form_factor=0.0,
             wave_froude=tuple(froude[rows].tolist()),
             wave_coefficient=tuple(value.tolist()),
-            relative_sd=CoefficientSd(friction=base.relative_sd.friction, wave=min(relative, 2.0)),
+            relative_sd=CoefficientSd(friction=base.relative_sd.friction, wave=relative),
             source=f'wave: form {fitted.form.name} fitted to {fitted.count} hulls, accepted for '
             f'Fr {low:.3g} to {high:.3g}; friction: {base.source}',
         ),

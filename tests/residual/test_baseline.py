@@ -79,6 +79,15 @@ def test_what_is_missing_is_told_together(ship: Ship, found: ResidualFit) -> Non
     assert [each.partition(':')[0] for each in told] == ['breadth_m', 'baseline', 'lcb']
 
 
+def test_what_is_hardly_known_is_refused(
+    ship: Ship, hulls: Hulls, resistance: Callable[[Hulls], Float64]
+) -> None:
+    noise = 2e-3 * np.random.default_rng(3).normal(size=len(hulls))
+    vague = fit_residual(hulls, 1e-3 * resistance(hulls) + noise, form='sirotina')
+    with pytest.raises(DataError, match='times the value'):
+        with_residual(ship, vague, lcb=None)
+
+
 def test_other_units_are_refused(
     ship: Ship, hulls: Hulls, resistance: Callable[[Hulls], Float64]
 ) -> None:
