@@ -34,6 +34,7 @@ from shipdrag_ros.estimation.warped_model import (
     design,
     quadratic_coast,
 )
+from shipdrag_ros.estimation.warped_prior import FREE, coast_priors
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.regression.averaging import average, condense, deviations, root
@@ -42,20 +43,14 @@ from shipdrag_ros.ship import Ship
 
 NAME = 'warped'
 
-# Priors of the polynomials from the third on: the standard deviation of coefficient j is
-# AMPLITUDE DECAY^(j - 2) / j of the distance run. The priors are averaged over, as orders are
-# elsewhere; more of them gain nothing.
-AMPLITUDES = (0.002, 0.01, 0.05)
-DECAYS = (0.2, 0.4, 0.6)
 _POLYNOMIALS = 12  # as many as any record needs, the priors do the rest
-_FREE = 2  # coefficients of quadratic drag: nothing is held against them
-_FREE_SD = 10.0  # of the distance run
-_WEIGHTS = (0.03, 0.45)  # amplitude and decay in the fit that finds the weights
+# The fit that finds the weights: standard deviation of coefficient j is
+# AMPLITUDE DECAY^(j - 2) / j of the distance run, that of the first ones FREE_SD.
+_AMPLITUDE, _DECAY, _FREE_SD = 0.03, 0.45, 10.0
 CURRENT_SD_M_S = 1.0  # prior
 SCALE_SD = 0.02  # prior of the factor of the log
 _TOLD = 0.5  # what leaves more than this of the prior sd of a column does not tell it
 _THRUST_SD = 0.3  # prior of the thrust at the stop, of the resistance there
-_RUN_DOWN_S = 10.0  # where the ship file does not say
 _SHORTEST_RUN_DOWN_S = 0.1
 
 _POINTS = 65  # of the curve, even in warped time
@@ -175,12 +170,12 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
         inputs.time_s[part], inputs.clean[part], span, 1 if kind == POSITION else 0
     )
     polynomials = min(_POLYNOMIALS, parameters.order_max)
-    run_down = _RUN_DOWN_S if ship.propulsion is None else ship.propulsion.run_down_s
-    run_down = max(run_down, _SHORTEST_RUN_DOWN_S)
+    # without `propulsion` in the ship file the thrust ends at once
+    stated = ship.propulsion.run_down_s if ship.propulsion is not None else 0.0
+    run_down = max(stated, _SHORTEST_RUN_DOWN_S)
     rows = design(inputs.time_s, inputs.count, tc, span, speed, run_down, polynomials)
-    mean = np.zeros(len(rows))
-    mean[-1] = speed / tc
-    sds = _priors(polynomials, speed * tc * float(np.log1p(span / tc)), speed / tc)
+    length = float(np.log1p(span / tc))
+    mean, sd = _loose(polynomials, speed * tc * length, speed / tc)
 
     # every column but the thrust: its prior is not about nothing
     full = np.ones(len(rows), np.bool_)
@@ -195,7 +190,7 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
         inputs.known_sd,
         columns,
         mean,
-        sds[-1],
+        sd,
     )
     start[polynomials:] = 0.0
     residual = inputs.value - combine(rows, start)
@@ -205,13 +200,17 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     else:
         white = slow.whitened(rows, residual, weight, inputs, ship)
         products = condense(*white, np.ones(len(residual)))
-    sd = deviations(products, start, columns, mean, sds[-1])
-    told, notes = _told(sd[polynomials:], inputs)
+    of_columns = deviations(products, start, columns, mean, sd)[polynomials:]
+    told, notes = _told(of_columns, inputs)
     if slow is not None:
         notes.append(slow.note)
-    families = _families(polynomials, *told)
-    chance = np.ones(len(families))
-    coefficients, covariance, share = average(products, start, families, chance, mean, sds[:-1])
+    families = _families(polynomials, *told, stated > 0.0)
+    # what is free is so about where it is, so that nothing cancels; the priors hold the others
+    mean[:FREE], mean[FREE:polynomials], sd[FREE:polynomials] = start[:FREE], 0.0, 0.0
+    priors = coast_priors(length, speed, tc, float(ship.froude(speed)), mean, sd)
+    coefficients, covariance, share = average(
+        products, start, families, np.ones(len(families)), *priors
+    )
     scaled = float(share[families[:, -2]].sum())
     if scaled > 0.5:
         notes.append(
@@ -229,23 +228,15 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     )
 
 
-@cache
-def _shapes(polynomials: int) -> Float64:
-    """Return the prior sd of polynomials, for a distance of 1; last, that of the weights."""
-    pairs = [(amplitude, decay) for decay in DECAYS for amplitude in AMPLITUDES]
-    amplitude, decay = np.array([*pairs, _WEIGHTS]).T[:, :, None]
+def _loose(polynomials: int, distance: float, deceleration: float) -> tuple[Float64, Float64]:
+    """Return mean and sd of all coefficients, the polynomials held loosely."""
     j = np.arange(polynomials)
-    held = amplitude * decay ** np.maximum(j - _FREE, 0) / np.maximum(j, 1)
-    return np.where(j < _FREE, _FREE_SD, held)
-
-
-def _priors(polynomials: int, distance: float, deceleration: float) -> Float64:
-    """Return the prior sd of all coefficients, one row a prior."""
-    shapes = _shapes(polynomials)
-    sd = np.empty((len(shapes), polynomials + THRUST + 1))
-    sd[:, :polynomials] = distance * shapes
-    sd[:, polynomials:] = (CURRENT_SD_M_S, SCALE_SD, _THRUST_SD * deceleration)
-    return sd
+    mean, sd = np.zeros(polynomials + THRUST + 1), np.empty(polynomials + THRUST + 1)
+    sd[:polynomials] = distance * _AMPLITUDE * _DECAY ** (j - FREE) / np.maximum(j, 1)
+    sd[:FREE] = distance * _FREE_SD
+    mean[-1] = deceleration
+    sd[polynomials:] = (CURRENT_SD_M_S, SCALE_SD, _THRUST_SD * deceleration)
+    return mean, sd
 
 
 def _told(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
@@ -268,12 +259,12 @@ def _told(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
 
 
 @cache
-def _families(polynomials: int, current: bool, scale: bool) -> NDArray[np.bool_]:
+def _families(polynomials: int, current: bool, scale: bool, runs_down: bool) -> NDArray[np.bool_]:
     """Return the columns of each family: with and without factor, with and without thrust."""
     rows = [
         [True] * polynomials + [current, with_scale, with_thrust]
         for with_scale in ((False, True) if scale else (False,))
-        for with_thrust in (False, True)
+        for with_thrust in ((False, True) if runs_down else (False,))
     ]
     return np.array(rows)
 

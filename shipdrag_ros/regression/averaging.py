@@ -201,36 +201,39 @@ def deviations(
     return found
 
 
-@njit('Tuple((f8, f8[:, ::1]))(f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])', cache=True)
-def _eliminate(
-    products: Float64,
-    start: Float64,
-    columns: NDArray[np.int64],
-    mean: Float64,
-    sd: Float64,
-) -> tuple[float, Float64]:
-    """Return the evidence of some columns and the products of what they leave."""
-    k, m = len(start), len(columns)
-    evidence, step, lower = posterior(products, start, columns, mean, sd)
-    reduced = products.copy()
-    taken = np.empty((k, m))
+@njit('void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])', cache=True, fastmath=_SUMS)
+def _between(products: Float64, root: Float64, half: Float64, matrix: Float64) -> None:
+    """Fill in half = G R and the matrix R' G R + 1, R lower, G the first k products."""
+    k = len(root)
     for a in range(k):
-        for b in range(m):
-            taken[a, b] = products[a, columns[b]]
-        _forward(lower, taken[a])
+        half[a] = 0.0
+        matrix[a] = 0.0
+        matrix[a, a] = 1.0
+        for c in range(k):
+            for b in range(c + 1):
+                half[a, b] += products[a, c] * root[c, b]
+    for c in range(k):
+        for a in range(c + 1):
+            for b in range(k):
+                matrix[a, b] += root[c, a] * half[c, b]
+
+
+@njit('Tuple((f8[:, ::1], f8[::1]))(f8[:, :], f8[:], b1[:])', cache=True)
+def _part(matrix: Float64, vector: Float64, kept: NDArray[np.bool_]) -> tuple[Float64, Float64]:
+    """Return the lines of a matrix and a vector that are kept."""
+    columns = np.flatnonzero(kept)
+    m = len(columns)
+    part, right = np.empty((m, m)), np.empty(m)
     for a in range(m):
-        for b in range(k):
-            reduced[k, b] -= step[a] * products[columns[a], b]
-    for a in range(k):
-        for b in range(k):
-            for c in range(m):
-                reduced[a, b] -= taken[a, c] * taken[b, c]
-    return evidence, reduced
+        right[a] = vector[columns[a]]
+        for b in range(m):
+            part[a, b] = matrix[columns[a], columns[b]]
+    return part, right
 
 
 @njit(
     'Tuple((f8[::1], f8[:, ::1], f8[:, ::1]))'
-    '(f8[:, ::1], f8[::1], b1[:, ::1], f8[::1], f8[::1], f8[:, ::1])',
+    '(f8[:, ::1], f8[::1], b1[:, ::1], f8[::1], f8[:, ::1], f8[:, :, ::1])',
     cache=True,
 )
 def average(
@@ -238,8 +241,8 @@ def average(
     start: Float64,
     families: NDArray[np.bool_],
     chance: Float64,
-    mean: Float64,
-    sds: Float64,
+    means: Float64,
+    roots: Float64,
 ) -> tuple[Float64, Float64, Float64]:
     """
     Average all families of columns under all priors.
@@ -254,10 +257,11 @@ def average(
         Which columns each has; a coefficient that is not in is 0.
     chance : (f,)
         Prior probability of each.
-    mean : (k,)
+    means : (p, k)
         Of the priors.
-    sds : (p, k)
-        Standard deviations, one row a prior.
+    roots : (p, k, k)
+        Lower root R of the covariance R R' of each prior. What some family
+        lacks is independent of the rest.
 
     Returns
     -------
@@ -272,45 +276,75 @@ def average(
     Mean and variance over models as Buckland, Burnham and Augustin (1997) have
     them; weights by marginal likelihood in place of an information criterion,
     because the models differ in how strongly coefficients are held, not in how
-    many there are.
+    many there are. Solved in units of the prior, in which it is the identity:
+    no covariance is inverted, however strongly it holds.
     """
-    k = len(start)
-    weight = np.empty((len(families), len(sds)))
-    # what all priors hold alike is solved for once
-    alike = np.empty(k, np.bool_)
-    for a in range(k):
-        alike[a] = sds[:, a].min() == sds[:, a].max()
-    for f in range(len(families)):
-        known, reduced = _eliminate(
-            products, start, np.flatnonzero(families[f] & alike), mean, sds[0]
-        )
-        columns = np.flatnonzero(families[f] & ~alike)
-        known += math.log(chance[f])
-        for p in range(len(sds)):
-            weight[f, p] = known + posterior(reduced, start, columns, mean, sds[p])[0]
+    k, f, p = len(start), len(families), len(roots)
+    weight = np.empty((f, p))
+    matrices, off = np.empty((p, k, k)), np.empty((p, f, k))
+    slopes = np.empty((p, f, k))
+    half = np.empty((k, k))
+    for q in range(p):
+        held, matrix = roots[q], matrices[q]
+        _between(products, held, half, matrix)
+        for g in range(f):
+            distance, slope = off[q, g], slopes[q, g]
+            # of the logarithm of the likelihood, at the mean of the prior
+            at_mean = 0.0
+            for a in range(k):
+                distance[a] = means[q, a] - start[a] if families[g, a] else 0.0
+            for a in range(k):
+                half[0, a] = products[k, a]
+                for b in range(k):
+                    half[0, a] -= products[a, b] * distance[b]
+                at_mean += 0.5 * distance[a] * (products[k, a] + half[0, a])
+            for a in range(k):
+                slope[a] = 0.0
+                for c in range(a, k):
+                    slope[a] += held[c, a] * half[0, c]
+            lower, right = _part(matrix, slope, families[g])
+            if not _factor(lower):
+                weight[g, q] = -np.inf
+                continue
+            _forward(lower, right)
+            evidence = at_mean + math.log(chance[g])
+            for a in range(len(right)):
+                evidence += 0.5 * right[a] * right[a] - math.log(lower[a, a])
+            weight[g, q] = evidence
     weight = np.exp(weight - weight.max())
     weight = np.where(weight < _NEGLIGIBLE, 0.0, weight)
     weight /= weight.sum()
 
-    coefficients, second = np.zeros(k), np.zeros((k, k))
-    for f in range(len(families)):
-        columns = np.flatnonzero(families[f])
-        m = len(columns)
-        inverse = np.empty((m, m))
-        for p in range(len(sds)):
-            share = weight[f, p]
+    coefficients, second, step = np.zeros(k), np.zeros((k, k)), np.empty(k)
+    for g in range(f):
+        columns = np.flatnonzero(families[g])
+        rows = np.empty((k, len(columns)))
+        for q in range(p):
+            share = weight[g, q]
             if share == 0.0:
                 continue
-            _, step, lower = posterior(products, start, columns, mean, sds[p])
-            _invert(lower, inverse)
-            for a in range(m):
-                coefficients[columns[a]] += share * step[a]
-                for b in range(m):
+            lower, right = _part(matrices[q], slopes[q, g], families[g])
+            _factor(lower)
+            _forward(lower, right)
+            # rows of a root of the covariance, and with it the step
+            for a in range(k):
+                step[a] = off[q, g, a]
+                for b in range(len(columns)):
+                    rows[a, b] = roots[q, a, columns[b]] if families[g, a] else 0.0
+                _forward(lower, rows[a])
+                for b in range(len(columns)):
+                    step[a] += rows[a, b] * right[b]
+                coefficients[a] += share * step[a]
+                for b in range(a + 1):
                     # moments about the start, which is near: nothing cancels
-                    second[columns[a], columns[b]] += share * (inverse[a, b] + step[a] * step[b])
+                    total = step[a] * step[b]
+                    for c in range(len(columns)):
+                        total += rows[a, c] * rows[b, c]
+                    second[a, b] += share * total
     for a in range(k):
-        for b in range(k):
+        for b in range(a + 1):
             second[a, b] -= coefficients[a] * coefficients[b]
+            second[b, a] = second[a, b]
     return start + coefficients, second, weight
 
 

@@ -41,10 +41,11 @@ def problem() -> Problem:
     )
 
 
-def dense(given: Problem, columns: list[int], sd: Float64) -> tuple[Float64, Float64, float]:
+def dense(
+    given: Problem, columns: list[int], mean: Float64, prior: Float64
+) -> tuple[Float64, Float64, float]:
     """Mean, covariance and log marginal likelihood, from the covariance of the data."""
-    h, mean = given.rows[columns], given.mean[columns]
-    prior = np.diag(sd[columns] ** 2)
+    h, mean, prior = given.rows[columns], mean[columns], prior[np.ix_(columns, columns)]
     data = np.diag(1.0 / given.weight) + h.T @ prior @ h
     gain = prior @ h @ np.linalg.inv(data)
     off = given.value - mean @ h
@@ -61,7 +62,9 @@ def test_one_model_is_the_textbook(problem: Problem) -> None:
         evidence, step, lower = posterior(
             products, start, np.array(columns), problem.mean, problem.sd
         )
-        mean, covariance, likelihood = dense(problem, columns, problem.sd)
+        mean, covariance, likelihood = dense(
+            problem, columns, problem.mean, np.diag(problem.sd**2)
+        )
         np.testing.assert_allclose(start[columns] + step, mean, rtol=1e-11, atol=1e-13)
         triangle = np.tril(lower)
         np.testing.assert_allclose(np.linalg.inv(triangle @ triangle.T), covariance, atol=1e-12)
@@ -71,19 +74,22 @@ def test_one_model_is_the_textbook(problem: Problem) -> None:
 
 
 def test_the_average_is_the_mixture(problem: Problem) -> None:
-    products = condense(problem.rows, problem.value, problem.weight)
     families = np.array([[True] * 5, [True, True, True, False, False]])
-    sds = np.array([problem.sd, problem.sd])
-    sds[1, 2:4] *= 2.0
+    # the second prior holds what all families have together, about another mean
+    roots = np.array([np.diag(problem.sd)] * 2)
+    roots[1, :3, :3] = np.tril(np.random.default_rng(5).normal(size=(3, 3)))
+    given = np.array([problem.mean] * 2)
+    given[1, :3] = 0.2, -0.1, 0.4
     chance = np.array([1.0, 3.0])
-    coefficients, covariance, weight = average(
-        products, np.zeros(K), families, chance, problem.mean, sds
-    )
+    start = np.zeros(K)
+    start[0] = 0.7  # the choice of the start must not matter
+    products = condense(problem.rows, problem.value - start @ problem.rows, problem.weight)
+    coefficients, covariance, weight = average(products, start, families, chance, given, roots)
     means, seconds, logs = [], [], []
     for family, share in zip(families, chance):
-        for sd in sds:
+        for about, half in zip(given, roots):
             columns = np.flatnonzero(family).tolist()
-            mean, inside, likelihood = dense(problem, columns, sd)
+            mean, inside, likelihood = dense(problem, columns, about, half @ half.T)
             whole, spread = np.zeros(K), np.zeros((K, K))
             whole[columns] = mean
             spread[np.ix_(columns, columns)] = inside
