@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.errors import SensitivityError, ShipdragError
-from shipdrag_ros.sensitivity import coast
-from shipdrag_ros.sensitivity.coast import coast_from, parse_coast
+from shipdrag_ros.errors import SensitivityError
+from shipdrag_ros.sensitivity.coast import coast_from
 from shipdrag_ros.sensitivity.coasting import study_coast
 from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline, Uncertain
-from shipdrag_ros.simulation import Action, simulate
+from shipdrag_ros.simulation import simulate
 from shipdrag_ros.simulation.effects import LIBRARY
 
 CONFIG = Path(__file__).resolve().parents[2] / 'config'
@@ -121,29 +120,3 @@ def test_a_table_of_resistance_and_a_ship_without_sd():
     found = study_coast(ship, coast_from(ship))
     assert {'baseline.resistance_n', 'displaced_volume_m3'} <= set(found.selection.kept)
     assert all(np.isnan(one.tolerable) for one in found.importance)
-
-
-def test_the_coastdown_ends_where_the_ship_has_slowed_to_a_third():
-    own = coast_from(CARGO, 8.0)
-    truth = simulate(CARGO, own.scenario)
-    assert truth.speed_through_water_m_s[-1] == pytest.approx(0.35 * 8.0, rel=0.05)
-    assert own.name == 'coastdown:8'
-    reading = own.read(CARGO, [Action(), Action(log_factor=0.1)])
-    np.testing.assert_allclose(reading[1, :, 0], 1.1 * reading[0, :, 0])
-    np.testing.assert_allclose(reading[0, 0, 0], 8.0 / coast.LOG_SD_M_S)
-    slower = own.read(CARGO, [Action()], speed_m_s=7.0)
-    np.testing.assert_allclose(slower[0, 0, 0], 7.0 / coast.LOG_SD_M_S)
-
-
-def test_names_of_coastdowns():
-    assert parse_coast(CARGO, 'coastdown:7.5').scenario.speed_m_s == 7.5
-    top = CARGO.baseline_range_m_s[1]
-    assert parse_coast(CARGO, 'coastdown').scenario.speed_m_s == pytest.approx(0.7 * top)
-    for text in ('zigzag:15', 'coastdown:', 'coastdown:fast', 'coast'):
-        with pytest.raises(SensitivityError, match='expected coastdown or coastdown:SPEED'):
-            parse_coast(CARGO, text)
-    for text in ('coastdown:20', 'coastdown:1', 'coastdown:nan', 'coastdown:-3'):
-        with pytest.raises(SensitivityError, match=r'expected 2\.131\.\.9\.974 m/s'):
-            parse_coast(CARGO, text)
-    with pytest.raises(ShipdragError, match='no baseline'):
-        parse_coast(replace(CARGO, baseline=None), 'coastdown')
