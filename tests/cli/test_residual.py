@@ -122,3 +122,14 @@ def test_errors_say_what_to_mend(
     assert "'C_B' is a ratio of the hull" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         fit(table, form='cubic')
+
+
+def test_the_example_of_the_readme(capsys: pytest.CaptureFixture[str]) -> None:
+    root = Path(__file__).resolve().parents[2]
+    line = 'residual docs/data/river_ships.csv --form auto --target c_R'
+    assert f'shipdrag {line}' in (root / 'README.md').read_text(encoding='utf-8')
+    verb, data, *rest = line.split()
+    assert main([verb, str(root / data), *rest, '--json']) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found['rank'] == 15
+    assert found['hulls'] == 40
