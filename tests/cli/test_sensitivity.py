@@ -93,6 +93,7 @@ def test_a_ship_file_coasts(
         (['--keep', '41'], 'keep is 41, expected 1..40'),
         (['--manoeuvre', 'spiral:15'], "manoeuvre 'spiral:15', expected zigzag:ANGLE or turn"),
         (['--manoeuvre', 'zigzag:120'], 'with 1..90 degrees of rudder'),
+        (['--manoeuvre', 'turn:45'], 'at most 40 degrees of rudder, which is as far as it goes'),
         (['--manoeuvre', 'coastdown'], 'expected zigzag:ANGLE or turn:ANGLE'),
         (['--ship', 'SHIP', '--manoeuvre', 'zigzag:15'], 'for zigzag and turn leave out --ship'),
         (['--ship', 'SHIP', '--manoeuvre', 'coastdown:30'], 'begins at 30 m/s, expected'),

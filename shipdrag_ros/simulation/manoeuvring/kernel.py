@@ -30,7 +30,7 @@ class Hull(NamedTuple):
         m' - X'udot.
     sway_by_y, sway_by_n, yaw_by_y, yaw_by_n
         Inverse of the inertia in sway and yaw.
-    limit_rad, rate_rad_s, lag_s
+    rate_rad_s, lag_s
         Rudder machine.
     """
 
@@ -41,7 +41,6 @@ class Hull(NamedTuple):
     sway_by_n: float
     yaw_by_y: float
     yaw_by_n: float
-    limit_rad: float
     rate_rad_s: float
     lag_s: float
 
@@ -194,7 +193,6 @@ def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Fl
     """Fill the path (n, STATES) of one ship, with so many looks between two rows."""
     state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     side = helm.first
-    order = min(helm.order_rad, hull.limit_rad)
     for row in range(len(path)):
         for i in range(STATES):
             path[row, i] = state[i]
@@ -205,12 +203,14 @@ def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Fl
                 side = -side
             for _ in range(steps):
                 # the derivatives count a rudder that turns the ship to port positive
-                after = _advance(hull, c, state, -side * order, helm.step_s)
+                after = _advance(hull, c, state, -side * helm.order_rad, helm.step_s)
                 if helm.attentive and side * after[5] >= helm.reverse_rad:
                     p = _reached(state, after, side * helm.reverse_rad, helm.step_s)
-                    state = _advance(hull, c, state, -side * order, p * helm.step_s)
+                    state = _advance(hull, c, state, -side * helm.order_rad, p * helm.step_s)
                     side = -side
-                    after = _advance(hull, c, state, -side * order, (1.0 - p) * helm.step_s)
+                    after = _advance(
+                        hull, c, state, -side * helm.order_rad, (1.0 - p) * helm.step_s
+                    )
                 state = after
 
 

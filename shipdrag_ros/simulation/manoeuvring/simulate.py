@@ -50,7 +50,8 @@ def steer(
     Raises
     ------
     SimulationError
-        If the times do not fit each other or the derivatives the form.
+        If the rudder does not go as far as is ordered, the times do not fit each
+        other, or the derivatives the form.
 
     Notes
     -----
@@ -58,6 +59,12 @@ def steer(
     in the dimensionless change of speed, sway, yaw rate and rudder angle, times
     powers of the momentary speed and the length.
     """
+    limit_rad = ship.rudder.limit_rad
+    if not 0.0 < manoeuvre.rudder_rad <= limit_rad * (1.0 + 1e-9):
+        raise SimulationError(
+            f'manoeuvre {manoeuvre.name!r}, expected more than 0 and at most '
+            f'{np.degrees(limit_rad):g} degrees of rudder, which is as far as it goes'
+        )
     looks = round(sample_s / control_s) if control_s > 0.0 else 1
     look_s = control_s or sample_s
     # written so that NaN fails
@@ -117,7 +124,6 @@ def _hull(ship: SteeredShip) -> Hull:
         sway_by_n=sway_by_n,
         yaw_by_y=yaw_by_y,
         yaw_by_n=yaw_by_n,
-        limit_rad=machine.limit_rad,
         rate_rad_s=machine.rate_rad_s,
         lag_s=machine.lag_s,
     )

@@ -151,8 +151,11 @@ def test_the_rudder_keeps_to_its_rate_and_limit():
     motion = steer(SHIP, zigzag(40.0), sample_s=0.1, samples=3000)[0]
     machine = SHIP.rudder
     assert np.max(np.abs(np.diff(motion.rudder_rad))) <= machine.rate_rad_s * 0.1 * (1 + 1e-9)
-    stiff = replace(SHIP, rudder=replace(machine, limit_rad=np.radians(10.0)))
-    assert np.max(np.abs(steer(stiff, turn(35.0))[0].rudder_rad)) <= np.radians(10.0) + 1e-12
+    stiff = replace(SHIP, rudder=replace(machine, limit_rad=np.radians(34.0)))
+    with pytest.raises(
+        SimulationError, match=r"'turn:35', expected more than 0 and at most 34 degrees"
+    ):
+        steer(stiff, turn(35.0))
     slow = replace(SHIP, rudder=replace(machine, rate_rad_s=np.radians(1.0)))
     lagging = replace(SHIP, rudder=replace(machine, lag_s=5.0))
     prompt = steer(SHIP, turn(35.0), samples=20)[0].rudder_rad
