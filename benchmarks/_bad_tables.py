@@ -47,7 +47,7 @@ CASES = (
         'words, nan and an empty cell among numbers',
         _surface('1,x,2', 'nan,2,3', '1,,3', *_GRID),
         1,
-        "line 2, beta: 'x', expected a finite number",
+        "line 2, beta: 'x', expected a number",
         "line 3, alpha: 'nan', expected",
         "line 4, beta: '', expected",
     ),

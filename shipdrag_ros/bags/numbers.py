@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from shipdrag_ros.errors import DataError, ImportDataError
 from shipdrag_ros.samples import Float64
 
 _SHOWN = 20  # cells that are told one by one
+_MOST = 1e30  # its tenth power is a number still
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Numbers:
     names : (k,)
         Of the columns.
     values : (n, k)
-        Finite numbers.
+        Finite numbers, whose higher powers are finite too.
     """
 
     names: tuple[str, ...]
@@ -60,7 +60,7 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
     Raises
     ------
     DataError
-        Naming every column that is missing, or every cell that is no finite
+        Naming every column that is missing, or every cell that is no usable
         number.
     ImportDataError
         If the file is no table.
@@ -81,10 +81,12 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
         row = []
         for name, place in zip(wanted, places):
             cell = cells[place] if place < len(cells) else ''
-            if NUMBER.fullmatch(cell) and isfinite(value := float(cell)):
+            if NUMBER.fullmatch(cell) and abs(value := float(cell)) <= _MOST:
                 row.append(value)
             else:
-                problems.append(f'line {line}, {name}: {cell!r}, expected a finite number')
+                problems.append(
+                    f'line {line}, {name}: {cell!r}, expected a number, at most {_MOST:g} in size'
+                )
         rows.append(row)
     if not rows:
         problems.append('no row below the header, expected a line a measurement')

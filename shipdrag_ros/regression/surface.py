@@ -23,6 +23,7 @@ from shipdrag_ros.samples import Float64
 
 LOWEST = 2  # S5 begins here
 MAX_DEGREE = 8
+_NARROWEST = 1e-30  # coefficients of raw powers go with the powers of its inverse
 # Two tests follow the right degree, so chance goes beyond it in 2 of 100 surfaces. S1's order
 # search takes more risk of that: there too low costs more than too high.
 SIGNIFICANCE = 0.01
@@ -143,6 +144,11 @@ def fit_surface(
         f'{name}: {count} different value(s), expected {LOWEST + 1} or more'
         for name, count in zip(inputs, levels)
         if count < LOWEST + 1
+    ]
+    problems += [
+        f'{name}: varies by {extent:g} alone, expected {_NARROWEST:g} or more; use another unit'
+        for name, extent in zip(inputs, np.ptp(points, axis=0))
+        if 0.0 < extent < _NARROWEST
     ]
     needed = len(terms_up_to(LOWEST, [LOWEST] * len(inputs))) + 1
     if len(points) < needed:

@@ -207,7 +207,7 @@ def fit_form(form: Form, hulls: Hulls, values: Float64) -> ResidualFit:
     if fit.rank < len(fit.coefficients):
         notes.append(
             f'{count} hulls determine {fit.rank} of {len(fit.coefficients)} coefficients: '
-            'single coefficients mean nothing, and most other hulls are refused.'
+            'single ones mean nothing, and hulls that need the others are refused.'
         )
     if hulls_known >= _ENOUGH:
         spread = max(1.0, float(np.sqrt(np.mean((error[known] / sd[known]) ** 2))))

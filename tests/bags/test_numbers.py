@@ -44,15 +44,16 @@ def test_all_missing_columns_are_told(tmp_path: Path) -> None:
 
 def test_all_bad_cells_are_told_with_their_lines(tmp_path: Path) -> None:
     path = tmp_path / 'data.csv'
-    path.write_text('a,b\n1,2\nnan,inf\n3\n1e9999,1_0\n5,6\n')
+    path.write_text('a,b\n1,2\nnan,inf\n3\n1e9999,1_0\n5,-2e30\n-1e-40,1e30\n')
     with pytest.raises(DataError) as raised:
         read_numbers(path, ('a', 'b'))
     assert raised.value.problems == (
-        "line 3, a: 'nan', expected a finite number",
-        "line 3, b: 'inf', expected a finite number",
-        "line 4, b: '', expected a finite number",
-        "line 5, a: '1e9999', expected a finite number",
-        "line 5, b: '1_0', expected a finite number",
+        "line 3, a: 'nan', expected a number, at most 1e+30 in size",
+        "line 3, b: 'inf', expected a number, at most 1e+30 in size",
+        "line 4, b: '', expected a number, at most 1e+30 in size",
+        "line 5, a: '1e9999', expected a number, at most 1e+30 in size",
+        "line 5, b: '1_0', expected a number, at most 1e+30 in size",
+        "line 6, b: '-2e30', expected a number, at most 1e+30 in size",
     )
 
 

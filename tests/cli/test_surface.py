@@ -80,7 +80,7 @@ def test_errors_say_what_to_mend(
     assert "no column 'gamma'" in told
     assert "no column 'c_y'" in told
     assert main([*line, 'alpha,beta', '--target', 'remark']) == 1
-    assert "line 2, remark: 'x', expected a finite number" in capsys.readouterr().err
+    assert "line 2, remark: 'x', expected a number" in capsys.readouterr().err
     assert main([*line, 'alpha,beta', '--target', 'alpha']) == 1
     assert "'alpha' is one of the inputs too" in capsys.readouterr().err
     for wrong in (['alpha,alpha', '--target', 'c_x'], ['a,', '--target', 'c_x']):

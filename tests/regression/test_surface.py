@@ -124,6 +124,8 @@ def test_problems_are_told_together() -> None:
         'beta: 1 different value(s), expected 3 or more',
         '4 row(s), expected 7 or more for degree 2 in 2 variable(s)',
     )
+    with pytest.raises(DataError, match=r'alpha: varies by 1\.8e-31 alone'):
+        fit_surface(1e-33 * grid(9), c_x(grid(9)), inputs=ANGLES)
     line = np.linspace(0.0, 1.0, 30)
     with pytest.raises(DataError, match='follow from each other'):
         fit_surface(np.column_stack([line, 2.0 * line]), line, inputs=ANGLES)
