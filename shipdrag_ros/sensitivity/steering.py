@@ -15,6 +15,7 @@ import numpy as np
 
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.sensitivity.loss import (
+    CHANGES,
     Losses,
     Norm,
     Responses,
@@ -43,7 +44,7 @@ DESIGN = (
 )
 _UP, _DOWN = slice(0, None, 2), slice(1, None, 2)  # columns of CHANGES
 _SMALL, _LARGE = slice(0, 2), slice(2, 4)
-_TEN, _TINY = (0.1, -0.1), (1e-3, -1e-3)  # tiny ones: what is not linear would look like no other
+_TEN, TINY = (0.1, -0.1), (1e-3, -1e-3)  # tiny ones: what is not linear would look like no other
 
 
 @dataclass(frozen=True)
@@ -212,17 +213,25 @@ def simulator(ship: SteeredShip, manoeuvre: Manoeuvre, *, control_s: float = 0.0
     return simulate
 
 
-def respond(ship: SteeredShip, manoeuvre: Manoeuvre, *, control_s: float = 0.0) -> Responses:
+def respond(
+    ship: SteeredShip,
+    manoeuvre: Manoeuvre,
+    *,
+    changes: Sequence[float] = CHANGES,
+    control_s: float = 0.0,
+) -> Responses:
     """
-    Change each derivative by `CHANGES`.
+    Change each derivative by fractions of it; `control_s` as in `simulator`.
     """
     simulate = simulator(ship, manoeuvre, control_s=control_s)
-    return vary(simulate, FORM, ship.values, relative(FORM, ship.values))
+    return vary(simulate, FORM, ship.values, relative(FORM, ship.values, changes))
 
 
-def respond_by_groups(ship: SteeredShip, manoeuvre: Manoeuvre) -> Responses:
+def respond_by_groups(
+    ship: SteeredShip, manoeuvre: Manoeuvre, *, changes: Sequence[float] = CHANGES
+) -> Responses:
     """
-    Change derivatives that are one measurement together, by `CHANGES`.
+    Change derivatives that are one measurement together.
 
     Each group has the name of its first.
     """
@@ -234,7 +243,7 @@ def respond_by_groups(ship: SteeredShip, manoeuvre: Manoeuvre) -> Responses:
     def simulate_groups(sets: Float64) -> Float64:
         return simulate(ship.values * sets[:, place])
 
-    return vary(simulate_groups, names, factors, relative(names, factors))
+    return vary(simulate_groups, names, factors, relative(names, factors, changes))
 
 
 def check(ship: SteeredShip, kept: Sequence[str], *, manoeuvre: Manoeuvre = CHECKED_BY) -> Check:
@@ -287,8 +296,8 @@ def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> E
     """
     Find which manoeuvre makes which derivative visible.
     """
-    steps = relative(FORM, ship.values, (*_TEN, *_TINY))
-    responses = [vary(simulator(ship, one), FORM, ship.values, steps) for one in manoeuvres]
+    changes = (*_TEN, *TINY)
+    responses = [respond(ship, manoeuvre, changes=changes) for manoeuvre in manoeuvres]
     slopes = [one.slopes(2, 3) for one in responses]
     return Experiment(
         FORM,

@@ -117,6 +117,12 @@ def test_groups_change_together():
     expected = Norm.ROOT_MEAN_SQUARE.of((both[1] - both[0]) / scale)
     losses = groups.losses().table[groups.names.index('Nd')]
     assert losses[0] == pytest.approx(expected, rel=1e-9)
+    halves = respond_by_groups(SHIP, ZIGZAG, changes=(0.05,)).losses()
+    assert halves.table[halves.names.index('Nd')][0] == pytest.approx(expected / 2.0, rel=0.1)
+    alone = respond(SHIP, ZIGZAG, changes=(0.1,)).losses()
+    i = FORM.index('Nd')
+    assert alone.table.shape == (40, 1)
+    assert alone.table[i, 0] == respond(SHIP, ZIGZAG).losses().table[i, 0]
 
 
 @settings(max_examples=10, deadline=None)
