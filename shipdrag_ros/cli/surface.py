@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--export',
         type=new_file('.py'),
         metavar='FILE.py',
-        help='write the surface as a plain Python function of the inputs',
+        help='write the surface and its derivatives as plain Python functions of the inputs',
     )
     parser.add_argument(
         '--report',
@@ -83,9 +83,8 @@ def run(options: argparse.Namespace) -> int:
     data = read_numbers(options.data, (*inputs, target))
     points, values = data.values[:, :-1], data.values[:, -1]
     found = fit_surface(points, values, inputs=inputs, max_degree=options.max_degree)
-    predictions = (
-        found.predict(read_numbers(options.predict, inputs).values) if options.predict else []
-    )
+    asked = None if options.predict is None else read_numbers(options.predict, inputs).values
+    predictions = [] if asked is None else found.predict(asked)
     _show(output, found, target, predictions)
     if options.export is not None:
         options.export.write_text(found.source(target), encoding='utf-8')
@@ -102,8 +101,12 @@ def run(options: argparse.Namespace) -> int:
         )
         output.log(f'report in {options.report}')
     content = document(found)
-    if options.predict is not None:
-        content['predictions'] = prediction_documents(predictions)
+    if asked is not None:
+        slopes = found.polynomial.gradient(asked).tolist()
+        content['predictions'] = [
+            {**each, 'gradient': dict(zip(inputs, slope))}
+            for each, slope in zip(prediction_documents(predictions), slopes)
+        ]
     output.json(content)
     return 0
 

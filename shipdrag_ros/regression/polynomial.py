@@ -9,7 +9,7 @@ Reynolds numbers would lose the digits that high degrees need.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from math import comb
@@ -112,6 +112,18 @@ class Polynomial:
         """
         slopes: Float64 = self._at(points, len(self.centre))[1:].T / self.half
         return slopes
+
+    def derivative(self, variable: int) -> Polynomial:
+        """
+        Return the derivative by one variable, a polynomial again.
+        """
+        has = self.powers[:, variable] > 0
+        powers = self.powers[has]
+        if not len(powers):
+            return replace(self, powers=self.powers[:1], coefficients=np.zeros(1))
+        factor = powers[:, variable] / self.half[variable]
+        powers[:, variable] -= 1
+        return replace(self, powers=powers, coefficients=self.coefficients[has] * factor)
 
     def _at(self, points: Float64, slopes: int) -> Float64:
         scaled = np.ascontiguousarray(((points - self.centre) / self.half).T)

@@ -96,14 +96,20 @@ class Surface:
 
     def source(self, name: str) -> str:
         """
-        Return the surface as a plain Python function.
+        Return the surface and its derivatives as plain Python functions.
+
+        They are named NAME and NAME_by_INPUT.
         """
         ranges = ', '.join(
             f'{key} {low:g}..{high:g}' for key, (low, high) in self.domain.ranges.items()
         )
-        return self.polynomial.source(
-            name, self.inputs, f'Polynomial of degree {self.degree} fitted to {ranges}.'
-        )
+        note = f'Polynomial of degree {self.degree} fitted to {ranges}.'
+        functions = [self.polynomial.source(name, self.inputs, note)]
+        for number, each in enumerate(self.inputs):
+            slope = self.polynomial.derivative(number)
+            text = f'Derivative of {name} by {each}.'
+            functions.append(slope.source(f'{name}_by_{each}', self.inputs, text))
+        return '\n\n'.join(functions)
 
 
 def fit_surface(

@@ -66,6 +66,12 @@ def test_exports_predicts_and_reports(
     function = space['c_x']
     assert callable(function)
     assert function(20.0, 10.0) == pytest.approx(inside['value'], rel=1e-12)
+    for name, along in (('alpha', (1e-4, 0.0)), ('beta', (0.0, 1e-4))):
+        by = space[f'c_x_by_{name}']
+        assert callable(by)
+        step = function(20.0 + along[0], 10.0 + along[1]) - function(20.0, 10.0)
+        assert by(20.0, 10.0) == pytest.approx(step / 1e-4, abs=1e-7)
+        assert inside['gradient'][name] == pytest.approx(by(20.0, 10.0), rel=1e-9)
     text = page.read_text()
     assert 'degree 4' in text
     assert text.count('data:image/svg+xml') == 3

@@ -31,6 +31,12 @@ def test_probabilities_against_scipy_stats() -> None:
     np.testing.assert_allclose(table.p[1:], stats.f.sf(table.f[1:], [1, 3], [27, 24]), rtol=1e-10)
 
 
+def test_a_stricter_test_stops_earlier() -> None:
+    table = OrderTable.of(range(1, 6), [100.0, 50.0, 48.0, 47.9, 47.8], rows=100)
+    assert 0.01 < table.p[2] < SIGNIFICANCE
+    assert (table.plateau(), table.plateau(significance=0.01)) == (2, 1)
+
+
 def test_one_idle_step_is_not_a_plateau() -> None:
     # an odd term after an even one that is not there
     table = OrderTable.of(range(1, 6), [100.0, 99.9, 1.0, 0.999, 0.998], rows=100)

@@ -56,6 +56,11 @@ def test_derivatives_raw_powers_and_source(variables: int, degree: int, seed: in
         np.testing.assert_allclose(
             polynomial.gradient(points)[:, j], slope, atol=1e-8 * size / polynomial.half[j]
         )
+        np.testing.assert_allclose(
+            polynomial.derivative(j)(points),
+            polynomial.gradient(points)[:, j],
+            atol=1e-12 * size / polynomial.half[j],
+        )
     raw = polynomial.raw() @ polynomial.coefficients
     terms = monomials(points, polynomial.powers) * raw
     # raw powers cancel: hence the scaling inside

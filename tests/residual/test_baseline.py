@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.errors import DataError
+from shipdrag_ros.errors import DataError, ShipdragError
 from shipdrag_ros.residual import Hulls, ResidualFit, fit_residual, with_residual
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
@@ -62,6 +62,8 @@ def test_the_ship_states_what_the_form_foretells(
     row = np.array([[130.0 / 16.5, 16.5 / 4.1, written.slenderness, 0.005, 0.15]])
     truth = 1e-3 * resistance(Hulls.of('q', ('L_B', 'B_T', 'slenderness', 'lcb', 'Fr'), row))[0]
     assert abs(base.wave(np.array([0.15]))[0] / truth - 1.0) < 3.0 * base.relative_sd.wave
+    with pytest.raises(ShipdragError, match='the table has'):
+        written.resistance_n(written.speed(0.3))
     low, high = written.baseline_range_m_s
     assert 0.08 <= written.froude(low) < written.froude(high) <= 0.2 + 1e-9
 
@@ -70,6 +72,13 @@ def test_a_hull_outside_the_data_is_refused(ship: Ship, found: ResidualFit) -> N
     narrow = replace(ship, breadth_m=11.0, draught_m=6.15)
     with pytest.raises(DataError, match=r'may not be used for this hull(.|\n)*L_B 11.8182 is out'):
         with_residual(narrow, found, lcb=0.005)
+
+
+def test_its_centre_of_buoyancy_counts(ship: Ship, found: ResidualFit) -> None:
+    base, other = (with_residual(ship, found, lcb=lcb).baseline for lcb in (0.005, 0.008))
+    assert base != other
+    with pytest.raises(DataError, match=r'lcb 0\.1 is outside'):
+        with_residual(ship, found, lcb=0.1)
 
 
 def test_what_is_missing_is_told_together(ship: Ship, found: ResidualFit) -> None:
