@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -76,13 +77,13 @@ def row(
     ]
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """
     Print the table.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
-    runs = parser.parse_args().runs
+    runs = parser.parse_args(arguments).runs
     ship = Ship.load(SHIP_FILE)
     table = Table(title=f'S1 on simulated coastdowns, N = {runs}, seeds 0..{runs - 1}')
     for heading in ('case', 'problem'):

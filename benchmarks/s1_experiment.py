@@ -11,6 +11,8 @@ real error.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib as mpl
@@ -109,6 +111,55 @@ def draw_hulls(axis: Axes, ship_truth: Truth, yachts: dict[str, Truth]) -> None:
     axis.legend(fontsize=7)
 
 
+@dataclass(frozen=True)
+class Stated:
+    """
+    What an estimate says of its error, and the error, mean of `RUNS` records [%].
+
+    Attributes
+    ----------
+    largest, mean
+        w = sigma_r / max r on the valid range, and over the Froude numbers.
+    small
+        Froude numbers between which w < 1 %, in the record of `SEED`.
+    rmse, at_top
+        Of r, in parts of max r.
+    """
+
+    largest: float
+    mean: float
+    small: tuple[float, float]
+    rmse: float
+    at_top: float
+
+    @classmethod
+    def of(cls, truth: Truth, problem: str, n: int, noise: Noise = NOISE) -> Stated:
+        """
+        Measure one problem.
+        """
+        largest, mean, wrong, small = [], [], [], np.zeros(0)
+        for seed in range(RUNS):
+            found = solve(truth, problem, n, seed=seed, noise=noise)
+            curve = found.valid_curve
+            w = curve.sigma_repeatable_m_s2 / curve.resistance_m_s2.max()
+            largest.append(w.max())
+            mean.append(np.trapezoid(w, curve.froude) / np.ptp(curve.froude))
+            wrong.append(errors(found, truth))
+            if seed == SEED:
+                small = curve.froude[w < 0.01]
+        rmse, top = (
+            100.0 * float(np.sqrt(np.mean(np.square([getattr(e, name) for e in wrong]))))
+            for name in ('rmse', 'at_top')
+        )
+        return cls(
+            100.0 * float(np.mean(largest)),
+            100.0 * float(np.mean(mean)),
+            (float(small.min()), float(small.max())),
+            rmse,
+            top,
+        )
+
+
 def draw_w(axis: Axes, truth: Truth) -> None:
     """
     Sigma_r over max r against the Froude number, n = 100.
@@ -125,27 +176,16 @@ def draw_w(axis: Axes, truth: Truth) -> None:
     )
     print(f'w = sigma_r / max r on the valid range and the real error, mean of {RUNS} records')
     for problem, n, noise in cases:
-        largest, mean, wrong = [], [], []
-        for seed in range(RUNS):
-            found = solve(truth, problem, n, seed=seed, noise=noise)
-            curve = found.valid_curve
+        found = Stated.of(truth, problem, n, noise)
+        if noise == NOISE and n <= 100:
+            curve = solve(truth, problem, n).valid_curve
             w = curve.sigma_repeatable_m_s2 / curve.resistance_m_s2.max()
-            largest.append(w.max())
-            mean.append(np.trapezoid(w, curve.froude) / np.ptp(curve.froude))
-            wrong.append(errors(found, truth))
-            if (seed, noise) == (SEED, NOISE) and n <= 100:
-                axis.semilogy(curve.froude, w, label=f'{LABELS[problem]}, n = {n}')
-            if seed == SEED:
-                small = curve.froude[w < 0.01]
-        rms, top = (
-            100.0 * np.sqrt(np.mean(np.square([getattr(e, name) for e in wrong])))
-            for name in ('rmse', 'at_top')
-        )
+            axis.semilogy(curve.froude, w, label=f'{LABELS[problem]}, n = {n}')
         print(
             f'  {LABELS[problem]:<9} n={n:3d}, log {noise[0]} m/s, radar {noise[1]:g} m: '
-            f'largest w {100 * np.mean(largest):.2f} %, mean over Fr {100 * np.mean(mean):.2f} %, '
-            f'w < 1 % from Fr {small.min():.3f} to {small.max():.3f} (one record); '
-            f'real error {rms:.2f} %, at the top {top:.1f} %'
+            f'largest w {found.largest:.2f} %, mean over Fr {found.mean:.2f} %, '
+            f'w < 1 % from Fr {found.small[0]:.3f} to {found.small[1]:.3f} (one record); '
+            f'real error {found.rmse:.2f} %, at the top {found.at_top:.1f} %'
         )
     axis.axhline(0.01, color='k', lw=0.6)
     axis.set(xlabel='Fr', ylabel='w', title='w, order by the test')
@@ -213,26 +253,37 @@ def draw_bands(axis: Axes, ship: Ship, truth: Truth) -> None:
     axis.legend(fontsize=7)
 
 
+def inflection(ship: Ship) -> float:
+    """
+    Return the Froude number of the true inflection of r.
+    """
+    froude = np.linspace(0.05, 0.284, 500)
+    r = ship.resistance_n(ship.speed(froude)) / ship.mass_kg
+    return float(froude[np.argmax(np.gradient(r, froude))])
+
+
+def maxima(truth: Truth, noise: Noise) -> tuple[Float64, Float64]:
+    """
+    Return Fr_max where it is a significant inflection, and argmax dr/dFr, of `RUNS` records.
+    """
+    results = [solve(truth, 's1_joint', 300, seed=seed, noise=noise) for seed in range(RUNS)]
+    found = [e.froude_valid[1] for e in results if e.froude_max_by is FroudeMax.INFLECTION]
+    return np.array(found), np.array([e.froude_max_argmax for e in results])
+
+
 def print_yacht(yachts: dict[str, Truth]) -> None:
     """
     Say whether Fr_max depends on the starting speed, over many records.
     """
     ship = next(iter(yachts.values())).ship
-    froude = np.linspace(0.05, 0.284, 500)
-    r = ship.resistance_n(ship.speed(froude)) / ship.mass_kg
-    inflection = froude[np.argmax(np.gradient(r, froude))]
     print(
-        f'yacht-like hull: true inflection at Fr {inflection:.3f}; joint, n = 300, {RUNS} records'
+        f'yacht-like hull: true inflection at Fr {inflection(ship):.3f}; joint, n = 300, '
+        f'{RUNS} records'
     )
     for log, radar in ((0.02, 1.0), YACHT_NOISE, (0.001, 0.02)):
         for name, truth in yachts.items():
-            results = [
-                solve(truth, 's1_joint', 300, seed=seed, noise=(log, radar))
-                for seed in range(RUNS)
-            ]
-            found = [e.froude_valid[1] for e in results if e.froude_max_by is FroudeMax.INFLECTION]
-            by_argmax = [e.froude_max_argmax for e in results]
-            where = f'at {np.mean(found):.3f} +- {np.std(found):.3f}' if found else ''
+            found, by_argmax = maxima(truth, (log, radar))
+            where = f'at {np.mean(found):.3f} +- {np.std(found):.3f}' if len(found) else ''
             print(
                 f'  {name:<12} log {log} m/s, position {radar} m: significant in '
                 f'{len(found)} {where}; argmax dr/dFr {np.mean(by_argmax):.3f} +- '
@@ -240,22 +291,27 @@ def print_yacht(yachts: dict[str, Truth]) -> None:
             )
 
 
-def main() -> None:
+def coastdowns() -> tuple[Truth, dict[str, Truth]]:
+    """
+    Return those of the cargo ship and of the yacht.
+    """
+    ship, yacht = (Ship.load(CONFIG / name) for name in ('vitus_bering.yaml', 'yacht.yaml'))
+    return coast(ship, speed_m_s=8.2, duration_s=1500.0), {
+        f'yacht {knots} kn': coast(yacht, speed_m_s=knots * KNOT_M_S, duration_s=300.0)
+        for knots in (6, 5)
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
     """
     Print the figures and draw the picture.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--out', type=Path, default=Path(__file__).parent / 'out')
-    out = parser.parse_args().out
+    out = parser.parse_args(arguments).out
     out.mkdir(parents=True, exist_ok=True)
 
-    ship = Ship.load(CONFIG / 'vitus_bering.yaml')
-    truth = coast(ship, speed_m_s=8.2, duration_s=1500.0)
-    yacht = Ship.load(CONFIG / 'yacht.yaml')
-    yachts = {
-        f'yacht {knots} kn': coast(yacht, speed_m_s=knots * KNOT_M_S, duration_s=300.0)
-        for knots in (6, 5)
-    }
+    truth, yachts = coastdowns()
     speed = truth.speed_through_water_m_s
     print(
         f'{truth.ship.name}: {speed[0]:.2f} to {speed[-1]:.2f} m/s in 1500 s, largest '
@@ -268,9 +324,9 @@ def main() -> None:
     draw_truth(axes[1, 2], truth)
     print_yacht(yachts)
 
-    draw_bands(axes[1, 3], ship, truth)
-    figure.savefig(out / 's1_experiment.png', dpi=110)
-    print('picture:', out / 's1_experiment.png')
+    draw_bands(axes[1, 3], truth.ship, truth)
+    figure.savefig(out / 's1_experiment.png', dpi=60)
+    print('picture: s1_experiment.png')
 
 
 if __name__ == '__main__':

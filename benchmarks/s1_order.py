@@ -10,6 +10,7 @@ too high: the base case of s1_accuracy.py, speed and position together.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -40,14 +41,14 @@ def tables(size: float, runs: int) -> list[OrderTable]:
     return [fit_orders(basis, truth + noise)[1] for noise in rng.normal(size=(runs, 100))]
 
 
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """
     Print the table.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--runs', type=int, default=2000, help='polynomials of each size')
     parser.add_argument('--coasts', type=int, default=100, help='coastdowns')
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     kept = order.SIGNIFICANCE, order.NEIGHBOURS
     ship = Ship.load(SHIP_FILE)
     truth = coast(ship, speed_m_s=8.2, duration_s=1500.0)
@@ -85,6 +86,7 @@ def main() -> None:
             f'{100 * np.sqrt(np.mean([e.at_top**2 for e in found])):.1f}',
             f'{100 * np.mean([e.covered for e in found]):.0f}',
         )
+    order.SIGNIFICANCE, order.NEIGHBOURS = kept
     Console(width=120).print(result)
 
 
