@@ -46,6 +46,11 @@ from _coasts import (
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import estimate, estimate_final
+from shipdrag_ros.estimation.motion_fit.families import POWERS
+from shipdrag_ros.estimation.motion_fit.guess import Guess
+from shipdrag_ros.estimation.motion_fit.problem import Problem, fit_robustly
+from shipdrag_ros.estimation.motion_fit.record import Record
+from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 
@@ -69,7 +74,7 @@ CASES = (
     Case('thrust runs down, shaft read', steady=True, run_down=True),
     GUSTS,
 )
-FINAL, LIVE = 'ours, final', 'ours, live'
+FINAL, LIVE, FIRST = 'ours, final', 'ours, live', 'first fit of the final, v .. v⁴'
 
 Figures = dict[str, dict[str, str]]  # by row and column of a table
 
@@ -126,6 +131,22 @@ def own(method: Callable[..., object], estimator: str, _: Coast) -> Callable[[Co
             np.interp(at, curve.speed_m_s, curve.sigma_repeatable_m_s2),
             (at >= valid[0]) & (at <= valid[-1]),
         )
+
+    return call
+
+
+def known_family(_: Coast) -> Callable[[Coast], Found]:
+    """
+    Wrap the first fit of the final figure, of v .. v⁴ alone.
+    """
+
+    def call(coast: Coast) -> Found:
+        ship, window = coast.truth.ship, coast.window
+        run_down = RunDown.of(window, ship)
+        record = Record.of(window, run_down, Parameters())
+        guess = Guess.of(record.coast, float(ship.n_r(1.0)))
+        first, _ = fit_robustly(Problem.of(record, run_down, ship, guess))
+        return Found(*first.resistance(coast.speeds), np.ones(len(coast.speeds), np.bool_))
 
     return call
 
@@ -238,7 +259,8 @@ class Tally:
         }
 
 
-EFFICIENCY = ('RMSE', 'bias', 'spread', 'v .. v⁴', 'v, v², v⁴')
+BOUNDS = {'v .. v⁴': BOUND_FAMILY, 'v, v², v⁴': IN_FAMILY, 'v .. v⁴, v⁶': POWERS}
+EFFICIENCY = ('RMSE', 'bias', 'spread', *BOUNDS)
 HEADINGS = ('RMSE', 'bias', 'spread', 'at the top', 'cover', 'where valid', 'valid', 'runs')
 
 
@@ -297,11 +319,11 @@ def efficiency(n: int, runs: int) -> Figures:
     """
     Return the figures on the hull whose resistance lies in the family.
     """
-    found = tally(FAMILY, WHITE, n, runs, OURS[:2])
+    found = tally(FAMILY, WHITE, n, runs, (*OURS[:2], Estimator(FIRST, 10_000, known_family)))
     result = {}
     for name, one in found.items():
         shown = {key: one.figures()[key] for key in EFFICIENCY[:3]}
-        for heading, powers in zip(EFFICIENCY[3:], (BOUND_FAMILY, IN_FAMILY)):
+        for heading, powers in BOUNDS.items():
             sd, largest = bound(FAMILY, WHITE, n, powers)
             limit = rms(sd) / largest
             shown[heading] = f'{percent(limit)}: {100.0 * (limit / one.spread) ** 2:.0f} %'
@@ -485,10 +507,13 @@ def main() -> None:
         '',
         '## Variance efficiency',
         '',
-        'The cargo ship with r = c₁v + c₂v² + c₄v⁴, which the families of the final fit hold; '
-        'white noise.',
-        'Under each family: its bound, and the efficiency, the variance of the bound over '
-        'that of ours. Ours does not know the family.',
+        'The cargo ship with r = c₁v + c₂v² + c₄v⁴; white noise. Under each family: its bound '
+        '(last: of all powers that the final fit',
+        'averages over), and the efficiency, the variance of the bound over that of ours. The '
+        'first fit knows that r is v .. v⁴ and reaches the bound: finding noise and',
+        'weights costs nothing. Final and live figure do not know the family; what they lose '
+        'against a bound that does is the price of not knowing, and where they',
+        'lie below one, what they expect of r beforehand is in the bias.',
         '',
         *head(['n', '', *EFFICIENCY]),
         *efficient,
