@@ -31,8 +31,13 @@ from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.record import Record
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.motion_fit.solve import fit
-from shipdrag_ros.estimation.motion_fit.weighing import weigh
-from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Noise, whiten
+from shipdrag_ros.estimation.motion_fit.weighing import drop_gross, weigh
+from shipdrag_ros.estimation.motion_fit.whitening import (
+    CALM,
+    Disturbance,
+    Noise,
+    whiten,
+)
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
@@ -275,6 +280,8 @@ def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
     weight = np.ones(len(base))
     start = problem.start()
     unknown = problem.first.size + len(problem.extras)
+    crude = FittedMotion(problem.first, start, np.zeros((len(start), len(start))))
+    drop_gross(problem.residual(crude), problem.rows.kind, weight)
     for _ in range(_ROUNDS):
         problem = problem.weighted(base / weight)
         first, white = problem.fit_first(start)

@@ -25,9 +25,12 @@ from shipdrag_ros.simulation.noise import GaussMarkov
 MS_NS = 1_000_000
 
 
-def window(coast, n: int = 500, **noise: float) -> Window:
-    block = coast.block(n, **noise)
+def cut(block: Block) -> Window:
     return Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
+
+
+def window(coast, n: int = 500, **noise: float) -> Window:
+    return cut(coast.block(n, **noise))
 
 
 def error(found: Estimate, coast, ship: Ship) -> Float64:
@@ -92,6 +95,17 @@ def test_outliers_hardly_matter(coast, ship) -> None:
     assert found.noise_sd['speed_through_water'] < 2.0 * clean.noise_sd['speed_through_water']
     largest = float(clean.curve.resistance_m_s2.max())
     assert np.sqrt(np.mean(error(found, coast, ship) ** 2)) < 0.015 * largest
+
+
+def test_a_first_reading_that_is_wrong_is_not_followed(coast, ship) -> None:
+    # five of a hundred, the first among them: powers of the speed can run up to it
+    block = coast.block(100, seed=4)
+    rows = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
+    clean = error(motion_fit.estimate(cut(block), ship, Parameters()), coast, ship)
+    block.value[rows[::20], 0] += 2.4
+    found = error(motion_fit.estimate(cut(block), ship, Parameters()), coast, ship)
+    largest = float(coast.resistance(np.array(coast.speed_m_s), ship))
+    assert np.abs(found).max() < np.abs(clean).max() + 0.03 * largest
 
 
 @pytest.mark.parametrize('only', [Channel.SPEED_THROUGH_WATER, Channel.POSITION])
