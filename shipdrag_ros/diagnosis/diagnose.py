@@ -14,7 +14,7 @@ from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, where
 from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict
+from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict, Where
 from shipdrag_ros.diagnosis.screening import promise
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
@@ -23,6 +23,7 @@ from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
+from shipdrag_ros.simulation.effect import Scope
 
 _PAIRED = 4  # most probable names that pairs are tried with
 _PAIRS = 12  # that are fitted
@@ -90,12 +91,15 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     never = _inseparable(library)
     alarm = weighed.nothing < QUIET and bool(best.hypothesis.names)
     predicted = held_out(library, best) if alarm else None
-    lacking = lacks(best, more) or (
-        predicted is not None and misses(predicted.chi2_per_sample, best.best.rows)
+    lacking = alarm and (
+        lacks(best, more)
+        or (predicted is not None and misses(predicted.chi2_per_sample, best.best.rows))
     )
-    if lacking and alarm:
+    # an instrument that errs before the stop has taught the noise what it should have shown
+    restless = any(run.restless for run in seen) and not _of_the_ship(library, best)
+    if lacking or restless:
         weighed = weighed.doubted()
-    verdict, candidates = decide(weighed, lacking=lacking, inseparable=never)
+    verdict, candidates = decide(weighed, lacking=lacking or restless, inseparable=never)
     would_decide: tuple[Advice, ...] = ()
     if verdict is Verdict.ONE_OF:
         would_decide = advice(library, weighed, candidates, inseparable=never)
@@ -111,7 +115,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         nothing=weighed.nothing,
         unnamed=weighed.unnamed,
         would_decide=would_decide,
-        where=None if verdict is Verdict.NONE else where(library, as_stated, smooth),
+        where=_place(library, as_stated, smooth, verdict, restless=restless),
         before=gap_of(library.problem, as_stated.best),
         after=gap_of(library.problem, best.best) if missing else None,
         held_out_before=held_out(library, None),
@@ -126,7 +130,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
 def _observed(
     runs: Sequence[CoastRun], ship: Ship, parameters: Parameters
 ) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
-    """Return the runs that can be diagnosed, and why the others cannot."""
+    """Return the runs that can be diagnosed, and what is to be said about them."""
     seen: list[Observation] = []
     refused: dict[str, DiagnosisError | EstimationError] = {}
     for run in runs:
@@ -137,7 +141,35 @@ def _observed(
     if not seen:
         name, reason = next(iter(refused.items()))
         raise type(reason)(f'{name}: {reason}')
-    return tuple(seen), tuple(f'left out: {name}: {why}' for name, why in refused.items())
+    notes = [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes += [
+        f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
+        'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '
+        'and as much of the coastdown as is like it passes for noise'
+        for run in seen
+        if run.restless
+    ]
+    return tuple(seen), tuple(notes)
+
+
+def _of_the_ship(library: Library, best: Fit) -> bool:
+    """Tell whether what is missing acts on the ship, whatever water and instruments do."""
+    scopes = {effect.scope for effect in library.effects if effect.name in best.hypothesis.names}
+    return bool(scopes) and scopes <= {Scope.HULL, Scope.RUN}
+
+
+def _place(
+    library: Library, as_stated: Fit, smooth: Sequence[Fit], verdict: Verdict, *, restless: bool
+) -> Where | None:
+    """Return where model and data disagree."""
+    if verdict is Verdict.NONE:
+        return None
+    if not restless:
+        return where(library, as_stated, smooth)
+    runs = [run for run in library.seen if run.restless]
+    speeds = [run.speed_m_s for run in runs]
+    lead_in_s = max(run.lead_in_s for run in runs)
+    return Where('log_radar', (-lead_in_s, 0.0), (min(speeds), max(speeds)))
 
 
 def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:

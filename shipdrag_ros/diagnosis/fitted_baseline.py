@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.coast_form import SHAPES, Coast, FormFit, FormProblem
 from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.result import Diagnosis, Named, Verdict, Where
-from shipdrag_ros.diagnosis.verdict import UNNAMED, Weighed, decide
+from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Weighed, decide
 from shipdrag_ros.ship import Ship, Uncertain
 
 _APART_RAD = 0.5  # between headings of runs, from which they tell what turns with the Earth
@@ -62,7 +62,8 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
     weighed = Weighed({}, {names: math.exp(each - total) for names, each in log.items()})
     first = weighed.named()[0]
     best = fits.get(first, nothing)
-    lacking = bool(first) and more.log_evidence > earth.log_evidence + _LACK_NATS
+    alarm = bool(first) and weighed.nothing < QUIET
+    lacking = alarm and more.log_evidence > earth.log_evidence + _LACK_NATS
     forces = frozenset(_EARTH) if apart else frozenset((*_EARTH, *_LOG_ALONE))
     verdict, candidates = decide(
         weighed, lacking=lacking and first != _LOG_ALONE, inseparable=[forces]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain, product
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -24,7 +25,7 @@ _ANEW = (0, 3)  # iterations in which all derivatives are found anew
 _CONVERGED = 0.02  # fall of -2 ln posterior
 _DAMPING = 1e-2
 _HOPELESS = 1e4  # damping
-_SMALL = 0.25  # of what has no name, in parts of its prior sd, where it is small
+_SMALL = 0.25  # of usual
 
 
 @dataclass(frozen=True)
@@ -144,17 +145,22 @@ class _State:
         covariance, log_evidence = self._laplace(matrix, fall, best.cost)
         if not math.isfinite(log_evidence):
             return failed
-        smooth = self.hypothesis.smooth
-        if smooth:
-            matrix, fall = matrix.copy(), fall.copy()
-            # what has no name may be large or small, either alike
-            more = _SMALL**-2 - 1.0
-            matrix[smooth, smooth] += more
-            fall[smooth] -= more * best.z[smooth]
-            cost = best.cost + more * float(best.z[smooth] @ best.z[smooth])
-            small = self._laplace(matrix, fall, cost)[1] - len(smooth) * math.log(_SMALL)
-            log_evidence = float(np.logaddexp(log_evidence, small)) - math.log(2.0)
+        groups = self.hypothesis.of_one_size
+        for small in product(*(([], group) for group in groups)):
+            if any(small):
+                log_evidence = np.logaddexp(log_evidence, self._if_small([*chain(*small)]))
+        log_evidence = float(log_evidence) - len(groups) * math.log(2.0)
         return Fit(best, covariance, log_evidence + self.hypothesis.weight)
+
+    def _if_small(self, places: list[int]) -> float:
+        """Return the log evidence where some unknowns are small."""
+        assert self.best is not None
+        matrix, fall = (each.copy() for each in self.best.normal)
+        z, more = self.best.z[places], _SMALL**-2 - 1.0
+        matrix[places, places] += more
+        fall[places] -= more * z
+        cost = self.best.cost + more * float(z @ z)
+        return self._laplace(matrix, fall, cost)[1] - len(places) * math.log(_SMALL)
 
     def _laplace(self, matrix: Float64, fall: Float64, cost: float) -> tuple[Float64, float]:
         """Return covariance and log evidence of what is as good as normal."""

@@ -10,11 +10,12 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.hypotheses import Library
-from shipdrag_ros.diagnosis.linear import Linear, Problem
+from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Problem
 from shipdrag_ros.diagnosis.result import Gap, Where
-from shipdrag_ros.diagnosis.terms import PlaceTerm
+from shipdrag_ros.diagnosis.terms import EffectTerm, PlaceTerm
 from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.simulation.effect import Scope
 
 _PARTS = 12  # of a coastdown, in telling where a gap is
 _SHARE = 0.9  # of the excess, between the ends of where it is
@@ -69,24 +70,37 @@ def held_out(library: Library, found: Fit | None) -> Gap | None:
     Notes
     -----
     What the other runs do not tell is allowed for: chi^2 is of residuals whose
-    covariance holds that of the prediction.
+    covariance holds that of the prediction. A run with an effect that is its own
+    cannot be predicted; None where that is so of all.
     """
     if len(library.seen) < 2:
         return None
     gaps, rows = [], []
     for j, run in enumerate(library.seen):
+        if found is not None and _has_its_own(found.hypothesis, j):
+            continue
         alone = replace(library, seen=(run,))
         if found is None:
             linear = frozen(alone).best
         else:
-            others = tuple(other for i, other in enumerate(library.seen) if i != j)
-            linear = _predicted(replace(library, seen=others), alone, found)
+            linear = _predicted(library, j, found)
         gaps.append(gap_of(alone.problem, linear))
         rows.append(linear.rows)
+    if not gaps:
+        return None
     return Gap(
         _mean_square([gap.rms_speed_m_s for gap in gaps]),
         _mean_square([gap.rms_position_m for gap in gaps]),
         float(np.average([gap.chi2_per_sample for gap in gaps], weights=rows)),
+    )
+
+
+def _has_its_own(hypothesis: Hypothesis, run: int) -> bool:
+    """Tell whether an effect of a single run acts in a run."""
+    return any(
+        term.effect.scope is Scope.RUN and not term.stated and term.acts_in(run)
+        for term in hypothesis.terms
+        if isinstance(term, EffectTerm)
     )
 
 
@@ -95,11 +109,14 @@ def _mean_square(values: Sequence[float | None]) -> float | None:
     return float(np.sqrt(np.mean(np.square(known)))) if known else None
 
 
-def _predicted(others: Library, alone: Library, found: Fit) -> Linear:
+def _predicted(library: Library, run: int, found: Fit) -> Linear:
     """Predict a run, learning from the others what belongs to it too."""
-    there = others.transferred(found.hypothesis)
+    rest = [i for i in range(len(library.seen)) if i != run]
+    others = replace(library, seen=tuple(library.seen[i] for i in rest))
+    alone = replace(library, seen=(library.seen[run],))
+    there = others.transferred(found.hypothesis, runs=rest)
     learnt = fit(others.problem, [there], [others.start(there)])[0]
-    here = alone.transferred(found.hypothesis)
+    here = alone.transferred(found.hypothesis, runs=[run])
     shared = sum(len(term.unknowns) for term in here.terms)
     z = alone.start(here)
     z[:shared] = learnt.best.z[:shared]

@@ -159,18 +159,28 @@ class Library:
         ]
         return replace(found, row_terms=(*base.row_terms, *errors))
 
-    def transferred(self, other: Hypothesis) -> Hypothesis:
+    def transferred(self, other: Hypothesis, *, runs: Sequence[int]) -> Hypothesis:
         """
-        Return a hypothesis about other runs as one about these.
+        Return a hypothesis about more runs as one about these.
 
-        What belongs to a single run is left out.
+        Parameters
+        ----------
+        runs
+            Which of the others these are. What is in a single run comes last, and
+            is left out where that is none of them.
         """
-        kept = [
-            term
-            for term in other.terms[len(self.nothing.terms) :]
-            if isinstance(term, EffectTerm) and term.effect.scope is not Scope.RUN
-        ]
-        return replace(self.nothing, names=other.names, terms=(*self.nothing.terms, *kept))
+        kept: list[Term] = []
+        own: list[Term] = []
+        for term in other.terms[len(self.nothing.terms) :]:
+            if not isinstance(term, EffectTerm):
+                continue
+            if term.effect.scope is not Scope.RUN:
+                kept.append(term)
+            elif term.only_run is None:
+                own.append(term)
+            elif term.only_run in runs:
+                own.append(replace(term, only_run=runs.index(term.only_run)))
+        return replace(self.nothing, names=other.names, terms=(*self.nothing.terms, *kept, *own))
 
     def channels(self) -> tuple[str, ...]:
         """

@@ -19,6 +19,7 @@ from shipdrag_ros.diagnosis.noise import apply
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import (
     BaselineTerm,
+    EffectTerm,
     ForceTerm,
     FormTerm,
     Predicted,
@@ -82,14 +83,20 @@ class Hypothesis:
         return tuple(found)
 
     @cached_property
-    def smooth(self) -> list[int]:
-        """Places of the unknowns of what has no name."""
-        return [
-            place + k
-            for part, place in self.parts
-            if isinstance(part, ForceTerm | SpeedErrorTerm)
-            for k in range(len(part.unknowns))
-        ]
+    def of_one_size(self) -> list[list[int]]:
+        """
+        Places of unknowns that are all usual or all small.
+
+        Those of something smooth, and the components of a current or a wind: where
+        one is small, so are the others.
+        """
+        found = []
+        for part, place in self.parts:
+            if isinstance(part, ForceTerm | SpeedErrorTerm):
+                found.append([place + k for k in range(len(part.unknowns))])
+            elif isinstance(part, EffectTerm) and len(part.components) > 1:
+                found.append([place + k for k in part.components])
+        return found
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:

@@ -36,6 +36,7 @@ _NEIGHBOURS = 9  # an outlier is told from the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8
+_RESTLESS_M_S = 0.15  # six times what is usual
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,15 @@ class Measured:
         `POSITION` rows are distances along the direction [m].
     whitener : (n, n)
         Makes of residuals what is white, of variance 1; lower triangular.
+    water_m_s
+        Slow motion of the water that the whitener takes for noise: by how much
+        log and way over ground wander apart in the steady record.
     """
 
     at: Int64
     rows: Rows
     whitener: Float64
+    water_m_s: float
 
     def __len__(self) -> int:
         return len(self.at)
@@ -106,6 +111,11 @@ class Observation:
     def duration_s(self) -> float:
         """Length of the coastdown."""
         return float(self.time_s[-1]) - self.lead_in_s
+
+    @property
+    def restless(self) -> bool:
+        """Whether log and way over ground wander apart as water seldom makes them."""
+        return self.along.water_m_s > _RESTLESS_M_S
 
     @classmethod
     def of(cls, window: Window, ship: Ship, parameters: Parameters, *, name: str) -> Observation:
@@ -214,7 +224,13 @@ class _Learner:
         speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
         whitener = np.eye(len(time))
         whiten(rows, variance, learnt, Damping(*self._damping(speed)), whitener)
-        return Measured(np.searchsorted(times, time), rows, np.ascontiguousarray(whitener.T))
+        return Measured(
+            np.searchsorted(times, time),
+            rows,
+            np.ascontiguousarray(whitener.T),
+            # without a log it is not told from a gust
+            float(learnt.size[1]) if (rows.kind[steady] == LOG).any() else 0.0,
+        )
 
     def _damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
         """Return dr/dv / (1 + n_r) and 1 + n_r of the baseline."""

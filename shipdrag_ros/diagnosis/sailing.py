@@ -19,7 +19,7 @@ from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.prior import UNNAMED_ODDS, nothing_missing
 from shipdrag_ros.diagnosis.result import Diagnosis, Gap, Named, Verdict, Where
 from shipdrag_ros.diagnosis.sailing_model import SMOOTH, LegFit, LegModel
-from shipdrag_ros.diagnosis.verdict import UNNAMED, Weighed, decide, simplest
+from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Weighed, decide, simplest
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Int64
 from shipdrag_ros.ship import Uncertain
@@ -73,7 +73,8 @@ def diagnose_sailing(records: Sequence[SailingRecord], parameters: Parameters) -
     if legs.direction is Direction.UNKNOWN:
         inseparable.append(_SET_APART)
     more = model.fit((*best.names, SMOOTH))
-    verdict, candidates = decide(weighed, lacking=_lacks(best, more), inseparable=inseparable)
+    lacking = weighed.nothing < QUIET and _lacks(best, more)
+    verdict, candidates = decide(weighed, lacking=lacking, inseparable=inseparable)
     missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.names)
     found = _named(best, weighed.probability[best.names])
     return Diagnosis(

@@ -24,7 +24,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import CoefficientBaseline
 from shipdrag_ros.simulation import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Scope
+from shipdrag_ros.simulation.effect import Effect, Frame, Scope, Shape
 from shipdrag_ros.simulation.hydrodynamics import viscous_n
 
 SHAPE_SD = 0.01  # of a baseline's form, beyond what its coefficients can follow
@@ -92,6 +92,14 @@ class EffectTerm:
             of_prior(quantity.name, quantity.prior, start=start)
             for quantity, start in zip(free, starts, strict=True)
         )
+
+    @property
+    def components(self) -> list[int]:
+        """Places, among its unknowns, of sizes that may have either sign and are not stated."""
+        if self.stated:
+            return []
+        free = [q for q in self.effect.parameters if q.name not in dict(self.fixed)]
+        return [i for i, q in enumerate(free) if q.prior.shape is Shape.NORMAL]
 
     def acts_in(self, run: int) -> bool:
         """Tell whether it does anything in a run."""

@@ -177,15 +177,17 @@ def decide(
     Parameters
     ----------
     lacking
-        The best name leaves something unexplained.
+        Something is left that no name explains.
     inseparable
         Effects that no record can tell apart.
     """
     candidates = _smallest(weighed)
     first = weighed.named()[0]
+    if lacking:
+        return Verdict.UNKNOWN, candidates
     if weighed.nothing >= QUIET:
         return Verdict.NONE, candidates
-    if lacking or weighed.unnamed > 0.5:
+    if weighed.unnamed > 0.5:
         return Verdict.UNKNOWN, candidates
     alone = not any(set(first) & group for group in inseparable)
     if alone and weighed.probability[first] >= CERTAIN:

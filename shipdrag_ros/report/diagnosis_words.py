@@ -87,9 +87,12 @@ def place(found: Diagnosis) -> str:
     if found.where is None:
         return 'nowhere'
     where = found.where
+    first, last = where.time_s
     since = 'of the record' if found.baseline == 'none' else 'after the stop'
+    if last <= 0.0:
+        first, last, since = -first, -last, 'before the stop'
     return (
-        f'{_CHANNELS[where.channel]}, {where.time_s[0]:.0f} to {where.time_s[1]:.0f} s {since}, '
+        f'{_CHANNELS[where.channel]}, {first:.0f} to {last:.0f} s {since}, '
         f'at {where.speed_m_s[0]:.1f} to {where.speed_m_s[1]:.1f} m/s'
     )
 

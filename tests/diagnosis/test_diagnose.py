@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose, with_effects
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
@@ -52,6 +55,38 @@ def test_a_run_that_tells_too_little_is_left_out_and_said_so() -> None:
     assert 'at least 300 s are needed' in found.notes[0]
     with pytest.raises(DiagnosisError, match='at least 300 s are needed'):
         diagnose([run(lead_in_s=120.0)], SHIP, PARAMETERS)
+
+
+def test_a_radar_that_bends_the_way_before_the_stop_is_not_nothing() -> None:
+    straight = run()
+    assert straight.window.before is not None
+    start = straight.window.before.position.value[0]
+
+    def bent(series: Series) -> Series:
+        way = series.value - start
+        reach = 6000.0
+        wrong = 1.0 + 0.03 * np.sin(np.pi * np.hypot(*way.T) / reach)
+        return replace(series, value=start + way * wrong[:, None])
+
+    before = replace(straight.window.before, position=bent(straight.window.before.position))
+    window = replace(straight.window, position=bent(straight.window.position), before=before)
+    found = diagnose([CoastRun('bent', window)], SHIP, PARAMETERS)
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.where is not None
+    assert found.where.channel == 'log_radar'
+    assert found.where.time_s[0] < -1000.0
+    assert found.where.time_s[1] == 0.0
+    assert 'wander apart' in found.notes[0]
+
+
+def test_what_is_in_one_run_alone_is_not_asked_of_the_other() -> None:
+    turning = 'turning=25,start_s=300,duration_s=200,rate_rad_s=0.001'
+    runs = [run(turning), run(heading_rad=0.3 + 3.14159, seed=2)]
+    found = diagnose(runs, SHIP, PARAMETERS)
+    assert found.candidates[0].names == ('turning',)
+    assert found.verdict in (Verdict.NAMED, Verdict.ONE_OF)
+    assert found.held_out_after is not None
+    assert found.held_out_after.chi2_per_sample < 1.5
 
 
 @pytest.mark.parametrize(
