@@ -259,7 +259,7 @@ class Tally:
         }
 
 
-BOUNDS = {'v .. v⁴': BOUND_FAMILY, 'v, v², v⁴': IN_FAMILY, 'v .. v⁴, v⁶': POWERS}
+BOUNDS = {'v .. v⁴': BOUND_FAMILY, 'v, v², v⁴': IN_FAMILY, 'v .. v⁴, v⁶, v⁸': POWERS}
 EFFICIENCY = ('RMSE', 'bias', 'spread', *BOUNDS)
 HEADINGS = ('RMSE', 'bias', 'spread', 'at the top', 'cover', 'where valid', 'valid', 'runs')
 

@@ -17,20 +17,19 @@ import numpy as np
 from numba import njit
 
 from shipdrag_ros.compiled import digest
-from shipdrag_ros.estimation.motion_fit.families import Humps
+from shipdrag_ros.estimation.motion_fit.families import (
+    CUBIC_SD,
+    HUMP_SIZES,
+    LINEAR_SDS,
+    WAVES,
+    Humps,
+)
 from shipdrag_ros.estimation.motion_fit.law import Law, shapes
 from shipdrag_ros.samples import Float64, Int64
 
 FREE = 2  # coefficients of quadratic drag: nothing is held against them
-# Standard deviations of the speed at the start, and of parts of r, over r at the start: linear,
-# cubic, and three of wave making, which only adds: about as much as its own.
-_POWERS = np.array([1, 3, 5, 7, 9])
-_START_SD = 1.0
-_LINEAR_SDS = (0.1, 1.0)  # one or the other
-_CUBIC_SD = 0.3
-_WAVES = 3
-_WAVE_SD, _WAVE_FROUDE, _WAVE_POWER = 0.3, 0.25, 4  # growing with the Froude number, up to there
-_HUMP_SIZES = (0.1, 0.3, 1.0)  # over the sizes of `Humps`
+_POWERS = np.array([1, 3, 5, 7, 9])  # of r; the last ones are wave making
+_START_SD = 1.0  # of the speed at the start
 # What else may bend it: of coefficient j, AMPLITUDE DECAY^(j - 2) / j of the distance run.
 _AMPLITUDE, _DECAY = 0.002, 0.5
 _NODES = 32  # in warped time
@@ -63,9 +62,8 @@ def coast_priors(
     humps = Humps.between(math.exp(-length), froude)
     k = int(np.count_nonzero(sd == 0.0)) + FREE
     bends = _bends(length, _POWERS, len(humps.sd), humps.first, humps.spacing, k)
-    waves = _WAVE_SD * min(1.0, (froude / _WAVE_FROUDE) ** _WAVE_POWER)
     result: tuple[Float64, Float64] = _priors(
-        speed_m_s * tc_s, length, bends, waves, humps.sd, mean, sd
+        speed_m_s * tc_s, length, bends, humps.waves, humps.sd, mean, sd
     )
     return result
 
@@ -170,20 +168,20 @@ def _priors(
 ) -> tuple[Float64, Float64]:
     """Return means and roots, for each linear part and size of the humps."""
     k, first = bends.shape[1], len(bends) - len(humps)
-    p = len(_LINEAR_SDS) * len(_HUMP_SIZES)
+    p = len(LINEAR_SDS) * len(HUMP_SIZES)
     means, roots = np.zeros((p, len(mean))), np.zeros((p, len(mean), len(mean)))
     of_powers = np.full(first, waves)
-    of_powers[0], of_powers[1], of_powers[2] = _START_SD, 0.0, _CUBIC_SD
+    of_powers[0], of_powers[1], of_powers[2] = _START_SD, 0.0, CUBIC_SD
     powers, linear = _spread(bends[:first], of_powers), _spread(bends[1:2], np.ones(1))
     hump = _spread(bends[first:], humps)
     q = 0
-    for of_linear in _LINEAR_SDS:
-        for size in _HUMP_SIZES:
+    for of_linear in LINEAR_SDS:
+        for size in HUMP_SIZES:
             root = roots[q]
             for a in range(len(mean)):
                 means[q, a], root[a, a] = mean[a], sd[a]
             for a in range(FREE, k):
-                for c in range(first - _WAVES, first):
+                for c in range(first - WAVES, first):
                     means[q, a] += unit * waves * bends[c, a]
                 left = length * _AMPLITUDE * _DECAY ** (a - FREE) / a
                 for b in range(FREE, a + 1):

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-All families of r(v) fitted at once, and averaged; compiled.
+One rich law of r(v) fitted under several priors at once, and averaged; compiled.
 
-Every family is a choice among the coefficients of one rich law, so one
-linearisation of the motion serves them all: each is solved in it, weighed by
-AICc, and the next linearisation is about the average. The covariance is that of
-the mixture: what families disagree about is in it.
+One linearisation of the motion serves all priors: the law is solved under each,
+weighed by its marginal likelihood, and the next linearisation is about the
+average. The covariance is that of the mixture: what priors disagree about is in it.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ import numpy as np
 from numba import njit
 
 from shipdrag_ros.estimation.motion_fit.coast import Rows
-from shipdrag_ros.estimation.motion_fit.families import Families
+from shipdrag_ros.estimation.motion_fit.families import Priors
 from shipdrag_ros.estimation.motion_fit.law import Law
-from shipdrag_ros.estimation.motion_fit.solve import cholesky_solve, normal_equations
+from shipdrag_ros.estimation.motion_fit.solve import cholesky, normal_equations, substitute
 from shipdrag_ros.estimation.motion_fit.whitening import Noise
 from shipdrag_ros.samples import Float64, Int64
 
@@ -26,70 +25,48 @@ _CLOSE, _NEAR = 0.03, 1.0  # of chi^2, between one average and the next; and at 
 
 @njit(cache=True)
 def _solve(
-    kept: np.ndarray,
+    mean: Float64,
     precision: Float64,
     now: Float64,
     chi2: float,
     matrix: Float64,
     gradient: Float64,
-    samples: int,
 ) -> tuple[float, Float64, Float64]:
     """
-    Solve one family about some unknowns.
+    Solve under one prior about some unknowns.
 
     Parameters
     ----------
-    kept, precision, now : (p,)
-        Which unknowns are fitted, the others are 0; prior about 0.
+    mean, precision, now : (p,)
+        Prior and present value of the unknowns; a precision of 0: none.
     chi2, matrix, gradient
         See `normal_equations`.
 
     Returns
     -------
     criterion, step, covariance
-        AICc; infinite where the samples do not tell the unknowns.
+        -2 ln of the marginal likelihood, less a constant; infinite where the
+        samples do not tell the unknowns.
     """
     p = len(now)
-    step = np.where(kept, 0.0, -now)
-    covariance = np.zeros((p, p))
-    inside = np.flatnonzero(kept)
-    q = len(inside)
-    part = np.empty((q, q))
-    right = np.zeros((q, q + 1))
-    # what is left out goes first: to chi^2 and gradient without it
+    part = matrix.copy()
+    right = np.zeros((p, p + 1))
+    criterion = chi2
     for a in range(p):
-        if not kept[a]:
-            chi2 -= 2.0 * step[a] * gradient[a]
-            for b in range(p):
-                if not kept[b]:
-                    chi2 += step[a] * matrix[a, b] * step[b]
-    for i in range(q):
-        a = inside[i]
-        slope = gradient[a] - precision[a] * now[a]
-        for b in range(p):
-            if not kept[b]:
-                slope -= matrix[a, b] * step[b]
-        for j in range(q):
-            part[i, j] = matrix[a, inside[j]]
-        part[i, i] += precision[a]
-        right[i, 0] = slope
-        right[i, 1 + i] = 1.0
-    solved, found = cholesky_solve(part, right, 0.0)
+        off = now[a] - mean[a]
+        part[a, a] += precision[a]
+        right[a, 0] = gradient[a] - precision[a] * off
+        right[a, 1 + a] = 1.0
+        criterion += precision[a] * off * off
+        if precision[a] > 0.0:
+            criterion -= np.log(precision[a])
+    solved, lower, scale = cholesky(part, 0.0)
     if not solved:
-        return np.inf, step, covariance
-    parameters = 0.0
-    for i in range(q):
-        a = inside[i]
-        step[a] = found[i, 0]
-        # of chi^2 with the prior; then what the prior has of it
-        before, after = now[a], now[a] + step[a]
-        chi2 += precision[a] * (before * before - after * after) - right[i, 0] * found[i, 0]
-        # what the samples tell of it: one less what the prior knows
-        parameters += 1.0 - precision[a] * found[i, 1 + i]
-        for j in range(q):
-            covariance[a, inside[j]] = found[i, 1 + j]
-    spare = max(samples - parameters - 1.0, 1.0)
-    return chi2 + 2.0 * parameters * samples / spare, step, covariance
+        return np.inf, now, part
+    found = substitute(lower, scale, right)
+    for a in range(p):
+        criterion += 2.0 * np.log(lower[a, a] / scale[a]) - right[a, 0] * found[a, 0]
+    return criterion, found[:, 0].copy(), found[:, 1:].copy()
 
 
 @njit(cache=True)
@@ -101,22 +78,21 @@ def average(
     noise: Noise,
     active: Int64,
     prior: Float64,
-    families: Families,
-    samples: int,
+    priors: Priors,
 ) -> tuple[bool, Float64, Float64]:
     """
-    Fit all families and average them.
+    Fit the law under all priors and average.
 
     Parameters
     ----------
     law
-        With all coefficients of all families.
+        Of k coefficients.
     active
         The k coefficients, then what else is fitted.
     prior
         See `normal_equations`; of what is not a coefficient.
-    samples
-        For AICc.
+    priors
+        Of the coefficients.
 
     Returns
     -------
@@ -124,13 +100,12 @@ def average(
     """
     unknowns = start.copy()
     size, p = len(unknowns), len(active)
-    count, k = families.included.shape
+    count, k = priors.precision.shape
     covariance = np.zeros((size, size))
     criteria = np.empty(count)
     steps = np.empty((count, p))
     spreads = np.empty((count, p, p))
-    kept = np.ones(p, np.bool_)
-    precision = np.zeros(p)
+    about, precision = np.zeros(p), np.zeros(p)
     mean = np.zeros(p)
     away = np.inf
     for number in range(_ROUNDS):
@@ -139,10 +114,9 @@ def average(
         )
         now = unknowns[active]
         for f in range(count):
-            kept[:k] = families.included[f]
-            precision[:k] = families.precision[f]
+            about[:k], precision[:k] = priors.mean[f], priors.precision[f]
             criteria[f], steps[f], spreads[f] = _solve(
-                kept, precision, now, chi2, matrix, gradient, samples
+                about, precision, now, chi2, matrix, gradient
             )
         least = criteria.min()
         # written so that NaN fails

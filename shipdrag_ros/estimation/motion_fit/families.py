@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Families of r(v): powers of the speed, with or without humps of wave making.
+What is known of r(v) before any measurement: powers of the speed, and humps of wave making.
 
-No single family is right: friction is nearly quadratic, wave making rises by
-the fourth to the sixth power, with humps and hollows where the waves of bow and
-stern meet. Humps are B-splines whose sizes are known beforehand, before any
-measurement, to be small at low Froude numbers; how many of them count grows
-with what the samples tell.
+Friction is nearly quadratic; wave making rises by the fourth to the eighth
+power, with humps and hollows where the waves of bow and stern meet, and is small
+at low Froude numbers. Humps are B-splines. How large the parts may be is averaged
+over, so that what counts grows with what the samples tell.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -21,9 +21,14 @@ from shipdrag_ros.samples import Float64
 
 FIRST = (1, 2, 3, 4)  # powers fitted first, to find the outliers
 PLAIN = (2, 3)  # hardly ever negative, and right enough to tell how a force is damped
-POWERS = (1, 2, 3, 4, 6)  # of any family
-_OF_FAMILY = [np.isin(POWERS, own) for own in ((2, 3, 4), (2, 4, 6), (1, 2, 4, 6))]
-_HUMP_SIZES = (0.0, 0.3, 1.0)  # of a family, over the sizes of `Humps`
+POWERS = (1, 2, 3, 4, 6, 8)  # of the law
+# Standard deviations of parts of r, over r at the start. Of the quadratic one nothing is known.
+LINEAR_SDS = (0.1, 1.0)  # one or the other
+CUBIC_SD = 0.3
+# Of each of `WAVES` powers above: wave making only adds, about as much as its standard deviation.
+WAVES = 3
+_WAVE_SD, _WAVE_POWER = 0.3, 4  # at _HUMP_FROUDE; growing with the Froude number, up to there
+HUMP_SIZES = (0.1, 0.3, 1.0)  # over the sizes of `Humps`
 
 _SPACING_FROUDE = 0.02  # of the humps: about a quarter wave of the pattern at Fr 0.2
 _MOST = 14  # humps
@@ -34,27 +39,25 @@ _LEAST_SD = 1e-4  # of r
 _ABOVE, _BELOW = 1.05, 0.9  # of the speeds of the coastdown, where humps still matter
 
 
-class Families(NamedTuple):
+class Priors(NamedTuple):
     """
-    Families as choices among `POWERS` and humps.
+    Priors of the coefficients of `POWERS` and humps.
 
     Attributes
     ----------
-    included : (f, k)
-        Which of the k coefficients each of f families has.
+    mean : (f, k)
     precision : (f, k)
-        1 over the variance that a coefficient has before any measurement, about
-        0; 0: not known.
+        1 over the variance; 0: not known.
     """
 
-    included: np.ndarray
+    mean: Float64
     precision: Float64
 
 
 @dataclass(frozen=True)
 class Humps:
     """
-    Where humps may be, and how large they are before any measurement.
+    Where humps may be, and how large wave making is before any measurement.
 
     Attributes
     ----------
@@ -62,11 +65,14 @@ class Humps:
         Of their middles, over the reference speed.
     sd : (h,)
         Standard deviation of each, over r / v^2.
+    waves
+        Of each power of wave making, over r at the reference speed.
     """
 
     first: float
     spacing: float
     sd: Float64
+    waves: float
 
     @classmethod
     def between(cls, lowest: float, froude: float) -> Humps:
@@ -91,23 +97,25 @@ class Humps:
         first = _ABOVE - (count - 1) * spacing
         at = np.minimum(froude * (first + spacing * np.arange(count)), _LARGEST_FROUDE)
         sd = _HUMP_SD * np.maximum(at / _HUMP_FROUDE, 0.0) ** _HUMP_POWER
-        return cls(first, spacing, np.maximum(sd, _LEAST_SD))
+        waves = _WAVE_SD * min(1.0, (froude / _HUMP_FROUDE) ** _WAVE_POWER)
+        return cls(first, spacing, np.maximum(sd, _LEAST_SD), waves)
 
-    def families(self, unit_m_s2: float) -> Families:
+    def priors(self, unit_m_s2: float) -> Priors:
         """
-        Return all families.
+        Return all priors.
 
         Parameters
         ----------
         unit_m_s2
-            r that the sizes of the humps are relative to, at the reference speed.
+            r at the reference speed.
         """
-        unknown = np.zeros(len(POWERS))
-        included, precision = [], []
-        for size in _HUMP_SIZES:
-            has = np.full(len(self.sd), size > 0.0)
-            known = 1.0 / (size * unit_m_s2 * self.sd) ** 2 if size > 0.0 else 0.0 * self.sd
-            for powers in _OF_FAMILY:
-                included.append(np.concatenate([powers, has]))
-                precision.append(np.concatenate([unknown, known]))
-        return Families(np.array(included), np.array(precision))
+        k = len(POWERS)
+        pairs = list(product(LINEAR_SDS, HUMP_SIZES))
+        mean, precision = np.zeros((2, len(pairs), k + len(self.sd)))
+        mean[:, k - WAVES : k] = unit_m_s2 * self.waves
+        for row, (linear, size) in enumerate(pairs):
+            sd = np.concatenate(
+                [(linear, np.inf, CUBIC_SD), (self.waves,) * WAVES, size * self.sd]
+            )
+            precision[row] = 1.0 / (unit_m_s2 * sd) ** 2
+        return Priors(mean, precision)

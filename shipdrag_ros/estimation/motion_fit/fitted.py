@@ -19,7 +19,7 @@ _TYPICAL_POWER = 2.5
 @dataclass(frozen=True)
 class FittedMotion:
     """
-    One family fitted, or the average of several.
+    One family fitted, or the average of a law under several priors.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class FittedMotion:
     unknowns
         See `coast`.
     covariance : (k + 6, k + 6)
-        Of all unknowns, between families too; rows of what was not fitted are 0.
+        Of all unknowns, between priors too; rows of what was not fitted are 0.
     """
 
     law: Law

@@ -59,8 +59,6 @@ class Problem:
         Of the steady record, then of the coastdown.
     steady
         How many of them are of the steady record.
-    samples
-        How many there were before rows were condensed.
     grid_s
         Times of the integration.
     noise
@@ -79,7 +77,6 @@ class Problem:
 
     rows: Rows
     steady: int
-    samples: int
     grid_s: Float64
     noise: Noise
     run_down: RunDown
@@ -118,7 +115,6 @@ class Problem:
         return cls(
             rows,
             len(steady.time_s),
-            len(rows.time_s),
             grid,
             Noise(variance, CALM, ones, ones),
             run_down,
@@ -191,7 +187,7 @@ class Problem:
         """
         size = self.first.size
         unknowns = np.zeros(size + EXTRAS)
-        unknowns[FIRST.index(2)] = self._hump_unit_m_s2
+        unknowns[FIRST.index(2)] = self._unit_m_s2
         unknowns[size + V0] = self.guess.speed_m_s
         unknowns[size + RUN_DOWN] = max(self.run_down.run_down_s, 1e-3)
         unknowns[size + X0] = self.guess.first_m
@@ -215,7 +211,7 @@ class Problem:
 
     def average(self, first: FittedMotion) -> FittedMotion:
         """
-        Fit all families from the first on; where none can be, it stands alone.
+        Fit the whole law from the first on; where it cannot be, the first stands alone.
         """
         law = self.first._replace(
             powers=np.array(POWERS, np.int64),
@@ -235,13 +231,12 @@ class Problem:
             self.noise,
             self._active(law),
             self._prior(law),
-            self.humps.families(self._hump_unit_m_s2),
-            self.samples,
+            self.humps.priors(self._unit_m_s2),
         )
         return FittedMotion(law, unknowns, covariance) if converged else first
 
     @property
-    def _hump_unit_m_s2(self) -> float:
+    def _unit_m_s2(self) -> float:
         return self.guess.quadratic_1_m * self.guess.speed_m_s**2
 
     def _active(self, law: Law) -> Int64:

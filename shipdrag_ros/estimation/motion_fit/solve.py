@@ -12,7 +12,7 @@ from shipdrag_ros.estimation.motion_fit.whitening import Noise, whiten
 from shipdrag_ros.samples import Float64, Int64
 
 _RISES = 8  # of the damping, in one iteration
-_CONVERGED = 1e-3  # fall of chi^2: far below what tells families apart
+_CONVERGED = 1e-3  # fall of chi^2: far below what tells laws apart
 _LAST_FALL = 0.03  # of chi^2, by a step so small that what it leads to need not be computed
 
 
@@ -115,7 +115,15 @@ def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[boo
     solved, lower, scale = cholesky(matrix, damping)
     if not solved:
         return False, right
-    p = len(matrix)
+    return True, substitute(lower, scale, right)
+
+
+@njit(cache=True)
+def substitute(lower: Float64, scale: Float64, right: Float64) -> Float64:
+    """
+    Solve for columns of b with a factor of `cholesky`.
+    """
+    p = len(lower)
     x = right.copy()
     for j in range(right.shape[1]):
         for a in range(p):
@@ -130,7 +138,7 @@ def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[boo
             x[a, j] = total / lower[a, a]
         for a in range(p):
             x[a, j] *= scale[a]
-    return True, x
+    return x
 
 
 @njit(cache=True)

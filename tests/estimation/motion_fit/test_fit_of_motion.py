@@ -98,14 +98,17 @@ def test_outliers_hardly_matter(coast, ship) -> None:
 
 
 def test_a_first_reading_that_is_wrong_is_not_followed(coast, ship) -> None:
-    # five of a hundred, the first among them: powers of the speed can run up to it
-    block = coast.block(100, seed=4)
-    rows = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
-    clean = error(motion_fit.estimate(cut(block), ship, Parameters()), coast, ship)
-    block.value[rows[::20], 0] += 2.4
-    found = error(motion_fit.estimate(cut(block), ship, Parameters()), coast, ship)
+    # N = 20, seeds 0..19; five of a hundred are wrong, the first among them, which powers of the
+    # speed could run up to: 2.2 % measured, 1.5 % without, over 100 % if the first is followed
     largest = float(coast.resistance(np.array(coast.speed_m_s), ship))
-    assert np.abs(found).max() < np.abs(clean).max() + 0.03 * largest
+    squares = []
+    for seed in range(20):
+        block = coast.block(100, seed=seed)
+        rows = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
+        block.value[rows[::20], 0] += 2.4
+        found = motion_fit.estimate(cut(block), ship, Parameters())
+        squares.append(np.mean(error(found, coast, ship) ** 2))
+    assert np.sqrt(np.mean(squares)) < 0.03 * largest
 
 
 @pytest.mark.parametrize('only', [Channel.SPEED_THROUGH_WATER, Channel.POSITION])
