@@ -100,7 +100,10 @@ def parse(found: Mapping[str, Any]) -> Answer:
             }
             for effect in found['effects']
         },
-        tuple(_recommendation(item) for item in found.get('would_decide') or ()),
+        tuple(
+            _recommendation(item, (found.get('resolves') or {}).get(item))
+            for item in found.get('would_decide') or ()
+        ),
         after.get('chi2_per_sample'),
     )
 
@@ -109,9 +112,7 @@ def _names(names: Iterable[str]) -> Names:
     return tuple(sorted(name for name in names if name != 'none'))
 
 
-def _recommendation(item: str | Mapping[str, Any]) -> Recommendation:
-    text = item if isinstance(item, str) else ' '.join(map(str, item.values()))
-    probability = None if isinstance(item, str) else item.get('probability')
+def _recommendation(text: str, probability: float | None) -> Recommendation:
     for words, test in _WORDS:
         if any(word in text.lower().replace('_', ' ') for word in words):
             return Recommendation(test, probability)

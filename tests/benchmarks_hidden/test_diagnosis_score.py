@@ -28,14 +28,17 @@ def scoring():
     return scoring
 
 
-def _found(verdict, *, effects=(), candidates=(), would_decide=(), held_out=None, parameters=None):
+def _found(
+    verdict, *, effects=(), candidates=(), would_decide=None, held_out=None, parameters=None
+):
     return {
         'verdict': verdict,
         'effects': [
             {'name': name, 'probability': 0.99, 'parameters': parameters or {}} for name in effects
         ],
         'candidates': [{'names': list(names), 'probability': p} for names, p in candidates],
-        'would_decide': list(would_decide),
+        'would_decide': list(would_decide or {}),
+        'resolves': would_decide or {},
         'gap': {'held_out_after': {'chi2_per_sample': held_out}},
     }
 
@@ -102,7 +105,7 @@ def test_a_recommendation_counts_where_anything_resolves(scoring) -> None:
     one_of = _found(
         'one_of',
         candidates=[(['current'], 0.6), (['log_offset'], 0.4)],
-        would_decide=[{'test': 'a run on the reciprocal heading', 'probability': 0.9}],
+        would_decide={'a run on the reciprocal heading': 0.9},
     )
     named = _found('named', effects=['current'])
     scores = scoring.scores(
@@ -132,7 +135,7 @@ def test_a_recommendation_counts_where_anything_resolves(scoring) -> None:
     ],
 )
 def test_recommendations_are_understood(scoring, text, test) -> None:
-    answer = scoring.parse(_found('one_of', would_decide=[text]))
+    answer = scoring.parse(_found('one_of', would_decide={text: None}))
     assert answer.recommended[0].test == test
 
 
