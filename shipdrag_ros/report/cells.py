@@ -93,7 +93,7 @@ def _estimate_facts(estimate: Estimate) -> list[tuple[str, str]]:
         ('estimator', words.estimator(estimate.estimator)),
         (
             'coefficients',
-            'averaged over orders' if estimate.order is None else f'{estimate.order}',
+            'averaged over models' if estimate.order is None else f'{estimate.order}',
         ),
         ('samples used', ', '.join(f'{n} {name}' for name, n in estimate.samples.items())),
         (

@@ -65,7 +65,7 @@ def test_facts_show_a_current_and_an_average(coastdown: Coastdown) -> None:
     assert coastdown.estimate is not None
     other = replace(coastdown.estimate, order=None, current_m_s=0.25, current_sigma_m_s=0.02)
     facts = dict(cells.facts(replace(coastdown, estimate=other)).rows)
-    assert facts['coefficients'] == 'averaged over orders'
+    assert facts['coefficients'] == 'averaged over models'
     assert facts['current along the track'] == '0.250 ± 0.040 m/s (two standard deviations)'
 
 
