@@ -40,11 +40,11 @@ def distance(power: int, part: float) -> tuple[Float64, Float64]:
     return u, np.concatenate([[0.0], np.cumsum(0.5 * h * (rate[1:] + rate[:-1]))])
 
 
-@pytest.mark.parametrize('froude', [0.12, 0.25, 0.4])
+@pytest.mark.parametrize('froude', [0.12, 0.2, 0.4])
 def test_the_mean_bends_as_wave_making_does(froude: float) -> None:
     means, _ = priors(froude)
     assert np.all(means == means[0]), 'friction and humps go either way'
-    waves = 0.3 * min(1.0, (froude / 0.25) ** 4)
+    waves = 0.1 * min(1.0, (froude / 0.2) ** 4)
     expected = np.zeros(STEPS + 1)
     for power in (5, 7, 9):
         u, some = distance(power, 1e-3)
@@ -78,6 +78,6 @@ def test_roots_hold_the_polynomials_and_leave_the_rest_apart() -> None:
 
 def test_a_slow_ship_makes_no_waves() -> None:
     slow, fast = (priors(froude) for froude in (0.08, 0.25))
-    assert np.abs(slow[0][0, FREE:K]).max() < 0.02 * np.abs(fast[0][0, FREE:K]).max()
+    assert np.abs(slow[0][0, FREE:K]).max() < 0.03 * np.abs(fast[0][0, FREE:K]).max()
     sd = [np.linalg.norm(roots[0, FREE:K], axis=1) for _, roots in (slow, fast)]
     assert np.all(sd[0] < sd[1])

@@ -27,7 +27,7 @@ LINEAR_SDS = (0.1, 1.0)  # one or the other
 CUBIC_SD = 0.3
 # Of each of `WAVES` powers above: wave making only adds, about as much as its standard deviation.
 WAVES = 3
-_WAVE_SD, _WAVE_POWER = 0.3, 4  # at _HUMP_FROUDE; growing with the Froude number, up to there
+_WAVE_SD, _WAVE_FROUDE, _WAVE_POWER = 0.1, 0.2, 4  # growing with the Froude number, up to there
 HUMP_SIZES = (0.1, 0.3, 1.0)  # over the sizes of `Humps`
 
 _SPACING_FROUDE = 0.02  # of the humps: about a quarter wave of the pattern at Fr 0.2
@@ -97,7 +97,7 @@ class Humps:
         first = _ABOVE - (count - 1) * spacing
         at = np.minimum(froude * (first + spacing * np.arange(count)), _LARGEST_FROUDE)
         sd = _HUMP_SD * np.maximum(at / _HUMP_FROUDE, 0.0) ** _HUMP_POWER
-        waves = _WAVE_SD * min(1.0, (froude / _HUMP_FROUDE) ** _WAVE_POWER)
+        waves = _WAVE_SD * min(1.0, (froude / _WAVE_FROUDE) ** _WAVE_POWER)
         return cls(first, spacing, np.maximum(sd, _LEAST_SD), waves)
 
     def priors(self, unit_m_s2: float) -> Priors:
