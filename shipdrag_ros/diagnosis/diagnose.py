@@ -3,31 +3,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.advice import advice
-from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, where
 from shipdrag_ros.diagnosis.hypotheses import Library
-from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict, Where
-from shipdrag_ros.diagnosis.screening import promise
+from shipdrag_ros.diagnosis.search import search
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, mode_of, weigh
+from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
 from shipdrag_ros.simulation.effect import Scope
 
-_PAIRED = 4  # most probable names that pairs are tried with
-_PAIRS = 12  # that are fitted
-_STARTS = 2  # of each hypothesis that are fitted
+_NEAR_S = 4.0  # by which a stop may be moved without seeing the run anew
 
 
 @dataclass(frozen=True)
@@ -71,28 +68,18 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     -----
     A run that has too little of either is left out, and a note says so.
     """
-    seen, notes = _observed(runs, ship, parameters)
-    library = Library(ship, seen, seen[0].heading_rad)
-    nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
-    named = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
-    unnamed = [library.with_discrepancy(library.nothing, c) for c in library.channels()]
-    likely = _likeliest_starts(library, named, nothing)
-    both = [*likely, *unnamed]
-    found = fit(library.problem, both, [library.start(h, nothing) for h in both])
-    smooth = found[len(likely) :]
-    weighed = weigh([nothing, *found])
-    best = weighed.best[weighed.named()[0]]
-    more = _with_more(library, best, smooth)
-    if weighed.nothing < QUIET:
-        found += _pairs(library, weighed)
-        weighed = weigh([nothing, *found])
-        best = weighed.best[weighed.named()[0]]
-        more = _with_more(library, best, smooth)
+    seen, notes = _observed(runs, ship, parameters, {})
+    found = search(Library(ship, seen, seen[0].heading_rad))
+    moved = {run.name: found.stop_moved_s(j) for j, run in enumerate(seen)}
+    if any(abs(by_s) > _NEAR_S for by_s in moved.values()):
+        seen, notes = _observed(runs, ship, parameters, moved)
+        found = search(Library(ship, seen, seen[0].heading_rad))
+    library, weighed, best = found.library, found.weighed, found.best
     never = _inseparable(library)
     alarm = weighed.nothing < QUIET and bool(best.hypothesis.names)
     predicted = held_out(library, best) if alarm else None
     lacking = alarm and (
-        lacks(best, more)
+        lacks(best, found.more)
         or (predicted is not None and misses(predicted.chi2_per_sample, best.best.rows))
     )
     # an instrument that errs before the stop has taught the noise what it should have shown
@@ -105,9 +92,9 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         would_decide = advice(library, weighed, candidates, inseparable=never)
     as_stated = frozen(library)
     missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.hypothesis.names)
-    explained = best if missing else nothing
+    explained = best if missing else found.nothing
     if verdict is Verdict.UNKNOWN:
-        explained = max(smooth, key=lambda one: one.log_likelihood)
+        explained = max(found.smooth, key=lambda one: one.log_likelihood)
     return Diagnosis(
         verdict=verdict,
         effects=_named(best, weighed) if verdict is Verdict.NAMED else (),
@@ -115,7 +102,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         nothing=weighed.nothing,
         unnamed=weighed.unnamed,
         would_decide=would_decide,
-        where=_place(library, as_stated, smooth, verdict, restless=restless),
+        where=_place(library, as_stated, found.smooth, verdict, restless=restless),
         before=gap_of(library.problem, as_stated.best),
         after=gap_of(library.problem, best.best) if missing else None,
         held_out_before=held_out(library, None),
@@ -128,14 +115,24 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
 
 
 def _observed(
-    runs: Sequence[CoastRun], ship: Ship, parameters: Parameters
+    runs: Sequence[CoastRun], ship: Ship, parameters: Parameters, moved_s: Mapping[str, float]
 ) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
-    """Return the runs that can be diagnosed, and what is to be said about them."""
+    """
+    Return the runs that can be diagnosed, and what is to be said about them.
+
+    Parameters
+    ----------
+    moved_s
+        By how much the stop of each run is later than it is taken for at first.
+    """
     seen: list[Observation] = []
     refused: dict[str, DiagnosisError | EstimationError] = {}
     for run in runs:
         try:
-            seen.append(Observation.of(run.window, ship, parameters, name=run.name))
+            by_s = moved_s.get(run.name, 0.0)
+            seen.append(
+                Observation.of(run.window, ship, parameters, name=run.name, stop_moved_s=by_s)
+            )
         except (DiagnosisError, EstimationError) as error:
             refused[run.name] = error
     if not seen:
@@ -178,50 +175,6 @@ def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
     """
     added = tuple(StatedEffect(effect.name, dict(effect.parameters)) for effect in effects)
     return replace(ship, effects=(*ship.effects, *added))
-
-
-def _likeliest_starts(
-    library: Library, hypotheses: Sequence[Hypothesis], near: Fit
-) -> list[Hypothesis]:
-    """Keep the most promising starts of each hypothesis."""
-    promised = promise(library.problem, near, hypotheses)
-    kept: dict[tuple[object, ...], list[Hypothesis]] = {}
-    for i in np.argsort(-promised):
-        found = kept.setdefault(mode_of(hypotheses[i]), [])
-        if len(found) < _STARTS:
-            found.append(hypotheses[i])
-    return [one for ones in kept.values() for one in ones]
-
-
-def _with_more(library: Library, best: Fit, smooth: Sequence[Fit]) -> list[Fit]:
-    """Fit something smooth besides a name."""
-    if not best.hypothesis.names:
-        return list(smooth)
-    more = [library.with_discrepancy(best.hypothesis, c) for c in library.channels()]
-    return fit(library.problem, more, [library.start(h, best) for h in more])
-
-
-def _pairs(library: Library, weighed: Weighed) -> list[Fit]:
-    """Fit pairs of the likeliest names with all others."""
-    first = [names for names in weighed.named() if names][:_PAIRED]
-    tried: list[tuple[float, Hypothesis, Fit]] = []
-    for names in first:
-        base = weighed.best[names]
-        hypotheses = [
-            hypothesis
-            for effect in library.effects
-            if effect.name not in names
-            for hypothesis in library.with_effect(base.hypothesis, effect)
-        ]
-        promised = promise(library.problem, base, hypotheses).tolist()
-        tried += [(p, one, base) for p, one in zip(promised, hypotheses, strict=True)]
-    tried.sort(key=lambda one: -one[0])
-    kept: dict[tuple[object, ...], tuple[Hypothesis, Fit]] = {}
-    for _, hypothesis, base in tried:
-        if len(kept) < _PAIRS:
-            kept.setdefault(mode_of(hypothesis), (hypothesis, base))
-    starts = [library.start(hypothesis, base) for hypothesis, base in kept.values()]
-    return fit(library.problem, [hypothesis for hypothesis, _ in kept.values()], starts)
 
 
 def _named(best: Fit, weighed: Weighed) -> tuple[Named, ...]:

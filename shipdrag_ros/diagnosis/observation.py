@@ -11,13 +11,14 @@ the very effect that is sought.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from shipdrag_ros.diagnosis.context import Context, Stop
+from shipdrag_ros.diagnosis.kink import kink_s
 from shipdrag_ros.diagnosis.noise import Damping, bin_means, learn, whiten
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
@@ -36,6 +37,7 @@ _NEIGHBOURS = 9  # an outlier is told from the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8
+_KNOWN_S = 5.0  # of the time of the stop
 _RESTLESS_M_S = 0.15  # six times what is usual
 
 
@@ -118,9 +120,23 @@ class Observation:
         return self.along.water_m_s > _RESTLESS_M_S
 
     @classmethod
-    def of(cls, window: Window, ship: Ship, parameters: Parameters, *, name: str) -> Observation:
+    def of(
+        cls,
+        window: Window,
+        ship: Ship,
+        parameters: Parameters,
+        *,
+        name: str,
+        stop_moved_s: float = 0.0,
+    ) -> Observation:
         """
         Condense a coastdown with the steady record before it.
+
+        Parameters
+        ----------
+        stop_moved_s
+            By how much the stop is known to be later than it is taken for; some
+            seconds, as the record is not looked through again for it.
 
         Raises
         ------
@@ -137,6 +153,9 @@ class Observation:
                 f'{LEAST_S:.0f} s are needed to tell an effect from the noise: give a record '
                 'that begins earlier'
             )
+        if run_down.stop_sd_s > _KNOWN_S:
+            run_down = _stopped(window, run_down, record)
+        run_down = replace(run_down, stop_ns=run_down.stop_ns + round(stop_moved_s * 1e9))
         since_ns = run_down.stop_ns + round(float(record.steady.time_s[0]) * 1e9)
         series = {
             input_: _joined(getattr(window.before, input_), getattr(window, input_), since_ns)
@@ -242,6 +261,22 @@ class _Learner:
         inertia = 1.0 + self.ship.n_r(speed)
         damping = np.maximum(rise / (above - below), 0.0) / (self.ship.mass_kg * inertia)
         return np.maximum(damping, 1e-6), inertia
+
+
+def _stopped(window: Window, run_down: RunDown, record: Record) -> RunDown:
+    """Move the stop to where the speed begins to fall, if there is a speed."""
+    assert window.before is not None
+    for input_ in ('speed_through_water', 'speed_over_ground'):
+        if input_ in record.white_sd:
+            both = _joined(getattr(window.before, input_), getattr(window, input_), 0)
+            stop_s = kink_s(
+                np.asarray((both.time_ns - run_down.stop_ns) * 1e-9, np.float64),
+                both.value,
+                sd_m_s=record.white_sd[input_],
+                run_down_s=run_down.run_down_s,
+            )
+            return replace(run_down, stop_ns=run_down.stop_ns + round(stop_s * 1e9))
+    return run_down
 
 
 def _joined(before: Series, after: Series, since_ns: int) -> Series:

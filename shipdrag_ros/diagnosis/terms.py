@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -33,6 +33,7 @@ _SHAPES = 5
 _DISCREPANCIES = 6
 _FORMS = 4
 _FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
+_CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
 _SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
 
 
@@ -320,10 +321,11 @@ class PlaceTerm:
     stop_sd_s: float
     has_positions: bool
     scatter: float = 0.0
+    place_of_stop: ClassVar[int] = 3  # among the unknowns
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Place [m], heading [rad], stop [s] and factor on the resistance, - 1."""
+        """Place [m], heading [rad], stop [s], factor on the resistance, - 1, clocks [s]."""
         # where no row shows it, a place with a prior leaves the evidence as it is
         tail = Tail.FLAT if self.has_positions else Tail.NORMAL
         return (
@@ -332,11 +334,12 @@ class PlaceTerm:
             scaled('heading', self.heading_sd_rad),
             scaled('stop', self.stop_sd_s),
             scaled('factor', self.scatter),
+            scaled('log late', _CLOCKS_SD_S if self.has_positions else 0.0),
         )
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (5, n) and (5, k)."""
-        along, across = _nothing(seen, 5)
+        """Return (6, n) and (6, k)."""
+        along, across = _nothing(seen, 6)
         if run != self.run:
             return along, across
         kind, at = seen.along.rows.kind, seen.along.at
@@ -349,6 +352,7 @@ class PlaceTerm:
         since = np.maximum(seen.time_s - seen.lead_in_s, 0.0)
         way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
         along[4] = np.where(position, (since * base.speed - way)[at], (since * slowing)[at])
+        along[5] = np.where(kind == LOG, -slowing[at], 0.0)
         if seen.across is not None:
             across[1] = 1.0
             across[2] = base.distance[seen.across.at]
