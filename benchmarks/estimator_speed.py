@@ -93,6 +93,7 @@ def whole(n: int) -> dict[str, Callable[[], object]]:
 
     return {
         'live (warped)': of('warped', estimate, plain.window),
+        'live, steady record of 30 min': of('warped', estimate, steady.window),
         'final (motion)': of('auto', estimate_final, plain.window),
         'final, steady record of 30 min': of('auto', estimate_final, steady.window),
         'S1 joint': of('s1_joint', estimate, plain.window),
