@@ -145,9 +145,9 @@ def answer(by: str, form: str, number: int) -> dict[str, Any]:
         'everything': None,
     }
     if found['verdict'] == 'one_of':
-        recommended = scoring.parse(found).recommended
-        if recommended and recommended[0].test is not None:
-            row['followed'], _ = diagnose(cases.observe(number, added=(recommended[0].test,)))
+        tried = scoring.parse(found).tried
+        if tried is not None:
+            row['followed'], _ = diagnose(cases.observe(number, added=(tried.test,)))
         row['everything'], _ = diagnose(cases.observe(number, added=cases.TESTS))
     return row
 

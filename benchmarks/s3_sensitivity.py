@@ -63,6 +63,7 @@ RTOL = 1e-6
 ROUNDS = 5
 CONTROLS_S = (0.0, 0.1, 0.5)
 KNOWN = {15.0: (6.79, 5.61), 20.0: (7.79, 6.35), 25.0: (8.85, 7.01)}  # with these values, 0.1 s
+APPROACH_S = 10.0  # rudder amidships before the first order, in the known figures
 SHIP_SPEED_M_S = 8.2
 
 
@@ -130,8 +131,9 @@ def checks() -> Table:
                 motion = steer(SHIP, manoeuvre, control_s=control_s)[0]
                 over = np.degrees(overshoots_rad(motion, manoeuvre))
                 cells.append(f'{over[0]:.2f} / {over[1]:.2f}')
-                if control_s == 0.1:
-                    largest = f'{max(over[::2]):.2f} / {max(over[1::2]):.2f}'
+            motion = steer(SHIP, manoeuvre, approach_s=APPROACH_S)[0]
+            over = np.degrees(overshoots_rad(motion, manoeuvre))
+            largest = f'{max(over[::2]):.2f} / {max(over[1::2]):.2f}'
             known = f'{starboard} / {port}' if first is Side.STARBOARD else ''
             rows.append((f'{manoeuvre.name}, to {first}', *cells, largest, known))
     heads = [f'looks every {control_s:g} s' for control_s in CONTROLS_S[1:]]
@@ -140,7 +142,7 @@ def checks() -> Table:
             'first / second overshoot [deg]',
             'at the very heading',
             *heads,
-            'largest to each side, 0.1 s',
+            f'largest to each side, 0.1 s, order after {APPROACH_S:g} s',
             'known',
         ),
         tuple(rows),
@@ -153,17 +155,21 @@ def circles() -> Table:
     """
     rows = []
     for first in Side:
-        motion = steer(SHIP, turn(35.0, first=first))[0]
         circle = turn(35.0, first=first)
-        rows.append(
-            (
-                f'turn:35 to {first}',
-                f'{advance_m(motion, circle):.0f}',
-                f'{tactical_diameter_m(motion, circle):.0f}',
-                '566 / 1029' if first is Side.STARBOARD else '',
-            )
-        )
-    return Table(('', 'advance [m]', 'tactical diameter [m]', 'known'), tuple(rows))
+        motions = [steer(SHIP, circle, approach_s=each)[0] for each in (0.0, APPROACH_S)]
+        cells = [
+            f'{advance_m(motion, circle):.0f} / {tactical_diameter_m(motion, circle):.0f}'
+            for motion in motions
+        ]
+        known = '566 / 1029' if first is Side.STARBOARD else ''
+        rows.append((f'turn:35 to {first}', *cells, known))
+    heads = (
+        'advance / tactical diameter [m]',
+        'order at once',
+        f'order after {APPROACH_S:g} s',
+        'known',
+    )
+    return Table(heads, tuple(rows))
 
 
 def observations() -> Table:
@@ -348,9 +354,10 @@ def page(
         *lines_of(circles()),
         '',
         'Known: figures computed elsewhere with the same values, first to starboard, control '
-        'every 0.1 s; their phase is not stated, and one look is worth',
-        'up to 0.1 degrees. Of the 15/15 the largest to starboard is meant, the third. Their '
-        'advance counts from half a second (3.9 m) after the order.',
+        'every 0.1 s. All eight come back to the last digit when the rudder is',
+        f'amidships for {APPROACH_S:g} s before the first order, in which the propeller turns her '
+        'a little, and of the 15/15 the largest to starboard is taken, the third.',
+        'Ordered at once the looks of the helmsman fall otherwise: one is worth up to 0.1 degrees.',
         '`tests/simulation/manoeuvring` holds the runs against a solve_ivp of their own: u and v '
         'to 2e-6 m/s, r to 1e-7 rad/s.',
         '',

@@ -70,6 +70,11 @@ class Answer:
         """The most probable candidate."""
         return self.candidates[0] if self.candidates else None
 
+    @property
+    def tried(self) -> Recommendation | None:
+        """The first recommendation that the cases can try."""
+        return next((each for each in self.recommended if each.test is not None), None)
+
     def holds(self, names: Names) -> bool:
         """
         Say whether it names them, or a small set that holds them.
@@ -226,10 +231,11 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
         ),
         'error of the predicted probability to resolve': calibration_error(
             [
-                (trial.answer.recommended[0].probability, trial.followed.verdict == 'named')
+                (tried.probability, trial.followed.verdict == 'named')
                 for trial in sets
                 if trial.followed is not None
-                and trial.answer.recommended[0].probability is not None
+                and (tried := trial.answer.tried) is not None
+                and tried.probability is not None
             ]
         ),
         'CPU s a case, median': float(np.median([trial.cpu_s for trial in trials])),
