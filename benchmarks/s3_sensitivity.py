@@ -34,6 +34,7 @@ from shipdrag_ros.sensitivity import CHANGES, Losses, Norm, own_share
 from shipdrag_ros.sensitivity.coast import coast_from
 from shipdrag_ros.sensitivity.coasting import CoastStudy, study_coast
 from shipdrag_ros.sensitivity.steering import (
+    APPROACH_S,
     DESIGN,
     TINY,
     Experiment,
@@ -63,7 +64,6 @@ RTOL = 1e-6
 ROUNDS = 5
 CONTROLS_S = (0.0, 0.1, 0.5)
 KNOWN = {15.0: (6.79, 5.61), 20.0: (7.79, 6.35), 25.0: (8.85, 7.01)}  # with these values, 0.1 s
-APPROACH_S = 10.0  # rudder amidships before the first order, in the known figures
 SHIP_SPEED_M_S = 8.2
 
 
@@ -357,7 +357,8 @@ def page(
         'every 0.1 s. All eight come back to the last digit when the rudder is',
         f'amidships for {APPROACH_S:g} s before the first order, in which the propeller turns her '
         'a little, and of the 15/15 the largest to starboard is taken, the third.',
-        'Ordered at once the looks of the helmsman fall otherwise: one is worth up to 0.1 degrees.',
+        'Ordered at once the looks of the helmsman fall otherwise: one is worth up to '
+        '0.1 degrees.',
         '`tests/simulation/manoeuvring` holds the runs against a solve_ivp of their own: u and v '
         'to 2e-6 m/s, r to 1e-7 rad/s.',
         '',

@@ -11,6 +11,7 @@ from shipdrag_ros.report import sensitivity_pictures as pictures
 from shipdrag_ros.report.cells import Table
 from shipdrag_ros.report.document import Picture, write_page
 from shipdrag_ros.sensitivity.steering import (
+    APPROACH_S,
     CONTROL_S,
     Check,
     Experiment,
@@ -20,8 +21,8 @@ from shipdrag_ros.sensitivity.steering import (
 
 LOSSES = 'Loss, root mean square of the differences in u, v and r; times 1000'
 CHECK = (
-    f'The check; the helmsman looks every {CONTROL_S:g} s, first to starboard; differences over '
-    'the whole manoeuvre'
+    f'The check; rudder amidships for {APPROACH_S:g} s, then first to starboard, the helmsman '
+    f'looks every {CONTROL_S:g} s; differences over the whole manoeuvre'
 )
 DESIGN = (
     'Which manoeuvre shows which derivative: loss of 10 per cent, times 1000. Own share: what of '

@@ -38,6 +38,7 @@ from shipdrag_ros.simulation.manoeuvring import (
 
 CHECKED_BY = zigzag(25.0)
 CONTROL_S = 0.1  # between two looks of the helmsman in that check
+APPROACH_S = 10.0  # with the rudder amidships before it
 DESIGN = (
     *(zigzag(angle) for angle in (5.0, 10.0, 15.0, 20.0, 25.0, 35.0)),
     *(turn(angle) for angle in (10.0, 20.0, 35.0)),
@@ -250,10 +251,12 @@ def check(ship: SteeredShip, kept: Sequence[str], *, manoeuvre: Manoeuvre = CHEC
     """
     Sail a manoeuvre without the derivatives that are not kept.
 
-    The helmsman looks every `CONTROL_S`, as in published figures.
+    The helmsman looks every `CONTROL_S` after an approach of `APPROACH_S`, as in
+    published figures.
     """
     reduced = np.where([name in kept for name in FORM], ship.values, 0.0)
-    both = steer(ship, manoeuvre, np.array([ship.values, reduced]), control_s=CONTROL_S)
+    sets = np.array([ship.values, reduced])
+    both = steer(ship, manoeuvre, sets, control_s=CONTROL_S, approach_s=APPROACH_S)
     return Check(manoeuvre, both[0], both[1])
 
 

@@ -85,10 +85,10 @@ def test_twenty_four_derivatives_are_eighteen_measurements(found):
 
 def test_the_reduced_model_is_close_and_closer_by_measurements(found):
     full, reduced = np.degrees(found.check.overshoots_rad)
-    np.testing.assert_allclose(full, [8.85, 7.01], rtol=0, atol=0.06)
+    np.testing.assert_allclose(full, [8.85, 7.01], rtol=0, atol=0.006)
     np.testing.assert_allclose(reduced, full, rtol=0, atol=1.0)
     by_group = np.degrees(found.group_check.overshoots_rad[1])
-    assert np.max(np.abs(by_group - full)) < 0.1 < np.max(np.abs(reduced - full))
+    assert np.max(np.abs(by_group - full)) < 0.2 < np.max(np.abs(reduced - full))
     for name, value in found.group_check.rms_difference.items():
         assert value < found.check.rms_difference[name]
 

@@ -61,6 +61,8 @@ class Helm(NamedTuple):
         True: the order changes at the very moment; else at the next look.
     step_s
         Of the integration.
+    approach
+        Steps with the rudder amidships before the first order.
     """
 
     order_rad: float
@@ -68,6 +70,7 @@ class Helm(NamedTuple):
     first: float
     attentive: bool
     step_s: float
+    approach: int
 
 
 @njit(cache=True)
@@ -192,6 +195,10 @@ def _reached(before: State, after: State, heading: float, h: float) -> float:
 def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Float64) -> None:
     """Fill the path (n, STATES) of one ship, with so many looks between two rows."""
     state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for _ in range(helm.approach):
+        state = _advance(hull, c, state, 0.0, helm.step_s)
+    # places count from the first order, headings from the course before
+    state = (state[0], state[1], state[2], 0.0, 0.0, state[5], state[6])
     side = helm.first
     for row in range(len(path)):
         for i in range(STATES):

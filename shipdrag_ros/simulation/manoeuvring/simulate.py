@@ -13,6 +13,7 @@ from shipdrag_ros.simulation.manoeuvring.motion import Motions
 from shipdrag_ros.simulation.manoeuvring.ship import FORM, SteeredShip
 
 _STEP_S = 0.5  # of the integration; the rudder, quickest of all, is followed exactly
+_LONGEST_APPROACH_S = 3600.0
 
 
 def steer(
@@ -23,6 +24,7 @@ def steer(
     sample_s: float = 0.5,
     samples: int = 1200,
     control_s: float = 0.1,
+    approach_s: float = 0.0,
 ) -> Motions:
     """
     Simulate a manoeuvre of k ships that differ in their derivatives.
@@ -40,6 +42,9 @@ def steer(
     control_s
         How often the helmsman looks at the heading and orders the rudder; 0:
         he reverses it at the very moment.
+    approach_s
+        How long the rudder is amidships before the first order, to the nearest
+        step of 0.5 s at most; the propeller alone turns the ship meanwhile.
 
     Returns
     -------
@@ -73,6 +78,10 @@ def steer(
             f'sample_s is {sample_s!r} and control_s {control_s!r}, expected a sample after a '
             'whole number of looks, or 0 for control_s'
         )
+    if not 0.0 <= approach_s <= _LONGEST_APPROACH_S:
+        raise SimulationError(
+            f'approach_s is {approach_s!r}, expected 0 to {_LONGEST_APPROACH_S:g} s'
+        )
     if samples < 2:
         raise SimulationError(f'samples is {samples!r}, expected 2 or more')
     table = np.atleast_2d(ship.values if derivatives is None else derivatives)
@@ -87,6 +96,7 @@ def steer(
         manoeuvre.first.sign,
         attentive=control_s == 0.0,
         step_s=look_s / steps,
+        approach=round(approach_s * steps / look_s),
     )
     paths = np.empty((len(table), samples, STATES))
     follow_columns(

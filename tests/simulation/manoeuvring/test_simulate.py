@@ -179,6 +179,8 @@ def test_samples_are_where_they_were_asked_for():
         ({'sample_s': np.nan, 'control_s': 0.0}, 'sample_s is nan'),
         ({'sample_s': 0.5, 'control_s': 1.0}, 'whole number of looks'),
         ({'samples': 1}, 'samples is 1'),
+        ({'approach_s': -1.0}, 'approach_s is -1.0, expected 0 to 3600 s'),
+        ({'approach_s': np.nan}, 'approach_s is nan'),
         ({'derivatives': np.zeros(39)}, r'shape \(1, 39\), expected \(k, 40\)'),
     ],
 )
