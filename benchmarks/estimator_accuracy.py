@@ -2,7 +2,8 @@
 """
 Error and coverage of the live estimator beside S1's three problems.
 
-Simulated coastdowns of three hulls, none of which anything was tuned to; log
+Simulated coastdowns of three hulls, in view of which what is expected of r was
+chosen (unseen_hulls.py has others); log
 and position with n samples each. Errors of r(v) are over the valid range of
 each estimate, in percent of the true r at the start; `top` is where that range
 ends, in percent of the speed at the start. Where something disturbs slowly, the
