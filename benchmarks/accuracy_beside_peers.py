@@ -424,8 +424,8 @@ def preface(runs: int) -> list[str]:
         '- Bound: Cramer-Rao, r = c₁v + .. + c₄v⁴ with the noise known, unknown current and state '
         'at the stop (`benchmarks/_bound.py`, apart from the',
         '  package). A smaller or a fitting family, or a biased estimator, may lie below it.',
-        '- What is expected of r beforehand was chosen, among some dozens of ways, in view of these '
-        'three ships and seeds, so ours are flattered here; on hulls that',
+        '- What is expected of r beforehand was chosen, among some dozens of ways, in view of '
+        'these three ships and seeds, so ours are flattered here; on hulls that',
         '  nothing was chosen on: [accuracy.md](accuracy.md), Unseen hulls.',
         '- Peers differentiate; r = -(1 + n_r) dv/dt with the true n_r, sorted by v. Chebyshev: '
         'degree by BIC. Savitzky-Golay: cubic, window by leave-one-out',
