@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -98,7 +99,10 @@ def run(options: argparse.Namespace) -> int:
     if options.form != AUTO and FORMS[options.form].needs_lcb:
         needed = (*REQUIRED, 'lcb')
     if options.target in (*REQUIRED, *OPTIONAL):
-        raise DataError('--target', [f'{options.target!r} is a ratio of the hull'])
+        raise DataError(
+            '--target',
+            [f'{options.target!r} is a ratio of the hull; name the column of its resistance'],
+        )
     table = read_numbers(options.data, (*needed, options.target), optional=OPTIONAL)
     hulls = Hulls.of(str(options.data), table.names, table.values)
     values = table.column(options.target)
@@ -136,6 +140,7 @@ def document(found: ResidualFit, predictions: Sequence[Prediction]) -> dict[str,
         'coefficients': named(found.fit.coefficients.tolist()),
         'coefficient_sd': named(found.coefficient_sd.tolist()),
         'F': found.criterion,
+        'left_out_rms': math.sqrt(found.left_out),
         'rank': found.fit.rank,
         'condition': found.fit.condition,
         'hulls': found.count,

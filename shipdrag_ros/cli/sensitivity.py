@@ -83,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _steering(options: argparse.Namespace, output: Output) -> None:
     ship = _MODELS[options.model or _MODEL]()
-    manoeuvre = parse(options.manoeuvre or _MANOEUVRE)
+    manoeuvre = parse(_MANOEUVRE if options.manoeuvre is None else options.manoeuvre)
     found = study(ship, manoeuvre, keep=_KEEP if options.keep is None else options.keep)
     shown = experiment(ship)
     page = steering_page
@@ -104,7 +104,8 @@ def _steering(options: argparse.Namespace, output: Output) -> None:
 
 def _coasting(options: argparse.Namespace, output: Output) -> None:
     ship = Ship.load(options.ship)
-    found = study_coast(ship, parse_coast(ship, options.manoeuvre or KIND), keep=options.keep)
+    coast = parse_coast(ship, KIND if options.manoeuvre is None else options.manoeuvre)
+    found = study_coast(ship, coast, keep=options.keep)
     page = coasting_page
     output.say(page.sentence(found))
     for note in page.notes(found):

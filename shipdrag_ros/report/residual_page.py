@@ -25,6 +25,8 @@ def sentence(found: ResidualFit, target: str, predictions: Sequence[Prediction])
         f'{len(found.hulls)} rows: F = {found.criterion:.4g}, rank {found.fit.rank} of '
         f'{len(found.fit.coefficients)}, condition {found.fit.condition:.2g}.'
     )
+    if np.isfinite(found.left_out):
+        said += f' Hulls that are left out are missed by {np.sqrt(found.left_out):.2g} (rms).'
     if predictions:
         used = sum(each.inside for each in predictions)
         said += f' Of {len(predictions)} predictions {used} may be used.'
@@ -100,8 +102,8 @@ def write_residual(
         pictures.append(
             Picture.of(
                 fit_pictures.left_out_picture(error, leverage, target),
-                'Each hull foretold from the others: the error to expect of a new one, and how '
-                'it grows beyond the data.',
+                'Each hull foretold from the others: the error to expect of a new one, within '
+                'the leverages of the data and beyond.',
             )
         )
     write_page(

@@ -60,6 +60,8 @@ def test_json_to_the_letter(
     assert list(found['coefficients']) == [f'b{i}' for i in range(15)]
     assert 0.0 < found['F'] < (0.02 * 2e-3) ** 2
     assert 10.0 < found['condition'] < 1e4
+    assert found['F'] ** 0.5 < found['left_out_rms'] < 0.1 * 2e-3
+    assert f'left out are missed by {found["left_out_rms"]:.2g} (rms)' in shown.err
     assert found['domain']['Fr'] == [0.08, 0.2]
     assert list(found['domain']) == ['L_B', 'B_T', 'C_B', 'Fr']
     good, bad = found['predictions']
@@ -119,7 +121,7 @@ def test_errors_say_what_to_mend(
     assert 'neither C_B nor slenderness' in capsys.readouterr().err
     line = ['residual', str(table), '--form', 'sirotina', '--target']
     assert main([*line, 'C_B']) == 1
-    assert "'C_B' is a ratio of the hull" in capsys.readouterr().err
+    assert "'C_B' is a ratio of the hull; name the column" in capsys.readouterr().err
     with pytest.raises(SystemExit):
         fit(table, form='cubic')
 

@@ -95,6 +95,8 @@ def test_a_ship_file_coasts(
         (['--manoeuvre', 'zigzag:120'], 'with 1..90 degrees of rudder'),
         (['--manoeuvre', 'turn:45'], 'at most 40 degrees of rudder, which is as far as it goes'),
         (['--manoeuvre', 'coastdown'], 'expected zigzag:ANGLE or turn:ANGLE'),
+        (['--manoeuvre', ''], "manoeuvre '', expected zigzag:ANGLE"),
+        (['--ship', 'SHIP', '--manoeuvre', ''], "manoeuvre ''"),
         (['--ship', 'SHIP', '--manoeuvre', 'zigzag:15'], 'for zigzag and turn leave out --ship'),
         (['--ship', 'SHIP', '--manoeuvre', 'coastdown:30'], 'begins at 30 m/s, expected'),
         (['--ship', 'SHIP', '--keep', '99'], 'keep is 99, expected 1..13'),
