@@ -84,8 +84,10 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
             if NUMBER.fullmatch(cell) and abs(value := float(cell)) <= _MOST:
                 row.append(value)
             else:
+                comma = NUMBER.fullmatch(cell.replace(',', '.', 1)) and ',' in cell
                 problems.append(
                     f'line {line}, {name}: {cell!r}, expected a number, at most {_MOST:g} in size'
+                    + ('; write a decimal point' if comma else '')
                 )
         rows.append(row)
     if not rows:

@@ -57,6 +57,13 @@ def test_all_bad_cells_are_told_with_their_lines(tmp_path: Path) -> None:
     )
 
 
+def test_a_decimal_comma_is_told(tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a;b\n1,5;1.5\n')
+    with pytest.raises(DataError, match=r"a: '1,5', expected a number, .*; write a decimal point"):
+        read_numbers(path, ('a', 'b'))
+
+
 def test_many_bad_cells_are_counted(tmp_path: Path) -> None:
     path = tmp_path / 'data.csv'
     path.write_text('a\n' + 'x\n' * 50)
