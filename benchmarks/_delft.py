@@ -7,7 +7,7 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from _regressions import CUBE, CUBIC, gauss, rms, shown
+from _regressions import CUBE, CUBIC, WRONG, gauss, rms, shown
 from _tables import table
 from matplotlib.figure import Figure
 
@@ -74,8 +74,9 @@ def delft(path: Path) -> tuple[list[str], Figure]:
         '- The cubic has 35 terms of shape for 21 hulls. All of it is refused, rightly: more',
         '  coefficients make it worse by ten times, as the paper says.',
         '- Froude numbers between those measured pass, those beyond do not.',
+        '- To be passed is not to be near: see the last table. The sd says how near.',
     ]
-    cases = []
+    cases, relative = [], []
     for title, froude_max in (('all Fr', 1.0), ('Fr up to 0.3', 0.301)):
         hulls, values = yachts(path, froude_max)
         cases.append((f'hulls, {title}', hulls, values, hulls.groups()))
@@ -122,10 +123,41 @@ def delft(path: Path) -> tuple[list[str], Figure]:
                 rows,
             ),
         ]
+        if title.startswith('hulls'):
+            relative += [
+                (title, name, *over(error / measured, ok, sd / measured))
+                for name, (error, ok, sd) in keep.items()
+                if name in FORMS
+            ]
         if title.startswith('hulls, Fr up'):
             figure = delft_picture(keep)
+    lines += [
+        '',
+        f'More than {WRONG:.0%} off, in the first two; at the lowest Froude numbers R_r is nearly 0.',
+        '',
+        *table(
+            (
+                'left out',
+                '',
+                'of passed ones %',
+                'of refused ones %',
+                'refused, of such %',
+                'sd of passed ones, median %',
+            ),
+            relative,
+        ),
+    ]
     lines += ['', '![Errors of hulls left out](pictures/s4_delft.png)']
     return lines, figure
+
+
+def over(error: Float64, ok: np.ndarray, sd: Float64) -> tuple[str, ...]:
+    """
+    Tell how many relative errors are too large, with and without the guard, in %.
+    """
+    bad = np.abs(error) > WRONG
+    shares = (bad[ok].mean(), bad[~ok].mean(), (~ok)[bad].mean(), np.median(sd[ok]))
+    return tuple(f'{100 * share:.0f}' for share in shares)
 
 
 def delft_picture(found: dict[str, tuple[Float64, np.ndarray, Float64]]) -> Figure:

@@ -14,6 +14,7 @@ from shipdrag_ros.regression.polynomial import monomials, terms_up_to
 from shipdrag_ros.residual import Form, Hulls
 from shipdrag_ros.samples import Float64
 
+WRONG = 0.15  # a prediction this far off, relative, is a bad one
 SHAPES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
 CUBE = terms_up_to(3, [3] * len(SHAPES))
 CUBIC = Form(
