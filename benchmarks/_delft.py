@@ -133,7 +133,8 @@ def delft(path: Path) -> tuple[list[str], Figure]:
             figure = delft_picture(keep)
     lines += [
         '',
-        f'More than {WRONG:.0%} off, in the first two; at the lowest Froude numbers R_r is nearly 0.',
+        f'More than {WRONG:.0%} off, in the first two; at the lowest Froude numbers R_r is '
+        'nearly 0.',
         '',
         *table(
             (
