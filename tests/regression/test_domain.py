@@ -48,3 +48,5 @@ def test_says_what_is_outside() -> None:
     np.testing.assert_allclose(
         domain.distance(np.array([[0.2, 8.0]])), [0.6 / np.sqrt(2.0)], rtol=1e-5
     )
+    line = Domain.of(('x',), np.array([[0.0], [1.0]]))
+    np.testing.assert_allclose(line.distance(np.array([[3.0], [-0.5]])), [2.0, 0.5], rtol=1e-5)
