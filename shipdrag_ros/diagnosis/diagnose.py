@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict, Whe
 from shipdrag_ros.diagnosis.search import search
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses
+from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, odd
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
@@ -80,6 +80,7 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     predicted = held_out(library, best) if alarm else None
     lacking = alarm and (
         lacks(best, found.more)
+        or odd(best)
         or (predicted is not None and misses(predicted.chi2_per_sample, best.best.rows))
     )
     # an instrument that errs before the stop has taught the noise what it should have shown

@@ -116,20 +116,29 @@ class Library:
         """
         Return a hypothesis with one effect more, in the ways that it may be there.
 
-        They differ in where a fit begins, in what is a choice, and in which run
+        They differ in where a fit begins, in what is a choice, in signs, and in which run
         an effect of a single run was.
         """
         free = [q for q in effect.parameters if q.prior.shape is not Shape.CHOICE]
         choices = [q for q in effect.parameters if q.prior.shape is Shape.CHOICE]
+        signed = [q for q in free if q.prior.shape is Shape.EITHER_SIGN]
+        signs = list(product((1.0, -1.0), repeat=len(signed)))
         starts = list(product(*(_starts(q, first=q is free[0]) for q in free)))
         words = list(product(*((q.prior.first, q.prior.second) for q in choices)))
         runs = scope_runs(effect, len(self.seen))
         names = tuple(sorted((*base.names, effect.name)))
         log_odds = math.log(effect.odds)
-        weight = base.weight + log_odds - math.log(len(words) * len(runs))
+        weight = base.weight + log_odds - math.log(len(words) * len(signs) * len(runs))
         found = []
-        for start, word, run in product(starts, words, runs):
-            term = EffectTerm(effect, self.problem.ship, start, _named(choices, word), run)
+        for start, word, sign, run in product(starts, words, signs, runs):
+            term = EffectTerm(
+                effect,
+                self.problem.ship,
+                start,
+                fixed=_named(choices, word),
+                signs=_named(signed, sign),
+                only_run=run,
+            )
             sd = effect.formula_sd
             forms = (*base.forms, FormTerm(term, sd)) if sd > 0.0 else base.forms
             terms = (*base.terms, term)
@@ -213,7 +222,7 @@ def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:
         return {Shape.HALF_NORMAL: (0.3,), Shape.LOG_NORMAL: _APART}.get(shape, (0.0,))
     if shape is Shape.UNIFORM:
         return _EVERYWHERE
-    return (0.0,) if shape is Shape.NORMAL else _APART
+    return (0.0,) if shape in (Shape.NORMAL, Shape.EITHER_SIGN) else _APART
 
 
 def _named(

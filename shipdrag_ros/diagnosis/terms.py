@@ -65,6 +65,8 @@ class EffectTerm:
         z that a fit begins from, one a parameter.
     fixed
         Parameters that are a choice, by name.
+    signs
+        Of parameters that have either, by name.
     only_run
         Where an effect of a single run is looked for; None: in all runs.
     stated
@@ -75,6 +77,7 @@ class EffectTerm:
     ship: Ship
     starts: tuple[float, ...] = ()
     fixed: tuple[tuple[str, float], ...] = ()
+    signs: tuple[tuple[str, float], ...] = ()
     only_run: int | None = None
     stated: tuple[tuple[float, float], ...] = ()
 
@@ -89,8 +92,11 @@ class EffectTerm:
             )
         free = [quantity for quantity in quantities if quantity.name not in dict(self.fixed)]
         starts = self.starts or (0.0,) * len(free)
+        signs = dict(self.signs)
         return tuple(
-            of_prior(quantity.name, quantity.prior, start=start)
+            of_prior(
+                quantity.name, quantity.prior, start=start, sign=signs.get(quantity.name, 1.0)
+            )
             for quantity, start in zip(free, starts, strict=True)
         )
 

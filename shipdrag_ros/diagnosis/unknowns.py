@@ -87,15 +87,20 @@ def scaled(name: str, sd: float, *, mean: float = 0.0, tail: Tail = Tail.NORMAL)
     return Unknown(name, tail, lambda z: mean + sd * z, lambda z: sd)
 
 
-def of_prior(name: str, prior: Prior, *, start: float = 0.0) -> Unknown:
+def of_prior(name: str, prior: Prior, *, start: float = 0.0, sign: float = 1.0) -> Unknown:
     """
     Return an unknown of the prior that an effect states.
+
+    Parameters
+    ----------
+    sign
+        Where the prior leaves it open.
     """
-    a, b = prior.first, prior.second
+    a, b = sign * prior.first, prior.second
     match prior.shape:
         case Shape.HALF_NORMAL:
             return Unknown(name, Tail.HALF, lambda z: b * z, lambda z: b, start)
-        case Shape.LOG_NORMAL:
+        case Shape.LOG_NORMAL | Shape.EITHER_SIGN:
             return Unknown(
                 name,
                 Tail.NORMAL,

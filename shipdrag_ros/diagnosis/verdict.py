@@ -25,6 +25,7 @@ QUIET = 0.1  # of nothing missing, from which nothing is said
 _SET = 0.99  # of the candidates
 _BARE_MENTION = math.log(3.0)  # of evidence that is not worth more (Kass and Raftery 1995)
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
+_ODD_SD = 2.5  # standard deviations of what is expected of an effect, its size apart
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
 
 
@@ -138,7 +139,7 @@ def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
     Return names, and what tells a mode apart from others of the same names.
     """
     ways = [
-        (term.effect.name, term.fixed, str(term.only_run))
+        (term.effect.name, term.fixed, term.signs, str(term.only_run))
         for term in hypothesis.terms
         if isinstance(term, EffectTerm)
     ]
@@ -159,6 +160,23 @@ def lacks(fit: Fit, with_more: Sequence[Fit], *, nats: float = _LACK_NATS) -> bo
     if misses(fit.chi2_per_row, fit.best.rows):
         return True
     return any(more.log_likelihood > fit.log_likelihood + nats for more in with_more)
+
+
+def odd(fit: Fit) -> bool:
+    """
+    Tell whether an effect is there in a way that it is not known in.
+
+    However large it is, a turn that hardly changes the heading, or is over in some
+    seconds, is something else.
+    """
+    for part, place in fit.hypothesis.parts:
+        if not isinstance(part, EffectTerm) or part.stated:
+            continue
+        size = part.effect.parameters[0].name
+        for i, unknown in enumerate(part.unknowns):
+            if unknown.name != size and abs(float(fit.best.z[place + i])) > _ODD_SD:
+                return True
+    return False
 
 
 def misses(chi2_per_row: float, rows: int) -> bool:

@@ -57,6 +57,7 @@ class Shape(StrEnum):
     NORMAL = 'normal'
     HALF_NORMAL = 'half-normal'
     LOG_NORMAL = 'log-normal'
+    EITHER_SIGN = 'log-normal in size, of either sign'
     UNIFORM = 'uniform'
     CHOICE = 'either'
 
@@ -71,8 +72,8 @@ class Prior:
     shape
     first, second
         Mean and sd of a normal one; 0 and sd of the normal of a half-normal
-        one; median and sd of the logarithm; ends of a uniform one; the two
-        values of a choice.
+        one; median and sd of the logarithm, of the size where either sign is
+        alike; ends of a uniform one; the two values of a choice.
     """
 
     shape: Shape
@@ -93,6 +94,8 @@ class Prior:
                 if value <= 0.0:
                     return -math.inf
                 return _log_normal(math.log(value / a) / b) - math.log(b * value)
+            case Shape.EITHER_SIGN:
+                return math.log(0.5) + log_normal(a, b).log_density(abs(value))
             case Shape.UNIFORM:
                 return -math.log(b - a) if a <= value <= b else -math.inf
             case Shape.CHOICE:
@@ -110,6 +113,8 @@ class Prior:
                 return float(abs(rng.normal(0.0, b)))
             case Shape.LOG_NORMAL:
                 return float(a * math.exp(b * rng.standard_normal()))
+            case Shape.EITHER_SIGN:
+                return float(rng.choice([a, -a]) * math.exp(b * rng.standard_normal()))
             case Shape.UNIFORM:
                 return float(rng.uniform(a, b))
             case Shape.CHOICE:
@@ -119,7 +124,7 @@ class Prior:
         """
         Return the prior of a quantity that is so many times larger.
         """
-        if self.shape is Shape.LOG_NORMAL:
+        if self.shape in (Shape.LOG_NORMAL, Shape.EITHER_SIGN):
             return Prior(self.shape, factor * self.first, self.second)
         return Prior(self.shape, factor * self.first, factor * self.second)
 
@@ -132,6 +137,8 @@ class Prior:
                 return f'half-normal, 0 + {b:g}'
             case Shape.LOG_NORMAL:
                 return f'log-normal, median {a:g}, factor {math.exp(b):.2g}'
+            case Shape.EITHER_SIGN:
+                return f'log-normal, median {a:g}, factor {math.exp(b):.2g}, either sign'
             case Shape.UNIFORM:
                 return f'uniform, {a:g} .. {b:g}'
             case Shape.CHOICE:
@@ -157,6 +164,13 @@ def log_normal(median: float, sd_of_log: float) -> Prior:
     Expect more than 0, within a factor of the median.
     """
     return Prior(Shape.LOG_NORMAL, median, sd_of_log)
+
+
+def either_sign(median: float, sd_of_log: float) -> Prior:
+    """
+    Expect either sign, within a factor of the median, and hardly 0.
+    """
+    return Prior(Shape.EITHER_SIGN, median, sd_of_log)
 
 
 def uniform(low: float, high: float) -> Prior:

@@ -79,6 +79,13 @@ def test_a_radar_that_bends_the_way_before_the_stop_is_not_nothing() -> None:
     assert 'wander apart' in found.notes[0]
 
 
+def test_a_drag_for_a_while_without_a_turn_is_not_called_turning() -> None:
+    found = diagnose([run('turning=25,start_s=300,duration_s=200,rate_rad_s=0')], SHIP, PARAMETERS)
+    assert found.verdict is Verdict.UNKNOWN
+    assert found.where is not None
+    assert found.where.channel == 'force'
+
+
 def test_what_is_in_one_run_alone_is_not_asked_of_the_other() -> None:
     turning = 'turning=25,start_s=300,duration_s=200,rate_rad_s=0.001'
     runs = [run(turning), run(heading_rad=0.3 + 3.14159, seed=2)]

@@ -222,6 +222,7 @@ def test_actions_add_and_the_empty_one_is_nothing():
         (Prior(Shape.NORMAL, 1.0, 2.0), 1.0, 2.0),
         (Prior(Shape.HALF_NORMAL, 0.0, 2.0), 2.0 * np.sqrt(2 / np.pi), 2 * np.sqrt(1 - 2 / np.pi)),
         (Prior(Shape.LOG_NORMAL, 2.0, 0.3), 2.0 * np.exp(0.045), 2.0 * 0.3 * 1.07),
+        (Prior(Shape.EITHER_SIGN, 2.0, 0.3), 0.0, 2.0 * np.exp(0.09)),
         (Prior(Shape.UNIFORM, -1.0, 3.0), 1.0, 4.0 / np.sqrt(12.0)),
         (Prior(Shape.CHOICE, 1.0, -1.0), 0.0, 1.0),
     ],

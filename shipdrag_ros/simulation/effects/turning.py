@@ -13,8 +13,8 @@ from shipdrag_ros.simulation.effect import (
     Measure,
     Quantity,
     Scope,
+    either_sign,
     log_normal,
-    normal,
     uniform,
 )
 from shipdrag_ros.simulation.scenario import Turn
@@ -71,7 +71,8 @@ EFFECT = Effect(
             unit='rad/s',
             meaning='yaw rate meanwhile, anticlockwise positive; 0 where helm and counter-helm '
             'keep the course',
-            prior=normal(0.005),
+            # one that does not change the course leaves the trace of any force for a while
+            prior=either_sign(0.0015, 1.1),
             low=-0.2,
             high=0.2,
             default=0.003,
