@@ -241,7 +241,8 @@ def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
     )
     # the fit starts a little above or below the true speed
     highest = min(_TRUE_MARGIN * settings.speed_m_s, _highest_speed(ship))
-    speed = np.linspace(0.0, highest, _TRUE_POINTS)
+    # a table that begins above rest, as a fitted one does, says nothing of slower speeds
+    speed = np.linspace(ship.baseline_range_m_s[0], highest, _TRUE_POINTS)
     truth = TrueCurve(speed, motion.specific_resistance(speed), settings.stated(ship))
     return block, truth
 

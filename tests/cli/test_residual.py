@@ -92,6 +92,10 @@ def test_writes_a_ship_file_or_refuses(
     ship.write_text(SHIP)
     assert fit(table, '--ship', str(ship), '--write', str(out)) == 0
     assert Ship.load(out).baseline != Ship.load(ship).baseline
+    # her table begins above rest, and she can be simulated all the same
+    bag, speed = str(tmp_path / 'run.mcap'), str(float(Ship.load(out).speed(0.16)))
+    line = ['simulate', '--ship', str(out), '-o', bag, '--speed', speed, '--duration', '60']
+    assert main(line) == 0
     wide = tmp_path / 'wide.yaml'
     wide.write_text(SHIP.replace('16.5', '30.0').replace('4.1', '2.5'))
     capsys.readouterr()
