@@ -112,6 +112,23 @@ def new_file(ending: str) -> Callable[[str], Path]:
     return read
 
 
+def add_report(parser: argparse.ArgumentParser, *, of: str) -> None:
+    """
+    Add `--report FILE.html`.
+
+    Parameters
+    ----------
+    of
+        What it shows, in a word.
+    """
+    parser.add_argument(
+        '--report',
+        type=new_file('.html'),
+        metavar='FILE.html',
+        help=f'write the {of} with its pictures to one HTML file',
+    )
+
+
 def unused_file(ending: str) -> Callable[[str], Path]:
     """
     Return a reader of the path of a file to write that does not exist yet.

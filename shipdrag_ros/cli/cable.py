@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from shipdrag_ros.cli.arguments import add_json, new_file, number
+from shipdrag_ros.cli.arguments import add_json, add_report, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.report import cable_page
 from shipdrag_ros.simulation.cable import Cable, Surface, Tangent, compare_errors, tangent_range
@@ -63,12 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='RHO',
         help='density of the water [kg/m^3]',
     )
-    parser.add_argument(
-        '--report',
-        type=new_file('.html'),
-        metavar='FILE.html',
-        help='write the result with its pictures to one HTML file',
-    )
+    add_report(parser, of='result')
     add_json(parser)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from shipdrag_ros.bags import Run, accepted_samples, coast_windows, open_runs, replay
 from shipdrag_ros.bags.playback import SHIP_FILE
 from shipdrag_ros.cli import diagnose_json
-from shipdrag_ros.cli.arguments import add_json, add_remap, bag, new_file, number, unused_file
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, bag, number, unused_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.diagnosis import (
     CoastRun,
@@ -57,12 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='write a ship file with the effect added, where one is named; an existing file is '
         'not overwritten',
     )
-    parser.add_argument(
-        '--report',
-        type=new_file('.html'),
-        metavar='FILE.html',
-        help='write the diagnosis with its pictures to one HTML file',
-    )
+    add_report(parser, of='diagnosis')
     parser.add_argument(
         '--window',
         nargs=2,

@@ -11,7 +11,7 @@ from typing import Any
 
 from shipdrag_ros.bags import Run, open_runs, replay
 from shipdrag_ros.cli import replay_json, replay_text
-from shipdrag_ros.cli.arguments import add_json, add_remap, bag, new_file, number
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, bag, number
 from shipdrag_ros.cli.output import Output, json_text
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters
@@ -74,12 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR',
         help=f'write {REPORT}, {JSON} and {CURVES} there; made if missing',
     )
-    parser.add_argument(
-        '--report',
-        type=new_file('.html'),
-        metavar='FILE.html',
-        help='write the report with its pictures to one HTML file',
-    )
+    add_report(parser, of='report')
     add_json(parser)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from shipdrag_ros.bags.numbers import read_numbers
-from shipdrag_ros.cli.arguments import add_json, new_file, number, unused_file
+from shipdrag_ros.cli.arguments import add_json, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.surface import prediction_documents
 from shipdrag_ros.errors import DataError
@@ -78,12 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='ship file to write; holds the Froude numbers at which the hull is accepted, '
         'refused if there are none',
     )
-    parser.add_argument(
-        '--report',
-        type=new_file('.html'),
-        metavar='FILE.html',
-        help='write the fit with its pictures to one HTML file',
-    )
+    add_report(parser, of='fit')
     add_json(parser)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.cli.arguments import add_json, new_file
+from shipdrag_ros.cli.arguments import add_json, add_report
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.report import coasting_page, steering_page
 from shipdrag_ros.sensitivity.coast import KIND, SPEED_FRACTION, parse_coast
@@ -58,12 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f'how many to keep (default: {_KEEP} derivatives; with --ship those values of which '
         '10 per cent move the record beyond its noise)',
     )
-    parser.add_argument(
-        '--report',
-        type=new_file('.html'),
-        metavar='FILE.html',
-        help='write the result with its pictures to one HTML file',
-    )
+    add_report(parser, of='result')
     add_json(parser)
 
 

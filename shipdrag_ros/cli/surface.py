@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.bags.numbers import read_numbers
-from shipdrag_ros.cli.arguments import add_json, new_file
+from shipdrag_ros.cli.arguments import add_json, add_report, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression import Prediction, Surface, fit_surface
@@ -61,12 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE.py',
         help='write the surface and its derivatives as plain Python functions of the inputs',
     )
-    parser.add_argument(
-        '--report',
-        type=new_file('.html'),
-        metavar='FILE.html',
-        help='write the surface with its pictures to one HTML file',
-    )
+    add_report(parser, of='surface')
     add_json(parser)
 
 

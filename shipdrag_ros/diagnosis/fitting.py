@@ -67,8 +67,6 @@ def fit(
     problem: Problem,
     hypotheses: Sequence[Hypothesis],
     starts: Sequence[Float64],
-    *,
-    iterations: int = _ITERATIONS,
 ) -> list[Fit]:
     """
     Fit hypotheses; those that cannot be have no evidence.
@@ -80,7 +78,7 @@ def fit(
     """
     states = [_State(h, z.copy()) for h, z in zip(hypotheses, starts, strict=True)]
     active = states
-    for number in range(iterations):
+    for number in range(_ITERATIONS):
         near = [None if number in _ANEW else s.best for s in active]
         points = problem.linearise([s.hypothesis for s in active], [s.trial for s in active], near)
         for state, point in zip(active, points, strict=True):

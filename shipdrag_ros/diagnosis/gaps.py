@@ -15,7 +15,6 @@ from shipdrag_ros.diagnosis.result import Gap, Where
 from shipdrag_ros.diagnosis.terms import EffectTerm, PlaceTerm
 from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.simulation.effect import Scope
 
 _PARTS = 12  # of a coastdown, in telling where a gap is
 _SHARE = 0.9  # of the excess, between the ends of where it is
@@ -77,11 +76,11 @@ def held_out(library: Library, found: Fit | None) -> Gap | None:
         return None
     gaps, rows = [], []
     for j, run in enumerate(library.seen):
-        if found is not None and _has_its_own(found.hypothesis, j):
-            continue
         alone = replace(library, seen=(run,))
         if found is None:
             linear = frozen(alone).best
+        elif _has_its_own(found.hypothesis, j):
+            continue
         else:
             linear = _predicted(library, j, found)
         gaps.append(gap_of(alone.problem, linear))
@@ -98,7 +97,7 @@ def held_out(library: Library, found: Fit | None) -> Gap | None:
 def _has_its_own(hypothesis: Hypothesis, run: int) -> bool:
     """Tell whether an effect of a single run acts in a run."""
     return any(
-        term.effect.scope is Scope.RUN and not term.stated and term.acts_in(run)
+        term.of_single_run and term.acts_in(run)
         for term in hypothesis.terms
         if isinstance(term, EffectTerm)
     )

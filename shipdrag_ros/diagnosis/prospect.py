@@ -26,7 +26,6 @@ from shipdrag_ros.diagnosis.terms import (
 )
 from shipdrag_ros.diagnosis.verdict import CERTAIN
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.simulation.effect import Scope
 
 _DRAWS = 200  # of each candidate
 _SEED = 0
@@ -183,7 +182,7 @@ def _transferred(hypothesis: Hypothesis) -> Hypothesis:
     assert isinstance(baseline, BaselineTerm)
     kept: list[Term] = [replace(baseline, run_down_change_s=baseline.run_down_change_s[:1])]
     kept += [term for term in others if not _of_single_run(term)]
-    forms = tuple(form for form in hypothesis.forms if not _of_single_run(form.term))
+    forms = tuple(form for form in hypothesis.forms if not form.term.of_single_run)
     # others of the same kind: where the first run began, and what was amiss with a sensor in
     # it, is not known of the next
     of_first = (
@@ -196,7 +195,7 @@ def _transferred(hypothesis: Hypothesis) -> Hypothesis:
 
 
 def _of_single_run(term: Term) -> bool:
-    return isinstance(term, EffectTerm) and term.effect.scope is Scope.RUN and not term.stated
+    return isinstance(term, EffectTerm) and term.of_single_run
 
 
 def _places(old: Hypothesis, new: Hypothesis) -> list[tuple[int, int]]:

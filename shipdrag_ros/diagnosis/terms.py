@@ -101,6 +101,11 @@ class EffectTerm:
         )
 
     @property
+    def of_single_run(self) -> bool:
+        """Whether nothing of it is to be expected in another run."""
+        return self.effect.scope is Scope.RUN and not self.stated
+
+    @property
     def components(self) -> list[int]:
         """Places, among its unknowns, of sizes that may have either sign and are not stated."""
         if self.stated:

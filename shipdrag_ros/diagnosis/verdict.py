@@ -146,7 +146,7 @@ def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
     return (hypothesis.names, hypothesis.discrepancy, *sorted(ways))
 
 
-def lacks(fit: Fit, with_more: Sequence[Fit], *, nats: float = _LACK_NATS) -> bool:
+def lacks(fit: Fit, with_more: Sequence[Fit]) -> bool:
     """
     Tell whether a name leaves more than noise.
 
@@ -154,12 +154,10 @@ def lacks(fit: Fit, with_more: Sequence[Fit], *, nats: float = _LACK_NATS) -> bo
     ----------
     with_more
         The same with something smooth besides.
-    nats
-        Of evidence that this must gain.
     """
     if misses(fit.chi2_per_row, fit.best.rows):
         return True
-    return any(more.log_likelihood > fit.log_likelihood + nats for more in with_more)
+    return any(more.log_likelihood > fit.log_likelihood + _LACK_NATS for more in with_more)
 
 
 def odd(fit: Fit) -> bool:
