@@ -75,9 +75,12 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
     Notes
     -----
     The heading decides where there is one; the course over ground of a ship
-    that slows down in a cross current changes without a turn.
+    that slows down in a cross current changes without a turn. A fix that jumps,
+    as when a radar takes another mark, is in a course for as long as the way
+    that this is taken over: a turn is what outlasts that.
     """
     before = mean_heading(bins, start - 1, HEADING_BEFORE_S)
+    way = 0
     if not math.isnan(before) and newest_bin(bins, _HEADING) > start:
 
         def change(at: int) -> float:
@@ -88,20 +91,23 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
         if not tracks:
             return None
         track = tracks[0]
-        course = _course(bins, track, start - 1, half)
+        way = 2 * half
+        # two ways, as a jump may be in one of them; nothing need be known of the older
+        courses = [_course(bins, track, start - 1 - back, half) for back in (0, way)]
 
         def change(at: int) -> float:
             # a way that begins before the onset tells nothing new
-            if at < start + 2 * half:
+            if at < start + way:
                 return math.nan
-            return _apart(_course(bins, track, at, half), course)
+            now = _course(bins, track, at, half)
+            return min(_apart(now, course) for course in courses)
 
     if not change(number) > turn_rad:
         return None
     last = number
     while last > start and not change(last) <= 0.5 * turn_rad:
         last -= 1
-    return last
+    return None if number - max(last, start + way) < way else last
 
 
 def heading_is_told(bins: Bins, start: int) -> bool:

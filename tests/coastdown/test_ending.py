@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, Turn
 
 START_NS = 1_700_000_000_000_000_000
@@ -52,6 +56,64 @@ def test_a_turn_ends_it_where_it_begins(
     # half of the 0.35 rad are still in; a course is the mean of a minute
     half_s = 0.175 / abs(rate_rad_s)
     assert 295.0 <= end_s(coastdown) <= 305.0 + half_s + (30.0 if second == 'radar' else 0.0)
+
+
+def on_another_mark(block: Block, at_s: float, seed: int) -> Block:
+    """Move all fixes from a time after the stop on by 150 m, to any side."""
+    moved = (block.channel == Channel.POSITION) & (block.stamp_ns >= START_NS + (900 + at_s) * S)
+    direction = np.random.default_rng(seed).uniform(-np.pi, np.pi)
+    value = block.value.copy()
+    value[moved] += 150.0 * np.array([np.cos(direction), np.sin(direction)])
+    return replace(block, value=value)
+
+
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('at_s', [-30.0, 60.0, 300.0, 700.0])
+def test_a_radar_that_takes_another_mark_is_no_turn(
+    watch, record, sensors, at_s: float, seed: int
+) -> None:
+    both = record(sensors=(sensors['log'], sensors['radar']), seed=seed)
+    coastdown = the_coastdown(watch(on_another_mark(both, at_s, seed)))
+    assert coastdown.ended_by is EndedBy.RECORD_END
+    assert coastdown.start_ns == the_coastdown(watch(both)).start_ns
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_single_fixes_far_off_are_no_turn(watch, record, sensors, seed: int) -> None:
+    radar = replace(sensors['radar'], rate_hz=1.0 / 3.0)
+    block = record(sensors=(sensors['log'], radar), seed=seed)
+    rng = np.random.default_rng(seed)
+    off = (block.channel == Channel.POSITION) & (rng.random(len(block)) < 0.005)
+    value = block.value.copy()
+    value[off] += rng.uniform(-300.0, 300.0, (np.count_nonzero(off), 2))
+    assert the_coastdown(watch(replace(block, value=value))).ended_by is EndedBy.RECORD_END
+
+
+def test_a_turn_on_another_mark_ends_it_still(watch, record, sensors) -> None:
+    both = record(sensors=(sensors['log'], sensors['radar']), turns=(Turn(500.0, 25.0, 0.02),))
+    coastdown = the_coastdown(watch(on_another_mark(both, 300.0, 0)))
+    assert coastdown.ended_by is EndedBy.TURN
+    assert 500.0 <= end_s(coastdown) <= 545.0
+
+
+def test_fixes_on_another_mark_are_kept_and_live_is_as_replay(ship, record, sensors, bits) -> None:
+    block = on_another_mark(
+        record(sensors=(sensors['log'], sensors['radar']), duration_s=500.0), 300.0, 0
+    )
+
+    def watched(blocks) -> list:
+        monitor = Monitor(ship, Parameters(), estimate=window_itself, final=window_itself)
+        return [event for part in blocks for event in monitor.update(part)] + monitor.finish()
+
+    def window_itself(window, ship, parameters):
+        return window
+
+    events = watched([block])
+    window = the_coastdown(events).estimate
+    inside = (block.stamp_ns >= window.start_ns) & (block.stamp_ns <= window.end_ns)
+    fixes = block.value[inside & (block.channel == Channel.POSITION)]
+    np.testing.assert_array_equal(window.position.value, fixes)
+    assert bits(watched([block[i : i + 1] for i in range(len(block))])) == bits(events)
 
 
 @pytest.mark.parametrize('seed', range(3))
