@@ -9,7 +9,7 @@ be simulated, the declarations of the effects say that it would help.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -22,13 +22,14 @@ from shipdrag_ros.diagnosis.linear import Problem
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.prospect import (
     Prospect,
+    Rival,
     empty,
     of_another_run,
     of_instrument,
     resolving,
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
-from shipdrag_ros.diagnosis.verdict import UNNAMED, Weighed
+from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Weighed
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Block, Channel
@@ -36,13 +37,13 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Measure
 from shipdrag_ros.simulation.effects import deciders
 
-_MOST = 12  # candidates that are told apart
+_MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed
 _READING_S = 10.0  # between readings of an instrument
 _TURNING, _STANDING = 0.5, 0.0  # shaft speed over that under power
 _TURNS = 0.05
 _SHALLOW_DRAUGHTS = 4.0
-_NOT_SIMULATED = 0.5  # where what cannot be simulated stands among the others
+_GUSTS_M_S = 0.2  # median change from minute to minute of a mean wind
 _HARDLY = 0.05  # probability below which nothing is gained
 _INSTRUMENTS = {
     Measure.WIND: Channel.WIND_APPARENT,
@@ -58,7 +59,7 @@ def advice(
     weighed: Weighed,
     candidates: Sequence[Candidate],
     *,
-    inseparable: Collection[frozenset[str]],
+    inseparable: Sequence[frozenset[str]],
 ) -> tuple[Advice, ...]:
     """
     Return what would decide, the most promising first.
@@ -68,68 +69,91 @@ def advice(
     candidates
         That the runs cannot tell apart.
     inseparable
-        Effects that no record can tell apart, which are never certain.
+        Effects that no record can tell apart, which are never named.
 
     Notes
     -----
-    The probability is that the candidate which is the truth is certain after the
-    measurement, averaged over the candidates and something unnamed, which never
-    is; None where it is not simulated.
+    The probability is that something is named after the measurement, averaged over
+    what may be the truth; None where it is not simulated. Among the rivals are pairs
+    that the runs do not ask for, which a measurement may bring up.
     """
-    rivals = [*((each.names, each.probability) for each in candidates[:_MOST])]
-    if UNNAMED in weighed.best:
-        rivals.append((UNNAMED, weighed.unnamed))
-    # one that could not be fitted is none
+    fits = _rivals(weighed)
     rivals = [
-        (names, probability)
-        for names, probability in rivals
-        if np.isfinite(weighed.best[names].covariance).all()
+        Rival(names, one.log_evidence, one.hypothesis.log_odds) for names, one in fits.items()
     ]
-    fits = [weighed.best[names] for names, _ in rivals]
-    share = np.array([probability for _, probability in rivals])
-    share /= share.sum()
-    never = {*UNNAMED, *(name for group in inseparable for name in group)}
-    possible = [float(never.isdisjoint(names)) for names, _ in rivals]
     found: list[Advice] = []
-    for measure in (*_RUNS, *_INSTRUMENTS) if len(fits) > 1 else ():
+    for measure in (*_RUNS, *_INSTRUMENTS):
         if _measured(measure, library.seen):
             continue
-        settings, setting = _settings(measure, library, fits)
+        settings, setting = _settings(measure, library, list(fits.values()))
         if settings and all(
-            np.isfinite(one.slope).all() and len(one.mean) for way in settings for one in way
+            np.isfinite(one.slope).all() and len(one.mean)
+            for way in settings
+            for ways in way
+            for one in ways
         ):
-            certain = resolving(settings, setting, share.tolist())
-            found.append(Advice(measure.value, float(share @ (np.array(certain) * possible))))
+            named = resolving(settings, setting, rivals, inseparable=inseparable)
+            found.append(Advice(measure.value, named))
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
-    simulated = {measure.value for measure in (*_RUNS, *_INSTRUMENTS)}
-    others = [
-        each
-        for each in declared(candidates)
-        if each.measure not in simulated and not _measured(Measure(each.measure), library.seen)
-    ]
-    return tuple(sorted([*promising, *others], key=_rank))
+    ranked = {each: each.probability or 0.0 for each in promising}
+    for each in declared(candidates):
+        measure = Measure(each.measure)
+        if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, library.seen):
+            ranked[each] = _reach(measure, candidates, inseparable)
+    return tuple(sorted(ranked, key=lambda each: -ranked[each]))
 
 
 def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
     """
     Return what the effects say tells them apart, what serves most pairs first.
     """
-    votes: dict[str, float] = {}
+    votes: dict[Measure, float] = {}
     for one, other in combinations(candidates, 2):
-        for a in one.names:
-            for b in other.names:
-                if a == b:
-                    continue
-                for measure in deciders(a, b):
-                    weight = one.probability * other.probability
-                    votes[measure.value] = votes.get(measure.value, 0.0) + weight
+        for measure in _deciders(one, other):
+            weight = one.probability * other.probability
+            votes[measure] = votes.get(measure, 0.0) + weight
     ranked = sorted(votes, key=lambda measure: -votes[measure])
-    return tuple(Advice(measure, None) for measure in ranked)
+    return tuple(Advice(measure.value, None) for measure in ranked)
 
 
-def _rank(each: Advice) -> float:
-    return -(_NOT_SIMULATED if each.probability is None else each.probability)
+def _deciders(one: Candidate, other: Candidate) -> list[Measure]:
+    """Return what tells two candidates apart, by what they do not share."""
+    own, others = set(one.names) - set(other.names), set(other.names) - set(one.names)
+    return [measure for a in sorted(own) for b in sorted(others) for measure in deciders(a, b)]
+
+
+def _reach(
+    measure: Measure, candidates: Sequence[Candidate], inseparable: Sequence[frozenset[str]]
+) -> float:
+    """Return how probably something is named if all is told apart that is said to be."""
+    if measure is Measure.THIRD_SPEED:  # is taken for one with the source over ground there is
+        return 0.0
+    never = {name for group in inseparable for name in group}
+    return sum(
+        one.probability
+        for one in candidates
+        if never.isdisjoint(one.names)
+        and one.probability
+        >= CERTAIN
+        * sum(
+            other.probability
+            for other in candidates
+            if other is one or measure not in _deciders(one, other)
+        )
+    )
+
+
+def _rivals(weighed: Weighed) -> dict[tuple[str, ...], Fit]:
+    """Return the most probable fits, asked for or not, nothing and something unnamed too."""
+    # one that could not be fitted is none
+    fitted = [names for names, one in weighed.best.items() if np.isfinite(one.covariance).all()]
+    fitted.sort(key=lambda names: -weighed.best[names].log_evidence)
+    return {
+        names: weighed.best[names]
+        for place, names in enumerate(fitted)
+        if place < _MOST or names in ((), UNNAMED)
+    }
 
 
 def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
@@ -160,7 +184,7 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
 
 def _settings(
     measure: Measure, library: Library, fits: Sequence[Fit]
-) -> tuple[list[list[Prospect]], list[int]]:
+) -> tuple[list[list[list[Prospect]]], list[int]]:
     """Return the ways in which a measurement may be read, and that of each candidate."""
     problem, first = library.problem, library.seen[0]
     if measure in _RUNS:
@@ -205,8 +229,9 @@ def _contexts(
     for run in problem.seen:
         stop = run.context.stop
         time_s = np.arange(0.0, run.time_s[-1], _READING_S)
+        gusts = 0.5 * _GUSTS_M_S * (-1.0) ** (time_s // 60.0)
         readings = {
-            Channel.WIND_APPARENT: np.outer(np.ones(len(time_s)), [-stop.speed_m_s, 0.0]),
+            Channel.WIND_APPARENT: np.column_stack([gusts - stop.speed_m_s, gusts]),
             Channel.DEPTH: np.full(len(time_s), _SHALLOW_DRAUGHTS * (ship.draught_m or math.nan)),
             Channel.HEADING: np.full(len(time_s), stop.heading_rad),
             Channel.SHAFT: np.where(time_s < stop.lead_in_s, 1.0, after),

@@ -2,39 +2,46 @@
 """
 What a measurement that is yet to be made would tell apart.
 
-Each candidate predicts it, as well as the runs that there are let it; outcomes
-are drawn under each in turn, and all are weighed by them as they would be.
+Each rival predicts it, as well as the runs that there are let it; outcomes are
+drawn under each in turn, and the verdict on every one of them is found as it
+would be.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
+from scipy.special import logsumexp
 
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.linear import Hypothesis, Problem
 from shipdrag_ros.diagnosis.observation import Measured, Observation
+from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.terms import (
     BaselineTerm,
     EffectTerm,
     PlaceTerm,
     SpeedErrorTerm,
     Term,
+    scope_runs,
 )
-from shipdrag_ros.diagnosis.verdict import CERTAIN
+from shipdrag_ros.diagnosis.verdict import Weighed, decide, simplest
 from shipdrag_ros.samples import Float64
 
-_DRAWS = 200  # of each candidate
+_DRAWS = 300  # of all rivals, of each as many as it is probable
 _SEED = 0
+Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Prospect:
     """
-    What one candidate predicts of a measurement, whitened rows.
+    What one rival predicts of a measurement, whitened rows.
 
     Attributes
     ----------
@@ -43,12 +50,15 @@ class Prospect:
         By each unknown.
     covariance, precision : (p, p)
         Of the unknowns before the measurement; 0 in both where nothing is known.
+    log_weight
+        Of the ways in which the rival may go on, this one's part.
     """
 
     mean: Float64
     slope: Float64
     covariance: Float64
     precision: Float64
+    log_weight: float = 0.0
 
     def draw(self, count: int, rng: np.random.Generator) -> Float64:
         """
@@ -63,7 +73,7 @@ class Prospect:
 
     def log_density(self, outcomes: Float64) -> Float64:
         """
-        Return that of each outcome, less a constant that all candidates share.
+        Return that of each outcome, less a constant that all rivals share.
         """
         away = outcomes - self.mean
         matrix = self.precision + self.slope @ self.slope.T
@@ -73,43 +83,79 @@ class Prospect:
         before = np.linalg.slogdet(self.precision[np.ix_(known, known)])[1]
         volume = before - np.linalg.slogdet(matrix)[1]
         squares = np.einsum('ai,ai->a', away, away)
-        density: Float64 = 0.5 * (volume - squares + explained)
+        density: Float64 = 0.5 * (volume - squares + explained) + self.log_weight
         return density
 
 
-def of_another_run(problem: Problem, fits: Sequence[Fit], run: Observation) -> list[Prospect]:
+@dataclass(frozen=True)
+class Rival:
+    """
+    A hypothesis before a measurement.
+
+    Attributes
+    ----------
+    names
+    log_evidence
+        With the prior probability, less a constant that all rivals share.
+    log_odds
+        Of the names before the data, over nothing.
+    """
+
+    names: Names
+    log_evidence: float
+    log_odds: float
+
+
+def of_another_run(
+    problem: Problem, fits: Sequence[Fit], run: Observation
+) -> list[list[Prospect]]:
     """
     Return what fitted hypotheses predict of a run that is yet to be made.
 
     Parameters
     ----------
     run
-        Values of its rows are 0. What belonged to a single run is not in it.
+        Values of its rows are 0.
+
+    Returns
+    -------
+    list of list
+        Of each hypothesis the ways in which it may go on: what belongs to single
+        runs is there again, or is not.
     """
-    there = [_transferred(one.hypothesis) for one in fits]
     at, before = [], []
-    for one, hypothesis in zip(fits, there, strict=True):
-        kept = _places(one.hypothesis, hypothesis)
-        z = np.array([*(unknown.start for unknown in hypothesis.unknowns), run.speed_m_s])
-        covariance = np.diag([*(float(u.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0])
-        precision = covariance.copy()
-        old, new = [pair[0] for pair in kept], [pair[1] for pair in kept]
-        z[new] = one.best.z[old]
-        learnt = one.covariance[np.ix_(old, old)]
-        covariance[np.ix_(new, new)] = learnt
-        precision[np.ix_(new, new)] = np.linalg.inv(learnt)
-        at.append(z)
-        before.append((covariance, precision))
+    there: list[Hypothesis] = []
+    weights: list[float] = []
+    whose: list[int] = []
+    for number, one in enumerate(fits):
+        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(problem.seen)):
+            kept = _places(one.hypothesis, hypothesis)
+            z = np.array([*(unknown.start for unknown in hypothesis.unknowns), run.speed_m_s])
+            covariance = np.diag([*(float(u.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0])
+            precision = covariance.copy()
+            old, new = [pair[0] for pair in kept], [pair[1] for pair in kept]
+            z[new] = one.best.z[old]
+            learnt = one.covariance[np.ix_(old, old)]
+            covariance[np.ix_(new, new)] = learnt
+            precision[np.ix_(new, new)] = np.linalg.inv(learnt)
+            at.append(z)
+            before.append((covariance, precision))
+            there.append(hypothesis)
+            weights.append(log_weight)
+            whose.append(number)
     linear = replace(problem, seen=(run,)).linearise(there, at)
-    return [
-        Prospect(-found.tables[0][0], found.tables[0][1:], covariance, precision)
-        for found, (covariance, precision) in zip(linear, before, strict=True)
-    ]
+    ways: list[list[Prospect]] = [[] for _ in fits]
+    for number, found, (covariance, precision), log_weight in zip(
+        whose, linear, before, weights, strict=True
+    ):
+        table = found.tables[0]
+        ways[number].append(Prospect(-table[0], table[1:], covariance, precision, log_weight))
+    return ways
 
 
 def of_instrument(
     problem: Problem, fits: Sequence[Fit], contexts: Sequence[Context]
-) -> tuple[list[Prospect], list[Float64]]:
+) -> tuple[list[list[Prospect]], list[Float64]]:
     """
     Return what fitted hypotheses predict of an instrument in the runs there are.
 
@@ -121,6 +167,7 @@ def of_instrument(
     Returns
     -------
     prospects
+        Of each hypothesis one.
     values
         (r,) of each, as predicted and not whitened.
     """
@@ -136,36 +183,59 @@ def of_instrument(
         both = list(zip(linear.tables, linear.residuals, contexts, strict=True))
         table = np.hstack([table[:, table.shape[1] - len(c) :] for table, _, c in both])
         precision = np.asarray(np.linalg.inv(one.covariance), np.float64)
-        prospects.append(Prospect(-table[0], table[1:], one.covariance, precision))
+        prospects.append([Prospect(-table[0], table[1:], one.covariance, precision)])
         values.append(-np.concatenate([left[len(left) - len(c) :] for _, left, c in both]))
     return prospects, values
 
 
 def resolving(
-    settings: Sequence[Sequence[Prospect]], setting: Sequence[int], probability: Sequence[float]
-) -> list[float]:
+    settings: Sequence[Sequence[Sequence[Prospect]]],
+    setting: Sequence[int],
+    rivals: Sequence[Rival],
+    *,
+    inseparable: Sequence[frozenset[str]],
+) -> float:
     """
-    Return how probably each candidate is certain after a measurement, if it is the truth.
+    Return how probably something is named after a measurement.
 
     Parameters
     ----------
     settings
-        Prospects of all candidates, for each way in which the measurement may
-        be read.
+        Prospects of all rivals, for each way in which the measurement may be
+        read.
     setting
-        The way it is read where each candidate is the truth.
-    probability
-        Of each candidate before.
+        The way it is read where each rival is the truth.
+    rivals
+        Nothing among them.
+    inseparable
+        Effects that no record can tell apart.
     """
     rng = np.random.default_rng(_SEED)
-    prior = np.log(np.maximum(probability, 1e-300))
-    found = []
-    for truth, way in enumerate(setting):
-        outcomes = settings[way][truth].draw(_DRAWS, rng)
-        log = np.array([one.log_density(outcomes) for one in settings[way]]) + prior[:, None]
-        odds = np.exp(log - log[truth])
-        found.append(float(np.mean(1.0 / odds.sum(axis=0) >= CERTAIN)))
-    return found
+    log_odds = {rival.names: rival.log_odds for rival in rivals}
+    probability = simplest({rival.names: rival.log_evidence for rival in rivals}, log_odds)
+    share = np.array([probability.get(rival.names, 0.0) for rival in rivals])
+    counts = np.diff(np.round(_DRAWS * np.concatenate([[0.0], np.cumsum(share)])).astype(int))
+    named = 0
+    for truth, (way, count) in enumerate(zip(setting, counts, strict=True)):
+        if count == 0:
+            continue
+        outcomes = _drawn(settings[way][truth], int(count), rng)
+        evidence = [
+            rival.log_evidence + logsumexp([one.log_density(outcomes) for one in ways], axis=0)
+            for rival, ways in zip(rivals, settings[way], strict=True)
+        ]
+        for log in np.array(evidence).T.tolist():
+            after = simplest(dict(zip(log_odds, log, strict=True)), log_odds)
+            verdict, _ = decide(Weighed({}, after), lacking=False, inseparable=inseparable)
+            named += verdict is Verdict.NAMED
+    return named / int(counts.sum())
+
+
+def _drawn(ways: Sequence[Prospect], count: int, rng: np.random.Generator) -> Float64:
+    """Return outcomes of a rival, of each way as many as it is probable."""
+    weight = np.exp([one.log_weight for one in ways])
+    of_way = rng.multinomial(count, weight / weight.sum())
+    return np.vstack([one.draw(int(n), rng) for one, n in zip(ways, of_way, strict=True)])
 
 
 def empty(measured: Measured) -> Measured:
@@ -176,26 +246,41 @@ def empty(measured: Measured) -> Measured:
     return replace(measured, rows=rows._replace(value=np.zeros(len(rows.value))))
 
 
-def _transferred(hypothesis: Hypothesis) -> Hypothesis:
-    """Return a hypothesis about some runs as one about another one alone."""
+def _transferred(hypothesis: Hypothesis, *, runs: int) -> list[tuple[Hypothesis, float]]:
+    """
+    Return a hypothesis about some runs as such about another one alone.
+
+    What belongs to single runs was in one of them, or is in all: each way with its
+    part of the prior, as it is among one run more.
+    """
     baseline, *others = hypothesis.terms
     assert isinstance(baseline, BaselineTerm)
-    kept: list[Term] = [replace(baseline, run_down_change_s=baseline.run_down_change_s[:1])]
-    kept += [term for term in others if not _of_single_run(term)]
-    forms = tuple(form for form in hypothesis.forms if not form.term.of_single_run)
+    first: Term = replace(baseline, run_down_change_s=baseline.run_down_change_s[:1])
     # others of the same kind: where the first run began, and what was amiss with a sensor in
     # it, is not known of the next
-    of_first = (
-        term
+    rows = tuple(
+        replace(term)
         for term in hypothesis.row_terms
         if isinstance(term, PlaceTerm | SpeedErrorTerm) and term.run == 0
     )
-    rows = tuple(replace(term) for term in of_first)
-    return Hypothesis(hypothesis.names, tuple(kept), rows, forms)
-
-
-def _of_single_run(term: Term) -> bool:
-    return isinstance(term, EffectTerm) and term.of_single_run
+    log_weight = 0.0
+    choices: list[list[list[Term]]] = []
+    for term in others:
+        if not (isinstance(term, EffectTerm) and term.of_single_run):
+            choices.append([[term]])
+            continue
+        places = len(scope_runs(term.effect, runs)), len(scope_runs(term.effect, runs + 1))
+        log_weight += math.log(places[0] / places[1])
+        if runs == 1:
+            choices.append([[term], []])
+        else:
+            choices.append([[term] if term.only_run is None else []])
+    found = []
+    for chosen in product(*choices):
+        kept = (first, *(term for terms in chosen for term in terms))
+        forms = tuple(form for form in hypothesis.forms if any(form.term is t for t in kept))
+        found.append((Hypothesis(hypothesis.names, kept, rows, forms), log_weight))
+    return found
 
 
 def _places(old: Hypothesis, new: Hypothesis) -> list[tuple[int, int]]:
