@@ -2,7 +2,7 @@
 """MCAP in and out."""
 
 from shipdrag_ros.bags.check import FileCheck, check
-from shipdrag_ros.bags.coasts import coast_windows
+from shipdrag_ros.bags.coasts import clocks_apart, coast_windows
 from shipdrag_ros.bags.columns import parse_input, parse_time
 from shipdrag_ros.bags.comparison import Recorded
 from shipdrag_ros.bags.csv_import import ImportResult, import_csv
@@ -37,6 +37,7 @@ __all__ = [
     'TopicInfo',
     'accepted_samples',
     'check',
+    'clocks_apart',
     'coast_windows',
     'import_csv',
     'import_nmea',

@@ -7,7 +7,14 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.bags import Run, accepted_samples, coast_windows, open_runs, replay
+from shipdrag_ros.bags import (
+    Run,
+    accepted_samples,
+    clocks_apart,
+    coast_windows,
+    open_runs,
+    replay,
+)
 from shipdrag_ros.bags.playback import SHIP_FILE
 from shipdrag_ros.cli import diagnose_json
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, bag, number, unused_file
@@ -160,6 +167,11 @@ def _found(
         with output.progress(f'replaying {each.name}') as progress:
             result = replay(each, ship=ship, window=window, progress=progress)
         ship, parameters = ship or result.ship, parameters or result.parameters
+        for name in clocks_apart(result):
+            output.log(
+                f'{each.name}: the clock of {name} is too slow or too fast, and on board it is '
+                'rejected; it is diagnosed all the same'
+            )
         windows = coast_windows(result)
         for place, (_, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'

@@ -21,6 +21,7 @@ from shipdrag_ros.coastdown.bins import Bins, line, speeds
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.tracking import shaft_fell_at, shaft_speed, turned_at
+from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -58,6 +59,8 @@ class Candidate:
         four times slope_window_s [m/s^2]; NaN while unknown.
     spread
         Standard deviation of the first of these slopes before it [m/s^2].
+    noticed
+        Bin in which it was seen.
     trials
         How often its deceleration was judged.
     """
@@ -67,6 +70,7 @@ class Candidate:
     shaft: float
     limits: tuple[float, ...] = ()
     spread: float = math.nan
+    noticed: int = NEVER
     trials: int = 0
 
     @property
@@ -106,11 +110,12 @@ def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candida
     """
     width = tuning.slopes.width
     if seen.by_shaft:
-        return replace(seen, start=shaft_fell_at(bins, number, seen.shaft, width))
+        start = shaft_fell_at(bins, number, seen.shaft, width)
+        return replace(seen, start=start, noticed=number)
     # the window that shows the fall holds its start, and one as long before it the steady speed
     span = seen.falls_over(bins, number, width, 1.0) or width
     start = change_point(bins, seen.source, number - 2 * span, number, tuning.speed_min)
-    return replace(seen, start=start)
+    return replace(seen, start=start, noticed=number)
 
 
 def judge(
@@ -131,6 +136,8 @@ def judge(
     """
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
     pending, dismissed = (Verdict.PENDING, candidate), (Verdict.DISMISSED, candidate)
+    if number < candidate.noticed:  # the clock of the speed is slower than that of the shaft
+        return pending
     level = line(bins, candidate.source, number, width)[1]
     if (
         level < tuning.speed_min

@@ -5,12 +5,19 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.cli import main
+from shipdrag_ros.cli.diagnose import coasts_of
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -54,6 +61,21 @@ def test_the_example_of_the_readme_works_as_typed(
     capsys.readouterr()
     assert main(['diagnose', str(sea)]) == 0
     assert capsys.readouterr().out.startswith('Model and data agree')
+
+
+def test_a_log_that_is_rejected_on_board_is_told_of_and_diagnosed(
+    ship_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ship = Ship.load(ship_file)
+    sensors = standard_sensors(rate_hz=1.0, inputs=('speed_through_water', 'position'))
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=900.0, duration_s=400.0)
+    block = sense(simulate(ship, scenario), sensors, seed=1)
+    slow_ns = np.where(block.channel == Channel.SPEED_THROUGH_WATER, 20_000_000_000, 0)
+    with BagWriter(tmp_path / 'slow.mcap') as bag:
+        bag.write_samples(replace(block, stamp_ns=block.stamp_ns - slow_ns))
+    (coast,), _, _ = coasts_of(Output(), open_runs([tmp_path / 'slow.mcap']), ship)
+    assert len(coast.window.speed_through_water.value) > 350
+    assert 'the clock of speed_through_water is too slow or too fast' in capsys.readouterr().err
 
 
 def test_the_result_reads_well_and_says_the_same_to_the_machine(

@@ -96,6 +96,21 @@ def test_onset_with_the_shaft_is_sooner_and_sharper(watch, record, sensors) -> N
     assert after_s(onset.detected_ns, 900.0) <= 45.0
 
 
+@pytest.mark.parametrize('slow_s', [3, 20])
+def test_a_shaft_that_is_ahead_of_a_slow_log_tells_the_onset(
+    watch, record, sensors, slow_s: int
+) -> None:
+    block = record(sensors=(sensors['log'], sensors['shaft']), duration_s=600.0)
+    behind = np.where(block.channel == LOG, slow_s * S, 0)
+    slow = replace(block, stamp_ns=block.stamp_ns - behind)
+    events = watch(slow, Parameters(late_s=60.0))
+    (onset,) = onsets(events)
+    assert -1.0 <= after_s(onset.start_ns, 900.0) <= 3.0
+    assert onset.start_ns < onset.detected_ns
+    (coastdown,) = [event for event in events if isinstance(event, Coastdown)]
+    assert coastdown.ended_by is EndedBy.RECORD_END
+
+
 def test_shaft_stopped_fraction_says_when_it_has_stopped(watch, record, sensors) -> None:
     # an engine that only slows down, to 0.2 of its speed
     block = record(
