@@ -20,7 +20,7 @@ import numpy as np
 from shipdrag_ros.coastdown.bins import Bins, line, speeds
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
-from shipdrag_ros.coastdown.tracking import shaft_fell_at, shaft_speed, turned_at
+from shipdrag_ros.coastdown.tracking import SHAFT_S, shaft_fell_at, shaft_speed, turned_at
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -59,8 +59,8 @@ class Candidate:
         four times slope_window_s [m/s^2]; NaN while unknown.
     spread
         Standard deviation of the first of these slopes before it [m/s^2].
-    noticed
-        Bin in which it was seen.
+    judged_from
+        First bin in which it is judged.
     trials
         How often its deceleration was judged.
     """
@@ -70,7 +70,7 @@ class Candidate:
     shaft: float
     limits: tuple[float, ...] = ()
     spread: float = math.nan
-    noticed: int = NEVER
+    judged_from: int = NEVER
     trials: int = 0
 
     @property
@@ -111,11 +111,11 @@ def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candida
     width = tuning.slopes.width
     if seen.by_shaft:
         start = shaft_fell_at(bins, number, seen.shaft, width)
-        return replace(seen, start=start, noticed=number)
+        return replace(seen, start=start, judged_from=number + SHAFT_S - 1)
     # the window that shows the fall holds its start, and one as long before it the steady speed
     span = seen.falls_over(bins, number, width, 1.0) or width
     start = change_point(bins, seen.source, number - 2 * span, number, tuning.speed_min)
-    return replace(seen, start=start, noticed=number)
+    return replace(seen, start=start)
 
 
 def judge(
@@ -136,7 +136,7 @@ def judge(
     """
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
     pending, dismissed = (Verdict.PENDING, candidate), (Verdict.DISMISSED, candidate)
-    if number < candidate.noticed:  # the clock of the speed is slower than that of the shaft
+    if number < candidate.judged_from:  # the clock of the speed may be slower than the shaft's
         return pending
     level = line(bins, candidate.source, number, width)[1]
     if (

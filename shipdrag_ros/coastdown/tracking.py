@@ -23,11 +23,13 @@ from shipdrag_ros.coastdown.bins import (
 )
 from shipdrag_ros.samples import Channel
 
+SHAFT_S = (
+    3  # the shaft is averaged over this long, so that one bad reading does not engage the engine
+)
 HEADING_BEFORE_S = 60  # the heading of a coastdown is the mean over this long before it
 _HEADING = int(Channel.HEADING)
 _SHAFT = int(Channel.SHAFT)
 _YAW_S = 5  # headings are averaged over this long: a ship yaws in the waves
-_SHAFT_S = 3  # so that one bad reading does not engage the engine
 
 
 def mean_heading(bins: Bins, last: int, width: int) -> float:
@@ -131,7 +133,7 @@ def _apart(one: float, other: float) -> float:
     return abs(math.remainder(one - other, 2.0 * math.pi))
 
 
-def shaft_speed(bins: Bins, number: int, width: int = _SHAFT_S) -> float:
+def shaft_speed(bins: Bins, number: int, width: int = SHAFT_S) -> float:
     """
     Return the mean size of the shaft speed up to a bin [rad/s]; NaN without any.
     """

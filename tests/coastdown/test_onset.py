@@ -96,11 +96,16 @@ def test_onset_with_the_shaft_is_sooner_and_sharper(watch, record, sensors) -> N
     assert after_s(onset.detected_ns, 900.0) <= 45.0
 
 
-@pytest.mark.parametrize('slow_s', [3, 20])
+@pytest.mark.parametrize('shaft', [0.0, 0.4])
+@pytest.mark.parametrize('slow_s', [3, 50])
 def test_a_shaft_that_is_ahead_of_a_slow_log_tells_the_onset(
-    watch, record, sensors, slow_s: int
+    watch, record, sensors, slow_s: int, shaft: float
 ) -> None:
-    block = record(sensors=(sensors['log'], sensors['shaft']), duration_s=600.0)
+    block = record(
+        sensors=(sensors['log'], sensors['shaft']),
+        orders=(EngineOrder(0.0, shaft=shaft, thrust=0.0),),
+        duration_s=600.0,
+    )
     behind = np.where(block.channel == LOG, slow_s * S, 0)
     slow = replace(block, stamp_ns=block.stamp_ns - behind)
     events = watch(slow, Parameters(late_s=60.0))
