@@ -27,19 +27,21 @@ from shipdrag_ros.diagnosis.prospect import (
     of_another_run,
     of_instrument,
     resolving,
+    with_known,
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Weighed
 from shipdrag_ros.estimation.motion_fit.coast import LOG
+from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Measure
 from shipdrag_ros.simulation.effects import deciders
 
 _MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed
-_READING_S = 10.0  # between readings of an instrument
+_READING_S = 1.0  # between readings of an instrument
 _TURNING, _STANDING = 0.5, 0.0  # shaft speed over that under power
 _TURNS = 0.05
 _SHALLOW_DRAUGHTS = 4.0
@@ -193,15 +195,25 @@ def _settings(
         run = _another(first, first.heading_rad + opposite, slower * first.speed_m_s)
         return [of_another_run(problem, fits, run)], [0] * len(fits)
     if measure is not Measure.SHAFT:
-        prospects, _ = of_instrument(problem, fits, _contexts(measure, problem, library.ship))
+        windows = _windows(measure, problem, library.ship)
+        prospects, _ = of_instrument(problem, fits, _contexts(windows, problem, library.ship))
         return [prospects], [0] * len(fits)
-    # whether the water turns the shaft is seen before all else, and differs by candidate
-    turning = _contexts(measure, problem, library.ship, after=_TURNING)
-    standing = _contexts(measure, problem, library.ship, after=_STANDING)
-    if any(len(context.at_shaft) == 0 for context in (*turning, *standing)):
-        return [], []
-    where_turning, values = of_instrument(problem, fits, turning)
-    where_standing, _ = of_instrument(problem, fits, standing)
+    # whether the water turns the shaft is seen before all else, and differs by rival
+    found: list[tuple[list[list[Prospect]], list[Float64]]] = []
+    for after in (_TURNING, _STANDING):
+        windows = _windows(measure, problem, library.ship, after=after)
+        contexts = _contexts(windows, problem, library.ship)
+        if any(len(context.at_shaft) == 0 for context in contexts):
+            return [], []
+        prospects, values = of_instrument(problem, fits, contexts)
+        # the time of the stop and the run-down are read from the shaft as well
+        seen = [RunDown.of(window, library.ship) for window in windows]
+        sd = {
+            'stop': [each.stop_sd_s for each in seen],
+            'run-down': [each.run_down_sd_s for each in seen],
+        }
+        found.append((with_known(prospects, fits, sd), values))
+    (where_turning, values), (where_standing, _) = found
     seen_to_stand = [int(np.median(value[:3]) <= _TURNS) for value in values]
     return [where_turning, where_standing], seen_to_stand
 
@@ -220,28 +232,38 @@ def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observ
     )
 
 
-def _contexts(
+def _windows(
     measure: Measure, problem: Problem, ship: Ship, *, after: float = 0.0
-) -> list[Context]:
-    """Return what an instrument would add to each run; `after` is the shaft after the stop."""
-    contexts = []
+) -> list[Window]:
+    """Return what an instrument may read in each run; `after` is the shaft after its fall."""
+    windows = []
     channel = _INSTRUMENTS[measure]
     for run in problem.seen:
         stop = run.context.stop
         time_s = np.arange(0.0, run.time_s[-1], _READING_S)
         gusts = 0.5 * _GUSTS_M_S * (-1.0) ** (time_s // 60.0)
+        since_s = np.maximum(time_s - stop.lead_in_s, 0.0)
         readings = {
             Channel.WIND_APPARENT: np.column_stack([gusts - stop.speed_m_s, gusts]),
             Channel.DEPTH: np.full(len(time_s), _SHALLOW_DRAUGHTS * (ship.draught_m or math.nan)),
             Channel.HEADING: np.full(len(time_s), stop.heading_rad),
-            Channel.SHAFT: np.where(time_s < stop.lead_in_s, 1.0, after),
+            Channel.SHAFT: after + (1.0 - after) * np.exp(-since_s / max(run.run_down_s, 1e-3)),
         }
         time_ns = stop.since_ns + np.round(time_s * 1e9).astype(np.int64)
-        window = Window.from_block(
-            Block.of(channel, time_ns, readings[channel]),
-            stop.since_ns + round(stop.lead_in_s * 1e9),
-            int(time_ns[-1]),
-            before_ns=stop.since_ns,
+        windows.append(
+            Window.from_block(
+                Block.of(channel, time_ns, readings[channel]),
+                stop.since_ns + round(stop.lead_in_s * 1e9),
+                int(time_ns[-1]),
+                before_ns=stop.since_ns,
+            )
         )
-        contexts.append(Context.of(window, ship, run.time_s, stop))
-    return contexts
+    return windows
+
+
+def _contexts(windows: Sequence[Window], problem: Problem, ship: Ship) -> list[Context]:
+    """Return what an instrument would add to each run."""
+    return [
+        Context.of(window, ship, run.time_s, run.context.stop)
+        for window, run in zip(windows, problem.seen, strict=True)
+    ]

@@ -10,7 +10,7 @@ would be.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -186,6 +186,48 @@ def of_instrument(
         prospects.append([Prospect(-table[0], table[1:], one.covariance, precision)])
         values.append(-np.concatenate([left[len(left) - len(c) :] for _, left, c in both]))
     return prospects, values
+
+
+def with_known(
+    prospects: Sequence[Sequence[Prospect]],
+    fits: Sequence[Fit],
+    sd: Mapping[str, Sequence[float]],
+) -> list[list[Prospect]]:
+    """
+    Return the same where a measurement tells some unknowns directly.
+
+    Parameters
+    ----------
+    sd
+        By the name of an unknown of the baseline or of a run, one a run; 0: tells
+        nothing.
+    """
+    found = []
+    for ways, one in zip(prospects, fits, strict=True):
+        mean, slope = [], []
+        for part, place in one.hypothesis.parts:
+            if not isinstance(part, BaselineTerm | PlaceTerm):
+                continue
+            run = part.run if isinstance(part, PlaceTerm) else 0
+            for at, unknown in enumerate(part.unknowns, place):
+                known = sd[unknown.name][run] if unknown.name in sd else 0.0
+                if known > 0.0:
+                    z = float(one.best.z[at])
+                    mean.append(unknown.value(z) / known)
+                    slope.append(np.zeros(len(one.best.z)))
+                    slope[-1][at] = unknown.slope(z) / known
+        rows = np.array(slope).reshape(len(mean), len(one.best.z)).T
+        found.append(
+            [
+                replace(
+                    way,
+                    mean=np.concatenate([way.mean, mean]),
+                    slope=np.hstack([way.slope, rows]),
+                )
+                for way in ways
+            ]
+        )
+    return found
 
 
 def resolving(

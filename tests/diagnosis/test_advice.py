@@ -6,9 +6,15 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.diagnosis.fitting import fit
+from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.prospect import Prospect, with_known
+from shipdrag_ros.diagnosis.terms import PlaceTerm
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -72,7 +78,12 @@ def test_echo_sounder_would_name_shallow_water_as_often_as_it_is_shallow() -> No
     assert abs(predicted - shallow.probability) < 0.05
     after = diagnose([run('shallow_water=12', 'depth')], SHIP, Parameters())
     assert [effect.name for effect in after.effects] == ['shallow_water']
+    # what cannot be simulated stands by what it could decide: all, if it is the cable
     assert resolves(found)[Measure.WITHOUT_CABLE] is None
+    ranked = list(resolves(found))
+    assert found.candidates[0].names == ('towed_cable',)
+    assert ranked.index(Measure.WITHOUT_CABLE) < ranked.index(Measure.DEPTH)
+    assert ranked.index(Measure.DEPTH) < ranked.index(Measure.DRAUGHT)
 
 
 def test_what_is_measured_already_is_not_advised(current: Diagnosis) -> None:
@@ -80,3 +91,26 @@ def test_what_is_measured_already_is_not_advised(current: Diagnosis) -> None:
     with_wind = diagnose([run('current=0.06', 'wind_apparent')], SHIP, Parameters())
     assert with_wind.verdict is Verdict.ONE_OF
     assert Measure.WIND not in resolves(with_wind)
+
+
+@pytest.mark.parametrize('known_s', [0.0, 0.1])
+def test_stop_that_is_read_from_a_shaft_is_one_row_more(known_s: float) -> None:
+    window = run('current=0.06').window
+    seen = Observation.of(window, SHIP, Parameters(), name='first')
+    library = Library(SHIP, (seen,), seen.heading_rad)
+    one = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
+    count = len(one.best.z)
+    before = Prospect(np.zeros(0), np.zeros((count, 0)), one.covariance, np.eye(count))
+    ((after,),) = with_known([[before]], [one], {'stop': [known_s]})
+    if known_s == 0.0:
+        assert after.mean.shape == (0,)
+        return
+    (place,) = (
+        place + PlaceTerm.place_of_stop
+        for part, place in one.hypothesis.parts
+        if isinstance(part, PlaceTerm)
+    )
+    slope = np.zeros((count, 1))
+    slope[place] = seen.stop_sd_s / known_s
+    np.testing.assert_allclose(after.slope, slope, rtol=1e-12)
+    np.testing.assert_allclose(after.mean, one.best.z @ slope, rtol=1e-12)

@@ -78,16 +78,17 @@ def test_what_no_record_tells_apart_is_never_named() -> None:
 
 
 def test_pair_that_is_no_longer_asked_for_leaves_its_share_to_the_name() -> None:
-    # alone, the name is short of being certain; the pair fits three times as well
-    alone = Rival(HULL, math.log(0.85), 0.0)
-    pair = Rival(('fouling', 'wind'), math.log(0.15), math.log(0.15 / 0.85 / 6.0))
+    alone = Rival(HULL, math.log(0.6), 0.0)
     same = [[prospect([0.0])], [prospect([0.0])], [prospect([0.0])]]
-    assert resolving([same], [0, 0, 0], [alone, pair, NOTHING], inseparable=()) == 0.0
     apart = [[prospect([0.0])], [prospect([1.5])], [prospect([0.0])]]
-    found = resolving([apart], [0, 0, 0], [alone, pair, NOTHING], inseparable=())
-    # where the name is true, it gains ln 2 or more in so many outcomes
-    wins = float(ndtr((0.5 * 1.5**2 - math.log(2.0)) / 1.5))
-    assert found > 0.85 * wins - DRAWN
+    found = []
+    for times in (12.0, 1e6):  # that the pair fits better, before it is weighed how rare it is
+        pair = Rival(('fouling', 'wind'), math.log(0.4), math.log(0.4 / 0.6 / times))
+        three = [alone, pair, NOTHING]
+        assert resolving([same], [0, 0, 0], three, inseparable=()) == 0.0
+        found.append(resolving([apart], [0, 0, 0], three, inseparable=()))
+    soon_dropped, asked_for = found
+    assert soon_dropped > asked_for + 0.02
 
 
 def test_what_may_have_been_there_once_is_drawn_both_ways() -> None:
