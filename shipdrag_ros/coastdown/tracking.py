@@ -79,7 +79,7 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
     The heading decides where there is one; the course over ground of a ship
     that slows down in a cross current changes without a turn. A fix that jumps,
     as when a radar takes another mark, is in a course for as long as the way
-    that this is taken over: a turn is what outlasts that.
+    that this is taken over: a turn is a change that outlasts it.
     """
     before = mean_heading(bins, start - 1, HEADING_BEFORE_S)
     way = 0
@@ -104,12 +104,15 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
             now = _course(bins, track, at, half)
             return min(_apart(now, course) for course in courses)
 
-    if not change(number) > turn_rad:
+    # at some of the bins between, too few fixes may tell a course
+    if not all(change(at) > turn_rad for at in (number, number - way)) or any(
+        change(at) <= turn_rad for at in range(number - way, number)
+    ):
         return None
     last = number
     while last > start and not change(last) <= 0.5 * turn_rad:
         last -= 1
-    return None if number - max(last, start + way) < way else last
+    return last
 
 
 def heading_is_told(bins: Bins, start: int) -> bool:
