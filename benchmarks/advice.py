@@ -58,7 +58,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Trial:
-    """A measurement that was advised, and what came of it."""
+    """A measurement that was advised, whether something was named, and the truth at that."""
 
     seed: int
     effect: str
@@ -66,6 +66,7 @@ class Trial:
     place: int
     predicted: float
     named: bool
+    right: bool
 
 
 def case(seed: int) -> Case:
@@ -137,10 +138,18 @@ def trials(seed: int) -> list[Trial]:
     known = [advised for advised in found.would_decide if advised.probability is not None]
     for place, advised in enumerate(known[:TRIED]):
         again = after(hidden, Measure(advised.measure))
-        named = [effect.name for effect in again.effects] == [hidden.effect.name]
+        named = [effect.name for effect in again.effects]
         assert advised.probability is not None
         rows.append(
-            Trial(seed, hidden.effect.name, advised.measure, place, advised.probability, named)
+            Trial(
+                seed,
+                hidden.effect.name,
+                advised.measure,
+                place,
+                advised.probability,
+                bool(named),
+                named == [hidden.effect.name],
+            )
         )
     return rows
 
@@ -183,8 +192,8 @@ def main() -> None:
     table(rows)
     print('\nthe first of it alone')
     table([row for row in rows if row.place == 0])
-    resolvable = {row.seed for row in rows if row.named}
-    first = {row.seed for row in rows if row.named and row.place == 0}
+    resolvable = {row.seed for row in rows if row.right}
+    first = {row.seed for row in rows if row.right and row.place == 0}
     print(f'\nsets that any of it resolves: {len(resolvable)}; that the first does: {len(first)}')
 
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.special import logsumexp
 
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
@@ -263,7 +262,7 @@ def resolving(
             continue
         outcomes = _drawn(settings[way][truth], int(count), rng)
         evidence = [
-            rival.log_evidence + logsumexp([one.log_density(outcomes) for one in ways], axis=0)
+            rival.log_evidence + np.logaddexp.reduce([one.log_density(outcomes) for one in ways])
             for rival, ways in zip(rivals, settings[way], strict=True)
         ]
         for log in np.array(evidence).T.tolist():
