@@ -14,6 +14,7 @@ from hidden.cases import Truth
 
 LARGEST_SET = 3
 _BINS = 10
+_DRAWS = 200
 Names = tuple[str, ...]
 UNKNOWN: Names = ('unknown',)
 
@@ -185,6 +186,13 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
         for trial in sets
         if trial.everything is not None and trial.everything.named == trial.truth.names
     ]
+    predicted = [
+        (tried.probability, trial.followed.verdict == 'named')
+        for trial in sets
+        if trial.followed is not None
+        and (tried := trial.answer.tried) is not None
+        and tried.probability is not None
+    ]
     chi2 = [
         trial.answer.held_out_chi2 for trial in right if trial.answer.held_out_chi2 is not None
     ]
@@ -229,15 +237,8 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
             trial.followed is not None and trial.followed.named == trial.truth.names
             for trial in resolvable
         ),
-        'error of the predicted probability to resolve': calibration_error(
-            [
-                (tried.probability, trial.followed.verdict == 'named')
-                for trial in sets
-                if trial.followed is not None
-                and (tried := trial.answer.tried) is not None
-                and tried.probability is not None
-            ]
-        ),
+        'error of the predicted probability to resolve': calibration_error(predicted),
+        'the same, by chance, if all were right': error_by_chance(predicted),
         'CPU s a case, median': float(np.median([trial.cpu_s for trial in trials])),
         'CPU s a case, 95 % are below': float(np.quantile([t.cpu_s for t in trials], 0.95)),
     }
@@ -261,6 +262,21 @@ def calibration_error(stated: Sequence[tuple[float, bool]]) -> float:
         sum(
             abs(probability[place == k].mean() - was_so[place == k].mean()) * np.mean(place == k)
             for k in np.unique(place)
+        )
+    )
+
+
+def error_by_chance(stated: Sequence[tuple[float, bool]]) -> float:
+    """
+    Return the calibration error that right probabilities show in so few outcomes, on average.
+    """
+    rng = np.random.default_rng(0)
+    return float(
+        np.mean(
+            [
+                calibration_error([(p, bool(rng.random() < p)) for p, _ in stated])
+                for _ in range(_DRAWS)
+            ]
         )
     )
 

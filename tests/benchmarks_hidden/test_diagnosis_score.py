@@ -119,6 +119,9 @@ def test_a_recommendation_counts_where_anything_resolves(scoring) -> None:
     assert _share(scores, name) == (1, 2)
     found = scores['error of the predicted probability to resolve']
     assert found == pytest.approx(0.9 - 1.0 / 3.0)
+    # of three that are right at 0.9: 0.73 x 0.1 + 0.24 x 0.23 + 0.03 x 0.57 (N 200, seed 0)
+    by_chance = scores['the same, by chance, if all were right']
+    assert by_chance == pytest.approx(0.146, abs=0.03)
 
 
 @pytest.mark.parametrize(
