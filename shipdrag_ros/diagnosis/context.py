@@ -146,7 +146,7 @@ class Context:
         yaw = np.zeros((len(actions), len(after)))
         for i, action in enumerate(actions):
             for turn in action.turns:
-                yaw[i] += turn.rate_rad_s * np.clip(after - turn.start_s, 0.0, turn.duration_s)
+                yaw[i] += turn.turned_rad(after)
         return np.concatenate([*parts, yaw], axis=1)
 
     def _shafts(self, columns: Columns, actions: Sequence[Action]) -> list[Float64]:

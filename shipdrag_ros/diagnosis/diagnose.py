@@ -14,7 +14,7 @@ from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, where
 from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict, Where
-from shipdrag_ros.diagnosis.search import search
+from shipdrag_ros.diagnosis.search import search, with_more, with_pairs
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
 from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, odd
@@ -25,6 +25,7 @@ from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
 from shipdrag_ros.simulation.effect import Scope
 
 _NEAR_S = 4.0  # by which a stop may be moved without seeing the run anew
+_LOOKS = 3  # at a run
 
 
 @dataclass(frozen=True)
@@ -68,18 +69,21 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     -----
     A run that has too little of either is left out, and a note says so.
     """
-    seen, notes = _observed(runs, ship, parameters, {})
-    found = search(Library(ship, seen, seen[0].heading_rad))
-    moved = {run.name: found.stop_moved_s(j) for j, run in enumerate(seen)}
-    if any(abs(by_s) > _NEAR_S for by_s in moved.values()):
-        seen, notes = _observed(runs, ship, parameters, moved)
+    moved_s = {run.name: 0.0 for run in runs}
+    for _ in range(_LOOKS):
+        seen, notes = _observed(runs, ship, parameters, moved_s)
         found = search(Library(ship, seen, seen[0].heading_rad))
+        more_s = {run.name: found.stop_moved_s(j) for j, run in enumerate(seen)}
+        if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
+            break
+        moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
+    found = with_pairs(found)
     library, weighed, best = found.library, found.weighed, found.best
     never = _inseparable(library)
     alarm = weighed.nothing < QUIET and bool(best.hypothesis.names)
     predicted = held_out(library, best) if alarm else None
     lacking = alarm and (
-        lacks(best, found.more)
+        lacks(best, with_more(found))
         or odd(best)
         or (predicted is not None and misses(predicted.chi2_per_sample, best.best.rows))
     )

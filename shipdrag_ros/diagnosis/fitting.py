@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Problem
 from shipdrag_ros.diagnosis.unknowns import Tail
 from shipdrag_ros.samples import Float64
 
-_ITERATIONS = 12
+_ITERATIONS = 16
 _ANEW = (0, 3)  # iterations in which all derivatives are found anew
 _CONVERGED = 0.02  # fall of -2 ln posterior
 _DAMPING = 1e-2

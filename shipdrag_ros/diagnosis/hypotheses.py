@@ -38,7 +38,7 @@ from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
 from shipdrag_ros.simulation.effects import LIBRARY, find
 
 DISCREPANCIES = ('force', 'log', 'radar')
-_EVERYWHERE = (-1.5, -0.8, 0.0, 0.8)  # z of what may be anywhere
+_EVERYWHERE = (-1.8, -1.4, -1.0, -0.6, -0.2, 0.2, 0.8)  # z of what may be anywhere
 _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find from 0
 
 

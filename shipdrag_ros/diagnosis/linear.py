@@ -33,7 +33,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns, Frame, Scenario, simulate_columns
 
-_STEP_Z = 0.05  # of the differences, in units of the prior
+_STEP_Z = 0.02  # of the differences, in units of the prior
 _STEP_M_S = 0.01  # of the steady speed
 
 

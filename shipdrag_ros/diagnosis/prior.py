@@ -3,12 +3,13 @@
 How probable effects are before any data.
 
 Each is missing or not whatever the others are, so that a pair is as probable as
-the odds of its two say; three at once are not looked for.
+the odds of its two say, if it can be; three at once are not looked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 from shipdrag_ros.simulation.effect import Effect
 
@@ -27,5 +28,5 @@ def nothing_missing(effects: Sequence[Effect], *, places: int) -> float:
         Where something unnamed may be besides.
     """
     ones = sum(effect.odds for effect in effects)
-    pairs = 0.5 * (ones**2 - sum(effect.odds**2 for effect in effects))
+    pairs = sum(a.odds * b.odds for a, b in combinations(effects, 2) if a.goes_with(b))
     return 1.0 / (1.0 + ones + pairs + places * UNNAMED_ODDS)

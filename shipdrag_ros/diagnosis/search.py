@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.screening import promise
 from shipdrag_ros.diagnosis.terms import PlaceTerm
 from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, mode_of, weigh
+from shipdrag_ros.simulation.effects import find
 
 _PAIRED = 4  # most probable names that pairs are tried with
 _PAIRS = 12  # that are fitted
@@ -30,24 +32,28 @@ class Found:
     library
     nothing
         The fit where nothing is missing.
-    smooth
-        Fits with something unnamed instead, one a channel.
-    weighed
-        All, with their probabilities.
-    more
-        Fits with something unnamed besides the best.
+    fits
+        Of everything.
     """
 
     library: Library
     nothing: Fit
-    smooth: tuple[Fit, ...]
-    weighed: Weighed
-    more: tuple[Fit, ...]
+    fits: tuple[Fit, ...]
+
+    @cached_property
+    def weighed(self) -> Weighed:
+        """All with their probabilities."""
+        return weigh(self.fits)
+
+    @property
+    def smooth(self) -> tuple[Fit, ...]:
+        """Fits with something unnamed instead, one a channel."""
+        return tuple(one for one in self.fits if one.hypothesis.discrepancy)
 
     @property
     def best(self) -> Fit:
         """The most probable of what has a name, or is nothing."""
-        return _best(self.weighed)
+        return self.weighed.best[self.weighed.named()[0]]
 
     def stop_moved_s(self, run: int) -> float:
         """
@@ -62,24 +68,36 @@ class Found:
 
 def search(library: Library) -> Found:
     """
-    Fit nothing, each effect, something unnamed; pairs where something is missing.
+    Fit nothing, each effect, and something unnamed.
     """
     nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
     named = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
     unnamed = [library.with_discrepancy(library.nothing, c) for c in library.channels()]
     likely = _likeliest_starts(library, named, nothing)
     both = [*likely, *unnamed]
-    found = fit(library.problem, both, [library.start(h, nothing) for h in both])
-    smooth = tuple(found[len(likely) :])
-    weighed = weigh([nothing, *found])
-    if weighed.nothing < QUIET:
-        weighed = weigh([nothing, *found, *_pairs(library, weighed)])
-    more = _with_more(library, _best(weighed), smooth)
-    return Found(library, nothing, smooth, weighed, more)
+    fits = fit(library.problem, both, [library.start(h, nothing) for h in both])
+    return Found(library, nothing, (nothing, *fits))
 
 
-def _best(weighed: Weighed) -> Fit:
-    return weighed.best[weighed.named()[0]]
+def with_pairs(found: Found) -> Found:
+    """
+    Fit pairs besides, where something is missing.
+    """
+    if found.weighed.nothing >= QUIET:
+        return found
+    pairs = _pairs(found.library, found.weighed)
+    return replace(found, fits=(*found.fits, *pairs))
+
+
+def with_more(found: Found) -> tuple[Fit, ...]:
+    """
+    Return fits of something smooth besides the best.
+    """
+    library, best = found.library, found.best
+    if not best.hypothesis.names:
+        return found.smooth
+    more = [library.with_discrepancy(best.hypothesis, c) for c in library.channels()]
+    return tuple(fit(library.problem, more, [library.start(h, best) for h in more]))
 
 
 def _likeliest_starts(
@@ -95,14 +113,6 @@ def _likeliest_starts(
     return [one for ones in kept.values() for one in ones]
 
 
-def _with_more(library: Library, best: Fit, smooth: Sequence[Fit]) -> tuple[Fit, ...]:
-    """Fit something smooth besides a name."""
-    if not best.hypothesis.names:
-        return tuple(smooth)
-    more = [library.with_discrepancy(best.hypothesis, c) for c in library.channels()]
-    return tuple(fit(library.problem, more, [library.start(h, best) for h in more]))
-
-
 def _pairs(library: Library, weighed: Weighed) -> list[Fit]:
     """Fit pairs of the likeliest names with all others."""
     first = [names for names in weighed.named() if names][:_PAIRED]
@@ -112,7 +122,7 @@ def _pairs(library: Library, weighed: Weighed) -> list[Fit]:
         hypotheses = [
             hypothesis
             for effect in library.effects
-            if effect.name not in names
+            if all(effect.goes_with(find(name)) for name in names)
             for hypothesis in library.with_effect(base.hypothesis, effect)
         ]
         promised = promise(library.problem, base, hypotheses).tolist()

@@ -290,8 +290,7 @@ class FormTerm:
         self, seen: Observation, trace: tuple[Float64, Float64]
     ) -> tuple[Float64, Float64]:
         """Return (4, n) of the rows along and (4, k) of those across, per unit value."""
-        after = np.clip((seen.time_s - seen.lead_in_s) / seen.duration_s, 0.0, 1.0)
-        bumps = hats(after, _FORMS)
+        bumps = _over_run(seen, _FORMS)
         along = bumps[:, seen.along.at] * trace[0]
         if seen.across is None:
             return along, np.zeros((_FORMS, 0))
@@ -393,8 +392,7 @@ class SpeedErrorTerm:
         if run != self.run:
             return along, across
         # one for the lead-in, the others over the coastdown
-        after = (seen.time_s - seen.lead_in_s) / seen.duration_s
-        error = hats(np.clip(after, 0.0, 1.0), _DISCREPANCIES)
+        error = _over_run(seen, _DISCREPANCIES)
         kind, at = seen.along.rows.kind, seen.along.at
         if self.of_log:
             along[:, kind == LOG] = error[:, at[kind == LOG]]
@@ -404,6 +402,17 @@ class SpeedErrorTerm:
         way = np.concatenate([np.zeros((_DISCREPANCIES, 1)), np.cumsum(steps, axis=1)], axis=1)
         along[:, kind == POSITION] = way[:, at[kind == POSITION]]
         return along, across
+
+
+def _over_run(seen: Observation, count: int) -> Float64:
+    """Return bumps over a coastdown, (count, m); the first one holds all that was before."""
+    after = np.clip((seen.time_s - seen.lead_in_s) / seen.duration_s, 0.0, 1.0)
+    return _kept_hats(after.tobytes(), count)
+
+
+@lru_cache(maxsize=32)
+def _kept_hats(x: bytes, count: int) -> Float64:
+    return hats(np.frombuffer(x), count)
 
 
 @lru_cache(maxsize=8)

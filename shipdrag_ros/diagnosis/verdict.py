@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.terms import EffectTerm
 CERTAIN = 0.9  # probability from which an effect is named
 QUIET = 0.1  # of nothing missing, from which nothing is said
 _SET = 0.99  # of the candidates
-_BARE_MENTION = math.log(3.0)  # of evidence that is not worth more (Kass and Raftery 1995)
+_ASKED = math.log(10.0)  # of evidence, from where it is strong (Jeffreys 1961)
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _ODD_SD = 2.5  # standard deviations of what is expected of an effect, its size apart
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
@@ -128,7 +128,7 @@ def simplest(
         if not fewer:
             continue
         alone = max(fewer, key=lambda other: asked[other])
-        if asked[names] <= asked[alone] + _BARE_MENTION:
+        if asked[names] <= asked[alone] + _ASKED:
             kept[alone] = float(np.logaddexp(kept[alone], kept.pop(names)))
     total = logsumexp(list(kept.values()))
     return {names: math.exp(log - total) for names, log in kept.items()}

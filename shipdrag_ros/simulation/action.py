@@ -100,12 +100,7 @@ class Action:
 
     def __add__(self, other: Action) -> Action:
         return Action(
-            **{
-                field.name: _ADD.get(field.name, _sum)(
-                    getattr(self, field.name), getattr(other, field.name)
-                )
-                for field in fields(Action)
-            }
+            **{name: add(getattr(self, name), getattr(other, name)) for name, add in _PARTS}
         )
 
     def resistance_n(self, speed_m_s: ArrayLike) -> Float64:
@@ -136,3 +131,4 @@ _ADD: dict[str, Callable[[Any, Any], Any]] = {
     'stall_m_s': max,
     'depth_m': min,
 }
+_PARTS = tuple((field.name, _ADD.get(field.name, _sum)) for field in fields(Action))

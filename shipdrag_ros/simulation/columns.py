@@ -137,8 +137,8 @@ def simulate_columns(
     Raises
     ------
     SimulationError
-        If the scenario has disturbances, an action's turns overlap others,
-        or the times are outside the record.
+        If the scenario has disturbances, an action's turn is impossible, or
+        the times are outside the record.
     ShipdragError
         If the ship has no baseline.
     """

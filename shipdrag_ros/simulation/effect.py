@@ -315,6 +315,8 @@ class Effect:
     look_alikes
         Effects of nearly the same trace, and what decides from each; nothing:
         no record can.
+    not_with
+        Effects that cannot be there at the same time.
     act
         From a frame and the values of the parameters, in their order.
     needs
@@ -329,9 +331,16 @@ class Effect:
     act: Callable[..., Action]
     struck_out_by: tuple[str, ...] = ()
     look_alikes: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
+    not_with: tuple[str, ...] = ()
     formula_sd: float = 0.0
     odds: float = 0.04
     needs: tuple[str, ...] = ()
+
+    def goes_with(self, other: Effect) -> bool:
+        """
+        Tell whether two effects can be there at the same time.
+        """
+        return other.name not in (self.name, *self.not_with) and self.name not in other.not_with
 
     def missing(self, ship: Ship) -> tuple[str, ...]:
         """

@@ -71,7 +71,7 @@ COLUMN = np.dtype(
 )
 
 # a stretch between two events; the thrust that is ordered is a fraction of the steady one,
-# turning_1_m the resistance of turning over u |u|
+# turning_1_m the resistance of turning over u |u|; this and the yaw rate change evenly
 LEG = np.dtype(
     [
         ('start_s', np.float64),
@@ -80,7 +80,9 @@ LEG = np.dtype(
         ('thrust_ordered', np.float64),
         ('yaw_rad', np.float64),
         ('yaw_rate_rad_s', np.float64),
+        ('yaw_rate_rad_s2', np.float64),
         ('turning_1_m', np.float64),
+        ('turning_1_m_s', np.float64),
     ]
 )
 
@@ -151,6 +153,13 @@ def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
+def _yaw_rad(leg: Any, elapsed: float) -> float:
+    """Return the heading within a leg."""
+    yaw: float = leg.yaw_rad + (leg.yaw_rate_rad_s + 0.5 * leg.yaw_rate_rad_s2 * elapsed) * elapsed
+    return yaw
+
+
+@njit(cache=True)
 def _rates(
     law: Law,
     column: Any,
@@ -171,9 +180,10 @@ def _rates(
     residual, at the start of the leg; `heading` cosine and sine of it then.
     """
     cos, sin = heading
-    if leg.yaw_rate_rad_s != 0.0:
-        yaw = leg.yaw_rad + leg.yaw_rate_rad_s * elapsed
+    if leg.yaw_rate_rad_s != 0.0 or leg.yaw_rate_rad_s2 != 0.0:
+        yaw = _yaw_rad(leg, elapsed)
         cos, sin = np.cos(yaw), np.sin(yaw)
+    turning_1_m = leg.turning_1_m + leg.turning_1_m_s * elapsed
     east, north = _current_m_s(column, leg.start_s + elapsed)
     over_ground = speed + water
     ground = (over_ground + east * cos + north * sin, north * cos - east * sin)
@@ -182,7 +192,7 @@ def _rates(
         force += thrust[1] * np.exp(-elapsed / column.run_down_s)
     if thrust[2] != 0.0:
         force += thrust[2] * np.exp(-elapsed / column.residual_decay_s)
-    force -= _retardation_m_s2(law, column, extra, speed, ground, cos, sin, leg.turning_1_m)
+    force -= _retardation_m_s2(law, column, extra, speed, ground, cos, sin, turning_1_m)
     if leg.start_s >= column.change_from_s:
         water_rate += column.change_east_m_s2 * cos + column.change_north_m_s2 * sin
 
@@ -292,7 +302,7 @@ def follow(
                 path[sample, 2] = y + b1 * y1 + b2 * (y2 + y3) + b4 * y4
                 along = path[sample, 0] + water + p * water_change
                 at = start + p * h
-                yaw = leg.yaw_rad + leg.yaw_rate_rad_s * at
+                yaw = _yaw_rad(leg, at)
                 east, north = _current_m_s(column, leg.start_s + at)
                 path[sample, 3] = along * np.cos(yaw) + east
                 path[sample, 4] = along * np.sin(yaw) + north

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from math import isfinite
 
 import numpy as np
@@ -46,19 +47,22 @@ STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
 @dataclass(frozen=True)
 class Turn:
     """
-    A turn at a constant rate.
+    A turn at a constant rate, which grows and falls evenly at its edges.
 
     Attributes
     ----------
     start_s
-        After the lead-in.
+        Where the rate has grown to half, after the lead-in.
     duration_s
+        Until it has fallen to half; the course changes by rate times duration.
     rate_rad_s
         Yaw rate, anticlockwise positive.
     drag_area_m2
         Resistance while turning is 0.5 rho drag_area u |u| larger.
     rudder_rad
         Rudder angle while turning.
+    edge_s
+        In which rate, drag and rudder grow, and fall; 0: at once.
     """
 
     start_s: float
@@ -66,11 +70,50 @@ class Turn:
     rate_rad_s: float
     drag_area_m2: float = 0.0
     rudder_rad: float = 0.0
+    edge_s: float = 0.0
 
     @property
     def end_s(self) -> float:
         """After the lead-in."""
         return self.start_s + self.duration_s
+
+    @property
+    def corners_s(self) -> tuple[float, float, float, float]:
+        """Where its edges begin and end, after the lead-in."""
+        half = 0.5 * self.edge_s
+        return self.start_s - half, self.start_s + half, self.end_s - half, self.end_s + half
+
+    def share(self, after_lead_in_s: ArrayLike) -> Float64:
+        """
+        Return how far rate, drag and rudder have grown, 0..1.
+        """
+        time = np.asarray(after_lead_in_s, np.float64)
+        begins, grown, falls, ends = self.corners_s
+        if self.edge_s == 0.0:
+            return ((time >= begins) & (time < ends)).astype(np.float64)
+        risen = np.clip((time - begins) / (grown - begins), 0.0, 1.0)
+        result: Float64 = risen - np.clip((time - falls) / (ends - falls), 0.0, 1.0)
+        return result
+
+    def turned_rad(self, after_lead_in_s: ArrayLike) -> Float64:
+        """
+        Return by how much the course has changed.
+        """
+        time = np.asarray(after_lead_in_s, np.float64)
+        begins, _, falls, _ = self.corners_s
+        result: Float64 = self.rate_rad_s * (
+            self._risen_s(time - begins) - self._risen_s(time - falls)
+        )
+        return result
+
+    def _risen_s(self, since_s: Float64) -> Float64:
+        """Return the integral of what grows to 1 within an edge."""
+        positive = np.maximum(since_s, 0.0)
+        if self.edge_s == 0.0:
+            return positive
+        within = np.minimum(positive, self.edge_s)
+        result: Float64 = positive - within + 0.5 * within**2 / self.edge_s
+        return result
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +138,7 @@ class Scenario:
     orders
         Engine orders in the order of time; none: steady sailing throughout.
     turns
-        Turns in the order of time, not overlapping.
+        Turns; where two overlap, they add.
     water_speed
         Slow disturbance of the water's velocity along the ship [m/s].
     gust_force
@@ -141,9 +184,10 @@ class Scenario:
         ascending = all(early < late for early, late in zip([-np.inf, *times], times))
         if not ascending or any(time < -self.lead_in_s for time in times):
             yield f'orders are at {times}, expected ascending and within the record'
-        edges = [time for turn in self.turns for time in (turn.start_s, turn.end_s)]
-        if not all(early <= late for early, late in zip([-self.lead_in_s, *edges], edges)):
-            yield f'turns are at {edges}, expected one after the other and within the record'
+        for turn in self.turns:
+            corners = (-self.lead_in_s, *turn.corners_s)
+            if not all(early <= late for early, late in pairwise(corners)):
+                yield f'a turn is at {turn.corners_s}, expected ascending and within the record'
         fractions = [value for order in self.orders for value in (order.shaft, order.thrust)]
         if not np.all(np.isfinite(fractions)):
             yield f'orders are {self.orders!r}, expected finite fractions'
@@ -170,7 +214,7 @@ class Scenario:
         """
         moments = {self.moment_s(order.time_s) for order in self.orders}
         for turn in self.turns:
-            moments |= {self.moment_s(turn.start_s), self.moment_s(turn.end_s)}
+            moments |= {self.moment_s(time_s) for time_s in turn.corners_s}
         return sorted(moments)
 
     def moment_s(self, after_lead_in_s: float) -> float:
@@ -205,8 +249,7 @@ class Scenario:
         time = np.asarray(time_s, np.float64)
         yaw = np.full_like(time, self.heading_rad)
         for turn in self.turns:
-            elapsed = np.clip(time - self.moment_s(turn.start_s), 0.0, turn.duration_s)
-            yaw += turn.rate_rad_s * elapsed
+            yaw += turn.turned_rad(time - self.lead_in_s)
         return yaw
 
     def rudder(self, time_s: ArrayLike) -> Float64:
@@ -216,18 +259,8 @@ class Scenario:
         time = np.asarray(time_s, np.float64)
         angle = np.zeros_like(time)
         for turn in self.turns:
-            start, end = self.moment_s(turn.start_s), self.moment_s(turn.end_s)
-            angle[(time >= start) & (time < end)] = turn.rudder_rad
+            angle += turn.rudder_rad * turn.share(time - self.lead_in_s)
         return angle
-
-    def turn_at(self, time_s: float) -> Turn | None:
-        """
-        Return the turn that goes on at a record time.
-        """
-        for turn in self.turns:
-            if self.moment_s(turn.start_s) <= time_s < self.moment_s(turn.end_s):
-                return turn
-        return None
 
     def _approach(self, targets: list[float], time_s: ArrayLike, run_down_s: float) -> Float64:
         """Follow the orders with a first-order lag, from 1 in the lead-in."""

@@ -137,7 +137,7 @@ def acted(scenario: Scenario, action: Action) -> Scenario:
     Raises
     ------
     SimulationError
-        If turns overlap.
+        If a turn is impossible.
     """
     east, north = scenario.current_m_s
     turns = sorted((*scenario.turns, *action.turns), key=lambda turn: turn.start_s)
@@ -171,13 +171,23 @@ def legs_of(
     """
     legs = np.zeros(len(steps), LEG)
     for leg, start, end, n in zip(legs, edges_s, edges_s[1:], steps):
-        turn = scenario.turn_at(start)
         leg['start_s'] = start
         leg['step_s'] = (end - start) / n
         leg['steps'] = n
         leg['thrust_ordered'] = scenario.thrust_ordered(start)
         leg['yaw_rad'] = scenario.heading(start)
-        if turn:
-            leg['yaw_rate_rad_s'] = turn.rate_rad_s
-            leg['turning_1_m'] = 0.5 * ship.water.density_kg_m3 * turn.drag_area_m2 / ship.mass_kg
+    edges = np.asarray(edges_s)
+    length = np.diff(edges)
+    for turn in scenario.turns:
+        # linear within a leg, and at its ends perhaps a step
+        early, late = (
+            turn.share(edges[:-1] + part * length - scenario.lead_in_s) for part in (0.25, 0.75)
+        )
+        per_s = 2.0 * (late - early) / length
+        share = early - 0.25 * length * per_s
+        area_1_m = 0.5 * ship.water.density_kg_m3 * turn.drag_area_m2 / ship.mass_kg
+        legs['yaw_rate_rad_s'] += turn.rate_rad_s * share
+        legs['yaw_rate_rad_s2'] += turn.rate_rad_s * per_s
+        legs['turning_1_m'] += area_1_m * share
+        legs['turning_1_m_s'] += area_1_m * per_s
     return legs

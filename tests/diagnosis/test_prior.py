@@ -16,7 +16,9 @@ def test_all_that_may_be_adds_up_to_one() -> None:
     effects = [replace(one, odds=0.01 * k) for k, one in enumerate(LIBRARY.values(), start=1)]
     nothing = nothing_missing(effects, places=3)
     ones = sum(nothing * effect.odds for effect in effects)
-    pairs = sum(nothing * one.odds * other.odds for one, other in combinations(effects, 2))
+    together = [(a, b) for a, b in combinations(effects, 2) if a.goes_with(b)]
+    assert len(together) == len(effects) * (len(effects) - 1) // 2 - 3  # states of a propeller
+    pairs = sum(nothing * one.odds * other.odds for one, other in together)
     assert nothing + ones + pairs + 3 * nothing * UNNAMED_ODDS == pytest.approx(1.0)
 
 

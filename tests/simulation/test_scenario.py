@@ -22,8 +22,9 @@ from shipdrag_ros.simulation import STOP, EngineOrder, GaussMarkov, Scenario, Tu
         ({'orders': (EngineOrder(5.0, 0.5, 0.25), STOP)}, 'orders are at'),
         ({'orders': (EngineOrder(-601.0, 0.0, 0.0),)}, 'orders are at'),
         ({'orders': (EngineOrder(0.0, np.nan, 0.0),)}, 'finite fractions'),
-        ({'turns': (Turn(0.0, 10.0, 0.1), Turn(5.0, 10.0, 0.1))}, 'turns are at'),
-        ({'turns': (Turn(0.0, -1.0, 0.1),)}, 'turns are at'),
+        ({'turns': (Turn(0.0, 10.0, 0.1, edge_s=11.0),)}, 'a turn is at'),
+        ({'turns': (Turn(0.0, -1.0, 0.1),)}, 'a turn is at'),
+        ({'turns': (Turn(-601.0, 1.0, 0.1),)}, 'a turn is at'),
         ({'turns': (Turn(0.0, 1.0, np.inf),)}, 'finite values'),
         ({'water_speed': GaussMarkov(0.1, 0.0)}, 'water_speed: correlation_time_s is 0.0'),
         ({'gust_force': GaussMarkov(-1.0, 1.0)}, 'gust_force: sd is -1.0'),
@@ -63,3 +64,28 @@ def test_the_rudder_is_laid_while_turning():
     np.testing.assert_array_equal(
         scenario.rudder([104.9, 105.0, 114.9, 115.0]), [0.0, 0.3, 0.3, 0.0]
     )
+
+
+@pytest.mark.parametrize('edge_s', [0.0, 4.0, 10.0])
+def test_a_turn_changes_the_course_by_rate_times_duration_whatever_its_edges(edge_s):
+    turn = Turn(5.0, 10.0, 0.02, edge_s=edge_s)
+    assert turn.turned_rad(1e3) == pytest.approx(0.2, rel=1e-12)
+    assert turn.turned_rad(-5.0) == 0.0
+    times = np.linspace(0.0, 20.0, 20001)
+    rate = np.gradient(turn.turned_rad(times), times)
+    away = np.abs(times[:, None] - np.array(turn.corners_s)).min(axis=1) > 0.01
+    np.testing.assert_allclose(rate[away], 0.02 * turn.share(times)[away], rtol=0, atol=1e-9)
+
+
+def test_half_of_an_edge_is_before_the_start():
+    turn = Turn(5.0, 10.0, 0.02, edge_s=4.0)
+    np.testing.assert_allclose(
+        turn.share([2.9, 4.0, 5.0, 7.0, 13.0, 15.0, 17.1]), [0, 0.25, 0.5, 1, 1, 0.5, 0]
+    )
+
+
+def test_turns_that_overlap_add():
+    first, second = Turn(0.0, 20.0, 0.01, rudder_rad=0.1), Turn(10.0, 20.0, 0.02, rudder_rad=0.2)
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=100.0, turns=(first, second))
+    np.testing.assert_allclose(scenario.heading([105.0, 115.0, 200.0]), [0.05, 0.25, 0.6])
+    np.testing.assert_allclose(scenario.rudder([105.0, 115.0, 125.0]), [0.1, 0.3, 0.2])

@@ -203,6 +203,23 @@ def test_a_turn_changes_the_heading_and_adds_its_drag():
     np.testing.assert_allclose(turned.position_m[1:], path, atol=1e-3)
 
 
+def test_a_turn_with_edges_is_one_of_many_short_turns():
+    scenario = Scenario(speed_m_s=8.2, lead_in_s=50.0, duration_s=400.0)
+    smooth = Turn(100.0, 60.0, rate_rad_s=0.01, drag_area_m2=30.0, edge_s=40.0)
+    parts = []
+    for start_s in 80.0 + np.arange(100.0):
+        share = float(smooth.share(start_s + 0.5))
+        parts.append(Turn(start_s, 1.0, 0.01 * share, drag_area_m2=30.0 * share))
+    one = simulate(CARGO, replace(scenario, turns=(smooth,)))
+    many = simulate(CARGO, replace(scenario, turns=tuple(parts)))
+    times = np.linspace(0.0, 450.0, 91)
+    for name, atol in (('speed_through_water_m_s', 1e-5), ('heading_rad', 2e-4)):
+        np.testing.assert_allclose(
+            getattr(one.at(times), name), getattr(many.at(times), name), rtol=0, atol=atol
+        )
+    np.testing.assert_allclose(one.at(times).position_m, many.at(times).position_m, atol=0.02)
+
+
 def test_a_moving_body_of_water_carries_ship_and_log_as_newton_says():
     # in one step of c, much faster than the drag: du = -dc / (1 + n_r)
     noise = GaussMarkov(sd=0.2, correlation_time_s=5.0)

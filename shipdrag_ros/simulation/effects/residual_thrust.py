@@ -35,6 +35,8 @@ EFFECT = Effect(
     ),
     formula='T = T0 [(1 - fraction) exp(-t/run_down) + fraction exp(-t/decay)], shaft speed alike',
     source='definition',
+    # a propeller does one thing at a time
+    not_with=('locked_propeller', 'windmilling_propeller'),
     formula_sd=0.2,
     act=_act,
     struck_out_by=('shaft',),

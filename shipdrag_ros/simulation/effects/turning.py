@@ -20,19 +20,29 @@ from shipdrag_ros.simulation.effect import (
 from shipdrag_ros.simulation.scenario import Turn
 
 _RUDDER_RAD = 0.17  # 10 degrees, to the side she turns to
+_HELM_EDGE, _YAW_EDGE = 0.125, 0.375  # of the duration: the rudder is quicker than the hull
 
 
 def _act(
     frame: Frame, drag_area_m2: float, start_s: float, duration_s: float, rate_rad_s: float
 ) -> Action:
-    turn = Turn(
-        start_s,
-        duration_s,
-        rate_rad_s,
-        drag_area_m2=drag_area_m2,
-        rudder_rad=copysign(_RUDDER_RAD, rate_rad_s),
+    def turn(edge: float, rate_rad_s: float, drag_area_m2: float, rudder_rad: float) -> Turn:
+        edge_s = edge * duration_s
+        return Turn(
+            start_s + 0.5 * edge_s,
+            duration_s - edge_s,
+            rate_rad_s / (1.0 - edge),
+            drag_area_m2=drag_area_m2,
+            rudder_rad=rudder_rad,
+            edge_s=edge_s,
+        )
+
+    return Action(
+        turns=(
+            turn(_HELM_EDGE, 0.0, drag_area_m2, copysign(_RUDDER_RAD, rate_rad_s)),
+            turn(_YAW_EDGE, rate_rad_s, 0.0, 0.0),
+        )
     )
-    return Action(turns=(turn,))
 
 
 EFFECT = Effect(
@@ -61,7 +71,7 @@ EFFECT = Effect(
             name='duration_s',
             unit='s',
             meaning='of the turn',
-            prior=log_normal(150.0, 0.6),
+            prior=log_normal(200.0, 0.8),
             low=0.0,
             high=1e5,
             default=150.0,
@@ -78,7 +88,8 @@ EFFECT = Effect(
             default=0.003,
         ),
     ),
-    formula='0.5 rho drag_area v^2 from start to start + duration, the heading turning evenly',
+    formula='0.5 rho drag_area v^2 from start to start + duration, its edges an eighth of that '
+    'long; the yaw rate grows and falls more slowly, in three eighths',
     source='definition',
     formula_sd=0.3,
     act=_act,

@@ -63,6 +63,8 @@ EFFECT = Effect(
     'that drives the ship as fast',
     source='four-quadrant open-water data of B4-70: 0.03 turning freely, 0.65 locked, on the '
     'speed at the propeller',
+    # a propeller does one thing at a time
+    not_with=('locked_propeller',),
     formula_sd=0.2,
     act=_act,
     struck_out_by=('shaft',),
