@@ -79,13 +79,13 @@ def fit(
     states = [_State(h, z.copy()) for h, z in zip(hypotheses, starts, strict=True)]
     active = states
     for number in range(_ITERATIONS):
+        if not active:
+            break
         near = [None if number in _ANEW else s.best for s in active]
         points = problem.linearise([s.hypothesis for s in active], [s.trial for s in active], near)
         for state, point in zip(active, points, strict=True):
             state.take(point)
         active = [state for state in active if not state.done]
-        if not active:
-            break
     return [state.result() for state in states]
 
 
