@@ -23,9 +23,7 @@ from shipdrag_ros.coastdown.bins import (
 )
 from shipdrag_ros.samples import Channel
 
-SHAFT_S = (
-    3  # the shaft is averaged over this long, so that one bad reading does not engage the engine
-)
+SHAFT_S = 3  # the shaft is averaged over this long, so that one bad reading engages no engine
 HEADING_BEFORE_S = 60  # the heading of a coastdown is the mean over this long before it
 _HEADING = int(Channel.HEADING)
 _SHAFT = int(Channel.SHAFT)

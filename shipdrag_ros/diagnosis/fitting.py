@@ -25,6 +25,8 @@ _ANEW = (0, 3)  # iterations in which all derivatives are found anew
 _CONVERGED = 0.02  # fall of -2 ln posterior
 _DAMPING = 1e-2
 _HOPELESS = 1e4  # damping
+_FAR = 80.0  # of -2 ln posterior behind the best, from where nothing has a chance
+_NEARER = 0.2  # part of the way to the best that a step must make good from there
 _SMALL = 0.25  # of usual
 
 
@@ -85,7 +87,8 @@ def fit(
         points = problem.linearise([s.hypothesis for s in active], [s.trial for s in active], near)
         for state, point in zip(active, points, strict=True):
             state.take(point)
-        active = [state for state in active if not state.done]
+        best = min(state.cost for state in states)
+        active = [state for state in active if not state.done and not state.lost(best)]
     return [state.result() for state in states]
 
 
@@ -97,6 +100,7 @@ class _State:
         self.trial = z
         self.best: Linear | None = None
         self.damping = 0.0
+        self.fallen = math.inf
         self.done = False
         self._half = np.zeros(len(z), bool)
         for i, unknown in enumerate(hypothesis.unknowns):
@@ -105,15 +109,27 @@ class _State:
     def take(self, point: Linear) -> None:
         """Go on from a point that was tried, or from the one before with a smaller step."""
         if self.best is None or point.cost < self.best.cost + 1e-9:
-            fallen = math.inf if self.best is None else self.best.cost - point.cost
+            self.fallen = math.inf if self.best is None else self.best.cost - point.cost
             self.best = point
-            self.done = fallen < _CONVERGED or not math.isfinite(point.cost)
+            self.done = self.fallen < _CONVERGED or not math.isfinite(point.cost)
             self.damping = 0.2 * self.damping if self.damping > 1e-4 else 0.0
         else:
             self.damping = max(8.0 * self.damping, _DAMPING)
             self.done = self.damping > _HOPELESS
         if not self.done:
             self.trial = self._step()
+
+    @property
+    def cost(self) -> float:
+        """-2 ln of the posterior at the best so far."""
+        return math.inf if self.best is None else self.best.cost
+
+    def lost(self, cost: float) -> bool:
+        """
+        Tell whether it is far behind another one, and hardly comes nearer.
+        """
+        behind = self.cost - cost
+        return behind > _FAR and self.fallen < _NEARER * behind
 
     def _step(self) -> Float64:
         assert self.best is not None

@@ -170,14 +170,13 @@ def legs_of(
         Records of `LEG`.
     """
     legs = np.zeros(len(steps), LEG)
-    for leg, start, end, n in zip(legs, edges_s, edges_s[1:], steps):
-        leg['start_s'] = start
-        leg['step_s'] = (end - start) / n
-        leg['steps'] = n
-        leg['thrust_ordered'] = scenario.thrust_ordered(start)
-        leg['yaw_rad'] = scenario.heading(start)
     edges = np.asarray(edges_s)
     length = np.diff(edges)
+    legs['start_s'] = edges[:-1]
+    legs['step_s'] = length / steps
+    legs['steps'] = steps
+    legs['thrust_ordered'] = [scenario.thrust_ordered(start) for start in edges_s[:-1]]
+    legs['yaw_rad'] = scenario.heading(edges[:-1])
     for turn in scenario.turns:
         # linear within a leg, and at its ends perhaps a step
         early, late = (
