@@ -111,11 +111,13 @@ def effects() -> str:
             effect.source,
             ', '.join(f'`{name}`' for name in effect.struck_out_by) or '-',
             ', '.join(f'`{name}`' for name in effect.needs) or '-',
+            ', '.join(f'`{name}`' for name in effect.not_with) or '-',
+            f'{effect.odds:g}',
         ]
         for effect in LIBRARY.values()
     )
     head = ['effect', 'scope', 'formula', 'source', 'struck out by', 'needs in the ship file']
-    return _table(head, rows)
+    return _table([*head, 'not together with', 'odds'], rows)
 
 
 def effect_parameters() -> str:
