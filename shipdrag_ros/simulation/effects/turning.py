@@ -61,7 +61,7 @@ EFFECT = Effect(
         Quantity(
             name='start_s',
             unit='s',
-            meaning='after the stop',
+            meaning='after the stop, where the drag begins to grow',
             prior=uniform(0.0, 1500.0),
             low=0.0,
             high=1e5,
@@ -70,7 +70,7 @@ EFFECT = Effect(
         Quantity(
             name='duration_s',
             unit='s',
-            meaning='of the turn',
+            meaning='until the drag has gone',
             prior=log_normal(200.0, 0.8),
             low=0.0,
             high=1e5,
@@ -88,8 +88,8 @@ EFFECT = Effect(
             default=0.003,
         ),
     ),
-    formula='0.5 rho drag_area v^2 from start to start + duration, its edges an eighth of that '
-    'long; the yaw rate grows and falls more slowly, in three eighths',
+    formula='0.5 rho drag_area v^2 from start to start + duration, growing and falling in an '
+    'eighth of that; the yaw rate does so more slowly, in three eighths',
     source='definition',
     formula_sd=0.3,
     act=_act,
