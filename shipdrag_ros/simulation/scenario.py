@@ -226,14 +226,25 @@ class Scenario:
     def shaft_fraction(self, time_s: ArrayLike, *, run_down_s: float) -> Float64:
         """
         Return shaft speed over the steady one, at record times.
-        """
-        return self._approach([order.shaft for order in self.orders], time_s, run_down_s)
 
-    def thrust_fraction(self, time_s: ArrayLike, *, run_down_s: float) -> Float64:
+        It follows the orders with a first-order lag, from 1 in the lead-in.
         """
-        Return thrust over the steady one, at record times.
-        """
-        return self._approach([order.thrust for order in self.orders], time_s, run_down_s)
+        time = np.asarray(time_s, np.float64)
+        result = np.ones_like(time)
+
+        def decay(elapsed: Float64) -> Float64:
+            # before an order the value is not used, and must not overflow
+            late = np.maximum(elapsed, 0.0)
+            return np.exp(-late / run_down_s) if run_down_s > 0.0 else np.zeros_like(late)
+
+        level, target, since = 1.0, 1.0, -np.inf
+        for order in self.orders:
+            moment = self.moment_s(order.time_s)
+            level = target + (level - target) * float(decay(np.asarray(moment - since)))
+            target, since = order.shaft, moment
+            value = target + (level - target) * decay(time - since)
+            result = np.where(time >= since, value, result)
+        return result
 
     def thrust_ordered(self, time_s: float) -> float:
         """
@@ -261,22 +272,3 @@ class Scenario:
         for turn in self.turns:
             angle += turn.rudder_rad * turn.share(time - self.lead_in_s)
         return angle
-
-    def _approach(self, targets: list[float], time_s: ArrayLike, run_down_s: float) -> Float64:
-        """Follow the orders with a first-order lag, from 1 in the lead-in."""
-        time = np.asarray(time_s, np.float64)
-        result = np.ones_like(time)
-
-        def decay(elapsed: Float64) -> Float64:
-            # before an order the value is not used, and must not overflow
-            late = np.maximum(elapsed, 0.0)
-            return np.exp(-late / run_down_s) if run_down_s > 0.0 else np.zeros_like(late)
-
-        level, target, since = 1.0, 1.0, -np.inf
-        for order, new_target in zip(self.orders, targets):
-            moment = self.moment_s(order.time_s)
-            level = target + (level - target) * float(decay(np.asarray(moment - since)))
-            target, since = new_target, moment
-            value = target + (level - target) * decay(time - since)
-            result = np.where(time >= since, value, result)
-        return result

@@ -50,8 +50,8 @@ def test_orders_are_approached_one_after_the_other():
     )
     at = np.array([0.0, 99.9, 100.0, 105.0, 110.0, 115.0, 1000.0])
     left = np.exp(-1.0)
-    expected = [1.0, 1.0, 1.0, np.exp(-0.5), left, 0.25 + (left - 0.25) * np.exp(-0.5), 0.25]
-    np.testing.assert_allclose(scenario.thrust_fraction(at, run_down_s=10.0), expected, rtol=1e-12)
+    expected = [1.0, 1.0, 1.0, np.exp(-0.5), left, 0.5 + (left - 0.5) * np.exp(-0.5), 0.5]
+    np.testing.assert_allclose(scenario.shaft_fraction(at, run_down_s=10.0), expected, rtol=1e-12)
     np.testing.assert_array_equal(
         scenario.shaft_fraction(at, run_down_s=0.0), [1.0, 1.0, 0.0, 0.0, 0.5, 0.5, 0.5]
     )
