@@ -13,9 +13,10 @@ import argparse
 import json
 import os
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from real_records import DATA, MODEL_SHIP, ROOT, run_command
+from real_records import DATA, MODEL_SHIP, run_command
 
 IMPORT_LOG = f'shipdrag import ${DATA}/psaros_lake_geneva.nmea.gz -o yacht.mcap'
 DIAGNOSE_LOG = 'shipdrag diagnose yacht.mcap'
@@ -66,15 +67,13 @@ def main() -> None:
     """
     Run both.
     """
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out')
-    out = parser.parse_args().out
+    argparse.ArgumentParser(description=__doc__).parse_args()
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set')
         return
-    out.mkdir(parents=True, exist_ok=True)
     for name in RECORDS:
-        show(name, diagnosed(name, data=Path(os.environ[DATA]), out=out))
+        with TemporaryDirectory() as folder:
+            show(name, diagnosed(name, data=Path(os.environ[DATA]), out=Path(folder)))
 
 
 if __name__ == '__main__':
