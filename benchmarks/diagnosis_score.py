@@ -198,6 +198,11 @@ def table(done: Sequence[scoring.Trial]) -> Iterator[str]:
         cells = [_cell(columns[name]) for columns in grouped.values()]
         yield f'| {name} | ' + ' | '.join(cells) + ' |'
     yield ''
+    yield 'parameters within 2 sd'
+    known = [trial for trial in done if not trial.truth.condition.misstated]
+    for name, share in scoring.parameters_inside(known).items():
+        yield f'  {name}: {share}'
+    yield ''
     yield 'hidden: answers (name: how often)'
     for truth, answers in scoring.confusion(done).items():
         yield f'  {truth}: ' + ', '.join(f'{name} {n}' for name, n in answers.most_common())

@@ -231,7 +231,7 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
         'held-out chi^2 per sample, median': float(np.median(chi2)) if chi2 else float('nan'),
         'held-out chi^2 per sample <= 1.1': Share.over(value <= 1.1 for value in chi2),
         'parameters within 2 sd': Share.over(
-            inside for trial in right for inside in _parameters_inside(trial)
+            inside for trial in right for _, inside in _parameters(trial)
         ),
         'recommended test resolves, of what anything resolves': Share.over(
             trial.followed is not None and trial.followed.named == trial.truth.names
@@ -323,9 +323,22 @@ def _answer_sought(truth: Truth) -> Names:
     return UNKNOWN if truth.kind == 'outside' else truth.names
 
 
-def _parameters_inside(trial: Trial) -> Iterable[bool]:
+def parameters_inside(trials: Sequence[Trial]) -> dict[str, Share]:
+    """
+    Return how often each parameter is within 2 sd, of effects that are named rightly.
+    """
+    inside: dict[str, list[bool]] = {}
+    for trial in trials:
+        if trial.truth.kind == 'one' and _right(trial):
+            for name, is_inside in _parameters(trial):
+                inside.setdefault(name, []).append(is_inside)
+    return {name: Share.over(found) for name, found in sorted(inside.items())}
+
+
+def _parameters(trial: Trial) -> Iterable[tuple[str, bool]]:
+    """Yield each parameter that is known of both, and whether it is within 2 sd."""
     for effect, true in trial.truth.parameters.items():
         found = trial.answer.parameters.get(effect, {})
         for name in true.keys() & found.keys():
             value, sd = found[name]
-            yield abs(value - true[name]) <= 2.0 * sd
+            yield f'{effect} {name}', abs(value - true[name]) <= 2.0 * sd
