@@ -30,7 +30,8 @@ class Channel(IntEnum):
 
     `POSITION` and `POSITION_GEODETIC` are two encodings of the one input
     `position`: only the window that uses a position knows where to put the
-    origin of its plane.
+    origin of its plane. The input `shaft` carries up to four shafts, and the
+    pitch of each.
     """
 
     SPEED_THROUGH_WATER = 0  # forward [m/s], unused
@@ -38,19 +39,31 @@ class Channel(IntEnum):
     POSITION = 2  # x, y [m] in a fixed frame
     POSITION_GEODETIC = 3  # latitude, longitude [deg]
     HEADING = 4  # yaw as sent [rad], unused
-    SHAFT = 5  # rate of turn [rad/s], unused
+    SHAFT = 5  # rate of turn [rad/s], negative astern, unused
     RUDDER = 6  # angle [rad], unused
     WIND_APPARENT = 7  # forward, to port [m/s], of the air relative to the ship
     DEPTH = 8  # from the surface [m], unused
+    SHAFT_2 = 9  # as SHAFT, of further shafts
+    SHAFT_3 = 10
+    SHAFT_4 = 11
+    PITCH = 12  # of a controllable propeller, ratio or angle, 0 no thrust, unused
+    PITCH_2 = 13  # of the propeller of SHAFT_2, and so on
+    PITCH_3 = 14
+    PITCH_4 = 15
 
     @property
     def input(self) -> str:
         """The name of the input (topic) that carries this channel."""
         if self is Channel.POSITION_GEODETIC:
             return 'position'
+        if self in SHAFTS or self in PITCHES:
+            return 'shaft'
         return self.name.lower()
 
 
+SHAFTS = (Channel.SHAFT, Channel.SHAFT_2, Channel.SHAFT_3, Channel.SHAFT_4)
+PITCHES = (Channel.PITCH, Channel.PITCH_2, Channel.PITCH_3, Channel.PITCH_4)
+"""The pitch of each of `SHAFTS`, in their order."""
 INPUTS: tuple[str, ...] = tuple(dict.fromkeys(channel.input for channel in Channel))
 MOTION_INPUTS: tuple[str, ...] = ('speed_through_water', 'position', 'speed_over_ground')
 
@@ -67,6 +80,7 @@ class Reason(IntEnum):
     INFINITE = 6
     ABSURD = 7
     FROZEN = 8
+    OUTLIER = 9  # what the readings before it, or its stated variance, make impossible
 
 
 @dataclass(frozen=True)

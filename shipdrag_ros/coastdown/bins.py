@@ -22,7 +22,7 @@ from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import INLINED, UNCOUNTED
 from shipdrag_ros.samples import Channel, Float64, Int64
 
-BINNED = int(Channel.SHAFT) + 1  # this many first channels are averaged
+BINNED = len(Channel)
 SOURCES = int(Channel.POSITION_GEODETIC) + 1  # of these, a speed can be had from; best first
 EARTH_RADIUS_M = 6_371_008.8  # mean; the third digit of a speed does not matter here
 

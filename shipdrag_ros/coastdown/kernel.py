@@ -16,7 +16,7 @@ from typing import cast
 
 from numba import njit, typeof, types
 
-from shipdrag_ros.coastdown.bins import BINNED, SOURCES, Bins, line, mean_turning, newest_bin
+from shipdrag_ros.coastdown.bins import SOURCES, Bins, line, mean_turning, newest_bin
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.memory import RECENT, Memory, Tally, Tuning, Watch
 from shipdrag_ros.coastdown.ring import append
@@ -192,17 +192,16 @@ def _walk(
             ):
                 stop = _SILENCE
                 break
-            if c < BINNED:
-                number = stamp // SECOND_NS
-                if bins.samples[c] > 0 and number > bins.filling[c]:
-                    closed = close(bins, c, tuning.slopes.width)
-                    if c < SOURCES:
-                        stop = _look_at_speed(bins, steadiness, watch, tuning, c, closed)
-                    elif c == _SHAFT:
-                        stop = _look_at_shaft(bins, watch, tuning, closed)
-                    if stop != 0:
-                        break
-                add(bins, c, number, stamp, a, b)
+            number = stamp // SECOND_NS
+            if bins.samples[c] > 0 and number > bins.filling[c]:
+                closed = close(bins, c, tuning.slopes.width)
+                if c < SOURCES:
+                    stop = _look_at_speed(bins, steadiness, watch, tuning, c, closed)
+                elif c == _SHAFT:
+                    stop = _look_at_shaft(bins, watch, tuning, closed)
+                if stop != 0:
+                    break
+            add(bins, c, number, stamp, a, b)
             remember(guard, c, stamp, a, b)
             recent = tally.reasons[c, _ACCEPTED] % RECENT
             tally.stamp_ns[c, recent] = stamp

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.samples import Block, Channel, Float64, Int64
+from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, Float64, Int64
 
 _PLANE = ('position', 'wind_apparent')  # inputs of two columns
 # WGS84
@@ -58,8 +58,11 @@ class Window:
         [m] in a plane: as sent, or east and north of the first one.
     heading
         Yaw as sent [rad].
-    shaft
-        Rate of turn [rad/s].
+    shafts, pitches
+        Rate of turn of each of `samples.SHAFTS` [rad/s] and the pitch of its
+        propeller [ratio or rad]; empty where there is none.
+    rudder
+        Angle [rad].
     wind_apparent
         (n, 2): of the air relative to the ship, forward and to port [m/s].
     depth
@@ -82,11 +85,18 @@ class Window:
     speed_over_ground: Series
     position: Series
     heading: Series
-    shaft: Series
+    shafts: tuple[Series, ...]
+    pitches: tuple[Series, ...]
+    rudder: Series
     wind_apparent: Series
     depth: Series
     notes: tuple[str, ...] = ()
     before: Window | None = None
+
+    @property
+    def shaft(self) -> Series:
+        """The first shaft that has been heard; empty where none has."""
+        return next((shaft for shaft in self.shafts if len(shaft)), self.shafts[0])
 
     @classmethod
     def from_block(
@@ -146,7 +156,9 @@ class Window:
             series(Channel.SPEED_OVER_GROUND),
             _local_plane(degrees, degrees.value[0]) if in_degrees else metres,
             series(Channel.HEADING),
-            series(Channel.SHAFT),
+            tuple(series(channel) for channel in SHAFTS),
+            tuple(series(channel) for channel in PITCHES),
+            series(Channel.RUDDER),
             series(Channel.WIND_APPARENT),
             series(Channel.DEPTH),
             notes,
@@ -164,7 +176,9 @@ class Window:
             series(Channel.SPEED_OVER_GROUND),
             metres_before,
             series(Channel.HEADING),
-            series(Channel.SHAFT),
+            tuple(series(channel) for channel in SHAFTS),
+            tuple(series(channel) for channel in PITCHES),
+            series(Channel.RUDDER),
             series(Channel.WIND_APPARENT),
             series(Channel.DEPTH),
         )
