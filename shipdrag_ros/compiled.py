@@ -2,27 +2,320 @@
 """
 How code is compiled, and how it is kept from outliving its source.
 
-numba caches a compiled function by the date of the one file that it is in, but
-the functions and constants it uses may be in others.
+numba keeps compiled functions by the file that each is in, but the functions and
+constants it uses may be in others. Here a module has a folder, named by a digest
+of its source, of the source of all that it imports from this package and of the
+compiler: what is in it is always what would be compiled now.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import logging
+import os
+import pickle
+import re
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, Protocol, TypeVar, overload
 
-# For code that is called a million times a second with arrays that Python owns: counting the
-# references to them would cost more than the work. Such code cannot make arrays.
-UNCOUNTED: dict[str, Any] = {'_nrt': False}
-INLINED: dict[str, Any] = {**UNCOUNTED, 'forceinline': True}
+import llvmlite
+import numba
+import numpy as np
+from numba.core import caching, compiler, config, serialize, sigutils
+
+Arguments = ParamSpec('Arguments')
+Result = TypeVar('Result')
 
 
-def digest(*paths: str) -> str:
+class Signature(Protocol):
     """
-    Return a digest of source files, paths being relative to the package.
-
-    A compiled function that closes over it is compiled anew when one changes.
+    A signature as numba makes one of types; text serves too.
     """
-    package = Path(__file__).parent
-    return hashlib.sha256(b''.join((package / path).read_bytes() for path in paths)).hexdigest()
+
+    args: tuple[Any, ...]
+    return_type: Any
+
+
+CACHE_DIR = 'SHIPDRAG_CACHE_DIR'  # environment
+_PACKAGE = Path(__file__).parent
+_NAME = _PACKAGE.name
+_IMPORT = re.compile(
+    rb'^[ \t]*from[ \t]+(%(name)s[.\w]*)[ \t]+import[ \t]+(\([^)]*\)|[^(\n]+)'
+    rb'|^[ \t]*import[ \t]+(%(name)s[.\w]*)' % {b'name': _NAME.encode()},
+    re.MULTILINE,
+)
+_FOLDER = re.compile(r'(?P<module>[.\w]+)-[0-9a-f]{16}')
+_KEPT = 8  # folders of a module: as many versions of its source can take turns
+_CHECKED = 32  # bytes of the digest before what is kept
+_log = logging.getLogger(__name__)
+
+
+@overload
+def compiled(function: Callable[Arguments, Result], /) -> Callable[Arguments, Result]: ...
+
+
+@overload
+def compiled(
+    signature: str | Signature | None = None,
+    /,
+    *,
+    fastmath: set[str] | bool = False,
+    inline: bool = False,
+    uncounted: bool = False,
+) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]: ...
+
+
+def compiled(
+    signature: Any = None,
+    /,
+    *,
+    fastmath: set[str] | bool = False,
+    inline: bool = False,
+    uncounted: bool = False,
+) -> Any:
+    """
+    Compile a function of this package to machine code; it keeps its type.
+
+    Parameters
+    ----------
+    signature
+        Of numba, as text or type: the function is compiled on import, for this one only.
+        Without it, on the first call with arguments of a type.
+    fastmath
+        What LLVM may do to floating-point arithmetic.
+    inline
+        Put the code into each caller.
+    uncounted
+        For code that is called a million times a second with arrays that Python owns: counting
+        the references to them would cost more than the work. Such code cannot make arrays.
+
+    Raises
+    ------
+    TypeError
+        If the function uses variables of a function around it: its source is then not all
+        that it depends on.
+    """
+    if callable(signature) and not isinstance(signature, numba.types.Type | str):
+        return compiled()(signature)
+
+    def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+        if function.__closure__:
+            raise TypeError(f'{function.__qualname__}: a compiled function stands in a module')
+        options: dict[str, Any] = {'fastmath': fastmath}
+        if uncounted:
+            options['_nrt'] = False
+        if inline:
+            options['forceinline'] = True
+        dispatcher = numba.njit(**options)(function)
+        if not config.DISABLE_JIT:
+            folder = _folder(function.__module__)
+            if folder is not None:
+                dispatcher._cache = _Cache(function, folder)
+            if signature is not None:
+                dispatcher.compile(signature)
+                dispatcher.disable_compile()
+        result: Callable[Arguments, Result] = dispatcher
+        return result
+
+    return decorate
+
+
+class _Cache(caching.NullCache):  # type: ignore[misc]
+    """
+    What numba compiled of one function, a file for each type of arguments.
+
+    A file is written whole or not at all, and one that is damaged is compiled again.
+    """
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        self._folder = folder
+        self._name = f'{function.__qualname__}-{function.__code__.co_firstlineno}'
+
+    @property
+    def cache_path(self) -> str:
+        """Where it is kept."""
+        return str(self._folder)
+
+    def _path(self, signature: Any, codegen: Any) -> Path:
+        arguments, _ = sigutils.normalize_signature(signature)
+        key = repr((arguments, codegen.magic_tuple()))
+        return self._folder / f'{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}'
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what was compiled for a type of arguments, None if nothing."""
+        target_context.refresh()
+        path = self._path(sig, target_context.codegen())
+        try:
+            kept = path.read_bytes()
+        except OSError:
+            return None
+        data = kept[_CHECKED:]
+        if hashlib.sha256(data).digest() != kept[:_CHECKED]:
+            return None  # the power failed, or the disk did
+        _mark_used(self._folder)
+        return compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what was compiled for a type of arguments."""
+        if data.library.has_dynamic_globals:  # addresses, of this process only
+            return
+        path = self._path(sig, data.codegen)
+        content = serialize.dumps(data._reduce())
+        try:
+            if not self._folder.exists():
+                _make(self._folder)
+                _forget_old(self._folder)
+            handle, name = tempfile.mkstemp(dir=self._folder)
+            try:
+                with os.fdopen(handle, 'wb') as file:
+                    file.write(hashlib.sha256(content).digest() + content)
+                os.replace(name, path)
+            except BaseException:
+                os.unlink(name)
+                raise
+        except OSError as error:
+            _say_not_kept(f'{self._folder.parent}: {error.strerror}')
+
+
+def _folder(module: str) -> Path | None:
+    """Return where a module's compiled functions are kept; None if nowhere."""
+    root = _root()
+    if root is None or module.partition('.')[0] != _NAME:
+        return None
+    try:
+        return root / f'{module.partition(".")[2]}-{digest(module)}'
+    except OSError as error:  # a package without its source
+        _say_not_kept(f'the source cannot be read: {error}')
+        return None
+
+
+def digest(module: str) -> str:
+    """
+    Return a digest of all that the compiled functions of a module depend on.
+
+    Notes
+    -----
+    That is its source, that of the modules of this package that it imports, those that
+    they import, and so on, and the compiler.
+    """
+    reached, left = set(), [module]
+    while left:
+        each = left.pop()
+        if each not in reached:
+            reached.add(each)
+            left.extend(_source(each)[1])
+    text = repr((_compiler(), sorted((each, _source(each)[0]) for each in reached)))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+@cache
+def _source(module: str) -> tuple[str, frozenset[str]]:
+    """Return a digest of the source of a module, and which of this package it imports."""
+    source = (_path(module) or _PACKAGE / module).read_bytes()
+    names = set()
+    for match in _IMPORT.finditer(source):
+        base = (match[1] or match[3]).decode()
+        names.add(base)
+        parts = re.sub(rb'#[^\n]*', b'', match[2] or b'').decode().strip('()').split(',')
+        names.update(f'{base}.{part.split()[0]}' for part in parts if part.strip())
+    imported = frozenset(name for name in names if _path(name) is not None)
+    return hashlib.sha256(source).hexdigest(), imported
+
+
+@cache
+def _path(module: str) -> Path | None:
+    """Return the file of a module of this package, None if there is none."""
+    stem = _PACKAGE.joinpath(*module.split('.')[1:])
+    for path in (stem.with_name(f'{stem.name}.py'), stem / '__init__.py'):
+        if path.is_file():
+            return path
+    return None
+
+
+@cache
+def _compiler() -> tuple[object, ...]:
+    """Return what besides source and processor the machine code depends on."""
+    settings = sorted(
+        f'{name}={value}'
+        for name, value in os.environ.items()
+        if name.startswith('NUMBA_') and 'CACHE' not in name and 'THREAD' not in name
+    )
+    versions = (sys.version, numba.__version__, llvmlite.__version__, np.__version__)
+    return (*versions, config.USING_SVML, settings)
+
+
+@cache
+def _root() -> Path | None:
+    """Return the folder that compiled code is kept in; None if none can be written."""
+    told = []
+    for path, own in _places():
+        try:
+            _make(path)
+            if own:
+                about = path.lstat()
+                if not stat.S_ISDIR(about.st_mode) or about.st_uid != os.getuid():
+                    raise PermissionError(0, 'it belongs to somebody else')
+                path.chmod(0o700)
+            tempfile.TemporaryFile(dir=path).close()
+        except OSError as error:
+            told.append(f'{path}: {error.strerror}')
+        else:
+            if told and CACHE_DIR in os.environ:
+                _log.warning('%s is not used (%s) but %s', CACHE_DIR, told[0], path)
+            return path
+    _say_not_kept('; '.join(told))
+    return None
+
+
+def _places() -> Iterator[tuple[Path, bool]]:
+    """Yield where compiled code may be kept; True for a place that anybody can make."""
+    given = os.environ.get(CACHE_DIR)
+    if given:
+        yield Path(given).absolute(), False
+    user = os.environ.get('XDG_CACHE_HOME', '')
+    home = Path(user if os.path.isabs(user) else os.path.expanduser('~/.cache'))
+    if home.is_absolute():
+        yield home / _NAME, False
+    with contextlib.suppress(OSError):  # no such folder at all
+        yield Path(tempfile.gettempdir()) / f'{_NAME}-{os.getuid()}', True
+
+
+def _make(folder: Path) -> None:
+    """Make a folder that only its owner can read and write."""
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+
+
+@cache
+def _say_not_kept(why: str) -> None:
+    _log.warning(
+        'compiled code is not kept, so each start takes a minute longer (%s); '
+        'set %s to a folder that can be written',
+        why,
+        CACHE_DIR,
+    )
+
+
+@cache
+def _mark_used(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        os.utime(folder)
+
+
+def _forget_old(new: Path) -> None:
+    """Remove the folders of a module that were not used for longest."""
+    module = new.name.rpartition('-')[0]
+    found = []
+    for entry in os.scandir(new.parent):
+        match = _FOLDER.fullmatch(entry.name)
+        if match and match['module'] == module and entry.is_dir(follow_symlinks=False):
+            found.append((entry.stat(follow_symlinks=False).st_mtime_ns, entry.path))
+    for _, path in sorted(found, reverse=True)[_KEPT:]:
+        shutil.rmtree(path, ignore_errors=True)

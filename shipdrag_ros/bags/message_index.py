@@ -12,10 +12,10 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba import types as nb
 from numpy.typing import NDArray
 
+from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.samples import Int64, UInt8
 
 CHANNELS = 1 << 16
@@ -186,7 +186,7 @@ def index_messages(
     return Indexed(found[:n], others[:m], told)
 
 
-@njit
+@compiled
 def _uint64(data: Any, place: Any) -> Any:
     at = _U(place)
     return (
@@ -205,25 +205,36 @@ _BYTES_READ = nb.Array(nb.uint8, 1, 'C', readonly=True)
 _PLACES_READ = nb.Array(nb.int64, 1, 'C', readonly=True)
 
 
-@njit(
-    nb.UniTuple(nb.int64, 2)(
-        _BYTES_READ,
-        _PLACES_READ,
-        _PLACES_READ,
-        _BYTES_READ,
-        nb.int64[::1],
-        nb.int64[::1],
-        nb.uint16[::1],
-        nb.int64[::1],
-        nb.int64[::1],
-        nb.int64[::1],
-        nb.int64[:, ::1],
-    ),
-    cache=True,
+_SIGNATURE: Signature = nb.UniTuple(nb.int64, 2)(
+    _BYTES_READ,
+    _PLACES_READ,
+    _PLACES_READ,
+    _BYTES_READ,
+    nb.int64[::1],
+    nb.int64[::1],
+    nb.uint16[::1],
+    nb.int64[::1],
+    nb.int64[::1],
+    nb.int64[::1],
+    nb.int64[:, ::1],
 )
-def _index(  # type: ignore[no-untyped-def]
-    data, bounds, offsets, wanted, log_ns, segment, channel, start, end, others, damage
-):
+_PACK: Signature = nb.void(_BYTES_READ, _PLACES_READ, _PLACES_READ, nb.uint8[::1])
+
+
+@compiled(_SIGNATURE)
+def _index(
+    data: UInt8,
+    bounds: Int64,
+    offsets: Int64,
+    wanted: UInt8,
+    log_ns: Int64,
+    segment: Int64,
+    channel: NDArray[np.uint16],
+    start: Int64,
+    end: Int64,
+    others: Int64,
+    damage: Int64,
+) -> tuple[int, int]:
     n = 0
     m = 0
     for s in range(len(offsets)):
@@ -267,8 +278,8 @@ def _index(  # type: ignore[no-untyped-def]
     return n, m
 
 
-@njit(nb.void(_BYTES_READ, _PLACES_READ, _PLACES_READ, nb.uint8[::1]), cache=True)
-def _pack(data, start, end, packed):  # type: ignore[no-untyped-def]
+@compiled(_PACK)
+def _pack(data: UInt8, start: Int64, end: Int64, packed: UInt8) -> None:
     at = 0
     for i in range(len(start)):
         for place in range(start[i], end[i]):

@@ -16,10 +16,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from shipdrag_ros.coastdown.validate import NEVER
-from shipdrag_ros.compiled import INLINED, UNCOUNTED
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Channel, Float64, Int64
 
 BINNED = len(Channel)
@@ -94,7 +93,7 @@ class Bins(NamedTuple):
         )
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def smoothing(width: int) -> int:
     """
     Return over how many bins positions are averaged before they make a speed.
@@ -104,7 +103,7 @@ def smoothing(width: int) -> int:
     return int(max(1, width // 6))
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _span(bins: Bins, channel: int, last: int, width: int) -> tuple[int, int]:
     """
     Say whose totals differ by the bins last - width + 1 .. last, as far as these are kept.
@@ -119,7 +118,7 @@ def _span(bins: Bins, channel: int, last: int, width: int) -> tuple[int, int]:
     return before, max(before, min(last, newest))
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _mean(
     bins: Bins, channel: int, last: int, width: int, a: int, b: int
 ) -> tuple[float, float, float, int]:
@@ -139,7 +138,7 @@ def _mean(
     )
 
 
-@njit(**INLINED, cache=True)
+@compiled(inline=True, uncounted=True)
 def mean_place(bins: Bins, channel: int, last: int, width: int) -> tuple[float, float, float, int]:
     """
     Average two columns over the bins last - width + 1 .. last.
@@ -153,7 +152,7 @@ def mean_place(bins: Bins, channel: int, last: int, width: int) -> tuple[float, 
     return time, a / UNIT[channel], b / UNIT[channel], count
 
 
-@njit(**INLINED, cache=True)
+@compiled(inline=True, uncounted=True)
 def displacement(bins: Bins, channel: int, last: int, width: int) -> tuple[float, float, float]:
     """
     Return time [s] and way east and north [m] between two neighbouring spans.
@@ -185,7 +184,7 @@ def displacement(bins: Bins, channel: int, last: int, width: int) -> tuple[float
     return time, (a1 - a0) / PER_UNIT, (b1 - b0) / PER_UNIT
 
 
-@njit(**INLINED, cache=True)
+@compiled(inline=True, uncounted=True)
 def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, int]:
     """
     Fit a straight line to the speed over the bins last - width + 1 .. last.
@@ -229,7 +228,7 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
     return slope * (PER_SECOND / PER_UNIT), level / PER_UNIT, count
 
 
-@njit(**INLINED, cache=True)
+@compiled(inline=True, uncounted=True)
 def mean_turning(bins: Bins, channel: int, last: int, width: int) -> tuple[float, int]:
     """
     Return the mean size of a shaft speed over the bins last - width + 1 .. last.
@@ -238,7 +237,7 @@ def mean_turning(bins: Bins, channel: int, last: int, width: int) -> tuple[float
     return turning, count
 
 
-@njit(**INLINED, cache=True)
+@compiled(inline=True, uncounted=True)
 def newest_bin(bins: Bins, channel: int) -> int:
     """
     Return the number of the last bin that holds anything; NEVER if none does.
@@ -248,7 +247,7 @@ def newest_bin(bins: Bins, channel: int) -> int:
     return int(bins.filling[channel])
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def speeds_kept(bins: Bins, source: int, last: int, width: int, speeds: Float64) -> int:
     """
     Put the speeds [m/s] of the bins last - width + 1 .. last in an array.

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from shipdrag_ros.coastdown.bins import (
     COUNT,
@@ -29,7 +28,7 @@ from shipdrag_ros.coastdown.bins import (
     smoothing,
 )
 from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS
-from shipdrag_ros.compiled import INLINED
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, Channel, Int64
 
 _GEODETIC = int(Channel.POSITION_GEODETIC)
@@ -40,7 +39,7 @@ _FARTHEST = 9e18  # beyond it there is no integer for a value
 _FASTEST = int(ABSURD_SPEED_M_S * PER_UNIT)
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def add(bins: Bins, channel: int, number: int, stamp: int, a: float, b: float) -> None:
     """
     Add an accepted sample to the bin being filled.
@@ -60,7 +59,7 @@ def add(bins: Bins, channel: int, number: int, stamp: int, a: float, b: float) -
     bins.sums[channel, 2] += b
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def close(bins: Bins, channel: int, width: int) -> int:
     """
     Close the bin being filled and return its number.
@@ -102,7 +101,7 @@ def close(bins: Bins, channel: int, width: int) -> int:
     return int(number)
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _add_speed(bins: Bins, source: int, before: int, number: int, time: int, speed: int) -> None:
     """Take the speed of a bin into the totals, unless it is faster than any ship."""
     speeds = bins.speeds[source]
@@ -117,7 +116,7 @@ def _add_speed(bins: Bins, source: int, before: int, number: int, time: int, spe
     total[TIME_SPEED] += time * speed
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _repeat(totals: Int64, before: int, number: int) -> None:
     """Repeat the total of the bin `before` up to the bin `number`."""
     mask = len(totals) - 1
@@ -128,7 +127,7 @@ def _repeat(totals: Int64, before: int, number: int) -> None:
             total[i] = old[i]
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _speed_of_track(bins: Bins, channel: int, number: int, width: int) -> tuple[int, int]:
     """Return time [ms] and speed from the means of 2 x `width` bins."""
     time, east, north = displacement(bins, channel, number, width)
@@ -140,7 +139,7 @@ def _speed_of_track(bins: Bins, channel: int, number: int, width: int) -> tuple[
     return number * PER_SECOND + middle, _whole(speed * PER_UNIT)
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _whole(value: float) -> int:
     """Return the nearest integer."""
     return int(np.rint(max(-_FARTHEST, min(_FARTHEST, value))))

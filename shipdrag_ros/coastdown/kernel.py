@@ -10,11 +10,9 @@ sample on: how the record is cut into blocks cannot matter.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import IntEnum
-from typing import cast
 
-from numba import njit, typeof, types
+from numba import typeof, types
 
 from shipdrag_ros.coastdown.bins import SOURCES, Bins, line, mean_turning, newest_bin
 from shipdrag_ros.coastdown.filling import add, close
@@ -33,7 +31,7 @@ from shipdrag_ros.coastdown.validate import (
     examine,
     remember,
 )
-from shipdrag_ros.compiled import INLINED, UNCOUNTED, digest
+from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
 
@@ -66,7 +64,7 @@ _SLOPE = int(Stop.SLOPE)
 _SHAFT_SLOWED = int(Stop.SHAFT)
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
     """Say whether no better source has delivered within data_stop_s."""
     oldest = number - tuning.data_stop_ns // SECOND_NS
@@ -77,7 +75,7 @@ def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
     return best == source
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def _shaft_tells(bins: Bins, tuning: Tuning, number: int) -> bool:
     """Say whether a stop of the engine would show in the shaft speed."""
     last = newest_bin(bins, _SHAFT)
@@ -87,7 +85,7 @@ def _shaft_tells(bins: Bins, tuning: Tuning, number: int) -> bool:
     return bool(count > 0 and turning >= SHAFT_TURNING_RAD_S)
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _look_at_speed(
     bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
 ) -> int:
@@ -129,7 +127,7 @@ def _look_at_speed(
     return 0
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int:
     """Judge a closed bin of the shaft speed; return a `Stop` code, 0 to go on."""
     if (
@@ -149,8 +147,22 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int
     return 0
 
 
-@njit(**UNCOUNTED)
-def _walk(
+_SLOPES = Slopes.of(Parameters())
+_SIGNATURE: Signature = types.UniTuple(types.int64, 2)(
+    typeof(Memory.fresh(_SLOPES, seconds=1, tally=Tally.fresh())),
+    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0, 0.0)),
+    CHANNEL_CODES,
+    STAMPS,
+    STAMPS,
+    VALUES,
+    VALUES,
+    types.int64,
+)
+
+
+# compiled on import, so that no coastdown waits for it
+@compiled(_SIGNATURE, uncounted=True)
+def walk(
     memory: Memory,
     tuning: Tuning,
     channel: UInt8,
@@ -215,31 +227,3 @@ def _walk(
         i += 1
     append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)
     return i, stop
-
-
-_SLOPES = Slopes.of(Parameters())
-_SIGNATURE = types.UniTuple(types.int64, 2)(
-    typeof(Memory.fresh(_SLOPES, seconds=1, tally=Tally.fresh())),
-    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0, 0.0)),
-    CHANNEL_CODES,
-    STAMPS,
-    STAMPS,
-    VALUES,
-    VALUES,
-    types.int64,
-)
-
-
-def _compile(sources: str) -> Callable[..., tuple[int, int]]:
-    @njit(_SIGNATURE, **UNCOUNTED, cache=True)
-    def compiled(memory, tuning, channel, stamp_ns, receive_ns, value, variance, start):  # type: ignore[no-untyped-def]
-        _ = sources  # part of the key of the cache
-        return _walk(memory, tuning, channel, stamp_ns, receive_ns, value, variance, start)
-
-    return cast(Callable[..., tuple[int, int]], compiled)
-
-
-_SOURCES = ('validate', 'bins', 'filling', 'ring', 'steadiness', 'memory', 'kernel')
-
-# compiled on import, so that no coastdown waits for it
-walk = _compile(digest('samples.py', *(f'coastdown/{name}.py' for name in _SOURCES)))

@@ -12,9 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from shipdrag_ros.compiled import UNCOUNTED
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Block, Float64, Int64, UInt8
 
 CAPACITY = 1 << 21  # samples kept at most, 100 MB: 5400 s of 390 samples a second
@@ -50,7 +49,7 @@ class Store(NamedTuple):
         )
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def append(
     store: Store,
     channel: UInt8,

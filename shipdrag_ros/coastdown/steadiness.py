@@ -16,12 +16,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy import stats
 
 from shipdrag_ros.coastdown.bins import FIRST_TRACK, SOURCES, Bins, line, smoothing, speeds_kept
 from shipdrag_ros.coastdown.validate import NEVER
-from shipdrag_ros.compiled import INLINED, UNCOUNTED
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 
@@ -139,7 +138,7 @@ class Steadiness(NamedTuple):
         )
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def learn(steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int) -> None:
     """
     Bring the spreads up to the last point at or before the closed bin `number`.
@@ -151,7 +150,7 @@ def learn(steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, numbe
             _learn_scale(steadiness, slopes, bins, source, number, scale)
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def _learn_scale(
     steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int, scale: int
 ) -> None:
@@ -171,7 +170,7 @@ def _learn_scale(
         _replace(changes, gone, _change(slope, slopes.lag, point))
     steadiness.due[source, scale] = (newest + 1) * stride - 1
 
-    count = np.searchsorted(changes, np.inf)
+    count = int(np.searchsorted(changes, np.inf))
     spread = _spread(changes, count)
     threshold = slopes.quantile[scale, count]
     if threshold == np.inf:
@@ -185,14 +184,14 @@ def _learn_scale(
     steadiness.limit[source, scale] = threshold * spread + SLOPE_FLOOR_M_S2
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def _change(slope: Float64, lag: int, point: int) -> float:
     """Return the size of the change of slope at a point; inf where it is not known."""
     change = abs(slope[point % len(slope)] - slope[(point - lag) % len(slope)])
     return np.inf if np.isnan(change) else change
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def _replace(ascending: Float64, gone: float, come: float) -> None:
     """Replace one number by another in an ascending array."""
     i = np.searchsorted(ascending, gone)
@@ -205,7 +204,7 @@ def _replace(ascending: Float64, gone: float, come: float) -> None:
     ascending[i] = come
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def _spread(changes: Float64, known: int) -> float:
     """Return the sd of a slope from the first `known`, ascending sizes of changes of slope."""
     count = int(_KEPT * known)
@@ -217,7 +216,7 @@ def _spread(changes: Float64, known: int) -> float:
     return _TRIMMED * math.sqrt(0.5 * total / count)
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def white_spread(bins: Bins, source: int, last: int, width: int, scratch: Float64) -> float:
     """
     Return the sd of a slope over `width` bins if successive bins differ by white noise.

@@ -22,13 +22,12 @@ sample is tested again, as the first one.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit, typeof, types
+from numba import typeof, types
 
-from shipdrag_ros.compiled import INLINED, UNCOUNTED, digest
+from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
     ABSURD_SPEED_M_S,
@@ -134,7 +133,7 @@ class Limits(NamedTuple):
         )
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def examine(
     guard: Guard, limits: Limits, channel: int, stamp: int, arrival: int, a: float, b: float
 ) -> int:
@@ -175,7 +174,7 @@ def examine(
     return _ACCEPTED
 
 
-@njit(**INLINED)
+@compiled(inline=True, uncounted=True)
 def remember(guard: Guard, channel: int, stamp: int, a: float, b: float) -> None:
     """
     Take an accepted sample into the memory of the tests.
@@ -191,7 +190,7 @@ def remember(guard: Guard, channel: int, stamp: int, a: float, b: float) -> None
         guard.held_since_ns[channel] = stamp
 
 
-@njit(**UNCOUNTED)
+@compiled(uncounted=True)
 def forget(guard: Guard) -> None:
     """
     Return to the state before the first sample.
@@ -224,7 +223,7 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
     Where a clock was set the tests start afresh, as in `Monitor`.
     """
     reasons = np.empty(len(block), np.uint8)
-    _walk_compiled(
+    _walk(
         Guard.fresh(),
         Limits.of(parameters),
         np.ascontiguousarray(block.channel),
@@ -236,7 +235,18 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
     return reasons
 
 
-@njit(**UNCOUNTED)
+_SIGNATURE: Signature = types.void(
+    typeof(Guard.fresh()),
+    typeof(Limits(0, 0)),
+    CHANNEL_CODES,
+    STAMPS,
+    STAMPS,
+    VALUES,
+    types.Array(types.uint8, 1, 'C'),
+)
+
+
+@compiled(_SIGNATURE, uncounted=True)
 def _walk(
     guard: Guard,
     limits: Limits,
@@ -256,26 +266,3 @@ def _walk(
             remember(guard, c, stamp, a, b)
         guard.arrival_ns[0] = receive_ns[i]
         reasons[i] = code
-
-
-_SIGNATURE = types.void(
-    typeof(Guard.fresh()),
-    typeof(Limits(0, 0)),
-    CHANNEL_CODES,
-    STAMPS,
-    STAMPS,
-    VALUES,
-    types.Array(types.uint8, 1, 'C'),
-)
-
-
-def _compile(sources: str) -> Callable[..., None]:
-    @njit(_SIGNATURE, **UNCOUNTED, cache=True)
-    def compiled(guard, limits, channel, stamp_ns, receive_ns, value, reasons):  # type: ignore[no-untyped-def]
-        _ = sources  # part of the key of the cache
-        _walk(guard, limits, channel, stamp_ns, receive_ns, value, reasons)
-
-    return cast(Callable[..., None], compiled)
-
-
-_walk_compiled = _compile(digest('samples.py', 'coastdown/validate.py'))

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import minimize
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.diagnosis.result import Gap
@@ -267,7 +267,7 @@ class FormProblem:
         return found
 
 
-@njit(cache=True)
+@compiled
 def _rate(speed: float, a: float, b: float, shape: Float64, top: float, force: float) -> float:
     """Return dv/dt; the shape is a factor, linear between even speeds up to the top."""
     place = min(abs(speed) / top, 1.0) * (len(shape) - 1)
@@ -276,7 +276,7 @@ def _rate(speed: float, a: float, b: float, shape: Float64, top: float, force: f
     return float(-(a + b * abs(speed)) * speed * factor - force)
 
 
-@njit(cache=True)
+@compiled
 def _coasting(
     time_s: Float64,
     first: Float64,

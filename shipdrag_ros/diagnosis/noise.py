@@ -15,9 +15,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.optimize import minimize
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.samples import Float64, Int64
 
@@ -62,8 +62,10 @@ class Damping(NamedTuple):
     inertia: Float64
 
 
-@njit(cache=True)
-def _carry(cov: Float64, mean: Float64, colour: Colour, rate: float, inertia: float, dt: float):  # type: ignore[no-untyped-def]
+@compiled
+def _carry(
+    cov: Float64, mean: Float64, colour: Colour, rate: float, inertia: float, dt: float
+) -> None:
     """Carry covariance and means over a step."""
     f = np.eye(_STATES)
     decay = math.exp(-rate * dt)
@@ -82,7 +84,7 @@ def _carry(cov: Float64, mean: Float64, colour: Colour, rate: float, inertia: fl
         cov[_GUST + k, _GUST + k] += colour.size[k] ** 2 * (1.0 - f[_GUST + k, _GUST + k] ** 2)
 
 
-@njit(cache=True)
+@compiled
 def whiten(
     rows: Rows, variance: Float64, colour: Colour, damping: Damping, table: Float64
 ) -> float:
@@ -201,7 +203,7 @@ def _units(rows: Rows, variance: Float64, damping_1_s: float, inertia: float) ->
     return np.array([force, _WATER_M_S, speed, max(place_m, 0.5)])
 
 
-@njit(cache=True)
+@compiled
 def _criterion(
     rows: Rows, variance: Float64, colour: Colour, damping: Damping, table: Float64
 ) -> float:
@@ -218,7 +220,7 @@ def _criterion(
     return float(total)
 
 
-@njit(cache=True)
+@compiled
 def apply(whitener: Float64, table: Float64) -> Float64:
     """
     Whiten lines by a matrix; compiled, as the threads of a library do not pay for so small ones.

@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.motion import Motion
 from shipdrag_ros.estimation.result import FroudeMax, ResistanceCurve
@@ -27,7 +27,7 @@ _MIN_POINTS = 3  # fewer are no curve
 _RESISTANCE, _SIGMA, _REPEATABLE, _SLOPE, _SLOPE_SIGMA = range(5)  # rows of `_of_motion`
 
 
-@njit('f8[:, ::1](f8[:], f8[:], f8[:], f8[:, :], f8[:, :], f8[::1], f8)', cache=True)
+@compiled('f8[:, ::1](f8[:], f8[:], f8[:], f8[:, :], f8[:, :], f8[::1], f8)')
 def _of_motion(
     speed: Float64,
     acceleration: Float64,
@@ -134,7 +134,7 @@ def resistance_curve(motion: Motion, ship: Ship, *, froude_min: float) -> Resist
     )
 
 
-@njit('UniTuple(i8, 2)(f8[:], f8[:], f8[:], f8)', cache=True)
+@compiled('UniTuple(i8, 2)(f8[:], f8[:], f8[:], f8)')
 def _falling(
     speed: Float64, acceleration: Float64, froude: Float64, froude_min: float
 ) -> tuple[int, int]:
@@ -173,7 +173,7 @@ def froude_max(curve: ResistanceCurve) -> tuple[float, FroudeMax]:
     return float(curve.froude[top]), FroudeMax.INFLECTION
 
 
-@njit('i8(f8[:], f8[:])', cache=True)
+@compiled('i8(f8[:], f8[:])')
 def _inflection(slope: Float64, sigma: Float64) -> int:
     """Find the first significant maximum; -1: there is none."""
     for top in range(1, len(slope) - 1):

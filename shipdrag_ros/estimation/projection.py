@@ -9,12 +9,10 @@ by AICc, at a cost that a live update can afford.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
-from shipdrag_ros.compiled import digest
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.regression.refit import COEFFICIENT, SSE, evaluate, refit
 from shipdrag_ros.samples import Float64
 
@@ -23,7 +21,7 @@ _STRAIGHT = 2
 _STEPS = 256  # of the integral of the excess
 
 
-@njit('i8(f8[::1], i8)', cache=True)
+@compiled('i8(f8[::1], i8)')
 def _best_order(sse: Float64, n: int) -> int:
     """Order of least AICc, at least a line."""
     best, least = _STRAIGHT, np.inf
@@ -37,59 +35,51 @@ def _best_order(sse: Float64, n: int) -> int:
     return best
 
 
-def _compile_project(sources: str) -> Callable[..., Float64]:
-    @njit('f8[::1](f8[::1], f8[:, ::1])', cache=True)
-    def project(time: Float64, position: Float64) -> Float64:
-        """
-        Return the distance along the track of each position.
+@compiled('f8[::1](f8[::1], f8[:, ::1])')
+def project(time: Float64, position: Float64) -> Float64:
+    """
+    Return the distance along the track of each position.
 
-        Parameters
-        ----------
-        time : (n,)
-            Normalised times, ascending from -1 to 1, 4 or more.
-        position : (n, 2)
-            In a plane [m].
+    Parameters
+    ----------
+    time : (n,)
+        Normalised times, ascending from -1 to 1, 4 or more.
+    position : (n, 2)
+        In a plane [m].
 
-        Returns
-        -------
-        (n,)
-            [m], ascending in the direction of travel; NaN where there is none.
+    Returns
+    -------
+    (n,)
+        [m], ascending in the direction of travel; NaN where there is none.
 
-        Notes
-        -----
-        The excess of the arc over its projection is that of the fitted track: a
-        length summed from noisy positions is biased long.
-        """
-        _ = sources  # part of the key of the cache
-        n = len(time)
-        order = min(_ORDER, n - 2)
-        east = position[:, 0] - position[0, 0]
-        north = position[:, 1] - position[0, 1]
-        to_east = refit(time, east, _STRAIGHT)[COEFFICIENT, 1]
-        to_north = refit(time, north, _STRAIGHT)[COEFFICIENT, 1]
-        length = math.sqrt(to_east * to_east + to_north * to_north)
-        if length == 0.0:
-            return np.full(n, np.nan)
-        cosine, sine = to_east / length, to_north / length
-        ahead, across = cosine * east + sine * north, cosine * north - sine * east
-        bend = refit(time, across, order)
-        bend_order = _best_order(bend[SSE], n)
-        if bend_order == _STRAIGHT:
-            return np.asarray(ahead)
-        along = refit(time, ahead, order)
-        steps = np.linspace(-1.0, 1.0, _STEPS + 1)
-        x = evaluate(along, steps, _best_order(along[SSE], n))[1]
-        y = evaluate(bend, steps, bend_order)[1]
-        excess = np.zeros(_STEPS + 1)
-        last = math.sqrt(x[0] * x[0] + y[0] * y[0]) - abs(x[0])
-        for i in range(1, _STEPS + 1):
-            now = math.sqrt(x[i] * x[i] + y[i] * y[i]) - abs(x[i])
-            excess[i] = excess[i - 1] + (now + last) / _STEPS
-            last = now
-        return np.asarray(ahead + np.interp(time, steps, excess))
-
-    compiled: Callable[..., Float64] = project
-    return compiled
-
-
-project = _compile_project(digest('regression/refit.py'))
+    Notes
+    -----
+    The excess of the arc over its projection is that of the fitted track: a
+    length summed from noisy positions is biased long.
+    """
+    n = len(time)
+    order = min(_ORDER, n - 2)
+    east = position[:, 0] - position[0, 0]
+    north = position[:, 1] - position[0, 1]
+    to_east = refit(time, east, _STRAIGHT)[COEFFICIENT, 1]
+    to_north = refit(time, north, _STRAIGHT)[COEFFICIENT, 1]
+    length = math.sqrt(to_east * to_east + to_north * to_north)
+    if length == 0.0:
+        return np.full(n, np.nan)
+    cosine, sine = to_east / length, to_north / length
+    ahead, across = cosine * east + sine * north, cosine * north - sine * east
+    bend = refit(time, across, order)
+    bend_order = _best_order(bend[SSE], n)
+    if bend_order == _STRAIGHT:
+        return np.asarray(ahead)
+    along = refit(time, ahead, order)
+    steps = np.linspace(-1.0, 1.0, _STEPS + 1)
+    x = evaluate(along, steps, _best_order(along[SSE], n))[1]
+    y = evaluate(bend, steps, bend_order)[1]
+    excess = np.zeros(_STEPS + 1)
+    last = math.sqrt(x[0] * x[0] + y[0] * y[0]) - abs(x[0])
+    for i in range(1, _STEPS + 1):
+        now = math.sqrt(x[i] * x[i] + y[i] * y[i]) - abs(x[i])
+        excess[i] = excess[i - 1] + (now + last) / _STEPS
+        last = now
+    return np.asarray(ahead + np.interp(time, steps, excess))

@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
-from shipdrag_ros.compiled import digest
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.warped_model import combine
 from shipdrag_ros.regression.averaging import condense, posterior
 from shipdrag_ros.samples import Float64, Int64
@@ -23,13 +21,13 @@ _PASSES = 2
 _LAGS = 5  # of the samples; noise that is slower cannot be told from the motion
 
 
-@njit('f8(f8[::1])', cache=True)
+@compiled('f8(f8[::1])')
 def _rounding(value: Float64) -> float:
     """A standard deviation above 0 for data that a fit follows exactly."""
     return 1e-14 * float(max(1e-6, np.abs(value).max()))
 
 
-@njit('f8(f8[::1])', cache=True)
+@compiled('f8(f8[::1])')
 def _spread(value: Float64) -> float:
     """Standard deviation of noise on a smooth curve, from second differences."""
     if len(value) < 3:
@@ -41,14 +39,14 @@ def _spread(value: Float64) -> float:
     return float(max(spread / math.sqrt(6.0), _rounding(value)))
 
 
-@njit('f8(f8, f8, f8, f8, f8)', cache=True)
+@compiled('f8(f8, f8, f8, f8, f8)')
 def _median_of_five(a: float, b: float, c: float, d: float, e: float) -> float:
     # the larger of the two smaller ones and the smaller of the two larger ones stay
     low, high = max(min(a, b), min(c, d)), min(max(a, b), max(c, d))
     return max(min(low, high), min(max(low, high), e))
 
 
-@njit('f8[::1](f8[::1])', cache=True)
+@compiled('f8[::1](f8[::1])')
 def despike(value: Float64) -> Float64:
     """
     Replace spikes by the median of five, to start from.
@@ -62,7 +60,7 @@ def despike(value: Float64) -> Float64:
     return clean
 
 
-@njit('f8(f8)', cache=True)
+@compiled('f8(f8)')
 def _weight(size: float) -> float:
     """Huber's weight of a residual in standard deviations."""
     if size <= HUBER:
@@ -70,7 +68,7 @@ def _weight(size: float) -> float:
     return HUBER / size if size <= GROSS else 0.0
 
 
-@njit('f8(f8[::1])', cache=True)
+@compiled('f8(f8[::1])')
 def _robust_sd(residual: Float64) -> float:
     """Huber's proposal 2, from the median on."""
     size = np.abs(residual)
@@ -84,7 +82,7 @@ def _robust_sd(residual: Float64) -> float:
     return float(sd)
 
 
-@njit('f8(f8[::1], f8[::1])', cache=True)
+@compiled('f8(f8[::1], f8[::1])')
 def _inflation(residual: Float64, weight: Float64) -> float:
     """How many samples of correlated noise are worth one of white noise."""
     n = len(residual)
@@ -99,112 +97,103 @@ def _inflation(residual: Float64, weight: Float64) -> float:
     return result
 
 
-def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, Float64, Float64]]:
-    @njit(
-        'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], f8[::1], '
-        'f8[::1])',
-        cache=True,
-    )
-    def robust_fit(
-        rows: Float64,
-        value: Float64,
-        clean: Float64,
-        count: Int64,
-        known_sd: Float64,
-        columns: Int64,
-        mean: Float64,
-        sd: Float64,
-    ) -> tuple[Float64, Float64, Float64, Float64]:
-        """
-        Fit one model, its weights found from its residuals.
+@compiled(
+    'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], f8[::1], '
+    'f8[::1])',
+)
+def robust_fit(
+    rows: Float64,
+    value: Float64,
+    clean: Float64,
+    count: Int64,
+    known_sd: Float64,
+    columns: Int64,
+    mean: Float64,
+    sd: Float64,
+) -> tuple[Float64, Float64, Float64, Float64]:
+    """
+    Fit one model, its weights found from its residuals.
 
-        Parameters
-        ----------
-        rows : (k, n)
-            Columns of the model at the samples, kind after kind.
-        value, clean : (n,)
-            Measured, and without spikes.
-        count : (kinds,) int64
-            Samples of each kind.
-        known_sd : (kinds,)
-            Standard deviation of each, 0 where unknown.
-        columns : (m,) int64
-            Those in the model.
-        mean, sd : (k,)
-            Prior of the coefficients.
+    Parameters
+    ----------
+    rows : (k, n)
+        Columns of the model at the samples, kind after kind.
+    value, clean : (n,)
+        Measured, and without spikes.
+    count : (kinds,) int64
+        Samples of each kind.
+    known_sd : (kinds,)
+        Standard deviation of each, 0 where unknown.
+    columns : (m,) int64
+        Those in the model.
+    mean, sd : (k,)
+        Prior of the coefficients.
 
-        Returns
-        -------
-        coefficients : (k,)
-        weight : (n,)
-            Inverse variance of each sample.
-        noise_sd : (kinds,)
-            Found from the residuals, robustly; NaN without samples.
-        used_sd : (kinds,)
-            The known one where the residuals do not contradict it.
+    Returns
+    -------
+    coefficients : (k,)
+    weight : (n,)
+        Inverse variance of each sample.
+    noise_sd : (kinds,)
+        Found from the residuals, robustly; NaN without samples.
+    used_sd : (kinds,)
+        The known one where the residuals do not contradict it.
 
-        Notes
-        -----
-        Huber (1981): weights min(1, c / |r|), scale by proposal 2. The inverse
-        variances are such that their inverse normal matrix is his covariance,
-        mean psi^2 / (mean psi')^2, times the number of samples that correlated noise
-        makes worth one, 1 + 2 sum of correlations up to the first that chance explains.
-        """
-        _ = sources  # part of the key of the cache
-        n = len(value)
-        coefficients, weight = np.zeros(len(rows)), np.empty(n)
-        noise_sd, used_sd = np.full(len(count), np.nan), np.full(len(count), np.nan)
-        residual = value - clean
-        free = len(columns) * 0.5  # about half of the coefficients are the prior's
-        for turn in range(_PASSES + 1):
-            first = 0
-            for kind in range(len(count)):
-                last = first + count[kind]
-                if last == first:
-                    continue
-                part = residual[first:last]
-                if turn == 0:
-                    found = _spread(value[first:last])
-                else:
-                    found = max(_robust_sd(part), _rounding(value[first:last]))
-                    found *= math.sqrt(n / max(n - free, 1.0))
-                scale = found
-                if 0.5 * found < known_sd[kind] and found < 1.25 * known_sd[kind]:
-                    scale = known_sd[kind]
-                inside = psi = total = 0.0
-                for i in range(first, last):
-                    size = abs(residual[i]) / scale
-                    w = _weight(size)
-                    weight[i] = w
-                    total += w
-                    psi += (w * size) ** 2
-                    if size <= HUBER:
-                        inside += 1.0
-                if scale == found:
-                    psi, inside = max(psi, 1e-9), max(inside, 1.0)
-                    of_huber = psi * (last - first) / (inside * inside)
-                else:
-                    of_huber = 1.0
-                if turn == 0:
-                    of_huber = 1.0
-                factor = (last - first) / (max(total, 1.0) * of_huber * scale * scale)
-                if turn > 0:
-                    factor /= _inflation(part, weight[first:last])
-                for i in range(first, last):
-                    weight[i] *= factor
-                noise_sd[kind], used_sd[kind] = found, scale
-                first = last
-            if turn < _PASSES:
-                # about nothing at first: the residual of the first turn is to what is clean
-                products = condense(rows, residual if turn else value, weight)
-                _, step, _ = posterior(products, coefficients, columns, mean, sd)
-                for a in range(len(columns)):
-                    coefficients[columns[a]] += step[a]
-                residual = value - combine(rows, coefficients)
-        return coefficients, weight, noise_sd, used_sd
-
-    compiled: Callable[..., tuple[Float64, Float64, Float64, Float64]] = robust_fit
-    return compiled
-
-
-robust_fit = _compile_robust_fit(digest('regression/averaging.py', 'estimation/warped_model.py'))
+    Notes
+    -----
+    Huber (1981): weights min(1, c / |r|), scale by proposal 2. The inverse
+    variances are such that their inverse normal matrix is his covariance,
+    mean psi^2 / (mean psi')^2, times the number of samples that correlated noise
+    makes worth one, 1 + 2 sum of correlations up to the first that chance explains.
+    """
+    n = len(value)
+    coefficients, weight = np.zeros(len(rows)), np.empty(n)
+    noise_sd, used_sd = np.full(len(count), np.nan), np.full(len(count), np.nan)
+    residual = value - clean
+    free = len(columns) * 0.5  # about half of the coefficients are the prior's
+    for turn in range(_PASSES + 1):
+        first = 0
+        for kind in range(len(count)):
+            last = first + count[kind]
+            if last == first:
+                continue
+            part = residual[first:last]
+            if turn == 0:
+                found = _spread(value[first:last])
+            else:
+                found = max(_robust_sd(part), _rounding(value[first:last]))
+                found *= math.sqrt(n / max(n - free, 1.0))
+            scale = found
+            if 0.5 * found < known_sd[kind] and found < 1.25 * known_sd[kind]:
+                scale = known_sd[kind]
+            inside = psi = total = 0.0
+            for i in range(first, last):
+                size = abs(residual[i]) / scale
+                w = _weight(size)
+                weight[i] = w
+                total += w
+                psi += (w * size) ** 2
+                if size <= HUBER:
+                    inside += 1.0
+            if scale == found:
+                psi, inside = max(psi, 1e-9), max(inside, 1.0)
+                of_huber = psi * (last - first) / (inside * inside)
+            else:
+                of_huber = 1.0
+            if turn == 0:
+                of_huber = 1.0
+            factor = (last - first) / (max(total, 1.0) * of_huber * scale * scale)
+            if turn > 0:
+                factor /= _inflation(part, weight[first:last])
+            for i in range(first, last):
+                weight[i] *= factor
+            noise_sd[kind], used_sd[kind] = found, scale
+            first = last
+        if turn < _PASSES:
+            # about nothing at first: the residual of the first turn is to what is clean
+            products = condense(rows, residual if turn else value, weight)
+            _, step, _ = posterior(products, coefficients, columns, mean, sd)
+            for a in range(len(columns)):
+                coefficients[columns[a]] += step[a]
+            residual = value - combine(rows, coefficients)
+    return coefficients, weight, noise_sd, used_sd

@@ -10,12 +10,10 @@ not share: a current, a factor of the log, and the run-down of the thrust.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
-from shipdrag_ros.compiled import digest
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.regression.refit import evaluate, refit
 from shipdrag_ros.samples import Float64, Int64
 
@@ -28,61 +26,53 @@ _SHORTEST = 0.02
 _CRUDE_ORDER = 4  # coefficients of the speed
 
 
-def _compile_quadratic_coast(sources: str) -> Callable[..., tuple[float, float]]:
-    @njit('UniTuple(f8, 2)(f8[::1], f8[::1], f8, i8)', cache=True)
-    def quadratic_coast(
-        time: Float64, value: Float64, span: float, derivative: int
-    ) -> tuple[float, float]:
-        """
-        Return tc and v0 of v = v0 / (1 + t / tc), from a line through 1 / v.
+@compiled('UniTuple(f8, 2)(f8[::1], f8[::1], f8, i8)')
+def quadratic_coast(
+    time: Float64, value: Float64, span: float, derivative: int
+) -> tuple[float, float]:
+    """
+    Return tc and v0 of v = v0 / (1 + t / tc), from a line through 1 / v.
 
-        Parameters
-        ----------
-        time : (n,)
-            From the start [s].
-        value : (n,)
-            Speed, or distance where `derivative` is 1.
-        span
-            Length of the window [s].
-        derivative
-            Of the value that is the speed.
-        """
-        _ = sources  # part of the key of the cache
-        order = min(_CRUDE_ORDER + derivative, len(time) - 1)
-        half = 0.5 * (time[-1] - time[0])
-        middle = 0.5 * (time[-1] + time[0])
-        table = refit((time - middle) / half, value, order)
-        grid = np.linspace(-1.0, 1.0, 33)
-        speed = evaluate(table, grid, order)[derivative]
-        if derivative == 1:
-            speed = speed / half
-        top = np.abs(speed).max()
-        w = wt = wtt = wy = wty = 0.0
-        for i in range(len(grid)):
-            t = middle + half * grid[i]
-            v = max(speed[i], 0.05 * top)
-            # the error of 1 / v is that of v over v^2
-            weight = (v / top) ** 4
-            w += weight
-            wt += weight * t
-            wtt += weight * t * t
-            wy += weight / v
-            wty += weight * t / v
-        slope = (w * wty - wt * wy) / (w * wtt - wt * wt)
-        at_start = (wy - slope * wt) / w
-        tc = _LONGEST * span
-        if at_start > 0.0 and slope * tc > at_start:
-            tc = max(at_start / slope, _SHORTEST * span)
-        return tc, top
-
-    compiled: Callable[..., tuple[float, float]] = quadratic_coast
-    return compiled
+    Parameters
+    ----------
+    time : (n,)
+        From the start [s].
+    value : (n,)
+        Speed, or distance where `derivative` is 1.
+    span
+        Length of the window [s].
+    derivative
+        Of the value that is the speed.
+    """
+    order = min(_CRUDE_ORDER + derivative, len(time) - 1)
+    half = 0.5 * (time[-1] - time[0])
+    middle = 0.5 * (time[-1] + time[0])
+    table = refit((time - middle) / half, value, order)
+    grid = np.linspace(-1.0, 1.0, 33)
+    speed = evaluate(table, grid, order)[derivative]
+    if derivative == 1:
+        speed = speed / half
+    top = np.abs(speed).max()
+    w = wt = wtt = wy = wty = 0.0
+    for i in range(len(grid)):
+        t = middle + half * grid[i]
+        v = max(speed[i], 0.05 * top)
+        # the error of 1 / v is that of v over v^2
+        weight = (v / top) ** 4
+        w += weight
+        wt += weight * t
+        wtt += weight * t * t
+        wy += weight / v
+        wty += weight * t / v
+    slope = (w * wty - wt * wy) / (w * wtt - wt * wt)
+    at_start = (wy - slope * wt) / w
+    tc = _LONGEST * span
+    if at_start > 0.0 and slope * tc > at_start:
+        tc = max(at_start / slope, _SHORTEST * span)
+    return tc, top
 
 
-quadratic_coast = _compile_quadratic_coast(digest('regression/refit.py'))
-
-
-@njit('f8[:, ::1](f8[::1], i8[::1], f8, f8, f8, f8, i8)', cache=True, fastmath=_SUMS)
+@compiled('f8[:, ::1](f8[::1], i8[::1], f8, f8, f8, f8, i8)', fastmath=_SUMS)
 def design(
     time: Float64,
     count: Int64,
@@ -143,7 +133,7 @@ def design(
     return columns
 
 
-@njit('f8[::1](f8[:, ::1], f8[::1])', cache=True, fastmath=_SUMS)
+@compiled('f8[::1](f8[:, ::1], f8[::1])', fastmath=_SUMS)
 def combine(columns: Float64, coefficients: Float64) -> Float64:
     """
     Return the model at the rows: (k, n), (k,) -> (n,).
@@ -157,7 +147,7 @@ def combine(columns: Float64, coefficients: Float64) -> Float64:
     return total
 
 
-@njit('f8[:, :, ::1](f8, f8, i8, i8)', cache=True)
+@compiled('f8[:, :, ::1](f8, f8, i8, i8)')
 def coast_rows(tc: float, span: float, polynomials: int, points: int) -> Float64:
     """
     Return speed, acceleration and jerk of each polynomial.
@@ -192,9 +182,8 @@ def coast_rows(tc: float, span: float, polynomials: int, points: int) -> Float64
     return rows
 
 
-@njit(
+@compiled(
     'Tuple((f8[:, ::1], f8[:, :, ::1]))(f8, f8, f8[::1], f8[:, ::1], i8, f8)',
-    cache=True,
     fastmath=_SUMS,
 )
 def coast_motion(

@@ -11,12 +11,10 @@ that they are free where drag is, near the top, and stiff where it is not.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
-from shipdrag_ros.compiled import digest
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.families import (
     CUBIC_SD,
     HUMP_SIZES,
@@ -68,79 +66,71 @@ def coast_priors(
     return result
 
 
-def _compile_bends(sources: str) -> Callable[..., Float64]:
-    @njit('f8[:, ::1](f8, i8[::1], i8, f8, f8, i8)', cache=True, fastmath=_SUMS)
-    def bends(
-        length: float, powers: Int64, humps: int, first: float, spacing: float, k: int
-    ) -> Float64:
-        """
-        Return what the start and each part of r do to the coefficients.
+@compiled('f8[:, ::1](f8, i8[::1], i8, f8, f8, i8)', fastmath=_SUMS)
+def _bends(
+    length: float, powers: Int64, humps: int, first: float, spacing: float, k: int
+) -> Float64:
+    """
+    Return what the start and each part of r do to the coefficients.
 
-        Parameters
-        ----------
-        length
-            See `coast_priors`.
-        powers, humps, first, spacing
-            See `Law`.
-        k
-            Polynomials.
+    Parameters
+    ----------
+    length
+        See `coast_priors`.
+    powers, humps, first, spacing
+        See `Law`.
+    k
+        Polynomials.
 
-        Returns
-        -------
-        (1 + parts, k)
-            For 1 of the speed at the start, then for each part as large as r there;
-            of a coast of speed and time constant 1.
+    Returns
+    -------
+    (1 + parts, k)
+        For 1 of the speed at the start, then for each part as large as r there;
+        of a coast of speed and time constant 1.
 
-        Notes
-        -----
-        With w = 1 + t / tc the quadratic coast is v = 1 / w, and a part f(v) of r
-        changes it by -(1 / w^2) times the integral of f(1 / w) w^2.
-        """
-        _ = sources  # part of the key of the cache
-        law = Law(powers, 1.0, 0.0, np.zeros(1), humps, first, spacing)
-        parts = len(powers) + humps
-        columns = np.zeros((k, 1 + parts))
-        before, middle, now = np.empty(parts), np.empty(parts), np.empty(parts)
-        slope, total = np.empty(parts), np.zeros(parts)
-        rate = np.empty(1 + parts)  # of distance by warped time
-        w_before = 1.0
-        shapes(law, 1.0, before, slope)
-        for i in range(_NODES):
-            s = -math.cos(math.pi * (i + 0.5) / _NODES)
-            w = math.exp(0.5 * length * (s + 1.0))
-            w_middle = 0.5 * (w + w_before)
-            shapes(law, 1.0 / w_middle, middle, slope)
-            shapes(law, 1.0 / w, now, slope)
-            rate[0] = 1.0 / w
-            for p in range(parts):
-                now[p] *= w * w
-                # Simpson
-                mean = (before[p] + 4.0 * middle[p] * w_middle * w_middle + now[p]) / 6.0
-                total[p] += (w - w_before) * mean
-                rate[1 + p] = -total[p] / w
-                before[p] = now[p]
-            w_before = w
-            # its Chebyshev series to degree k - 2, integrated
-            t_before, t = s, 1.0
-            for j in range(k - 1):
-                weight = length / _NODES * t * (1.0 if j == 0 else 0.5)
+    Notes
+    -----
+    With w = 1 + t / tc the quadratic coast is v = 1 / w, and a part f(v) of r
+    changes it by -(1 / w^2) times the integral of f(1 / w) w^2.
+    """
+    law = Law(powers, 1.0, 0.0, np.zeros(1), humps, first, spacing)
+    parts = len(powers) + humps
+    columns = np.zeros((k, 1 + parts))
+    before, middle, now = np.empty(parts), np.empty(parts), np.empty(parts)
+    slope, total = np.empty(parts), np.zeros(parts)
+    rate = np.empty(1 + parts)  # of distance by warped time
+    w_before = 1.0
+    shapes(law, 1.0, before, slope)
+    for i in range(_NODES):
+        s = -math.cos(math.pi * (i + 0.5) / _NODES)
+        w = math.exp(0.5 * length * (s + 1.0))
+        w_middle = 0.5 * (w + w_before)
+        shapes(law, 1.0 / w_middle, middle, slope)
+        shapes(law, 1.0 / w, now, slope)
+        rate[0] = 1.0 / w
+        for p in range(parts):
+            now[p] *= w * w
+            # Simpson
+            mean = (before[p] + 4.0 * middle[p] * w_middle * w_middle + now[p]) / 6.0
+            total[p] += (w - w_before) * mean
+            rate[1 + p] = -total[p] / w
+            before[p] = now[p]
+        w_before = w
+        # its Chebyshev series to degree k - 2, integrated
+        t_before, t = s, 1.0
+        for j in range(k - 1):
+            weight = length / _NODES * t * (1.0 if j == 0 else 0.5)
+            for p in range(1 + parts):
+                columns[j + 1, p] += weight / (j + 1) * rate[p]
+            if j > 1:
                 for p in range(1 + parts):
-                    columns[j + 1, p] += weight / (j + 1) * rate[p]
-                if j > 1:
-                    for p in range(1 + parts):
-                        columns[j - 1, p] -= weight / (j - 1) * rate[p]
-                t_before, t = t, 2.0 * s * t - t_before
-        columns[:FREE] = 0.0
-        return np.ascontiguousarray(columns.T)
-
-    compiled: Callable[..., Float64] = bends
-    return compiled
+                    columns[j - 1, p] -= weight / (j - 1) * rate[p]
+            t_before, t = t, 2.0 * s * t - t_before
+    columns[:FREE] = 0.0
+    return np.ascontiguousarray(columns.T)
 
 
-_bends = _compile_bends(digest('estimation/motion_fit/law.py'))
-
-
-@njit('f8[:, ::1](f8[:, ::1], f8[::1])', cache=True, fastmath=_SUMS)
+@compiled('f8[:, ::1](f8[:, ::1], f8[::1])', fastmath=_SUMS)
 def _spread(bends: Float64, sd: Float64) -> Float64:
     """Return the covariance (k, k) of parts with some sd (b,) on bends (b, k)."""
     k = bends.shape[1]
@@ -153,9 +143,8 @@ def _spread(bends: Float64, sd: Float64) -> Float64:
     return covariance
 
 
-@njit(
+@compiled(
     'Tuple((f8[:, ::1], f8[:, :, ::1]))(f8, f8, f8[:, ::1], f8, f8[::1], f8[::1], f8[::1])',
-    cache=True,
 )
 def _priors(
     unit: float,

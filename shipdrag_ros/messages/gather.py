@@ -12,11 +12,12 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba import types as nb
 
+from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.messages.layout import Step
 from shipdrag_ros.messages.types import ENCAPSULATION_BYTES, PADDING_BYTES
+from shipdrag_ros.samples import Float64, Int64, UInt8
 
 
 class Found(IntEnum):
@@ -50,7 +51,7 @@ _BAD = -1
 _U = np.uint64
 
 
-@njit
+@compiled
 def _word(data: Any, place: int, big: bool) -> Any:
     at = _U(place)
     if big:
@@ -68,17 +69,17 @@ def _word(data: Any, place: int, big: bool) -> Any:
     )
 
 
-@njit
+@compiled
 def _as_float64(bits: Any) -> Any:
     return _U(bits).view(np.float64)
 
 
-@njit
+@compiled
 def _as_float32(bits: Any) -> Any:
     return np.uint32(bits).view(np.float32)
 
 
-@njit
+@compiled
 def _float64(data: Any, place: int, big: bool) -> Any:
     first = _word(data, place, big)
     second = _word(data, place + 4, big)
@@ -87,12 +88,12 @@ def _float64(data: Any, place: int, big: bool) -> Any:
     return _as_float64(second << _U(32) | first)
 
 
-@njit
+@compiled
 def _float32(data: Any, place: int, big: bool) -> Any:
     return np.float64(_as_float32(_word(data, place, big)))
 
 
-@njit
+@compiled
 def _is_utf8(data: Any, start: int, end: int) -> bool:
     """Say whether bytes are UTF-8, as Python decodes it."""
     at = start
@@ -118,24 +119,24 @@ def _is_utf8(data: Any, start: int, end: int) -> bool:
     return True
 
 
-@njit
+@compiled
 def _aligned(at: int, size: int) -> int:
     return (at + size - 1) & -size
 
 
-@njit
+@compiled
 def _string_end(data: Any, body: int, at: int, size: int, big: bool) -> Any:
     """Return the end of the string at a place, `_BAD` if there is none."""
     if at + 4 > size:
         return _BAD
-    length = np.int64(_word(data, body + at, big))
+    length = int(np.int64(_word(data, body + at, big)))
     end = at + 4 + length
     if length < 1 or end > size or data[_U(body + end - 1)] != 0:
         return _BAD
     return end if _is_utf8(data, body + at + 4, body + end - 1) else _BAD
 
 
-@njit
+@compiled
 def _is_name(data: Any, start: int, end: int, name: Any) -> bool:
     if end - start != len(name):
         return False
@@ -145,7 +146,7 @@ def _is_name(data: Any, start: int, end: int, name: Any) -> bool:
     return same
 
 
-@njit
+@compiled
 def _read(
     data: Any, start: int, end: int, steps: Any, name: Any, i: Any, stamp_ns: Any, rows: Any
 ) -> int:
@@ -217,21 +218,31 @@ _BUFFER = nb.Array(nb.uint8, 1, 'C', readonly=True)
 _PLACES = nb.Array(nb.int64, 1, 'C', readonly=True)
 
 
-@njit(
-    nb.void(
-        _BUFFER,
-        _PLACES,
-        _PLACES,
-        _PLACES,
-        nb.Array(nb.int64, 2, 'C', readonly=True),
-        _BUFFER,
-        nb.int64[::1],
-        nb.float64[:, ::1],
-        nb.uint8[::1],
-    ),
-    cache=True,
+_SIGNATURE: Signature = nb.void(
+    _BUFFER,
+    _PLACES,
+    _PLACES,
+    _PLACES,
+    nb.Array(nb.int64, 2, 'C', readonly=True),
+    _BUFFER,
+    nb.int64[::1],
+    nb.float64[:, ::1],
+    nb.uint8[::1],
 )
-def gather(data, start, end, place, steps, name, stamp_ns, rows, found):  # type: ignore[no-untyped-def]
+
+
+@compiled(_SIGNATURE)
+def gather(
+    data: UInt8,
+    start: Int64,
+    end: Int64,
+    place: Int64,
+    steps: Int64,
+    name: UInt8,
+    stamp_ns: Int64,
+    rows: Float64,
+    found: UInt8,
+) -> None:
     """
     Read the stamp and the wanted numbers of some messages.
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 _BLOCK = 128
@@ -23,7 +23,7 @@ _NEGLIGIBLE = 1e-3  # weight of a model against the best; the rest is left out o
 _SUMS = {'reassoc', 'contract', 'nsz'}
 
 
-@njit('f8[:, ::1](f8[:, ::1], f8[::1], f8[::1])', cache=True, fastmath=_SUMS)
+@compiled('f8[:, ::1](f8[:, ::1], f8[::1], f8[::1])', fastmath=_SUMS)
 def condense(rows: Float64, residual: Float64, weight: Float64) -> Float64:
     """
     Return the weighted products of all columns and of the residual.
@@ -62,7 +62,7 @@ def condense(rows: Float64, residual: Float64, weight: Float64) -> Float64:
     return products
 
 
-@njit('b1(f8[:, ::1])', cache=True)
+@compiled('b1(f8[:, ::1])')
 def _factor(matrix: Float64) -> bool:
     """Cholesky in place, lower, row by row; False where it is not positive."""
     n = len(matrix)
@@ -81,7 +81,7 @@ def _factor(matrix: Float64) -> bool:
     return True
 
 
-@njit('void(f8[:, ::1], f8[::1])', cache=True)
+@compiled('void(f8[:, ::1], f8[::1])')
 def _forward(lower: Float64, vector: Float64) -> None:
     """Solve L x = b in place."""
     for i in range(len(vector)):
@@ -91,7 +91,7 @@ def _forward(lower: Float64, vector: Float64) -> None:
         vector[i] = total / lower[i, i]
 
 
-@njit('void(f8[:, ::1], f8[::1])', cache=True)
+@compiled('void(f8[:, ::1], f8[::1])')
 def _backward(lower: Float64, vector: Float64) -> None:
     """Solve L' x = b in place."""
     n = len(vector)
@@ -102,7 +102,7 @@ def _backward(lower: Float64, vector: Float64) -> None:
         vector[i] = total / lower[i, i]
 
 
-@njit('void(f8[:, ::1], f8[:, ::1])', cache=True, fastmath=_SUMS)
+@compiled('void(f8[:, ::1], f8[:, ::1])', fastmath=_SUMS)
 def _invert(lower: Float64, inverse: Float64) -> None:
     """Invert L L' into another matrix."""
     n = len(lower)
@@ -122,9 +122,7 @@ def _invert(lower: Float64, inverse: Float64) -> None:
             inverse[a, b] = inverse[b, a] = total
 
 
-@njit(
-    'Tuple((f8, f8[::1], f8[:, ::1]))(f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])', cache=True
-)
+@compiled('Tuple((f8, f8[::1], f8[:, ::1]))(f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])')
 def posterior(
     products: Float64,
     start: Float64,
@@ -176,7 +174,7 @@ def posterior(
     return evidence, step, lower
 
 
-@njit('f8[::1](f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])', cache=True)
+@compiled('f8[::1](f8[:, ::1], f8[::1], i8[::1], f8[::1], f8[::1])')
 def deviations(
     products: Float64,
     start: Float64,
@@ -201,7 +199,7 @@ def deviations(
     return found
 
 
-@njit('void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])', cache=True, fastmath=_SUMS)
+@compiled('void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])', fastmath=_SUMS)
 def _between(products: Float64, root: Float64, half: Float64, matrix: Float64) -> None:
     """Fill in half = G R and the matrix R' G R + 1, R lower, G the first k products."""
     k = len(root)
@@ -218,7 +216,7 @@ def _between(products: Float64, root: Float64, half: Float64, matrix: Float64) -
                 matrix[a, b] += root[c, a] * half[c, b]
 
 
-@njit('Tuple((f8[:, ::1], f8[::1]))(f8[:, :], f8[:], b1[:])', cache=True)
+@compiled('Tuple((f8[:, ::1], f8[::1]))(f8[:, :], f8[:], b1[:])')
 def _part(matrix: Float64, vector: Float64, kept: NDArray[np.bool_]) -> tuple[Float64, Float64]:
     """Return the lines of a matrix and a vector that are kept."""
     columns = np.flatnonzero(kept)
@@ -231,10 +229,9 @@ def _part(matrix: Float64, vector: Float64, kept: NDArray[np.bool_]) -> tuple[Fl
     return part, right
 
 
-@njit(
+@compiled(
     'Tuple((f8[::1], f8[:, ::1], f8[:, ::1]))'
     '(f8[:, ::1], f8[::1], b1[:, ::1], f8[::1], f8[:, ::1], f8[:, :, ::1])',
-    cache=True,
 )
 def average(
     products: Float64,
@@ -348,7 +345,7 @@ def average(
     return start + coefficients, second, weight
 
 
-@njit('f8[:, ::1](f8[:, ::1])', cache=True)
+@compiled('f8[:, ::1](f8[:, ::1])')
 def root(covariance: Float64) -> Float64:
     """
     Return a lower root R of a covariance, R R'; it may be singular.

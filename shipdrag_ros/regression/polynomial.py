@@ -15,9 +15,9 @@ from itertools import product
 from math import comb
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 Powers = NDArray[np.int64]
@@ -45,7 +45,7 @@ def terms_up_to(degree: int, most: Sequence[int]) -> Powers:
     return np.array(sorted(found, key=sum), np.int64).reshape(-1, len(most))
 
 
-@njit('f8[:, ::1](f8[:, ::1], i8[:, ::1], f8[::1], i8)', cache=True)
+@compiled('f8[:, ::1](f8[:, ::1], i8[:, ::1], f8[::1], i8)')
 def _evaluate(points: Float64, steps: Powers, coefficients: Float64, slopes: int) -> Float64:
     """
     Evaluate at (d, m) scaled points, and the first `slopes` derivatives.

@@ -9,8 +9,8 @@ and is no faster than this.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 ALPHA, BETA, SQUARED_NORM, COEFFICIENT, SSE = range(5)  # rows of the result
@@ -20,7 +20,7 @@ ALPHA, BETA, SQUARED_NORM, COEFFICIENT, SSE = range(5)  # rows of the result
 _SUMS = {'reassoc', 'contract', 'nsz'}
 
 
-@njit('f8[:, ::1](f8[::1], f8[::1], i8)', cache=True, fastmath=_SUMS)
+@compiled('f8[:, ::1](f8[::1], f8[::1], i8)', fastmath=_SUMS)
 def refit(time: Float64, value: Float64, order: int) -> Float64:
     """
     Fit orthogonal polynomials of orders 1, 2, .. to one input.
@@ -74,7 +74,7 @@ def refit(time: Float64, value: Float64, order: int) -> Float64:
     return table
 
 
-@njit('f8[:, ::1](f8[:, ::1], f8[::1], i8)', cache=True)
+@compiled('f8[:, ::1](f8[:, ::1], f8[::1], i8)')
 def evaluate(table: Float64, time: Float64, order: int) -> Float64:
     """
     Evaluate a fit of `refit` and its rate.

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
 
@@ -52,7 +52,7 @@ def log_flow(
     return reading
 
 
-@njit(cache=True)
+@compiled
 def _lagged(time_s: Float64, value: Float64, lag_s: float) -> Float64:
     """Filter what is linear between times, exactly, from a steady start."""
     result = value.copy()

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 
@@ -89,7 +89,7 @@ LEG = np.dtype(
 Records = NDArray[np.void]
 
 
-@njit(cache=True)
+@compiled
 def _magnitude_m_s2(law: Law, extra: Float64, magnitude: float) -> float:
     """Look up the resistance at a speed through water."""
     cell = int((magnitude - law.low_m_s) / law.cell_m_s)
@@ -114,7 +114,7 @@ def _magnitude_m_s2(law: Law, extra: Float64, magnitude: float) -> float:
     return r + added
 
 
-@njit(cache=True)
+@compiled
 def _retardation_m_s2(
     law: Law,
     column: Any,
@@ -142,7 +142,7 @@ def _retardation_m_s2(
     return retardation
 
 
-@njit(cache=True)
+@compiled
 def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
     """Return the velocity of the water to the east and to the north."""
     since = max(time_s - column.change_from_s, 0.0)
@@ -152,14 +152,14 @@ def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
     )
 
 
-@njit(cache=True)
+@compiled
 def _yaw_rad(leg: Any, elapsed: float) -> float:
     """Return the heading within a leg."""
     yaw: float = leg.yaw_rad + (leg.yaw_rate_rad_s + 0.5 * leg.yaw_rate_rad_s2 * elapsed) * elapsed
     return yaw
 
 
-@njit(cache=True)
+@compiled
 def _rates(
     law: Law,
     column: Any,
@@ -209,7 +209,7 @@ def _rates(
     )
 
 
-@njit(cache=True)
+@compiled
 def follow(
     law: Law,
     column: Any,
@@ -312,7 +312,7 @@ def follow(
             y += h * (y1 + 2.0 * y2 + 2.0 * y3 + y4) / 6.0
 
 
-@njit(cache=True)
+@compiled
 def follow_columns(
     law: Law,
     columns: Records,

@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 
@@ -60,7 +60,7 @@ class GaussMarkov:
         return realisation
 
 
-@njit(cache=True)
+@compiled
 def _filter(white: Float64, decay: Float64) -> Float64:
     result = white.copy()
     for i in range(1, len(result)):

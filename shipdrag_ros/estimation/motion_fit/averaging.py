@@ -10,8 +10,8 @@ average. The covariance is that of the mixture: what priors disagree about is in
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import Rows
 from shipdrag_ros.estimation.motion_fit.families import Priors
 from shipdrag_ros.estimation.motion_fit.law import Law
@@ -23,7 +23,7 @@ _ROUNDS, _WHOLE_ROUNDS = 16, 3  # the later ones go half the way: a late onset m
 _CLOSE, _NEAR = 0.03, 1.0  # of chi^2, between one average and the next; and at the end
 
 
-@njit(cache=True)
+@compiled
 def _solve(
     mean: Float64,
     precision: Float64,
@@ -69,7 +69,7 @@ def _solve(
     return criterion, found[:, 0].copy(), found[:, 1:].copy()
 
 
-@njit(cache=True)
+@compiled
 def average(
     law: Law,
     start: Float64,

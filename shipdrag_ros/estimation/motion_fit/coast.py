@@ -13,8 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.law import Law, shapes
 from shipdrag_ros.samples import Float64, Int64
 
@@ -47,7 +47,7 @@ class Rows(NamedTuple):
     value: Float64
 
 
-@njit(cache=True)
+@compiled
 def _rates(
     law: Law,
     unknowns: Float64,
@@ -97,7 +97,7 @@ def _rates(
         rate[q + 1 + j] = state[j]
 
 
-@njit(cache=True)
+@compiled
 def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Float64]:
     """
     Follow the motion and its sensitivities over a grid of times from 0 on.
@@ -149,7 +149,7 @@ def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Fl
     return state, rate
 
 
-@njit(cache=True)
+@compiled
 def predict(
     law: Law, unknowns: Float64, grid_s: Float64, rows: Rows, active: Int64
 ) -> tuple[Float64, Float64]:

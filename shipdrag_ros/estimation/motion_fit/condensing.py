@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import KIND_COUNT, Rows
 from shipdrag_ros.samples import Float64
 
 
-@njit(cache=True)
+@compiled
 def means(
     rows: Rows, first: int, residual: Float64, variance: Float64, grid_s: Float64
 ) -> tuple[Rows, Float64]:

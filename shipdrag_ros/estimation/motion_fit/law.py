@@ -6,8 +6,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64, Int64
 
 
@@ -46,7 +46,7 @@ class Law(NamedTuple):
         return len(self.powers) + self.humps
 
 
-@njit(cache=True)
+@compiled
 def shapes(law: Law, s: float, value: Float64, slope: Float64) -> None:
     """
     Fill in what each coefficient is multiplied by at a relative speed.
@@ -86,7 +86,7 @@ def shapes(law: Law, s: float, value: Float64, slope: Float64) -> None:
         slope[k + j] = 2.0 * s * b + s * s * by_d / law.spacing
 
 
-@njit(cache=True)
+@compiled
 def shape_table(law: Law, speed_m_s: Float64) -> tuple[Float64, Float64]:
     """
     Return the shapes of r and of dr/dv at (m,) speeds, each (m, k).
@@ -98,7 +98,7 @@ def shape_table(law: Law, speed_m_s: Float64) -> tuple[Float64, Float64]:
     return value, slope / law.v_ref_m_s
 
 
-@njit(cache=True)
+@compiled
 def spread(shape: Float64, unknowns: Float64, covariance: Float64) -> tuple[Float64, Float64]:
     """
     Return sums of the coefficients, and their standard deviations.

@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.estimation.motion_fit.solve import cholesky
 from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Noise, whiten
@@ -90,7 +90,7 @@ def learn(rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float) 
     return Disturbance(*_learn(steady, bool(log.any())))
 
 
-@njit(cache=True)
+@compiled
 def _about(x: Float64, which: Int64, units: Float64) -> Disturbance:
     """Return the disturbances of four logarithms; those not searched for are none."""
     found = np.array([0.0, CALM.gust_s, 0.0, CALM.water_s])
@@ -103,7 +103,7 @@ def _about(x: Float64, which: Int64, units: Float64) -> Disturbance:
     return Disturbance(found[0], found[1], found[2], found[3])
 
 
-@njit(cache=True)
+@compiled
 def _criterion(x: Float64, which: Int64, steady: _Steady) -> float:
     """Return -2 ln of the restricted likelihood and of the prior, less a constant."""
     about = _about(x, which, steady.units)
@@ -131,7 +131,7 @@ def _criterion(x: Float64, which: Int64, steady: _Steady) -> float:
     return float(total)
 
 
-@njit(cache=True)
+@compiled
 def _search(start: Float64, which: Int64, steady: _Steady) -> tuple[Float64, float]:
     """Minimise the criterion over some of the logarithms by Nelder and Mead's simplex."""
     p = len(which)
@@ -179,7 +179,7 @@ def _search(start: Float64, which: Int64, steady: _Steady) -> tuple[Float64, flo
     return points[best], costs[best]
 
 
-@njit(cache=True)
+@compiled
 def _mean(top: Float64, least: float, which: Int64, steady: _Steady) -> Float64:
     """
     Return the mean over what is likely, instead of the most likely.
@@ -205,7 +205,7 @@ def _mean(top: Float64, least: float, which: Int64, steady: _Steady) -> Float64:
     return mean
 
 
-@njit(cache=True)
+@compiled
 def _learn(steady: _Steady, logged: bool) -> Disturbance:
     """Choose between no disturbance, one and two by Akaike's criterion."""
     best, chosen, which = _criterion(np.zeros(4), _GUST[:0], steady), np.zeros(4), _GUST[:0]

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import Rows, predict
 from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.whitening import Noise, whiten
@@ -16,7 +16,7 @@ _CONVERGED = 1e-3  # fall of chi^2: far below what tells laws apart
 _LAST_FALL = 0.03  # of chi^2, by a step so small that what it leads to need not be computed
 
 
-@njit(cache=True, fastmath={'reassoc', 'contract'})
+@compiled(fastmath={'reassoc', 'contract'})
 def _products(table: Float64) -> Float64:
     """Return all products of two lines of a table; no library, whose threads may differ."""
     size, n = table.shape
@@ -30,7 +30,7 @@ def _products(table: Float64) -> Float64:
     return products
 
 
-@njit(cache=True)
+@compiled
 def normal_equations(
     law: Law,
     unknowns: Float64,
@@ -74,7 +74,7 @@ def normal_equations(
     return chi2, matrix, gradient, table[0].copy()
 
 
-@njit(cache=True)
+@compiled
 def cholesky(matrix: Float64, damping: float) -> tuple[bool, Float64, Float64]:
     """
     Return the lower factor of M + damping diag M, M scaled to unit diagonal.
@@ -107,7 +107,7 @@ def cholesky(matrix: Float64, damping: float) -> tuple[bool, Float64, Float64]:
     return True, lower, scale
 
 
-@njit(cache=True)
+@compiled
 def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[bool, Float64]:
     """
     Solve (M + damping diag M) x = b for columns of b, M scaled to unit diagonal.
@@ -118,7 +118,7 @@ def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[boo
     return True, substitute(lower, scale, right)
 
 
-@njit(cache=True)
+@compiled
 def substitute(lower: Float64, scale: Float64, right: Float64) -> Float64:
     """
     Solve for columns of b with a factor of `cholesky`.
@@ -141,7 +141,7 @@ def substitute(lower: Float64, scale: Float64, right: Float64) -> Float64:
     return x
 
 
-@njit(cache=True)
+@compiled
 def fit(
     law: Law,
     start: Float64,

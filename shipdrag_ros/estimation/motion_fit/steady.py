@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64, Int64
 
 BIN_S = 30.0  # a steady record is condensed to its means over this
@@ -24,7 +24,7 @@ _OUTLIER = 5.0  # robust standard deviations
 _MAD_TO_SD = 1.4826
 
 
-@njit(cache=True)
+@compiled
 def white_sd(value: Float64) -> float:
     """
     Return the standard deviation of white noise on a smooth signal.
@@ -48,7 +48,7 @@ def white_sd(value: Float64) -> float:
     return float(np.sqrt(np.mean(size * size) / 6.0))
 
 
-@njit(cache=True)
+@compiled
 def block_medians(value: Float64, edges: Int64) -> Float64:
     """
     Return the medians of parts of a record.
@@ -69,7 +69,7 @@ def block_medians(value: Float64, edges: Int64) -> Float64:
     return result
 
 
-@njit(cache=True)
+@compiled
 def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: Float64) -> float:
     """
     Return the time from which a record has been steady to its end.
@@ -109,7 +109,7 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
     return float(time_s[0])
 
 
-@njit(cache=True)
+@compiled
 def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
     """
     Return means over `BIN_S` of a record that is steady or moves evenly.
@@ -138,7 +138,7 @@ def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
     return mean_s, mean, count
 
 
-@njit(cache=True)
+@compiled
 def _parts(time_s: Float64, length_s: float) -> Int64:
     """Return where each part of a length begins, and the end of the last."""
     edges = np.zeros(len(time_s) + 1, np.int64)

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import KIND_COUNT
 from shipdrag_ros.samples import Float64, Int64
 
@@ -16,7 +16,7 @@ _OF_MEDIAN = 0.6745  # median of |z| of a standard normal z
 _HUBER_SQUARE = 0.9775  # mean of min(z, 2.5)^2 of a standard normal z
 
 
-@njit(cache=True)
+@compiled
 def drop_gross(residual: Float64, kind: Int64, weight: Float64) -> None:
     """
     Take the weight, in place, of rows far from a crude answer, as others of their input go.
@@ -36,7 +36,7 @@ def drop_gross(residual: Float64, kind: Int64, weight: Float64) -> None:
                     weight[i] = _LOST
 
 
-@njit(cache=True)
+@compiled
 def weigh(
     white: Float64,
     kind: Int64,

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
 from shipdrag_ros.samples import Float64
 
@@ -44,7 +44,7 @@ class Disturbance(NamedTuple):
 CALM = Disturbance(0.0, 60.0, 0.0, 60.0)
 
 
-@njit(cache=True)
+@compiled
 def _carry(about: Disturbance, damping: float, inertia: float, dt: float, carry: Float64) -> None:
     """Fill in what a step does to the states."""
     gust_decay = np.exp(-dt / about.gust_s)
@@ -58,7 +58,7 @@ def _carry(about: Disturbance, damping: float, inertia: float, dt: float, carry:
     carry[7] = about.water_m_s**2 * (1.0 - carry[6] ** 2)
 
 
-@njit(cache=True)
+@compiled
 def _step(cov: Float64, mean: Float64, carry: Float64, low: int, high: int) -> None:
     """Carry covariance and means, of the states low .. high - 1, over a step."""
     decay, by_gust, way, way_by_gust, gust_decay, gust, water_decay, water = carry
@@ -110,7 +110,7 @@ class Noise(NamedTuple):
     inertia: Float64
 
 
-@njit(cache=True)
+@compiled
 def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
     """
     Whiten, in place, residual and columns of the design.

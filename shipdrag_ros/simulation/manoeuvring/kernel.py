@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 STATES = 7  # of a path: u, v, r, x, y, heading, rudder
@@ -73,7 +73,7 @@ class Helm(NamedTuple):
     approach: int
 
 
-@njit(cache=True)
+@compiled
 def _accelerations(
     hull: Hull, c: Float64, du: float, v: float, r: float, d: float
 ) -> tuple[float, float, float]:
@@ -113,7 +113,7 @@ def _accelerations(
     )
 
 
-@njit(cache=True)
+@compiled
 def _rudder(hull: Hull, d: float, ordered: float, after_s: float) -> float:
     """Return the angle some time later: it moves at its largest rate, then as a lag does."""
     gap = ordered - d
@@ -126,7 +126,7 @@ def _rudder(hull: Hull, d: float, ordered: float, after_s: float) -> float:
     return float(ordered - gap * np.exp(-after_s / hull.lag_s))
 
 
-@njit(cache=True)
+@compiled
 def _step(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> State:
     """Return the state a step later, in which the rudder moves smoothly."""
     du, v, r, x, y, heading, d = state
@@ -154,14 +154,14 @@ def _step(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> Sta
     )
 
 
-@njit(cache=True)
+@compiled
 def _over_ground(hull: Hull, du: float, v: float, heading: float) -> tuple[float, float]:
     cos, sin = np.cos(heading), np.sin(heading)
     ahead = hull.speed_m_s + du
     return ahead * cos - v * sin, ahead * sin + v * cos
 
 
-@njit(cache=True)
+@compiled
 def _advance(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> State:
     """Return the state a time later, in two steps where the rudder leaves its largest rate."""
     ramp_s = abs(ordered - state[6]) / hull.rate_rad_s - hull.lag_s
@@ -172,7 +172,7 @@ def _advance(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> 
     return after
 
 
-@njit(cache=True)
+@compiled
 def _reached(before: State, after: State, heading: float, h: float) -> float:
     """Return the part of a step after which a heading is reached."""
     low, high = 0.0, 1.0
@@ -191,7 +191,7 @@ def _reached(before: State, after: State, heading: float, h: float) -> float:
     return high
 
 
-@njit(cache=True)
+@compiled
 def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Float64) -> None:
     """Fill the path (n, STATES) of one ship, with so many looks between two rows."""
     state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -221,7 +221,7 @@ def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Fl
                 state = after
 
 
-@njit(cache=True)
+@compiled
 def follow_columns(
     hull: Hull, helm: Helm, derivatives: Float64, steps: int, looks: int, paths: Float64
 ) -> None:
