@@ -20,6 +20,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -46,15 +47,14 @@ class Signature(Protocol):
 CACHE_DIR = 'SHIPDRAG_CACHE_DIR'  # environment
 _PACKAGE = Path(__file__).parent
 _NAME = _PACKAGE.name
-_IMPORT = re.compile(
-    rb'^[ \t]*from[ \t]+(%(name)s[.\w]*)[ \t]+import[ \t]+(\([^)]*\)|[^(\n]+)'
-    rb'|^[ \t]*import[ \t]+(%(name)s[.\w]*)' % {b'name': _NAME.encode()},
-    re.MULTILINE,
-)
+# any mention of a module, which is fast to find, and what is imported from it
+_MENTION = re.compile(rb'(%b[.\w]*)(?:[ \t]+import[ \t]+(\([^)]*\)|[^(\n]+))?' % _NAME.encode())
 _FOLDER = re.compile(r'(?P<module>[.\w]+)-[0-9a-f]{16}')
 _KEPT = 8  # folders of a module: as many versions of its source can take turns
 _CHECKED = 32  # bytes of the digest before what is kept
+_FORGOTTEN_S = 90 * 86400.0  # not used for so long: its module may be gone
 _log = logging.getLogger(__name__)
+_not_kept: list[str] = []
 
 
 @overload
@@ -144,9 +144,8 @@ class _Cache(caching.NullCache):  # type: ignore[misc]
         return str(self._folder)
 
     def _path(self, signature: Any, codegen: Any) -> Path:
-        arguments, _ = sigutils.normalize_signature(signature)
-        key = repr((arguments, codegen.magic_tuple()))
-        return self._folder / f'{self._name}.{hashlib.sha256(key.encode()).hexdigest()[:16]}'
+        arguments = [str(each) for each in _arguments(signature)]
+        return self._folder / f'{self._name}.{_short(repr((arguments, codegen.magic_tuple())))}'
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what was compiled for a type of arguments, None if nothing."""
@@ -160,7 +159,9 @@ class _Cache(caching.NullCache):  # type: ignore[misc]
         if hashlib.sha256(data).digest() != kept[:_CHECKED]:
             return None  # the power failed, or the disk did
         _mark_used(self._folder)
-        return compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
+        result = compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
+        # types of two modules may have one name
+        return result if tuple(result.signature.args) == _arguments(sig) else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a type of arguments."""
@@ -170,7 +171,7 @@ class _Cache(caching.NullCache):  # type: ignore[misc]
         content = serialize.dumps(data._reduce())
         try:
             if not self._folder.exists():
-                _make(self._folder)
+                os.makedirs(self._folder, mode=0o700, exist_ok=True)
                 _forget_old(self._folder)
             handle, name = tempfile.mkstemp(dir=self._folder)
             try:
@@ -184,15 +185,25 @@ class _Cache(caching.NullCache):  # type: ignore[misc]
             _say_not_kept(f'{self._folder.parent}: {error.strerror}')
 
 
+def _arguments(signature: Any) -> tuple[Any, ...]:
+    """Return the types of the arguments, however the signature is given."""
+    return tuple(sigutils.normalize_signature(signature)[0])
+
+
+def _short(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
 def _folder(module: str) -> Path | None:
     """Return where a module's compiled functions are kept; None if nowhere."""
-    root = _root()
-    if root is None or module.partition('.')[0] != _NAME:
+    package, _, name = module.partition('.')
+    root = _root() if package == _NAME else None
+    if root is None:
         return None
     try:
-        return root / f'{module.partition(".")[2]}-{digest(module)}'
+        return root / f'{name}-{digest(module)}'
     except OSError as error:  # a package without its source
-        _say_not_kept(f'the source cannot be read: {error}')
+        _say_not_kept(f'{_PACKAGE}: {error.strerror}')
         return None
 
 
@@ -205,38 +216,38 @@ def digest(module: str) -> str:
     That is its source, that of the modules of this package that it imports, those that
     they import, and so on, and the compiler.
     """
-    reached, left = set(), [module]
+    reached, left = set(), {module}
     while left:
         each = left.pop()
-        if each not in reached:
-            reached.add(each)
-            left.extend(_source(each)[1])
-    text = repr((_compiler(), sorted((each, _source(each)[0]) for each in reached)))
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+        reached.add(each)
+        left |= read(each)[1] - reached
+    return _short(repr((_compiler(), sorted((each, read(each)[0]) for each in reached))))
 
 
 @cache
-def _source(module: str) -> tuple[str, frozenset[str]]:
-    """Return a digest of the source of a module, and which of this package it imports."""
-    source = (_path(module) or _PACKAGE / module).read_bytes()
+def read(module: str) -> tuple[str, frozenset[str]]:
+    """
+    Return a digest of the source of a module, and the modules of this package it speaks of.
+    """
+    with open(_file(module), 'rb') as file:
+        source = file.read()
     names = set()
-    for match in _IMPORT.finditer(source):
-        base = (match[1] or match[3]).decode()
+    for mention, imported in _MENTION.findall(source):
+        base = mention.decode().rstrip('.')
         names.add(base)
-        parts = re.sub(rb'#[^\n]*', b'', match[2] or b'').decode().strip('()').split(',')
-        names.update(f'{base}.{part.split()[0]}' for part in parts if part.strip())
-    imported = frozenset(name for name in names if _path(name) is not None)
-    return hashlib.sha256(source).hexdigest(), imported
+        if _file(base).endswith('__init__.py'):
+            parts = re.sub(rb'#[^\n]*|[()]', b'', imported).decode().split(',')
+            names.update(f'{base}.{part.split()[0]}' for part in parts if part.strip())
+    names = {name for name in names if os.path.exists(_file(name))}
+    return hashlib.sha256(source).hexdigest(), frozenset(names)
 
 
 @cache
-def _path(module: str) -> Path | None:
-    """Return the file of a module of this package, None if there is none."""
-    stem = _PACKAGE.joinpath(*module.split('.')[1:])
-    for path in (stem.with_name(f'{stem.name}.py'), stem / '__init__.py'):
-        if path.is_file():
-            return path
-    return None
+def _file(module: str) -> str:
+    """Return where the source of a module of this package lies."""
+    stem = os.path.join(_PACKAGE, *module.split('.')[1:])
+    package = os.path.join(stem, '__init__.py')
+    return package if os.path.exists(package) else f'{stem}.py'
 
 
 @cache
@@ -257,7 +268,7 @@ def _root() -> Path | None:
     told = []
     for path, own in _places():
         try:
-            _make(path)
+            os.makedirs(path, mode=0o700, exist_ok=True)
             if own:
                 about = path.lstat()
                 if not stat.S_ISDIR(about.st_mode) or about.st_uid != os.getuid():
@@ -268,7 +279,7 @@ def _root() -> Path | None:
             told.append(f'{path}: {error.strerror}')
         else:
             if told and CACHE_DIR in os.environ:
-                _log.warning('%s is not used (%s) but %s', CACHE_DIR, told[0], path)
+                _log.warning('shipdrag: %s is not used (%s) but %s', CACHE_DIR, told[0], path)
             return path
     _say_not_kept('; '.join(told))
     return None
@@ -287,20 +298,16 @@ def _places() -> Iterator[tuple[Path, bool]]:
         yield Path(tempfile.gettempdir()) / f'{_NAME}-{os.getuid()}', True
 
 
-def _make(folder: Path) -> None:
-    """Make a folder that only its owner can read and write."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    folder.mkdir(mode=0o700, exist_ok=True)
-
-
-@cache
 def _say_not_kept(why: str) -> None:
-    _log.warning(
-        'compiled code is not kept, so each start takes a minute longer (%s); '
-        'set %s to a folder that can be written',
-        why,
-        CACHE_DIR,
-    )
+    """Say it once."""
+    if not _not_kept:
+        _not_kept.append(why)
+        _log.warning(
+            'shipdrag: compiled code is not kept, so that each start takes a minute longer (%s); '
+            'set %s to a folder that can be written',
+            why,
+            CACHE_DIR,
+        )
 
 
 @cache
@@ -310,12 +317,15 @@ def _mark_used(folder: Path) -> None:
 
 
 def _forget_old(new: Path) -> None:
-    """Remove the folders of a module that were not used for longest."""
+    """Remove folders that were not used for longest; links and what is not ours stay."""
     module = new.name.rpartition('-')[0]
     found = []
     for entry in os.scandir(new.parent):
         match = _FOLDER.fullmatch(entry.name)
-        if match and match['module'] == module and entry.is_dir(follow_symlinks=False):
-            found.append((entry.stat(follow_symlinks=False).st_mtime_ns, entry.path))
-    for _, path in sorted(found, reverse=True)[_KEPT:]:
+        if match and entry.is_dir(follow_symlinks=False):
+            used = entry.stat(follow_symlinks=False).st_mtime
+            found.append((used, match['module'] == module, entry.path))
+    versions = sorted((each for each in found if each[1]), reverse=True)
+    long_ago = time.time() - _FORGOTTEN_S
+    for _, _, path in versions[_KEPT:] + [each for each in found if each[0] < long_ago]:
         shutil.rmtree(path, ignore_errors=True)
