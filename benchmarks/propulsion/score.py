@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the program makes of one case, against the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from propulsion.cases import STOPS, Case
+from propulsion.motion import ROW_S
+from propulsion.world import Truth, World, build, inputs, seconds
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import in_arrival_order
+
+HELD_SHARE = 0.8
+DRIVEN_S = 10.0
+INPUTS: dict[str, tuple[str, ...]] = {
+    'log': ('log',),
+    'track': ('track',),
+    'both': ('log', 'track', 'heading'),
+}
+SUITES = {
+    **INPUTS,
+    **{f'{name} + shaft': (*instruments, 'shaft') for name, instruments in INPUTS.items()},
+}
+WITH_HEADING = {
+    'log + heading': ('log', 'heading'),
+    'log + heading + shaft': ('log', 'heading', 'shaft'),
+}
+FEWER = (
+    ('log', 'log + shaft'),
+    ('track', 'track + shaft'),
+    ('both', 'both + shaft'),
+    ('log', 'both'),
+    ('track', 'both'),
+    ('log + shaft', 'both + shaft'),
+    ('track + shaft', 'both + shaft'),
+)
+"""Pairs of suites, the second of which has an input more."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """
+    One case under one suite of inputs.
+
+    Attributes
+    ----------
+    long
+        Whether the glide lasts 10 min from half of the service speed or more.
+    found
+        Exactly one reported coastdown in the glide, with an estimate, that holds 80 % of
+        it and at most 10 s of driven propeller.
+    why
+        What it lacks where it is not found.
+    dated_s, delay_s
+        Reported start, and first report, less the true end of drive; NaN without.
+    wrong
+        Reported coastdowns that hold more than 10 s of drive, or no glide to speak of.
+    wrong_live
+        Onsets announced of which the same is true at the time when they were.
+    rms, cover
+        Of r against the truth over the valid range: relative to r's maximum; share within
+        2 sigma. NaN without.
+    refused
+        Coastdowns reported without an estimate.
+    """
+
+    case: Case
+    suite: str
+    glide_s: float
+    long: bool
+    found: bool
+    why: str
+    dated_s: float
+    delay_s: float
+    wrong: int
+    wrong_live: int
+    rms: float
+    cover: float
+    refused: int
+    record_s: float
+
+
+def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) -> list[Row]:
+    """
+    Make a case and give it to the program under each suite.
+    """
+    world = build(case, hours)
+    return [_one(world, name, instruments) for name, instruments in suites.items()]
+
+
+def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
+    monitor = Monitor(world.ship, Parameters(update_s=60.0))
+    events = [
+        *monitor.update(in_arrival_order(inputs(world, instruments))),
+        *monitor.finish(),
+    ]
+    ended = [event for event in events if type(event).__name__ == 'Coastdown']
+    kept = [event for event in ended if event.estimate is not None]
+    spans = [(seconds(event.start_ns), seconds(event.end_ns)) for event in kept]
+    onsets = [
+        (seconds(event.start_ns), seconds(event.detected_ns))
+        for event in events
+        if type(event).__name__ == 'Onset'
+    ]
+    truth = world.truth
+    why, best = _lacks(truth, spans)
+    glide = truth.glide or (np.nan, np.nan)
+    rms = cover = np.nan
+    dated = delay = np.nan
+    if best is not None:
+        dated = spans[best][0] - glide[0]
+        delay = kept[best].onset_detected_ns
+        delay = np.nan if delay is None else seconds(delay) - glide[0]
+        rms, cover = _error(truth, kept[best].estimate)
+    return Row(
+        world.case,
+        suite,
+        glide[1] - glide[0],
+        truth.glide is not None
+        and glide[1] - glide[0] >= 600.0
+        and truth.first_speed_m_s >= 0.5 * world.case.ship.service_m_s,
+        truth.glide is not None and not why,
+        why,
+        dated,
+        delay,
+        sum(_is_wrong(truth, span) for span in spans),
+        sum(_is_wrong(truth, span) for span in onsets),
+        rms,
+        cover,
+        len(ended) - len(kept),
+        truth.seconds,
+    )
+
+
+def _driven_s(truth: Truth, span: tuple[float, float]) -> float:
+    return float(truth.driven[_rows(span)].sum() * ROW_S)
+
+
+def _rows(span: tuple[float, float]) -> slice:
+    return slice(max(round(span[0] / ROW_S), 0), max(round(span[1] / ROW_S), 0))
+
+
+def _is_wrong(truth: Truth, span: tuple[float, float]) -> bool:
+    """More than 10 s of drive, or less than half of it a glide."""
+    gliding = truth.gliding[_rows(span)].sum() * ROW_S
+    return _driven_s(truth, span) > DRIVEN_S or gliding < 0.5 * (span[1] - span[0])
+
+
+def _lacks(truth: Truth, spans: list[tuple[float, float]]) -> tuple[str, int | None]:
+    """What is missing for a glide to count as found; which report is of it."""
+    if truth.glide is None:
+        return '', None
+    begin, end = truth.glide
+    shared = [min(end, b) - max(begin, a) for a, b in spans]
+    there = [k for k, overlap in enumerate(shared) if overlap > 10.0]
+    if not there:
+        return 'none', None
+    best = max(there, key=lambda k: shared[k])
+    if len(there) > 1:
+        return 'several', best
+    if _driven_s(truth, spans[best]) > DRIVEN_S:
+        return 'driven', best
+    if shared[best] < HELD_SHARE * (end - begin):
+        return 'short', best
+    return '', best
+
+
+def _error(truth: Truth, estimate: Estimate) -> tuple[float, float]:
+    curve = estimate.valid_curve
+    if len(truth.speed) < 5 or not len(curve):
+        return np.nan, np.nan
+    inside = (curve.speed_m_s >= truth.speed[0]) & (curve.speed_m_s <= truth.speed[-1])
+    if not inside.any():
+        return np.nan, np.nan
+    true = np.interp(curve.speed_m_s[inside], truth.speed, truth.retardation)
+    off = curve.resistance_m_s2[inside] - true
+    rms = float(np.sqrt(np.mean(off**2)) / true.max())
+    return rms, float(np.mean(np.abs(off) <= 2.0 * curve.sigma_m_s2[inside]))
+
+
+def is_stop(case: Case) -> bool:
+    """
+    Return whether a case is one of the ways to stop.
+    """
+    return case.kind in STOPS
