@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import Help
+from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
 
 
@@ -123,6 +124,7 @@ def parser(verb: str) -> argparse.ArgumentParser:
             known.name, help=known.summary, description=known.summary, formatter_class=Help
         )
         if known.name == verb:
+            added.epilog = epilog(verb)
             module = import_module(f'{__name__}.{known.module}')
             module.add_arguments(added)
             added.set_defaults(run=module.run)

@@ -12,12 +12,17 @@ STDOUT = '-'
 
 
 class Help(argparse.ArgumentDefaultsHelpFormatter):
-    """Name every default that says something."""
+    """Name every default that says something; leave examples to stand line by line."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         if action.default in (None, False, []):
             return action.help
         return super()._get_help_string(action)
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        if text.startswith('example'):
+            return text
+        return super()._fill_text(text, width, indent)
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

@@ -61,13 +61,15 @@ def run(ship_file: Path, output_directory: Path, *, ros_arguments: Sequence[str]
     Parameters
     ----------
     ros_arguments
-        More of what may follow `--ros-args`, for instance `['-p', 'window_s:=600.0']`.
+        More of what may follow `--ros-args`, for instance `['-p', 'window_s:=600.0']`; the
+        two paths hold whatever is said of them there.
     """
     # the value of -p is YAML, and a JSON string is a YAML string whatever is in it
     given = [f'ship_file:={json.dumps(str(ship_file))}']
     given += [f'output_directory:={json.dumps(str(output_directory))}']
     flags = [word for assignment in given for word in ('-p', assignment)]
-    return main(['coastdown_node', '--ros-args', *flags, *ros_arguments])
+    # of several values of a parameter ROS takes the last
+    return main(['coastdown_node', '--ros-args', *ros_arguments, *flags])
 
 
 def _run(line: list[str]) -> int:

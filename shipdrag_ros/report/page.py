@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.report import cells, pictures, words
 from shipdrag_ros.report.cells import Table
 from shipdrag_ros.report.document import Picture, write_page
@@ -85,35 +86,39 @@ def _run(run: RunResult) -> _Run:
 
 def _coastdown(number: int, coastdown: Coastdown, run: RunResult) -> _Coastdown:
     estimate = coastdown.estimate
-    drawn: tuple[Picture, ...] = ()
     curve: Table | None = None
     if estimate is not None:
-        drawn = (
-            Picture.of(
-                pictures.resistance_picture(estimate, mass_kg=run.ship.mass_kg, truth=run.truth),
-                'Specific resistance against speed, with its band of two standard deviations; '
-                'shaded: where it may be used.',
-            ),
-            Picture.of(
-                pictures.track_picture(estimate),
-                'What was measured, the fit, and what is left between them. Left-overs that '
-                'wave slowly, instead of scattering, are not in the band.',
-            ),
-            Picture.of(
-                pictures.order_picture(estimate),
-                'Residual variance against the number of coefficients; the smallest number on '
-                'the plateau is chosen.',
-            ),
-        )
         curve = cells.curve_table(estimate.valid_curve, truth=run.truth)
     return _Coastdown(
         heading=f'Coastdown {number}: {words.utc(coastdown.start_ns)}',
         sentence=words.result_sentence(coastdown, mass_kg=run.ship.mass_kg),
         facts=cells.facts(coastdown),
-        pictures=drawn,
+        pictures=() if estimate is None else tuple(_pictures(estimate, run)),
         curve=curve,
         notes=words.notes(coastdown),
     )
+
+
+def _pictures(estimate: Estimate, run: RunResult) -> Iterator[Picture]:
+    """Draw what there are data for."""
+    if len(estimate.curve):
+        yield Picture.of(
+            pictures.resistance_picture(estimate, mass_kg=run.ship.mass_kg, truth=run.truth),
+            'Specific resistance against speed, with its band of two standard deviations; '
+            'shaded: where it may be used.',
+        )
+    if estimate.tracks:
+        yield Picture.of(
+            pictures.track_picture(estimate),
+            'What was measured, the fit, and what is left between them. Left-overs that '
+            'wave slowly, instead of scattering, are not in the band.',
+        )
+    if estimate.orders:  # where orders are averaged none is chosen, and there is no table of them
+        yield Picture.of(
+            pictures.order_picture(estimate),
+            'Residual variance against the number of coefficients; the smallest number on '
+            'the plateau is chosen.',
+        )
 
 
 def _combined(runs: Sequence[RunResult]) -> _Together | None:

@@ -113,6 +113,11 @@ def order_picture(estimate: Estimate) -> Figure:
     Draw the residual variance against the number of coefficients.
 
     One panel for each input used, and one for the joint problem.
+
+    Parameters
+    ----------
+    estimate
+        With a table of orders, as an estimator of one order has.
     """
     orders = np.array([trial.order for trial in estimate.orders])
     panels = [
@@ -128,7 +133,7 @@ def order_picture(estimate: Estimate) -> Figure:
         panels = panels[1:]
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 2.6), layout='constrained')
-        axes = figure.subplots(1, max(len(panels), 1), squeeze=False)[0]
+        axes = figure.subplots(1, len(panels), squeeze=False)[0]
         for axis, (label, variance) in zip(axes, panels):
             axis.semilogy(orders, variance, color=BLUE, marker='o', markersize=3)
             axis.set_title(label, loc='left', fontsize=9)

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+import yaml
 
 from shipdrag_ros.cli import main
 
@@ -45,9 +46,11 @@ def test_a_bad_ship_file_is_told_before_ros_starts(
     assert 'no such.yaml: 1 problem' in capsys.readouterr().err
 
 
-def test_it_records_where_it_was_told_and_ends_on_a_signal(
-    ship_file: Path, tmp_path: Path
-) -> None:
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def node_log(tmp_path: Path, ship: Path, *ros_arguments: str) -> str:
+    """Start the node, end it by a signal once it records, and return what it said."""
     pytest.importorskip('rclpy')
     worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
     environment = os.environ | {
@@ -55,10 +58,10 @@ def test_it_records_where_it_was_told_and_ends_on_a_signal(
         'ROS_DOMAIN_ID': str(10 + worker),
     }
     log = tmp_path / 'log'
-    line = ['node', '--ship', ship_file, '--out', tmp_path / 'bags']
+    line = [SHIPDRAG, 'node', '--ship', ship, '--out', tmp_path / 'bags', '--ros-args']
     with log.open('w') as file:
         node = subprocess.Popen(
-            [SHIPDRAG, *line, '--ros-args', '-p', 'froude_min:=0.07'],
+            [*line, *ros_arguments],
             stdin=subprocess.DEVNULL,
             stdout=file,
             stderr=subprocess.STDOUT,
@@ -75,5 +78,43 @@ def test_it_records_where_it_was_told_and_ends_on_a_signal(
     finally:
         node.kill()
         node.wait()
-    assert 'froude_min=0.07' in log.read_text()
+    return log.read_text()
+
+
+def test_it_records_where_it_was_told_and_ends_on_a_signal(
+    ship_file: Path, tmp_path: Path
+) -> None:
+    assert 'froude_min=0.07' in node_log(tmp_path, ship_file, '-p', 'froude_min:=0.07')
     assert len(list((tmp_path / 'bags').glob('*.mcap'))) == 1
+
+
+@pytest.mark.parametrize(
+    ('changed', 'said'),
+    [
+        ({}, False),  # the file as it is: no ship file, recordings into '.'
+        ({'ship_file': 'another.yaml', 'output_directory': 'elsewhere'}, True),
+    ],
+)
+def test_the_command_line_holds_over_a_parameter_file(
+    ship_file: Path, tmp_path: Path, changed: dict[str, str], said: bool
+) -> None:
+    tree = yaml.safe_load((ROOT / 'config' / 'parameters.yaml').read_text())
+    tree['/**']['ros__parameters'] |= {**changed, 'froude_min': 0.07}
+    file = tmp_path / 'parameters.yaml'
+    file.write_text(yaml.safe_dump(tree))
+    log = node_log(tmp_path, ship_file, '--params-file', str(file))
+    assert f"ship_file='{ship_file}'" in log
+    assert f"output_directory='{tmp_path / 'bags'}'" in log
+    assert 'froude_min=0.07' in log  # the rest of the file holds
+    assert len(list((tmp_path / 'bags').glob('*.mcap'))) == 1
+    line = f"ship_file 'another.yaml' of {file} is not used: --ship says '{ship_file}'"
+    assert (line in log) == said
+    assert ("output_directory 'elsewhere'" in log) == said
+
+
+def test_the_command_line_holds_over_what_follows_ros_args(
+    ship_file: Path, tmp_path: Path
+) -> None:
+    log = node_log(tmp_path, ship_file, '-p', 'ship_file:=another.yaml')
+    assert f"ship_file='{ship_file}'" in log
+    assert "ship_file 'another.yaml' of -p is not used" in log

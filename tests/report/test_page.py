@@ -77,6 +77,19 @@ def test_a_coastdown_without_estimate_says_why(
     assert 'only 3 samples' in read_page(tmp_path / 'report.html').text
 
 
+def test_without_a_table_of_orders_none_is_drawn(
+    run: RunResult, tmp_path: Path, read_page: ReadPage
+) -> None:
+    (coastdown,) = run.coastdowns
+    assert coastdown.estimate is not None
+    averaged = replace(coastdown, estimate=replace(coastdown.estimate, order=None, orders=()))
+    write_report(tmp_path / 'report.html', [replace(run, coastdowns=(averaged,))])
+    page = read_page(tmp_path / 'report.html')
+    assert len(page.images) == 2
+    assert 'number of coefficients' not in page.text
+    assert 'averaged over models' in page.text
+
+
 def test_hulls_compared_come_first(run: RunResult, tmp_path: Path, read_page: ReadPage) -> None:
     other = replace(run, ship=replace(run.ship, name='Rowdy'))
     write_report(tmp_path / 'report.html', [run, other], ranking=rank([run, other]))

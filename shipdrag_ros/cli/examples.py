@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Command lines that stand below the help of each verb; a test runs every one."""
+
+from __future__ import annotations
+
+EXAMPLES = {
+    'demo': ('shipdrag demo --out demo',),
+    'node': (
+        'shipdrag node --ship ship.yaml --out records',
+        'shipdrag node --ship ship.yaml --out records --ros-args -p window_s:=1800.0 '
+        '-r position:=/gps --params-file parameters.yaml',
+    ),
+    'replay': (
+        'shipdrag replay run.mcap --report report.html',
+        'shipdrag replay run.mcap --ship ship.yaml --window 600 1800 --json result.json',
+    ),
+    'simulate': (
+        'shipdrag simulate --ship ship.yaml -o calm.mcap --lead-in 1800',
+        'shipdrag simulate --ship ship.yaml -o fouled.mcap --effect fouling=0.3 '
+        '--effect current=0.4,cross_track_m_s=0.1',
+    ),
+    'baseline': ('shipdrag baseline clean_1.mcap clean_2.mcap --ship ship.yaml -o learnt.yaml',),
+    'diagnose': (
+        'shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml',
+        'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
+    ),
+    'residual': (
+        'shipdrag residual hulls.csv --form auto --target c_R --predict new_hulls.csv '
+        '--report residual.html',
+    ),
+    'surface': (
+        'shipdrag surface table.csv --inputs alpha,beta --target c_x --report surface.html',
+    ),
+    'sensitivity': (
+        'shipdrag sensitivity --manoeuvre zigzag:15 --keep 24 --report mariner.html',
+        'shipdrag sensitivity --ship ship.yaml --manoeuvre coastdown:8.2',
+    ),
+    'import': (
+        'shipdrag import LOG.nmea.gz -o log.mcap --ship ship.yaml',
+        'shipdrag import log.csv -o plane.mcap --time t:ms --map speed_through_water=u:kn '
+        '--map position=x,y:km',
+        'shipdrag import log.csv -o globe.mcap --rate 1 --map position=lat,lon:deg',
+    ),
+    'info': ('shipdrag info run.mcap',),
+    'check': ('shipdrag check run.mcap --json check.json',),
+    'recover': ('shipdrag recover damaged.mcap -o saved.mcap',),
+    'cable': ('shipdrag cable --length 50 --diameter 0.1 --speed 3 --report cable.html',),
+}
+
+
+def epilog(verb: str) -> str:
+    """
+    Return the examples of a verb, as they stand below its help.
+    """
+    lines = EXAMPLES[verb]
+    return '\n'.join(
+        [f'example{"s" if len(lines) > 1 else ""}:', *(f'  {line}' for line in lines)]
+    )

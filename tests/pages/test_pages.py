@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every kind of page that a verb writes, opened in a browser: no picture without data."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipdrag_ros.cli import VERBS, main, parser
+
+ROOT = Path(__file__).resolve().parents[2]
+SHIP = ROOT / 'config' / 'vitus_bering.yaml'
+DESK, PHONE = 1280, 412  # width of the window [pixels]
+
+# what a page is made of, by the bag it needs and the command that writes it to {page}
+PAGES = {
+    'replay, motion': 'replay {coast}',
+    'replay, warped': 'replay {coast} --parameters {warped}',
+    'replay, s1_joint': 'replay {coast} --parameters {s1_joint}',
+    'replay, s1_speed': 'replay {coast} --parameters {s1_speed}',
+    'replay, window': 'replay {coast} --window 320 900',
+    'replay, two of one ship': 'replay {coast} {back}',
+    'replay, hulls compared': 'replay {coast} {back} --compare',
+    'replay, no coastdown': 'replay {steady}',
+    'diagnose, stated baseline': 'diagnose {coast} {back}',
+    'diagnose, fitted baseline': 'diagnose {coast} --ship {plain}',
+    'diagnose, no coastdown': 'diagnose {steady}',
+    'cable': 'cable --length 50 --diameter 0.1 --speed 3',
+    'sensitivity, steering': 'sensitivity --manoeuvre zigzag:15 --keep 24',
+    'sensitivity, coasting': 'sensitivity --ship {ship} --manoeuvre coastdown:8',
+    'surface, two inputs': 'surface {root}/docs/data/c_x.csv --inputs alpha,beta --target c_x',
+    'surface, one input': 'surface {root}/docs/data/c_x.csv --inputs alpha --target c_x',
+    'residual': 'residual {root}/docs/data/river_ships.csv --form auto --target c_R',
+}
+
+# of each picture: its axes that show nothing but frame, ticks, words and lines from edge to edge
+EMPTY_AXES = """
+(() => {
+  const empty = [];
+  let axes_seen = 0;
+  for (const img of document.images) {
+    const holder = document.createElement('div');
+    const bytes = Uint8Array.from(atob(img.src.split(',')[1]), c => c.charCodeAt(0));
+    const text = new TextDecoder().decode(bytes);
+    holder.append(new DOMParser().parseFromString(text, 'image/svg+xml').documentElement);
+    document.body.append(holder);
+    for (const axes of holder.querySelectorAll('g[id^="axes_"]')) {
+      if (axes.parentElement.closest('g[id^="axes_"]')) continue;  // a second scale
+      axes_seen += 1;
+      const frame = axes.querySelector(':scope > g[id^="patch_"]').getBoundingClientRect();
+      const shown = [...axes.children].some(part => {
+        if (/^(matplotlib\\.axis|legend|text|axes)_/.test(part.id)) return false;
+        const all = [part, ...part.querySelectorAll('path, use, image')];
+        return all.some(mark => {
+          if (!mark.matches('path, use, image') || mark.closest('defs')) return false;
+          const box = mark.getBoundingClientRect();
+          const inside = box.right >= frame.left && box.left <= frame.right
+            && box.bottom >= frame.top && box.top <= frame.bottom;
+          if (!inside) return false;
+          if (part.id.startsWith('patch_')) {  // a bar, if it is neither edge nor shading
+            const wide = Math.min(box.right, frame.right) - Math.max(box.left, frame.left);
+            const high = Math.min(box.bottom, frame.bottom) - Math.max(box.top, frame.top);
+            return getComputedStyle(mark).fill !== 'none'
+              && wide < frame.width - 2 && high < frame.height - 2;
+          }
+          const points = (mark.getAttribute('d') || '').match(/[MLCQ]/g) || [];
+          return !mark.matches('path') || points.length > 2;
+        });
+      });
+      if (!shown) empty.push(`axes ${axes_seen} of: ${img.alt}`);
+    }
+    holder.remove();
+  }
+  return {pictures: document.images.length, axes: axes_seen, empty};
+})()
+"""
+NOT_LOADED = (
+    '[...document.images].filter(i => !(i.complete && i.naturalWidth > 0)).map(i => i.alt)'
+)
+TOO_WIDE = 'document.documentElement.scrollWidth - document.documentElement.clientWidth'
+
+
+@pytest.fixture(scope='module')
+def words(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What stands for the words in braces: bags and files."""
+    folder = tmp_path_factory.mktemp('pages')
+    found = {'ship': str(SHIP), 'root': str(ROOT)}
+    for name, options in (
+        ('coast', ('--lead-in', '600')),
+        ('back', ('--lead-in', '600', '--heading', '3.1416', '--first-heading', '0')),
+        ('steady', ('--lead-in', '900', '--duration', '1')),
+    ):
+        path = folder / f'{name}.mcap'
+        line = ['simulate', '--ship', str(SHIP), '-o', str(path), '--speed', '8', '--seed', '3']
+        assert main([*line, *options]) == 0
+        found[name] = str(path)
+    for name in ('warped', 's1_joint', 's1_speed'):
+        (folder / f'{name}.yaml').write_text(f'estimator: {name}\n')
+        found[name] = str(folder / f'{name}.yaml')
+    (folder / 'plain.yaml').write_text('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
+    return found | {'plain': str(folder / 'plain.yaml')}
+
+
+@pytest.mark.parametrize('kind', PAGES)
+def test_a_page_opens_and_no_picture_is_without_data(
+    browser: Any, words: dict[str, str], tmp_path: Path, kind: str
+) -> None:
+    page = tmp_path / 'page.html'
+    line = PAGES[kind].format_map(words).split()
+    assert main([*line, '--report', str(page)]) == 0
+    for width in (PHONE, DESK):
+        browser.open(page, width=width)
+        assert browser.problems == []
+        assert browser.run(NOT_LOADED) == []
+        assert browser.run(TOO_WIDE) == 0
+    found = browser.run(EMPTY_AXES)
+    assert found['empty'] == []
+    assert found['axes'] >= found['pictures'] >= ('no coastdown' not in kind)
+
+
+def test_every_verb_that_writes_a_page_is_among_them() -> None:
+    writing = {verb.name for verb in VERBS if '--report' in options(parser(verb.name), verb.name)}
+    assert writing == {line.split()[0] for line in PAGES.values()}
+
+
+def options(top: argparse.ArgumentParser, verb: str) -> set[str]:
+    (verbs,) = (each for each in top._actions if isinstance(each, argparse._SubParsersAction))
+    return set(verbs.choices[verb]._option_string_actions)
+
+
+@pytest.mark.parametrize(
+    ('draw', 'empty'),
+    [
+        (lambda axis: axis.plot([1.0, 2.0, 3.0], [1.0, 3.0, 2.0]), 0),
+        (lambda axis: axis.plot([1.0, 2.0], [1.0, 3.0], '.'), 0),
+        (lambda axis: axis.barh([1.0, 2.0], [0.5, 0.7]), 0),
+        (lambda axis: axis.fill_between([1.0, 2.0, 3.0], [1.0, 3.0, 2.0]), 0),
+        (lambda axis: axis.imshow([[1.0, 2.0]]), 0),
+        (lambda axis: axis.plot([], [], label='nothing'), 1),
+        (lambda axis: axis.plot([1.0, 2.0, 3.0], [float('nan')] * 3, 'o-'), 1),
+        (lambda axis: axis.semilogy([], [], marker='o'), 1),
+        (lambda axis: axis.axvline(0.5, label='chosen'), 1),
+        (lambda axis: axis.axhspan(0.1, 0.5), 1),
+        (lambda axis: axis.text(0.5, 0.5, 'words'), 1),
+        (lambda axis: axis.legend([], []), 1),
+    ],
+)
+def test_the_check_knows_empty_axes(
+    browser: Any, tmp_path: Path, draw: Callable[[Any], object], empty: int
+) -> None:
+    from matplotlib.figure import Figure
+
+    from shipdrag_ros.report.document import Picture
+
+    figure = Figure(figsize=(4.0, 3.0))
+    axis = figure.subplots()
+    draw(axis)
+    axis.secondary_xaxis('top')
+    axis.set_title('a title')
+    page = tmp_path / 'page.html'
+    page.write_text(f'<html><body><img src="{Picture.of(figure, "").uri}" alt="it"></body></html>')
+    browser.open(page, width=DESK)
+    found = browser.run(EMPTY_AXES)
+    assert (found['axes'], len(found['empty'])) == (1, empty)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every command line in the help, the README and the docs runs, in the order it stands there."""
+
+from __future__ import annotations
+
+import glob
+import gzip
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.cli import VERBS, main
+from shipdrag_ros.samples import INPUTS, Block, concatenate
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = (ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md')))
+PROGRAMS = ('shipdrag', 'coastdown_node', 'ros2')
+NOT_HERE = ('ros2 launch',)  # needs ROS from apt
+DATA = 'SHIPDRAG_DATA'
+LIMIT_S = 120.0
+
+
+def examples(text: str) -> Iterator[str]:
+    """
+    Yield the command lines of a page: of its code blocks, and between backticks.
+
+    A verb alone, `shipdrag recover`, is a name and no example.
+    """
+    fenced = re.findall(r'^```.*\n([\s\S]*?)^```', text, flags=re.MULTILINE)
+    blocks = re.findall(r'^(?: {4}|\t)(.*)$', text, flags=re.MULTILINE)
+    spans = re.findall(r'(?<!`)`([^`]+)`(?!`)', text)
+    known = '|'.join(PROGRAMS)
+    for line in [*'\n'.join(fenced).splitlines(), *blocks, *spans]:
+        command = line.strip().removeprefix('.venv/bin/').partition('  #')[0].strip()
+        if re.match(rf'(?:{known}) +\S+ +\S', command) and command != 'shipdrag VERB':
+            yield command
+
+
+SOURCES = {str(page.relative_to(ROOT)): page.read_text(encoding='utf-8') for page in PAGES}
+OF_PAGES = {name: lines for name, text in SOURCES.items() if (lines := list(examples(text)))}
+
+
+def help_text(verb: str, capsys: pytest.CaptureFixture[str]) -> str:
+    with pytest.raises(SystemExit):
+        main([verb, '--help'])
+    return capsys.readouterr().out
+
+
+@pytest.fixture(scope='module')
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make small files of the names that examples take for granted."""
+    folder = tmp_path_factory.mktemp('made')
+    ship = ROOT / 'config' / 'vitus_bering.yaml'
+    shutil.copy(ship, folder / 'ship.yaml')
+    shutil.copy(ROOT / 'config' / 'parameters.yaml', folder / 'parameters.yaml')
+    shutil.copy(ROOT / 'docs' / 'data' / 'river_ships.csv', folder / 'hulls.csv')
+    shutil.copy(ROOT / 'docs' / 'data' / 'c_x.csv', folder / 'table.csv')
+    for name in ('NEW.csv', 'new_hulls.csv'):
+        (folder / name).write_text('L_B,B_T,C_B,lcb,Fr\n8.2,4.0,0.85,0.005,0.12\n')
+    (folder / 'records').mkdir()
+    for seed, name in enumerate(('run', 'out', 'back', 'clean_1', 'clean_2', 'records/1')):
+        line = ['simulate', '--ship', str(ship), '-o', str(folder / f'{name}.mcap')]
+        course = ('--heading', '3.1416', '--first-heading', '0') if name == 'back' else ()
+        assert main([*line, '--lead-in', '600', '--seed', str(seed), *course]) == 0
+    (folder / 'damaged.mcap').write_bytes((folder / 'run.mcap').read_bytes()[:-20_000])
+    rows = ((f'{1000 * i}', '10', f'{0.005 * i}', '0', '60', '5') for i in range(60))
+    table = ['t,u,x,y,lat,lon', *(','.join(row) for row in rows)]
+    (folder / 'log.csv').write_text('\n'.join(table))
+    with gzip.open(folder / 'LOG.nmea.gz', 'wt') as log:
+        log.writelines(nmea(second) for second in range(60))
+    return folder
+
+
+def nmea(second: int) -> str:
+    """One second of a receiver and a log."""
+    bodies = (
+        f'GPRMC,1200{second:02d}.00,A,4612.909,N,00610.158,E,05.0,003,280224,,,A',
+        'VWVHW,,T,,M,5.0,N,,K',
+    )
+    lines = []
+    for body in bodies:
+        check = 0
+        for byte in body.encode():
+            check ^= byte
+        lines.append(f'${body}*{check:02X}\r\n')
+    return ''.join(lines)
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that looks like the source tree with a user's files in it."""
+    here = tmp_path / 'here'
+    shutil.copytree(made, here)
+    for name in ('config', 'docs', 'benchmarks'):
+        (here / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(here)
+    return here
+
+
+def run(command: str) -> None:
+    """Run an example as a shell would; the node is ended by a signal once it records."""
+    words = [os.path.expandvars(word) for word in shlex.split(command.replace(' ... ', ' '))]
+    words = [path for word in words for path in (sorted(glob.glob(word)) or [word])]
+    if words[:2] == ['ros2', 'run']:
+        words = words[3:]
+    if words[:2] == ['shipdrag', 'demo']:
+        return  # tests/cli/test_demo.py runs it
+    if words[0] == 'shipdrag' and words[1] != 'node':
+        assert main(words[1:]) == 0, command
+        return
+    pytest.importorskip('rclpy')
+    words[0] = str(Path(sys.executable).with_name(words[0]))
+    worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
+    environment = os.environ | {
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'ROS_DOMAIN_ID': str(30 + worker),
+    }
+    log, before = Path('node.log'), set(Path.cwd().rglob('*.mcap'))
+    with log.open('w') as file:
+        node = subprocess.Popen(words, stdout=file, stderr=file, env=environment)
+    try:
+        end_s = time.monotonic() + LIMIT_S
+        while 'active; recording to' not in log.read_text():
+            assert node.poll() is None, log.read_text()
+            assert time.monotonic() < end_s, log.read_text()
+            time.sleep(0.1)
+        node.send_signal(signal.SIGINT)
+        assert node.wait(timeout=LIMIT_S) == 0, log.read_text()
+    finally:
+        node.kill()
+        node.wait()
+    for recorded in set(Path.cwd().rglob('*.mcap')) - before:
+        recorded.unlink()  # it has heard no ship, and a replay of nothing is an error
+
+
+@pytest.mark.parametrize('verb', [verb.name for verb in VERBS])
+def test_the_examples_of_the_help_run(
+    folder: Path, verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = help_text(verb, capsys)
+    lines = re.findall(r'^ +(shipdrag .*)$', text, flags=re.MULTILINE)
+    assert lines, 'give one in shipdrag_ros/cli/examples.py'
+    for line in lines:
+        assert line.split()[1] == verb
+        for made in set(re.findall(r'-o (\S+)|--write (\S+)', line)):
+            Path(''.join(made)).unlink(missing_ok=True)
+        run(line)
+
+
+@pytest.mark.parametrize('page', OF_PAGES)
+def test_the_examples_of_a_page_run(folder: Path, page: str) -> None:
+    lines = [line for line in OF_PAGES[page] if not line.startswith(NOT_HERE)]
+    if any(DATA in line for line in lines) and DATA not in os.environ:
+        pytest.skip(f'needs the folder of records in {DATA}')
+    if 's4_residual' in page:  # a ship whose form the regression knows
+        (folder / 'ship.yaml').write_text(RIVER_SHIP)
+    for name in {name for line in lines for name in re.findall(r'-o (\S+)', line)}:
+        Path(name).unlink(missing_ok=True)
+    for line in lines:
+        run(line)
+
+
+def test_the_pages_have_the_examples_that_they_should() -> None:
+    """What looks like a command anywhere in a page is collected."""
+    for page, text in SOURCES.items():
+        lines = OF_PAGES.get(page, [])
+        for found in re.findall(r'(?:^ {4}|`)(?:\.venv/bin/)?(shipdrag [a-z]+ [^`\n]*-.*)', text):
+            command = found.partition('`')[0].partition('  #')[0].strip()
+            assert command in lines, f'{page}: {command}'
+    verbs = {line.split()[1] for lines in OF_PAGES.values() for line in lines}
+    assert verbs >= {'simulate', 'replay', 'diagnose', 'import', 'node', 'baseline', 'cable'}
+
+
+MAP = re.compile(rf'\b(?:{"|".join(INPUTS)})=[a-z0-9]+(?::[a-z/]+)?(?:,[a-z0-9]+(?::[a-z/]+)?)?')
+
+
+def test_the_columns_that_the_help_shows_are_read_as_it_says(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = re.sub(r'\s+', ' ', help_text('import', capsys))
+    shown = MAP.findall(text)
+    assert {'position=x,y:km', 'position=x:km,y:km', 'position=lat,lon:deg'} <= set(shown)
+    for number, each in enumerate(shown):
+        out = f'{number}.mcap'
+        assert main(['import', 'log.csv', '-o', out, '--rate', '1', '--map', each]) == 0
+    x_km = values('0.mcap')  # position=x,y:km, the form that was read as metres and kilometres
+    assert shown[0] == 'position=x,y:km'
+    assert x_km[-1] == pytest.approx([295.0, 0.0])
+
+
+def values(bag: str) -> list[list[float]]:
+    (opened,) = open_runs([Path(bag)])
+    block = concatenate([item for item in opened.inputs() if isinstance(item, Block)])
+    found: list[list[float]] = block.value.tolist()
+    return found
+
+
+RIVER_SHIP = """
+length_m: 130.0
+breadth_m: 16.5
+draught_m: 4.1
+displaced_volume_m3: 7370.0
+wetted_surface_m2: 2900.0
+added_mass: {model: constant, value: 0.05, sd: 0.02}
+baseline:
+  form_factor: 0.2
+  correlation_allowance: 3.0e-4
+  wave_froude: [0.0, 0.22]
+  wave_coefficient: [0.0, 8.0e-4]
+  relative_sd: {friction: 0.02, wave: 0.10}
+"""
