@@ -95,7 +95,8 @@ class Coastdown:
 
     `estimate` is None where none was possible; `failure` then says why.
     `onset_detected_ns` is None where the window was given; `heading_rad` (yaw, REP-103, at the
-    start) where there is no heading.
+    start) where there is no heading. One that was `withdrawn` turned out to be none: a
+    `NotCoastdown` says why.
     """
 
     start_ns: int
@@ -105,6 +106,7 @@ class Coastdown:
     estimate: Estimate | None
     failure: str | None = None
     heading_rad: float | None = None
+    withdrawn: bool = False
 
 
 @dataclass(frozen=True)
