@@ -43,7 +43,7 @@ _SIGMAS = 2.0
 _DRIVE_SD = 0.01  # of the logarithm of a drive averaged over some seconds
 _KNEE = 0.8  # of the drive before the last fall: where it stopped, ...
 _GONE = 0.3  # ... and of the largest: where it is over
-_BEFORE_S = 40  # the drive before the last fall is the median over this long
+_BEFORE_S = 90  # the drive before the last fall is the upper fifth of this long
 _RUN_DOWN_S = 20  # a fall that takes longer may have been ordered so
 _EVEN = 0.52  # of the plateau, half-way down: an even fall has 0.55, one by itself 0.49
 _RATE_S = 6  # the rate of a fall is taken over this long
@@ -287,7 +287,7 @@ def _knee(row: Float64) -> int:
         return len(row) - 1
     gone = int(driving[-1])
     # what it fell from: a slow-down may have come before
-    plateau = float(np.median(above[max(0, gone - _BEFORE_S) : gone + 1]))
+    plateau = float(np.quantile(above[max(0, gone - _BEFORE_S) : gone + 1], 0.8))
     knee = int(np.flatnonzero(above[: gone + 1] >= _KNEE * plateau)[-1])
     # a shaft that runs down by itself does so ever more slowly, from the stop on; one that is
     # taken back evenly drives until that ends
