@@ -24,10 +24,44 @@ class EndedBy(Enum):
     SPEED = 'speed'  # the minimum speed was reached
     TURN = 'turn'
     ENGINE = 'engine'  # re-engaged, or the speed settled or rose
+    BRAKE = 'brake'  # stopped by something but the water
+    ASTERN = 'astern'  # the propeller was reversed
     DATA_STOP = 'data_stop'
+    SILENCE = 'silence'  # all sources were silent by wall time
     RESET = 'reset'
     RECORD_END = 'record_end'
     GIVEN = 'given'  # the window was given by hand
+
+
+class Dismissal(Enum):
+    """Why a stretch of record is not, or no longer, taken for a coastdown."""
+
+    LEAD_IN = 'lead_in'  # too little steady sailing before it
+    THRUST = 'thrust'  # the propeller drives, or the speed settles as if it did
+    BRAKE = 'brake'  # slowed by something but the water
+    ASTERN = 'astern'  # the propeller is reversed, or the ship goes astern
+    TURN = 'turn'
+    RUDDER = 'rudder'
+    PLATEAU = 'plateau'  # the ship no longer slows
+    SETTLED = 'settled'  # a new steady speed after a small loss: power reduced
+    SLOW = 'slow'  # below the minimum speed
+    GAP = 'gap'  # the data stopped before it could be confirmed
+    OUTLIER = 'outlier'  # bad readings
+    OTHER = 'other'
+
+
+@dataclass(frozen=True)
+class NotCoastdown:
+    """
+    A candidate that was dismissed, or a part of a window that was cut.
+
+    `text` says in one sentence, with figures, what spoke against it.
+    """
+
+    start_ns: int
+    end_ns: int
+    reason: Dismissal
+    text: str
 
 
 @dataclass(frozen=True)
@@ -81,4 +115,4 @@ class Reset:
     reason: str
 
 
-Event = Onset | Update | NoEstimate | Coastdown | Reset
+Event = Onset | Update | NoEstimate | NotCoastdown | Coastdown | Reset

@@ -14,7 +14,15 @@ from enum import Enum
 
 import numpy as np
 
-from shipdrag_ros.coastdown.events import Coastdown, Event, NoEstimate, Onset, Reset, Update
+from shipdrag_ros.coastdown.events import (
+    Coastdown,
+    Event,
+    NoEstimate,
+    NotCoastdown,
+    Onset,
+    Reset,
+    Update,
+)
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import types
 from shipdrag_ros.messages.encoding import covariance6, vector3
@@ -48,6 +56,7 @@ class EventKind(Enum):
     ONSET = 'onset'
     COASTDOWN = 'coastdown'
     NO_ESTIMATE = 'no_estimate'
+    DISMISSED = 'dismissed'  # nearly a coastdown, or a part of one that was cut
     RESET = 'reset'  # done, whatever the cause
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
     LIFECYCLE = 'lifecycle'
@@ -99,6 +108,17 @@ def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
             )
         case NoEstimate(stamp_ns, reason):
             note = EventNote(EventKind.NO_ESTIMATE, stamp_ns, reason, {})
+        case NotCoastdown(start_ns, end_ns, dismissal, text):
+            note = EventNote(
+                EventKind.DISMISSED,
+                end_ns,
+                f'nearly a coastdown: {text}',
+                {
+                    'start_ns': str(start_ns),
+                    'end_ns': str(end_ns),
+                    'reason': dismissal.value,
+                },
+            )
         case Reset(receive_ns, reason):
             note = EventNote(EventKind.RESET, receive_ns, reason, {})
     return [event_message(note, node=node)]
