@@ -21,11 +21,13 @@ from shipdrag_ros.coastdown.events import (
     EndedBy,
     Event,
     NoEstimate,
+    NotCoastdown,
     Onset,
     Reset,
     State,
     Update,
 )
+from shipdrag_ros.coastdown.examination import estimate_examined
 from shipdrag_ros.coastdown.health import InputHealth, input_health
 from shipdrag_ros.coastdown.kernel import Stop, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
@@ -199,7 +201,8 @@ class Monitor:
 
         What is older than `history_ns` may be missing; after a reset all is.
         """
-        return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - self._steady_ns)
+        before_ns = 0 if ended.cut_at_start else self._steady_ns
+        return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - before_ns)
 
     def _fresh(self, tally: Tally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
@@ -317,21 +320,24 @@ class Monitor:
 
     def _conclude(self, ended_by: EndedBy, end_ns: int, failure: str | None) -> Coastdown:
         assert self._onset is not None
-        final = None
+        start_ns, final = self._onset.start_ns, None
+        cuts: tuple[NotCoastdown, ...] = ()
         if failure is None:
-            try:
-                window = self._window(end_ns, before_ns=self._steady_ns)
-                final = self._final_estimator(window, self._ship, self._parameters)
-            except EstimationError as error:
-                failure = str(error)
+            window = self._window(end_ns, before_ns=self._steady_ns)
+            first_ns, end_ns, cuts, final, failure = estimate_examined(
+                window, self._ship, self._parameters, self._final_estimator
+            )
+            if first_ns != window.start_ns:  # which is later where an old part has rolled out
+                start_ns = first_ns
         return Coastdown(
-            self._onset.start_ns,
+            start_ns,
             end_ns,
             self._onset.detected_ns,
             ended_by,
             final,
             failure,
             self._heading_rad,
+            cuts=cuts,
         )
 
     def _stand_down(self) -> None:
