@@ -113,5 +113,5 @@ def _window(result: ReplayResult, coastdown: Coastdown, apart: bool) -> Window:
         accepted,
         coastdown.start_ns,
         coastdown.end_ns,
-        before_ns=coastdown.start_ns - before_ns,
+        before_ns=None if coastdown.cut_at_start else coastdown.start_ns - before_ns,
     )

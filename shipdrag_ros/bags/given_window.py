@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +11,9 @@ import numpy as np
 from shipdrag_ros.bags.run import Inputs, Run
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.coastdown.examination import Examined, estimate_examined
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, rep103_yaw
-from shipdrag_ros.errors import BagError, EstimationError
+from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, Reason, UInt8, concatenate
@@ -94,45 +94,31 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     """
     Estimate r(v) from a window, as of a coastdown that has ended.
 
-    What came before is not known to be steady sailing, so it is left out.
+    A person's claim is examined like any other: what is no coastdown is cut. What came
+    before is not known to be steady sailing; it helps to examine, and teaches the
+    estimate nothing.
     """
     accepted = samples.block[samples.reasons == Reason.ACCEPTED]
     start_ns, end_ns = samples.start_ns, samples.end_ns
-    found = None
-    failure = None
+    before_ns = int(accepted.stamp_ns.min()) if len(accepted) else None
     try:
-        found = estimate_final(Window.from_block(accepted, start_ns, end_ns), ship, parameters)
-    except EstimationError as error:
-        failure = str(error)
+        window = Window.from_block(accepted, start_ns, end_ns, before_ns=before_ns)
     except ValueError:  # accepted stamps ascend but for this
         failure = 'a clock was set in the window; choose one before or after'
+        found = Examined(start_ns, end_ns, (), None, failure)
     else:
-        turned = _turn_notes(accepted, samples, parameters)
-        found = replace(found, notes=(*found.notes, *turned))
-    heading = _heading(accepted, start_ns)
+        found = estimate_examined(window, ship, parameters, estimate_final, steady=False)
+    heading = _heading(accepted, found.start_ns)
     return Coastdown(
-        start_ns,
-        end_ns,
+        found.start_ns,
+        found.end_ns,
         None,
         EndedBy.GIVEN,
-        found,
-        failure,
+        found.estimate,
+        found.failure,
         None if heading is None else rep103_yaw(heading, parameters.heading_convention),
+        cuts=found.cuts,
     )
-
-
-def _turn_notes(accepted: Block, samples: WindowSamples, parameters: Parameters) -> list[str]:
-    """Tell of a turn, which would have ended a coastdown that was watched."""
-    inside = (accepted.stamp_ns >= samples.start_ns) & (accepted.stamp_ns <= samples.end_ns)
-    yaw = accepted.value[inside & (accepted.channel == Channel.HEADING), 0]
-    turn_rad = float(np.ptp(np.unwrap(yaw))) if len(yaw) else 0.0
-    if turn_rad <= parameters.turn_rad:
-        return []
-    return [
-        f'the heading swings over {math.degrees(turn_rad):.0f} degrees in the window, more than '
-        f'turn_rad, {math.degrees(parameters.turn_rad):.0f} degrees: the drag of drifting and '
-        'turning is part of r'
-    ]
 
 
 def _heading(accepted: Block, start_ns: int) -> float | None:

@@ -96,7 +96,9 @@ class Coastdown:
     `estimate` is None where none was possible; `failure` then says why.
     `onset_detected_ns` is None where the window was given; `heading_rad` (yaw, REP-103, at the
     start) where there is no heading. One that was `withdrawn` turned out to be none: a
-    `NotCoastdown` says why.
+    `NotCoastdown` says why. `cuts` are parts of the stretch as it was found or given that are
+    no coastdown: they lie before `start_ns` and after `end_ns`, or are the reason why there is
+    no estimate.
     """
 
     start_ns: int
@@ -107,6 +109,12 @@ class Coastdown:
     failure: str | None = None
     heading_rad: float | None = None
     withdrawn: bool = False
+    cuts: tuple[NotCoastdown, ...] = ()
+
+    @property
+    def cut_at_start(self) -> bool:
+        """Whether what comes before it is no steady sailing, but was cut off."""
+        return any(cut.start_ns < self.start_ns for cut in self.cuts)
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from shipdrag_ros.coastdown.events import (
     State,
     Update,
 )
+from shipdrag_ros.coastdown.examination import estimate_examined
 from shipdrag_ros.coastdown.health import InputHealth, input_health
 from shipdrag_ros.coastdown.kernel import Stop, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
@@ -216,7 +217,8 @@ class Monitor:
 
         What is older than `history_ns` may be missing; after a reset all is.
         """
-        return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - self._steady_ns)
+        before_ns = 0 if ended.cut_at_start else self._steady_ns
+        return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - before_ns)
 
     def _fresh(self, tally: Tally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
@@ -356,14 +358,15 @@ class Monitor:
 
     def _conclude(self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None) -> list[Event]:
         assert self._onset is not None
-        start_ns = self._onset.start_ns
-        final, failure = None, None
+        start_ns, final, failure = self._onset.start_ns, None, None
+        cuts: tuple[NotCoastdown, ...] = ()
         if doubt is None:
-            try:
-                window = self._window(end_ns, before_ns=self._steady_ns)
-                final = self._final_estimator(window, self._ship, self._parameters)
-            except EstimationError as error:
-                failure = str(error)
+            window = self._window(end_ns, before_ns=self._steady_ns)
+            first_ns, end_ns, cuts, final, failure = estimate_examined(
+                window, self._ship, self._parameters, self._final_estimator
+            )
+            if first_ns != window.start_ns:  # which is later where an old part has rolled out
+                start_ns = first_ns
         else:
             failure = f'withdrawn: {doubt.text}'
         ended = Coastdown(
@@ -375,6 +378,7 @@ class Monitor:
             failure,
             self._heading_rad,
             doubt is not None,
+            cuts,
         )
         if doubt is None:
             return [ended]

@@ -98,6 +98,41 @@ class Window:
         """The first shaft that has been heard; empty where none has."""
         return next((shaft for shaft in self.shafts if len(shaft)), self.shafts[0])
 
+    def part(self, start_ns: int, end_ns: int) -> Window:
+        """
+        Return a part of it, both bounds included.
+
+        The record `before` is that of the whole: it is kept where the part
+        begins with the window, and left out elsewhere.
+        """
+
+        def cut(series: Series) -> Series:
+            inside = slice(
+                int(np.searchsorted(series.time_ns, start_ns)),
+                int(np.searchsorted(series.time_ns, end_ns, side='right')),
+            )
+            return Series(
+                series.time_ns[inside].copy(),
+                series.value[inside].copy(),
+                series.variance[inside].copy(),
+            )
+
+        return replace(
+            self,
+            start_ns=start_ns,
+            end_ns=end_ns,
+            speed_through_water=cut(self.speed_through_water),
+            speed_over_ground=cut(self.speed_over_ground),
+            position=cut(self.position),
+            heading=cut(self.heading),
+            shafts=tuple(cut(each) for each in self.shafts),
+            pitches=tuple(cut(each) for each in self.pitches),
+            rudder=cut(self.rudder),
+            wind_apparent=cut(self.wind_apparent),
+            depth=cut(self.depth),
+            before=self.before if start_ns == self.start_ns else None,
+        )
+
     @classmethod
     def from_block(
         cls, block: Block, start_ns: int, end_ns: int, *, before_ns: int | None = None
