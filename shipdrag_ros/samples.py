@@ -22,6 +22,7 @@ Float64 = NDArray[np.float64]
 FUTURE_NS = 2_000_000_000  # a stamp this far after its arrival is not a measurement
 BACKWARD_JUMP_NS = 10_000_000_000  # a stamp this far back means that the clock was set
 ABSURD_SPEED_M_S = 40.0  # faster than any displacement ship
+ABSURD_POSITION_M = 4.1e7  # farther than once around the Earth
 
 
 class Channel(IntEnum):

@@ -28,7 +28,9 @@ from shipdrag_ros.coastdown.validate import (
     STAMPS,
     VALUES,
     Limits,
+    alive_ns,
     examine,
+    reject,
     remember,
 )
 from shipdrag_ros.compiled import Signature, compiled
@@ -181,8 +183,8 @@ def walk(
     kept, room = start, len(store.stamp_ns) - store.end[0]
     while i < len(channel):
         c, stamp, arrival = int(channel[i]), stamp_ns[i], receive_ns[i]
-        a, b = value[i, 0], value[i, 1]
-        code = examine(guard, tuning.limits, c, stamp, arrival, a, b)
+        a, b, p, q = value[i, 0], value[i, 1], variance[i, 0], variance[i, 1]
+        code = examine(guard, tuning.limits, c, stamp, arrival, a, b, p, q)
         if code < 0:
             stop = code
             break
@@ -195,7 +197,7 @@ def walk(
                 break
             if (
                 watch.source[0] != NEVER
-                and stamp > guard.last_ns[watch.source[0]] + tuning.data_stop_ns
+                and stamp > alive_ns(guard, tuning.limits, watch.source[0]) + tuning.data_stop_ns
             ):
                 stop = _SILENCE
                 break
@@ -209,11 +211,12 @@ def walk(
                 if stop != 0:
                     break
             add(bins, c, number, stamp, a, b)
-            remember(guard, c, stamp, a, b)
+            remember(guard, c, stamp, a, b, p, q)
             recent = tally.reasons[c, _ACCEPTED] % RECENT
             tally.stamp_ns[c, recent] = stamp
             tally.arrival_ns[c, recent] = arrival
         else:
+            reject(guard, code, c, stamp, a, b, p, q)
             append(store, channel, stamp_ns, receive_ns, value, variance, kept, i)
             room -= i - kept
             kept = i + 1

@@ -13,7 +13,11 @@ The tests, in this order; the first that fails names the reason:
 3. stamp more than 10 s before the last accepted one of the channel: clock set
 4. equal to it: `DUPLICATE`; before it: `OUT_OF_ORDER`
 5. more than `late_s` before the newest accepted stamp of any input: `LATE`
-6. value: `NAN`, `INFINITE`, `ABSURD`, `FROZEN`
+6. value: `NAN`, `INFINITE`, `ABSURD`, `FROZEN`, `OUTLIER`
+
+`FROZEN` is a reading of the motion that repeats for longer than `frozen_s`, or half a
+dozen times where the sensor did not repeat before; `OUTLIER` one that those before it
+make impossible (`outliers`).
 
 A stamp comes before its value because a clock that was set is a fact whatever
 the value says. After a clock was set everything is forgotten and the same
@@ -27,9 +31,19 @@ from typing import NamedTuple
 import numpy as np
 from numba import typeof, types
 
+from shipdrag_ros.coastdown.outliers import (
+    fits,
+    forget_past,
+    refuse,
+    repeats_refused,
+    sticks,
+    take,
+)
+from shipdrag_ros.coastdown.past import Past
 from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import (
+    ABSURD_POSITION_M,
     ABSURD_SPEED_M_S,
     BACKWARD_JUMP_NS,
     FUTURE_NS,
@@ -58,8 +72,10 @@ _NAN = int(Reason.NAN)
 _INFINITE = int(Reason.INFINITE)
 _ABSURD = int(Reason.ABSURD)
 _FROZEN = int(Reason.FROZEN)
+_OUTLIER = int(Reason.OUTLIER)
 
 _SPEEDS = int(Channel.SPEED_OVER_GROUND)  # this channel and those before it
+_POSITION = int(Channel.POSITION)
 _GEODETIC = int(Channel.POSITION_GEODETIC)
 # The motion of a ship at sea never repeats to the last bit; a stopped shaft, a rudder
 # amidships, a steady depth and a course held by a coarse compass do, and rightly.
@@ -94,6 +110,8 @@ class Guard(NamedTuple):
         Value of the last accepted sample.
     held_since_ns : (channels,) int64
         Stamp since which it has not changed [ns].
+    past
+        What tells an outlier.
     """
 
     last_ns: Int64
@@ -101,6 +119,7 @@ class Guard(NamedTuple):
     arrival_ns: Int64
     held: Float64
     held_since_ns: Int64
+    past: Past
 
     @classmethod
     def fresh(cls) -> Guard:
@@ -113,6 +132,7 @@ class Guard(NamedTuple):
             np.full(1, NEVER),
             np.full((CHANNELS, 2), np.nan),
             np.full(CHANNELS, NEVER),
+            Past.fresh(),
         )
 
 
@@ -135,12 +155,20 @@ class Limits(NamedTuple):
 
 @compiled(inline=True, uncounted=True)
 def examine(
-    guard: Guard, limits: Limits, channel: int, stamp: int, arrival: int, a: float, b: float
+    guard: Guard,
+    limits: Limits,
+    channel: int,
+    stamp: int,
+    arrival: int,
+    a: float,
+    b: float,
+    variance_a: float,
+    variance_b: float,
 ) -> int:
     """
     Return the `Reason` of one sample, or that a clock was set.
 
-    Changes nothing: `remember` does, once the sample is taken.
+    Changes nothing: `remember` and `reject` do, once it is decided.
     """
     if arrival < guard.arrival_ns[0] - BACKWARD_JUMP_NS:
         return ARRIVAL_JUMPED_BACK
@@ -162,23 +190,42 @@ def examine(
         return _INFINITE
     if channel <= _SPEEDS and abs(a) > ABSURD_SPEED_M_S:
         return _ABSURD
+    if channel > _MOTION:
+        return _ACCEPTED
     if channel == _GEODETIC and (abs(a) > 90.0 or abs(b) > 360.0):
         return _ABSURD
+    if channel == _POSITION and max(abs(a), abs(b)) > ABSURD_POSITION_M:
+        return _ABSURD
     if (
-        channel <= _MOTION
-        and a == guard.held[channel, 0]
+        a == guard.held[channel, 0]
         and (not two or b == guard.held[channel, 1])
-        and stamp - guard.held_since_ns[channel] > limits.frozen_ns
+        and (
+            stamp - guard.held_since_ns[channel] > limits.frozen_ns or sticks(guard.past, channel)
+        )
     ):
         return _FROZEN
-    return _ACCEPTED
+    if fits(guard.past, channel, stamp, a, b, variance_a, variance_b):
+        return _ACCEPTED
+    if repeats_refused(guard.past, channel, stamp, a, b, limits.frozen_ns):
+        return _FROZEN
+    return _OUTLIER
 
 
 @compiled(inline=True, uncounted=True)
-def remember(guard: Guard, channel: int, stamp: int, a: float, b: float) -> None:
+def remember(
+    guard: Guard,
+    channel: int,
+    stamp: int,
+    a: float,
+    b: float,
+    variance_a: float,
+    variance_b: float,
+) -> None:
     """
     Take an accepted sample into the memory of the tests.
     """
+    if channel <= _MOTION:
+        take(guard.past, channel, stamp, a, b, variance_a, variance_b)
     guard.last_ns[channel] = stamp
     guard.newest_ns[0] = max(guard.newest_ns[0], stamp)
     same = a == guard.held[channel, 0] and (
@@ -188,6 +235,36 @@ def remember(guard: Guard, channel: int, stamp: int, a: float, b: float) -> None
         guard.held[channel, 0] = a
         guard.held[channel, 1] = b
         guard.held_since_ns[channel] = stamp
+
+
+@compiled(inline=True, uncounted=True)
+def reject(
+    guard: Guard,
+    code: int,
+    channel: int,
+    stamp: int,
+    a: float,
+    b: float,
+    variance_a: float,
+    variance_b: float,
+) -> None:
+    """
+    Take a sample that was rejected into the memory of the tests.
+    """
+    if code >= _FROZEN:
+        refuse(guard.past, channel, stamp, a, b, variance_a, variance_b)
+
+
+@compiled(inline=True, uncounted=True)
+def alive_ns(guard: Guard, limits: Limits, channel: int) -> int:
+    """
+    Return the stamp up to which a channel of the motion has been delivering [ns].
+
+    A sensor that sticks or drops out is not silent: it may be back in a while, but
+    `frozen_s` of nothing else is as good as silence.
+    """
+    last = guard.last_ns[channel]
+    return int(max(last, min(guard.past.heard_ns[channel], last + limits.frozen_ns)))
 
 
 @compiled(uncounted=True)
@@ -200,6 +277,7 @@ def forget(guard: Guard) -> None:
     guard.arrival_ns[:] = NEVER
     guard.held[:] = np.nan
     guard.held_since_ns[:] = NEVER
+    forget_past(guard.past)
 
 
 def validate(block: Block, parameters: Parameters) -> UInt8:
@@ -230,6 +308,7 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
         np.ascontiguousarray(block.stamp_ns),
         np.ascontiguousarray(block.receive_ns),
         np.ascontiguousarray(block.value),
+        np.ascontiguousarray(block.variance),
         reasons,
     )
     return reasons
@@ -241,6 +320,7 @@ _SIGNATURE: Signature = types.void(
     CHANNEL_CODES,
     STAMPS,
     STAMPS,
+    VALUES,
     VALUES,
     types.Array(types.uint8, 1, 'C'),
 )
@@ -254,15 +334,19 @@ def _walk(
     stamp_ns: Int64,
     receive_ns: Int64,
     value: Float64,
+    variance: Float64,
     reasons: UInt8,
 ) -> None:
     for i in range(len(channel)):
         c, stamp, a, b = int(channel[i]), stamp_ns[i], value[i, 0], value[i, 1]
-        code = examine(guard, limits, c, stamp, receive_ns[i], a, b)
+        p, q = variance[i, 0], variance[i, 1]
+        code = examine(guard, limits, c, stamp, receive_ns[i], a, b, p, q)
         if code < 0:
             forget(guard)
-            code = examine(guard, limits, c, stamp, receive_ns[i], a, b)
+            code = examine(guard, limits, c, stamp, receive_ns[i], a, b, p, q)
         if code == _ACCEPTED:
-            remember(guard, c, stamp, a, b)
+            remember(guard, c, stamp, a, b, p, q)
+        else:
+            reject(guard, code, c, stamp, a, b, p, q)
         guard.arrival_ns[0] = receive_ns[i]
         reasons[i] = code

@@ -29,8 +29,10 @@ _CAUSE = {
     'alike',
     'nan': 'without a value, as GNSS without a fix or a rotation of zeros; check the sensor',
     'infinite': 'with an infinite value; check the sensor',
-    'absurd': 'faster than 40 m/s, or no latitude and longitude; check the unit',
-    'frozen': 'unchanged for longer than frozen_s; check the sensor',
+    'absurd': 'faster than 40 m/s, or no place on Earth; check the unit',
+    'frozen': 'unchanged for longer than frozen_s, or than this sensor ever is; check the sensor',
+    'outlier': 'impossible beside the readings before and after, as drop-outs to 0, spikes and '
+    'jumps are; check the sensor',
 }
 
 

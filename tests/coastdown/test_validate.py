@@ -117,7 +117,7 @@ def test_motion_that_does_not_change_is_frozen(channel: Channel) -> None:
     # frozen at t = 1..: accepted for frozen_s, then not, until it changes
     samples = [sample(channel, 0.0, [1.0, 2.0])]
     samples += [sample(channel, t, [3.0, 4.0]) for t in range(1, 20)]
-    samples += [sample(channel, 20.0, [3.5, 4.0]), sample(channel, 21.0, [3.5, 4.0])]
+    samples += [sample(channel, t, [3.000001, 4.0]) for t in (20.0, 21.0)]
     found = reasons(*samples, frozen_s=10.0)
     assert found[:12] == ['accepted'] * 12
     assert found[12:20] == ['frozen'] * 8

@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The last accepted readings of the motion, and what they make of the next.
+
+How far two successive readings may be apart is learnt: six robust standard deviations
+of their differences, and for a position the way that it has gone. The memory is of the
+last `KEPT` readings of a channel and of those refused since the last one, so that what
+comes out does not depend on what was long before.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.compiled import compiled
+from shipdrag_ros.samples import Channel, Float64, Int64
+
+MOTION = int(Channel.POSITION_GEODETIC) + 1  # the channels before it are judged
+FIRST_TRACK = int(Channel.POSITION)  # this channel and those after it are positions
+GEODETIC = int(Channel.POSITION_GEODETIC)
+KEPT = 32  # accepted readings that the gate is learnt from
+AGREED = 5  # readings that make a truth: refused ones that agree, and the first ones
+MIDDLE = 5  # readings in the median
+SD = 6.0  # standard deviations of a difference, beyond which it is none of this motion
+M_PER_DEGREE = 111_195.0
+STUCK = 6  # repeats in a row that a sensor that does not repeat makes when it sticks
+REPEATS = 2  # among the readings kept: a sensor that repeats more often does so by its nature
+
+_NEVER = -(2**62)
+_LEARN_NS = 64_000_000_000
+_WITNESSES = 16  # readings before a run of repeats that tell whether it is natural
+_OF_MEDIAN = 0.6745  # median of the size of a normal variable, in standard deviations
+_OF_QUARTILE = 1.1503  # its upper quartile
+_OF_PLANE = 1.1774  # median of the length of a normal vector of the plane
+# A step of 0.1 knots, the resolution of many logs, is never an outlier; and 2 % are not worth it.
+_FLOOR_M_S = 0.06
+_FLOOR_PART = 0.02
+_FLOOR_M = 0.5
+
+
+class Past(NamedTuple):
+    """
+    What is remembered of the channels before `MOTION`.
+
+    Attributes
+    ----------
+    value : (channels, KEPT, 2)
+        The last accepted readings, number n in slot n % KEPT.
+    stamp_ns : (channels, KEPT) int64
+        Their stamps [ns].
+    count : (channels,) int64
+        How many were accepted since all was learnt anew.
+    gate : (channels,)
+        Difference of successive readings that noise explains [m/s or m]; inf while unknown.
+    rate : (channels,)
+        Of positions, the speed by the readings kept [m/s]; else 0.
+    learn_ns : (channels,) int64
+        Stamp from which on these are to be learnt again [ns].
+    due_ns : (channels,) int64
+        Stamp from which on an accepted reading is more than kept [ns]; `learn_ns`, or at once.
+    repeats, stuck : (channels,) int64
+        How often the last one has repeated, and 1 where that means that the sensor sticks.
+    refused : (channels, AGREED, 2)
+        The last of the refused readings that agree with each other.
+    refused_count, refused_new : (channels,) int64
+        How many they are, and how many of them differ from the one before.
+    refused_ns : (channels, 2) int64
+        Stamps of the first and of the last of them [ns].
+    heard_ns : (channels,) int64
+        Stamp of the last reading that was refused [ns].
+    doubts, doubted_ns : (channels,) int64
+        Readings refused more than accepted, and the stamp since which [ns].
+    scratch : (KEPT,)
+        Room to sort in: compiled code makes no arrays.
+    """
+
+    value: Float64
+    stamp_ns: Int64
+    count: Int64
+    gate: Float64
+    rate: Float64
+    learn_ns: Int64
+    due_ns: Int64
+    repeats: Int64
+    stuck: Int64
+    refused: Float64
+    refused_count: Int64
+    refused_new: Int64
+    refused_ns: Int64
+    heard_ns: Int64
+    doubts: Int64
+    doubted_ns: Int64
+    scratch: Float64
+
+    @classmethod
+    def fresh(cls) -> Past:
+        """
+        Return the memory before the first reading.
+        """
+
+        def none() -> Int64:
+            return np.zeros(MOTION, np.int64)
+
+        return cls(
+            np.zeros((MOTION, KEPT, 2)),
+            np.zeros((MOTION, KEPT), np.int64),
+            none(),
+            np.full(MOTION, np.inf),
+            np.zeros(MOTION),
+            none(),
+            np.full(MOTION, _NEVER),
+            none(),
+            none(),
+            np.zeros((MOTION, AGREED, 2)),
+            none(),
+            none(),
+            np.zeros((MOTION, 2), np.int64),
+            np.full(MOTION, _NEVER),
+            none(),
+            none(),
+            np.zeros(KEPT),
+        )
+
+
+@compiled(uncounted=True)
+def learn_anew(past: Past, channel: int) -> None:
+    """
+    Forget all readings of a channel.
+    """
+    past.count[channel] = 0
+    past.gate[channel] = np.inf
+    past.rate[channel] = 0.0
+    past.due_ns[channel] = _NEVER
+    past.repeats[channel] = 0
+    past.stuck[channel] = 0
+    past.refused_count[channel] = 0
+    past.refused_new[channel] = 0
+    past.doubts[channel] = 0
+
+
+@compiled(inline=True, uncounted=True)
+def keep(past: Past, channel: int, stamp: int, a: float, b: float) -> None:
+    """
+    Keep an accepted reading where nothing else is due.
+    """
+    count = past.count[channel]
+    slot = count % KEPT
+    past.value[channel, slot, 0] = a
+    past.value[channel, slot, 1] = b
+    past.stamp_ns[channel, slot] = stamp
+    past.count[channel] = count + 1
+
+
+@compiled(uncounted=True)
+def keep_and_learn(past: Past, channel: int, stamp: int, a: float, b: float) -> None:
+    """
+    Keep an accepted reading, and learn from it what is due.
+    """
+    count = past.count[channel]
+    if count > 0 and same_as_last(past, channel, a, b):
+        past.repeats[channel] += 1
+    else:
+        past.repeats[channel] = 0
+        past.stuck[channel] = 0
+    keep(past, channel, stamp, a, b)
+    if past.repeats[channel] == STUCK:
+        past.stuck[channel] = _is_stuck(past, channel)
+    if count < KEPT or stamp >= past.learn_ns[channel]:
+        _learn(past, channel)
+        past.learn_ns[channel] = (stamp // _LEARN_NS + 1) * _LEARN_NS
+    quiet = count >= KEPT and past.repeats[channel] == 0 and past.doubts[channel] == 0
+    past.due_ns[channel] = past.learn_ns[channel] if quiet else _NEVER
+
+
+@compiled(inline=True, uncounted=True)
+def same_as_last(past: Past, channel: int, a: float, b: float) -> bool:
+    """
+    Say whether a reading is the last accepted one again; there must be one.
+    """
+    last = (past.count[channel] - 1) % KEPT
+    return bool(
+        a == past.value[channel, last, 0]
+        and (channel < FIRST_TRACK or b == past.value[channel, last, 1])
+    )
+
+
+@compiled(uncounted=True)
+def apart(channel: int, a: float, b: float, other_a: float, other_b: float) -> float:
+    """Return the distance of two readings [m/s or m]."""
+    if channel < FIRST_TRACK:
+        return abs(a - other_a)
+    x, y = a - other_a, b - other_b
+    if channel == GEODETIC:
+        y -= 360.0 * np.round(y / 360.0)
+        x *= M_PER_DEGREE
+        y *= M_PER_DEGREE * math.cos(math.radians(other_a))
+    return math.sqrt(x * x + y * y)
+
+
+@compiled(uncounted=True)
+def median(past: Past, channel: int, count: int, column: int, near: float) -> float:
+    """Return the median of a column over the `MIDDLE` readings up to number `count` - 1."""
+    scratch = past.scratch
+    for i in range(MIDDLE):
+        value = past.value[channel, (count - 1 - i) % KEPT, column]
+        if channel == GEODETIC and column == 1:
+            value -= 360.0 * np.round((value - near) / 360.0)
+        _insert(scratch, i, value)
+    return float(scratch[MIDDLE // 2])
+
+
+@compiled(inline=True, uncounted=True)
+def _insert(scratch: Float64, count: int, value: float) -> None:
+    """Put a value among the first `count`, ascending."""
+    at = count
+    while at > 0 and scratch[at - 1] > value:
+        scratch[at] = scratch[at - 1]
+        at -= 1
+    scratch[at] = value
+
+
+@compiled(uncounted=True)
+def repeats_kept(past: Past, channel: int, kept: int, newest: int) -> int:
+    """Count repeats among the readings kept, without the `newest` ones."""
+    number, repeats = past.count[channel] - newest, 0
+    for i in range(kept - newest - 1):
+        one, other = (number - 1 - i) % KEPT, (number - 2 - i) % KEPT
+        repeats += past.value[channel, one, 0] == past.value[channel, other, 0] and (
+            channel < FIRST_TRACK or past.value[channel, one, 1] == past.value[channel, other, 1]
+        )
+    return repeats
+
+
+@compiled(uncounted=True)
+def _is_stuck(past: Past, channel: int) -> int:
+    """Say whether repeats that go on are odd for this sensor; 1 or 0."""
+    kept, run = min(past.count[channel], KEPT), STUCK + 1
+    if kept - run < _WITNESSES:
+        return 0
+    return int(repeats_kept(past, channel, kept, run) <= REPEATS)
+
+
+@compiled(uncounted=True)
+def _learn(past: Past, channel: int) -> None:
+    """Learn the gate, and the speed of a track, from the readings kept."""
+    count = past.count[channel]
+    kept = min(count, KEPT)
+    if kept < MIDDLE:
+        return
+    if channel < FIRST_TRACK:
+        _learn_speed(past, channel, count, kept)
+    else:
+        _learn_track(past, channel, count, kept)
+
+
+@compiled(uncounted=True)
+def _learn_speed(past: Past, channel: int, count: int, kept: int) -> None:
+    scratch, value = past.scratch, past.value[channel]
+    for i in range(kept - 1):
+        one, other = (count - 1 - i) % KEPT, (count - 2 - i) % KEPT
+        _insert(scratch, i, abs(value[one, 0] - value[other, 0]))
+    known = kept - 1
+    # the quartile too: more than half of the readings of a coarse log repeat
+    spread = max(scratch[known // 2] / _OF_MEDIAN, scratch[3 * known // 4] / _OF_QUARTILE)
+    near = abs(median(past, channel, count, 0, 0.0))
+    past.gate[channel] = max(_FLOOR_M_S + _FLOOR_PART * near, SD * spread)
+
+
+@compiled(uncounted=True)
+def _learn_track(past: Past, channel: int, count: int, kept: int) -> None:
+    scratch, value = past.scratch, past.value[channel]
+    last, first = (count - 1) % KEPT, (count - kept) % KEPT
+    near = value[last, 1]
+    # the way from median to median: a single jump is in neither
+    new_a, new_b = median(past, channel, count, 0, 0.0), median(past, channel, count, 1, near)
+    old = count - kept + MIDDLE
+    old_a, old_b = median(past, channel, old, 0, 0.0), median(past, channel, old, 1, near)
+    time = (past.stamp_ns[channel, last] - past.stamp_ns[channel, first]) * 1e-9
+    time *= (kept - MIDDLE) / (kept - 1.0)
+    rate_a = (new_a - old_a) / time if time > 0.0 else 0.0
+    rate_b = (new_b - old_b) / time if time > 0.0 else 0.0
+    for i in range(kept - 1):
+        one, other = (count - 1 - i) % KEPT, (count - 2 - i) % KEPT
+        step = (past.stamp_ns[channel, one] - past.stamp_ns[channel, other]) * 1e-9
+        _insert(
+            scratch,
+            i,
+            apart(
+                channel,
+                value[one, 0] - rate_a * step,
+                value[one, 1] - rate_b * step,
+                value[other, 0],
+                value[other, 1],
+            ),
+        )
+    known = kept - 1
+    past.rate[channel] = apart(channel, old_a + rate_a, old_b + rate_b, old_a, old_b)
+    past.gate[channel] = max(_FLOOR_M, SD * scratch[known // 2] / _OF_PLANE)
