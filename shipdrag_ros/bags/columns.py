@@ -68,9 +68,10 @@ def parse_input(text: str) -> InputColumns:
     """
     Read `INPUT=COLUMN[:unit]`.
 
-    `position` and `wind_apparent` take two columns, `position=x,y:km` for
-    instance; a position in `deg` is latitude and longitude. Without a unit
-    the values are SI.
+    `position` and `wind_apparent` take two columns. A unit given once holds
+    for both, `position=x,y:km` as much as `position=x:km,y`; two are taken as
+    written, `position=x:km,y:m`. A position in `deg` is latitude and
+    longitude. Without a unit the values are SI.
 
     Raises
     ------
@@ -79,26 +80,26 @@ def parse_input(text: str) -> InputColumns:
     """
     name, _, rest = text.partition('=')
     name = name.strip()
-    channels = [channel for channel in Channel if channel.input == name]
+    channels = [channel for channel in _UNITS if channel.input == name]
     if not channels:
-        known = ', '.join(dict.fromkeys(channel.input for channel in Channel))
+        known = ', '.join(dict.fromkeys(channel.input for channel in _UNITS))
         raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {known}')
     count = 2 if name in _TWO_COLUMNS else 1
     columns = [_split_unit(piece, _units_of(channels)) for piece in rest.split(',')]
     if len(columns) != count or not all(column for column, _ in columns):
         example = f'{name}={",".join(["COLUMN[:unit]"] * count)}'
         raise ImportDataError(f'--map {text!r}: expected {count} column(s), {example}')
-    units = [unit for _, unit in columns]
+    given = [unit for _, unit in columns if unit is not None]
     channel = channels[0]
-    if 'deg' in units and channel is Channel.POSITION:
+    if 'deg' in given and channel is Channel.POSITION:
         channel = Channel.POSITION_GEODETIC
     factors = _UNITS[channel]
-    if any(unit not in (None, *factors) for unit in units) or (
-        channel is Channel.POSITION_GEODETIC and None in units
-    ):
+    if any(unit not in factors for unit in given):
         raise ImportDataError(
             f'--map {text!r}: expected both columns in deg, or both in {", ".join(_LENGTH)}'
         )
+    common = given[0] if given else None  # a unit given once holds for both columns
+    units = [unit or common for _, unit in columns]
     return InputColumns(
         channel,
         tuple(column for column, _ in columns),

@@ -92,9 +92,10 @@ def _add_csv(group: argparse._ArgumentGroup) -> None:
         default=[],
         metavar='INPUT=COLUMN[:unit]',
         help='column (name, or number from 1) of an input; more than once for more inputs. '
-        'position and wind_apparent take two: position=x,y:km, and in deg a position is latitude '
-        'and longitude. Units: speeds m/s kn km/h ft/s, lengths m km ft nmi, angles rad deg, '
-        'shaft rad/s rpm (default: the first of each)',
+        'position and wind_apparent take two, and a unit given once holds for both: '
+        'position=x,y:km is position=x:km,y:km. A position in deg is latitude and longitude: '
+        'position=lat,lon:deg. Units: speeds m/s kn km/h ft/s, lengths m km ft nmi, angles rad '
+        'deg, shaft rad/s rpm (default: the first of each)',
     )
     times = group.add_mutually_exclusive_group()
     times.add_argument(

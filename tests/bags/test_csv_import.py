@@ -108,12 +108,33 @@ def test_units(import_text: Import, text: str, name: str, value: float) -> None:
 
 
 def test_two_columns(import_text: Import) -> None:
-    _, block = import_text('1,2,3,4\n', 'position=1:km,2:nmi', 'wind_apparent=4:kn,3', rate_hz=1)
+    _, block = import_text('1,2,3,4\n', 'position=1:km,2:nmi', 'wind_apparent=4,3', rate_hz=1)
     assert block.value[0].tolist() == [1000.0, 3704.0]
-    assert block.value[1] == pytest.approx([4 * 1852 / 3600, 3.0], rel=1e-15)
+    assert block.value[1].tolist() == [4.0, 3.0]
     _, block = import_text('lat,lon\n60.5,-5.25\n', 'position=lat:deg,lon:deg', rate_hz=1)
     assert block.channel.tolist() == [Channel.POSITION_GEODETIC]
     assert block.value[0].tolist() == [60.5, -5.25]
+
+
+@pytest.mark.parametrize(
+    ('columns', 'value'),
+    [
+        ('position=1,2:km', [1000.0, 2000.0]),
+        ('position=1:km,2', [1000.0, 2000.0]),
+        ('position=1:km,2:km', [1000.0, 2000.0]),
+        ('position=1:km,2:m', [1000.0, 2.0]),
+        ('position=1,2:deg', [1.0, 2.0]),
+        ('position=1:deg,2', [1.0, 2.0]),
+        ('wind_apparent=1,2:kn', [1852 / 3600, 2 * 1852 / 3600]),
+    ],
+)
+def test_a_unit_given_once_holds_for_both_columns(
+    import_text: Import, columns: str, value: list[float]
+) -> None:
+    _, block = import_text('1,2\n', columns, rate_hz=1)
+    assert block.value[0] == pytest.approx(value, rel=1e-15)
+    geodetic = block.channel[0] == Channel.POSITION_GEODETIC
+    assert geodetic == columns.count('deg')
 
 
 @pytest.mark.parametrize(
@@ -241,7 +262,7 @@ def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -
         ('shaft', r'expected 1 column\(s\)'),
         ('shaft=n:rps', "no unit 'rps' here; units are rad/s, rpm"),
         ('depth=d:kn', "no unit 'kn' here"),
-        ('position=x:deg,y', 'both columns in deg'),
+        ('position=x:m,y:deg', 'both columns in deg'),
         ('position=x:deg,y:m', 'both columns in deg'),
     ],
 )
