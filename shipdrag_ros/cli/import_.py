@@ -61,8 +61,8 @@ def _add_nmea(group: argparse._ArgumentGroup) -> None:
     group.description = (
         'Of VHW VBW VTG RMC GGA GLL HDT HDG RPM MWV DPT DBT RSA ZDA, each input is taken from '
         'one talker; of RPM, up to four shafts (numbers 0 to 4) and their pitch. A sentence '
-        'without a time has that of the last one with a time; where the logger wrote the time of receipt '
-        'before each line, the time since is added.'
+        'without a time has that of the last one with a time; where the logger wrote the time of '
+        'receipt before each line, the time since is added.'
     )
     group.add_argument(
         '--date',
