@@ -15,7 +15,7 @@ from numba import njit
 from numba import types as nb
 from numpy.typing import NDArray
 
-from shipdrag_ros.compiled import digest
+from shipdrag_ros.compiled import INLINED, UNCOUNTED, digest
 from shipdrag_ros.messages.gather import (
     BAD,
     BODY,
@@ -38,6 +38,13 @@ _MALFORMED = int(Found.MALFORMED)
 _NO_JOINT = int(Found.NO_JOINT)
 _PADDING = PADDING_BYTES
 _SOURCES = ('gather', 'joint_names', 'joints', 'types')
+_ARRAYS = 3  # position, velocity, effort
+# what is found in one message: the joint of each slot; the shafts and the pitches that take a free
+# place; length of each array, and where it begins
+_WAITING = len(_CODES)
+_LENGTH = _WAITING + 2 * PLACES
+_FIRST = _LENGTH + _ARRAYS
+_SCRATCH = _FIRST + _ARRAYS
 _SHORTEST_STRING = 5  # its length, and its zero
 
 _U = np.uint64
@@ -108,79 +115,86 @@ def read_joints(
     rudder = channel is Channel.RUDDER
     room = 0 if rudder else (2 * PLACES - 1) * len(place)
     more = Joints(np.empty(room, np.intp), np.empty(room, np.uint8), np.empty(room), 0)
+    scratch = np.empty(_SCRATCH, np.int64)
     count, surplus = _read_all(
-        data, start, end, place, rudder, stamp_ns, code, rows, found, *more[:3]
+        data, start, end, place, rudder, stamp_ns, code, rows, found, scratch, *more[:3]
     )
     return Joints(more.message[:count], more.code[:count], more.value[:count], surplus)
 
 
-@njit
-def _give_places(joint: Any, waiting: Any, waits: Any, surplus: Any) -> None:
-    """Give the free places to the joints that have none by their name."""
-    for kind in range(2):
-        given = 0
-        for slot in range(kind * PLACES, (kind + 1) * PLACES):
-            if joint[slot] < 0 and given < min(waits[kind], PLACES):
-                joint[slot] = waiting[kind, given]
-                given += 1
-        surplus[0] += waits[kind] - given
+@njit(**INLINED)
+def _give_places(scratch: Any, kind: int, waits: int, slots: int) -> tuple[int, int]:
+    """Give free places to the joints of a kind; return the slots taken, and what is left."""
+    given = 0
+    for slot in range(kind * PLACES, (kind + 1) * PLACES):
+        if not slots >> slot & 1 and given < min(waits, PLACES):
+            scratch[_U(slot)] = scratch[_U(_WAITING + kind * PLACES + given)]
+            slots |= 1 << slot
+            given += 1
+    return slots, waits - given
 
 
-@njit
+@njit(**INLINED)
 def _read_names(
-    data: Any, body: int, at: int, size: int, big: bool, rudder: bool, found: Any
-) -> int:
-    """Find the joint of each slot; return the end of the names, `BAD` if they are none."""
+    data: Any, body: int, at: int, size: int, big: bool, rudder: bool, scratch: Any
+) -> tuple[int, int, int]:
+    """
+    Find the joint of each slot.
+
+    Returns the end of the names, `BAD` if they are none; the slots that have a joint,
+    one bit each; and how many joints have no place.
+    """
     at = aligned(at, 4)
     if at + 4 > size:
-        return BAD
-    count = np.int64(word(data, body + at, big))
+        return BAD, 0, 0
+    count: Any = np.int64(word(data, body + at, big))
     at += 4
     if at + count * _SHORTEST_STRING > size:
-        return BAD
-    joint, waiting, waits, surplus = found
-    joint[:] = -1
-    waits[:] = 0
-    surplus[0] = 0
+        return BAD, 0, 0
+    slots = shafts = pitches = surplus = 0
     for each in range(count):
         at = aligned(at, 4)
         first = body + at + 4
         at = string_end(data, body, at, size, big)
         if at == BAD:
-            return BAD
+            return BAD, 0, 0
         kind, place = slot_of(data, first, body + at - 1, rudder)
         if kind == NOT_OURS:
             continue
         if place == BEYOND:
-            surplus[0] += 1
-        elif place != FREE and joint[kind + place] < 0:
-            joint[kind + place] = each
-        elif kind != RUDDER:  # of two rudders of the name, the first
-            which = kind // PLACES
-            if waits[which] < PLACES:
-                waiting[which, waits[which]] = each
-            waits[which] += 1
-    _give_places(joint, waiting, waits, surplus)
-    return at
+            surplus += 1
+        elif place != FREE and not slots >> (kind + place) & 1:
+            scratch[_U(kind + place)] = each
+            slots |= 1 << (kind + place)
+        elif kind == 0:
+            scratch[_U(_WAITING + min(shafts, PLACES - 1))] = each
+            shafts += 1
+        elif kind == PLACES:
+            scratch[_U(_WAITING + PLACES + min(pitches, PLACES - 1))] = each
+            pitches += 1
+    for kind, waits in ((0, shafts), (1, pitches)):
+        if waits:
+            slots, left = _give_places(scratch, kind, waits, slots)
+            surplus += left
+    return at, slots, surplus
 
 
-@njit
-def _read_arrays(
-    data: Any, body: int, at: int, size: int, big: bool, count: Any, first: Any
-) -> bool:
+@njit(**INLINED)
+def _read_arrays(data: Any, body: int, at: int, size: int, big: bool, scratch: Any) -> bool:
     """Find position, velocity and effort; False if they do not fill the message."""
-    for k in range(3):
+    for k in range(_ARRAYS):
         at = aligned(at, 4)
         if at + 4 > size:
             return False
-        count[k] = np.int64(word(data, body + at, big))
+        count: Any = np.int64(word(data, body + at, big))
         at += 4
-        if count[k] > 0:
+        if count > 0:
             at = aligned(at, 8)
-        if at + 8 * count[k] > size:
+        scratch[_U(_LENGTH + k)] = count
+        scratch[_U(_FIRST + k)] = body + at
+        at += 8 * count
+        if at > size:
             return False
-        first[k] = body + at
-        at += 8 * count[k]
     return size - at <= _PADDING
 
 
@@ -201,10 +215,12 @@ def _compile(sources: str) -> Callable[..., tuple[int, int]]:
             nb.float64[:, ::1],
             nb.uint8[::1],
             nb.int64[::1],
+            nb.int64[::1],
             nb.uint8[::1],
             nb.float64[::1],
         ),
         cache=True,
+        **UNCOUNTED,
     )
     def read_all(  # type: ignore[no-untyped-def]
         data,
@@ -216,21 +232,17 @@ def _compile(sources: str) -> Callable[..., tuple[int, int]]:
         code,
         rows,
         found,
+        scratch,
         more_message,
         more_code,
         more_value,
     ):
         """Read the joints of messages; return how many more there are, and how many surplus."""
-        sources  # noqa: B018  compiled anew when they change
-        joint = np.empty(len(_CODES), np.int64)
-        beyond = np.empty(1, np.int64)
-        names = joint, np.empty((2, PLACES), np.int64), np.empty(2, np.int64), beyond
-        count = np.empty(3, np.int64)
-        first = np.empty(3, np.int64)
+        _ = sources  # part of the key of the cache
         more = 0
         surplus = 0
         for k in range(len(place)):
-            i = place[k]
+            i = _U(place[_U(k)])
             body = start[i] + BODY
             size = end[i] - body
             found[i] = _MALFORMED
@@ -240,28 +252,29 @@ def _compile(sources: str) -> Callable[..., tuple[int, int]]:
             at = string_end(data, body, TIME_BYTES, size, big)
             if at == BAD:
                 continue
-            at = _read_names(data, body, at, size, big, rudder, names)
-            if at == BAD or not _read_arrays(data, body, at, size, big, count, first):
+            at, slots, left = _read_names(data, body, at, size, big, rudder, scratch)
+            if at == BAD or not _read_arrays(data, body, at, size, big, scratch):
                 continue
-            surplus += beyond[0]
-            samples = 0
-            for slot in range(len(_CODES)):
+            surplus += left
+            found[i] = _NO_JOINT
+            for slot in range(RUDDER + 1):
                 which = 1 if slot < PLACES else 0  # the rate of a shaft, the angle of the others
-                if joint[slot] < 0 or joint[slot] >= count[which]:
+                joint = scratch[_U(slot)]
+                if not slots >> slot & 1 or joint >= scratch[_U(_LENGTH + which)]:
                     continue
-                value = float64(data, first[which] + 8 * joint[slot], big)
-                if samples == 0:
-                    code[i] = _CODES[slot]
+                value = float64(data, scratch[_U(_FIRST + which)] + 8 * joint, big)
+                if found[i] != _READ:
+                    found[i] = _READ
+                    code[i] = _CODES[_U(slot)]
                     rows[i, 0] = value
                     rows[i, 1] = 0.0
-                    rows[i, 2:COLUMNS] = np.nan
+                    for column in range(2, COLUMNS):
+                        rows[i, _U(column)] = np.nan
                 else:
-                    more_message[more] = i
-                    more_code[more] = _CODES[slot]
-                    more_value[more] = value
+                    more_message[_U(more)] = np.int64(i)
+                    more_code[_U(more)] = _CODES[_U(slot)]
+                    more_value[_U(more)] = value
                     more += 1
-                samples += 1
-            found[i] = _READ if samples else _NO_JOINT
         return more, surplus
 
     return cast(Callable[..., tuple[int, int]], read_all)
