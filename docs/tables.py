@@ -27,7 +27,8 @@ _INPUT_MEANING = {
     'position': 'radar-derived from a fixed mark, or GNSS: metres in a fixed frame, or latitude '
     'and longitude',
     'heading': 'yaw',
-    'shaft': 'joint `shaft`, `velocity` [rad/s]',
+    'shaft': 'joints `shaft...`, up to four: `velocity` [rad/s], negative astern; joints '
+    '`pitch...` of controllable propellers: `position`, a ratio or an angle, 0 no thrust',
     'rudder': 'joint `rudder`, `position` [rad]',
     'wind_apparent': 'air relative to the ship in base_link [m/s]; head wind: `linear.x` < 0',
     'depth': 'water depth from the surface [m]',

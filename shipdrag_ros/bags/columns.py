@@ -3,18 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from math import pi
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import Channel
+from shipdrag_ros.samples import PITCHES, SHAFTS, Channel
 
 _SPEED = {'m/s': 1.0, 'kn': 1852.0 / 3600.0, 'km/h': 1.0 / 3.6, 'ft/s': 0.3048}
 _LENGTH = {'m': 1.0, 'km': 1000.0, 'ft': 0.3048, 'nmi': 1852.0}
 _ANGLE = {'rad': 1.0, 'deg': pi / 180.0}
-_TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0}
+_TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0, 'rev/s': 2.0 * pi}
+_PITCH = {'ratio': 1.0, '%': 0.01, **_ANGLE}
 _LATITUDE = {'deg': 1.0}  # as they are sent
 _UNITS: Mapping[Channel, Mapping[str, float]] = {
     Channel.SPEED_THROUGH_WATER: _SPEED,
@@ -23,11 +24,12 @@ _UNITS: Mapping[Channel, Mapping[str, float]] = {
     Channel.POSITION_GEODETIC: _LATITUDE,
     Channel.HEADING: _ANGLE,
     Channel.SHAFT: _TURN_RATE,
+    Channel.PITCH: _PITCH,
     Channel.RUDDER: _ANGLE,
     Channel.WIND_APPARENT: _SPEED,
     Channel.DEPTH: _LENGTH,
 }
-_TWO_COLUMNS = ('position', 'wind_apparent')
+_COUNTS = {'position': (2,), 'wind_apparent': (2,), 'shaft': (1, 2, 3, 4), 'pitch': (1, 2, 3, 4)}
 NANOSECONDS: Mapping[str, Decimal] = {
     's': Decimal(10**9),
     'ms': Decimal(10**6),
@@ -44,9 +46,9 @@ class InputColumns:
     Attributes
     ----------
     channel
-        What they hold.
+        What they hold; of several shafts or pitches, the first one.
     names
-        Names or numbers, counted from 1; one or two.
+        Names or numbers, counted from 1; of one value, or of one a shaft.
     factors
         What each is multiplied by for the unit of `Channel`.
     """
@@ -54,6 +56,22 @@ class InputColumns:
     channel: Channel
     names: tuple[str, ...]
     factors: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """What they are mapped to."""
+        return _name(self.channel)
+
+    def by_channel(self) -> Iterator[InputColumns]:
+        """
+        Yield the columns of each channel: of several shafts, one each.
+        """
+        for channels in (SHAFTS, PITCHES):
+            if self.channel is channels[0]:
+                for channel, name, factor in zip(channels, self.names, self.factors, strict=False):
+                    yield InputColumns(channel, (name,), (factor,))
+                return
+        yield self
 
 
 @dataclass(frozen=True)
@@ -68,10 +86,11 @@ def parse_input(text: str) -> InputColumns:
     """
     Read `INPUT=COLUMN[:unit]`.
 
-    `position` and `wind_apparent` take two columns. A unit given once holds
-    for both, `position=x,y:km` as much as `position=x:km,y`; two are taken as
-    written, `position=x:km,y:m`. A position in `deg` is latitude and
-    longitude. Without a unit the values are SI.
+    `position` and `wind_apparent` take two columns, `shaft` and `pitch` up to
+    four, one a shaft. A unit given once holds for all, `position=x,y:km` as much
+    as `position=x:km,y`; several are taken as written, `position=x:km,y:m`. A
+    position in `deg` is latitude and longitude. Without a unit the values are SI,
+    a pitch is a ratio.
 
     Raises
     ------
@@ -80,15 +99,16 @@ def parse_input(text: str) -> InputColumns:
     """
     name, _, rest = text.partition('=')
     name = name.strip()
-    channels = [channel for channel in _UNITS if channel.input == name]
+    channels = [channel for channel in _UNITS if _name(channel) == name]
     if not channels:
-        known = ', '.join(dict.fromkeys(channel.input for channel in _UNITS))
+        known = ', '.join(dict.fromkeys(map(_name, _UNITS)))
         raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {known}')
-    count = 2 if name in _TWO_COLUMNS else 1
+    counts = _COUNTS.get(name, (1,))
     columns = [_split_unit(piece, _units_of(channels)) for piece in rest.split(',')]
-    if len(columns) != count or not all(column for column, _ in columns):
-        example = f'{name}={",".join(["COLUMN[:unit]"] * count)}'
-        raise ImportDataError(f'--map {text!r}: expected {count} column(s), {example}')
+    if len(columns) not in counts or not all(column for column, _ in columns):
+        expected = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
+        example = f'{name}={",".join(["COLUMN[:unit]"] * counts[0])}'
+        raise ImportDataError(f'--map {text!r}: expected {expected} column(s), {example}')
     given = [unit for _, unit in columns if unit is not None]
     channel = channels[0]
     if 'deg' in given and channel is Channel.POSITION:
@@ -98,7 +118,7 @@ def parse_input(text: str) -> InputColumns:
         raise ImportDataError(
             f'--map {text!r}: expected both columns in deg, or both in {", ".join(_LENGTH)}'
         )
-    common = given[0] if given else None  # a unit given once holds for both columns
+    common = given[0] if given else None  # a unit given once holds for all columns
     units = [unit or common for _, unit in columns]
     return InputColumns(
         channel,
@@ -120,6 +140,10 @@ def parse_time(text: str) -> TimeColumn:
     if not column:
         raise ImportDataError(f'--time {text!r}: expected COLUMN[:unit]')
     return TimeColumn(column, NANOSECONDS[unit or 's'])
+
+
+def _name(channel: Channel) -> str:
+    return 'pitch' if channel in PITCHES else channel.input
 
 
 def _units_of(channels: list[Channel]) -> set[str]:

@@ -67,7 +67,7 @@ class ImportResult:
     left_out
         Rows that `where` does not choose.
     written
-        Samples by input.
+        Samples by input; pitches are of `shaft`.
     rejected
         By input, or 'time' for a whole row, and reason.
     start_ns, end_ns
@@ -146,7 +146,11 @@ def import_csv(
     _check_inputs(inputs)
     table = Table(source)
     record = _Record(
-        [(each, [table.column(name) for name in each.names]) for each in inputs],
+        [
+            (each, [table.column(name) for name in each.names])
+            for mapped in inputs
+            for each in mapped.by_channel()
+        ],
         [(table.column(name), text) for name, text in where],
         clock,
         None if time is None else table.column(time.name),
@@ -355,7 +359,7 @@ def _clock(time: TimeColumn | None, rate_hz: float | None, start_ns: int) -> _Cl
 def _check_inputs(inputs: Sequence[InputColumns]) -> None:
     if not inputs:
         raise ImportDataError('no column is mapped; give --map INPUT=COLUMN[:unit]')
-    for name, count in Counter(each.channel.input for each in inputs).items():
+    for name, count in Counter(each.name for each in inputs).items():
         if count > 1:
             raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
 
@@ -370,7 +374,7 @@ def _provenance(
     """Say where the samples come from; the name alone, whatever the machine."""
     about = {
         'source': source.name,
-        'inputs': {each.channel.input: list(each.names) for each in inputs},
+        'inputs': {each.name: list(each.names) for each in inputs},
         'time': None if time is None else time.name,
         'rate_hz': rate_hz,
         'where': dict(where),

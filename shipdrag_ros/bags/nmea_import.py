@@ -47,7 +47,7 @@ class NmeaResult:
     written
         Samples by input.
     sources
-        Talker and sentence that each input is taken from.
+        Talker and sentence that each input is taken from; several of several shafts.
     not_taken
         By input, values of the sentences that it is not taken from.
     not_used
@@ -210,16 +210,8 @@ def _result(
         lines=log.lines,
         sentences=record.sentences,
         written={name: record.written[name] for name in INPUTS if record.written[name]},
-        sources={channel.input: str(source) for channel, source in sorted(record.chosen.items())},
-        not_taken={
-            channel.input: {
-                str(source): count
-                for source, count in counts.items()
-                if source != record.chosen[channel]
-            }
-            for channel, counts in sorted(survey.values.items())
-            if len(counts) > 1
-        },
+        sources=_sources(record),
+        not_taken=_not_taken(survey, record),
         not_used=dict(not_used.most_common()),
         unknown_talkers=dict(unknown),
         rejected=rejected,
@@ -233,3 +225,22 @@ def _result(
         log_attached=attached,
         damage=log.damage,
     )
+
+
+def _sources(record: Record) -> dict[str, str]:
+    """Say what each input is taken from; of several shafts and pitches, each once."""
+    told: dict[str, dict[str, None]] = {}
+    for channel, source in sorted(record.chosen.items()):
+        told.setdefault(channel.input, {})[str(source)] = None
+    return {name: ', '.join(sources) for name, sources in told.items()}
+
+
+def _not_taken(survey: Survey, record: Record) -> dict[str, dict[str, int]]:
+    """Count by input the values of the sources that nothing is taken from."""
+    counts: dict[str, dict[str, int]] = {}
+    for channel, of_channel in sorted(survey.values.items()):
+        for source, count in of_channel.items():
+            if source != record.chosen[channel]:
+                others = counts.setdefault(channel.input, {})
+                others[str(source)] = others.get(str(source), 0) + count
+    return counts

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from pynmeagps.nmeatypes_get import NMEA_PAYLOADS_GET
 
 from shipdrag_ros.bags.table import NUMBER
-from shipdrag_ros.samples import Channel
+from shipdrag_ros.samples import PITCHES, SHAFTS, Channel
 
 KNOT_M_S = 1852.0 / 3600.0
 _FOOT_M = 0.3048
@@ -50,11 +50,14 @@ class Measured(NamedTuple):
     detail
         What tells it from others of the same sentence: the shaft, the rudder, a
         heading that is magnetic.
+    channel
+        What it is, where the sentence tells: which shaft.
     """
 
     a: float
     b: float = 0.0
     detail: str = ''
+    channel: Channel | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,8 @@ class Mounting:
     transducer_m: float | None = None
 
 
-Reader = Callable[[Fields, Mounting], Measured]
+# None: the sentence need not hold it, and does not
+Reader = Callable[[Fields, Mounting], Measured | None]
 
 
 def _water_vhw(fields: Fields, mounting: Mounting) -> Measured:
@@ -196,10 +200,33 @@ def _yaw(compass_deg: float) -> float:
 
 
 def _shaft(fields: Fields, mounting: Mounting) -> Measured:
+    place, detail = _shaft_place(fields)
+    return Measured(fields.number('rpm') * pi / 30.0, detail=detail, channel=SHAFTS[place])
+
+
+def _pitch(fields: Fields, mounting: Mounting) -> Measured | None:
+    """Return the ratio to the greatest pitch; a fixed propeller has none to tell."""
+    if not fields['pitch'] or fields['source'] != 'S':
+        return None
+    place, detail = _shaft_place(fields)
+    return Measured(fields.number('pitch') * 0.01, detail=detail, channel=PITCHES[place])
+
+
+def _shaft_place(fields: Fields) -> tuple[int, str]:
+    """
+    Return place of a shaft, from 0, and its name.
+
+    NMEA 0183 numbers from the centre line, odd to starboard and even to port, 0 on
+    the line; the place of 1 to 4 is the number and that of 0 the fourth, as in the
+    names of joints, so that no two of four shafts meet.
+    """
     fields.check('status', allowed='A')
     if fields['source'] != 'S':
         raise NoValue('not of a shaft', fields['source'])
-    return Measured(fields.number('rpm') * pi / 30.0, detail=f'shaft {fields["engineshaftnum"]}')
+    number = fields['engineshaftnum'] or '0'
+    if not number.isdecimal() or int(number) > len(SHAFTS):
+        raise NoValue('no number of a shaft from 0 to 4', number)
+    return (int(number) - 1) % len(SHAFTS), f'shaft {number}'
 
 
 def _wind(fields: Fields, mounting: Mounting) -> Measured:
@@ -290,7 +317,7 @@ READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
     'VHW': ((Channel.SPEED_THROUGH_WATER, _water_vhw),),
     'HDT': ((Channel.HEADING, _yaw_hdt),),
     'HDG': ((Channel.HEADING, _yaw_hdg),),
-    'RPM': ((Channel.SHAFT, _shaft),),
+    'RPM': ((Channel.SHAFT, _shaft), (Channel.PITCH, _pitch)),
     'RSA': ((Channel.RUDDER, _rudder),),
     'MWV': ((Channel.WIND_APPARENT, _wind),),
     'DPT': ((Channel.DEPTH, _depth_dpt),),

@@ -47,12 +47,17 @@ def read_values(
     """
     found: list[tuple[Channel, Source | None, Measured | NoValue]] = []
     fields = Fields(sentence.kind, sentence.fields)
-    for channel, read in READERS.get(sentence.kind, ()):
+    for told, read in READERS.get(sentence.kind, ()):
+        channel = told
         try:
             value = read(fields, mounting)
         except NoValue as reason:
             found.append((channel, None, reason))
         else:
+            if value is None:
+                continue
+            if value.channel is not None:
+                channel = value.channel
             rank = _RANK[sentence.kind]
             source = Source(rank, value.detail, sentence.talker, sentence.kind)
             found.append((channel, source, value))

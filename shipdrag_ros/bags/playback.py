@@ -32,7 +32,18 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class InputCounts:
-    """Messages of one input: how many came, were used, and were rejected why."""
+    """
+    What became of one input.
+
+    Attributes
+    ----------
+    messages
+        Messages that came.
+    used, rejected
+        Readings that were used, and those that were not by reason. A message holds one
+        reading, but of shafts and pitches one a joint; one that cannot be read counts
+        as a reading rejected.
+    """
 
     messages: int
     used: int
@@ -55,7 +66,7 @@ class ReplayResult:
     events
         All events but the updates, which recorded outputs stand for.
     inputs
-        Messages counted, of inputs that have any.
+        Messages and readings counted, of inputs that have any.
     recorded
         Comparison with the outputs in the bag.
     """

@@ -224,7 +224,8 @@ class Inputs:
     messages
         Messages read so far, by input.
     unreadable
-        Of these, how many gave no sample, by input and reason.
+        Of these, how many gave no sample, by input and reason; of joints that have no
+        place, how many joints.
     """
 
     def __init__(self, run: Run, start_ns: int, end_ns: int) -> None:
@@ -234,7 +235,7 @@ class Inputs:
         self._span = (start_ns, end_ns)
 
     def __iter__(self) -> Iterator[Block | ResetMark]:
-        """Yield blocks of at most `BATCH` samples, and resets at their place."""
+        """Yield the samples of at most `BATCH` messages, and resets at their place."""
         heard = self._run._matched.heard
         keys = list(heard)
         if self._run.node is not None:

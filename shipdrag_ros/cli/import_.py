@@ -60,8 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def _add_nmea(group: argparse._ArgumentGroup) -> None:
     group.description = (
         'Of VHW VBW VTG RMC GGA GLL HDT HDG RPM MWV DPT DBT RSA ZDA, each input is taken from '
-        'one talker. A sentence without a time has that of the last one with a time; where the '
-        'logger wrote the time of receipt before each line, the time since is added.'
+        'one talker; of RPM, up to four shafts (numbers 0 to 4) and their pitch. A sentence '
+        'without a time has that of the last one with a time; where the logger wrote the time of '
+        'receipt before each line, the time since is added.'
     )
     group.add_argument(
         '--date',
@@ -95,7 +96,8 @@ def _add_csv(group: argparse._ArgumentGroup) -> None:
         'position and wind_apparent take two, and a unit given once holds for both: '
         'position=x,y:km is position=x:km,y:km. A position in deg is latitude and longitude: '
         'position=lat,lon:deg. Units: speeds m/s kn km/h ft/s, lengths m km ft nmi, angles rad '
-        'deg, shaft rad/s rpm (default: the first of each)',
+        'deg, shaft rad/s rpm rev/s, pitch ratio %% rad deg (default: the first of each). '
+        'shaft and pitch take up to four, one a shaft: shaft=port,starboard:rpm',
     )
     times = group.add_mutually_exclusive_group()
     times.add_argument(

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipdrag_ros.messages import types
 from shipdrag_ros.messages.gather import Found, gather
+from shipdrag_ros.messages.joints import Joints, read_joints
 from shipdrag_ros.messages.layout import steps
 from shipdrag_ros.messages.topics import Source
 from shipdrag_ros.samples import Block, Channel, Float64, Int64, UInt8
@@ -30,10 +31,11 @@ QUATERNION_TOLERANCE = 0.1
 
 
 class Unreadable(Enum):
-    """Why a message gave no sample."""
+    """Why a message, or a joint in one, gave no sample."""
 
     MALFORMED = 'malformed'
-    NO_JOINT = 'no_joint'  # a JointState without the joint, or without its value
+    NO_JOINT = 'no_joint'  # a JointState without a joint that is read, or without its value
+    SURPLUS_JOINT = 'surplus_joint'  # not a message, but a joint in it that has no place
 
 
 @dataclass(frozen=True)
@@ -44,11 +46,12 @@ class Decoded:
     Attributes
     ----------
     block
-        One sample a readable message, in the order given.
+        The samples in the order of the messages: one of each that is readable, but of
+        shafts and pitches one a joint, in the order of their channels.
     kept : (n,) intp
-        Which message each sample came from.
+        Which message each sample came from; ascending.
     unreadable
-        Number of messages without a sample, by reason.
+        Number of messages without a sample, by reason; of `SURPLUS_JOINT`, joints.
     """
 
     block: Block
@@ -123,11 +126,19 @@ def decode_batch(
     width = max((reading.width for reading in readings), default=_COLUMNS)
     stamp_ns, rows = np.empty(n, np.int64), np.empty((n, width))
     unreadable = []
+    more: list[Joints] = []
     for i, reading in enumerate(readings):
         place = np.flatnonzero(number == i)
+        if not reading.steps:
+            joints = read_joints(
+                data, start, end, place, reading.channel, stamp_ns, code, rows, found
+            )
+            more.append(joints)
+            unreadable.append(_count(found[place], joints.surplus))
+            continue
         code[place] = reading.channel
         for by in reading.steps:
-            gather(data, start, end, place, by, reading.joint, stamp_ns, rows, found)
+            gather(data, start, end, place, by, stamp_ns, rows, found)
             if reading.columns is not None:
                 computed = reading.columns(rows[place, _COLUMNS : reading.width])
                 rows[place, :_COLUMNS] = computed
@@ -135,12 +146,38 @@ def decode_batch(
             place = place[bad] if bad.any() else place[:0]
             if not len(place):
                 break
-        unreadable.append(Counter(_UNREADABLE[each] for each in found[place].tolist()))
+        unreadable.append(_count(found[place]))
     kept = np.flatnonzero(found == Found.READ)
-    if len(kept) < n:
+    if any(len(joints.message) for joints in more):
+        kept, code, rows = _with_more(kept, code, rows, more)
+        stamp_ns, receive_ns = stamp_ns[kept], receive_ns[kept]
+    elif len(kept) < n:
         code, stamp_ns, rows, receive_ns = code[kept], stamp_ns[kept], rows[kept], receive_ns[kept]
     block = Block(code, stamp_ns, receive_ns, rows[:, :2], rows[:, 2:_COLUMNS])
     return DecodedBatch(block, kept, tuple(unreadable))
+
+
+def _with_more(
+    kept: NDArray[np.intp], code: UInt8, rows: Float64, more: Sequence[Joints]
+) -> tuple[NDArray[np.intp], UInt8, Float64]:
+    """Put further joints behind the first one of their message."""
+    message = np.concatenate([kept, *(joints.message for joints in more)])
+    order = np.argsort(message, kind='stable')
+    message = message[order]
+    code, rows = code[message], rows[message]
+    further = np.flatnonzero(order >= len(kept))
+    which = order[further] - len(kept)
+    code[further] = np.concatenate([joints.code for joints in more])[which]
+    rows[further, 0] = np.concatenate([joints.value for joints in more])[which]
+    return message, code, rows
+
+
+def _count(found: UInt8, surplus: int = 0) -> Counter[Unreadable]:
+    """Count what gave no sample."""
+    counts = Counter(_UNREADABLE[each] for each in found[found != Found.READ].tolist())
+    if surplus:
+        counts[Unreadable.SURPLUS_JOINT] = surplus
+    return counts
 
 
 _UNREADABLE = {
@@ -159,9 +196,8 @@ class _Reading:
     Attributes
     ----------
     steps
-        Through the type as it is, then through the type as it was.
-    joint : uint8
-        Name of the joint.
+        Through the type as it is, then through the type as it was; none through
+        JointState, which `read_joints` reads.
     columns
         Values and variances of the extra fields; None where they are as sent.
     width
@@ -170,7 +206,6 @@ class _Reading:
 
     channel: Channel
     steps: tuple[Int64, ...]
-    joint: UInt8
     columns: Columns | None
     width: int
 
@@ -235,7 +270,6 @@ def _reading(
     channel: Channel,
     type_name: str,
     *fields: str,
-    joint: bytes = b'',
     older: str | None = None,
 ) -> tuple[Source, _Reading]:
     """
@@ -246,8 +280,12 @@ def _reading(
     ways = [steps(type_name, fields)]
     if older is not None:
         ways.append(steps(older, [field for field in fields if field != 'variance']))
-    name = np.frombuffer(joint, np.uint8)
-    return Source(channel.input, type_name), _Reading(channel, tuple(ways), name, None, _COLUMNS)
+    return Source(channel.input, type_name), _Reading(channel, tuple(ways), None, _COLUMNS)
+
+
+def _joints(channel: Channel) -> tuple[Source, _Reading]:
+    """Pair a source of joints with how it is read."""
+    return Source(channel.input, types.JOINT_STATE), _Reading(channel, (), None, _COLUMNS)
 
 
 def _computed(
@@ -256,7 +294,7 @@ def _computed(
     """Pair a source with how its fields are read, and with what is made of them."""
     behind = (*[''] * _COLUMNS, *fields)
     way = steps(type_name, behind)
-    reading = _Reading(channel, (way,), np.empty(0, np.uint8), columns, len(behind))
+    reading = _Reading(channel, (way,), columns, len(behind))
     return Source(channel.input, type_name), reading
 
 
@@ -288,8 +326,8 @@ def _readings() -> Iterator[tuple[Source, _Reading]]:
     imu += [f'orientation_covariance[{i}]' for i in (8, 0)]
     yield _computed(Channel.HEADING, types.IMU, _imu, *imu)
 
-    yield _reading(Channel.SHAFT, types.JOINT_STATE, 'velocity', joint=b'shaft')
-    yield _reading(Channel.RUDDER, types.JOINT_STATE, 'position', joint=b'rudder')
+    yield _joints(Channel.SHAFT)
+    yield _joints(Channel.RUDDER)
     yield _reading(Channel.WIND_APPARENT, types.TWIST, x, y)
     depth = ('range', '', 'variance')
     yield _reading(Channel.DEPTH, types.RANGE, *depth, older=types.RANGE_BEFORE_IRON)

@@ -3,20 +3,22 @@
 Blocks to CDR bytes: how simulated and imported samples become messages.
 
 The inverse of `decode` for one type an input. A variance that the type cannot
-carry is dropped; one that is unknown is sent as 0.
+carry is dropped; one that is unknown is sent as 0. Each shaft and each pitch has a
+message of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import cos, isnan, nan, sin
 from typing import Any
 
 import numpy as np
 
 from shipdrag_ros.messages import types
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel
 
 Pair = tuple[float, float]
 
@@ -169,8 +171,12 @@ def _joint(stamp_ns: int, name: str, *, position: float, velocity: float) -> Any
     )
 
 
-def _shaft(stamp_ns: int, value: Pair, variance: Pair) -> Any:
-    return _joint(stamp_ns, 'shaft', position=nan, velocity=value[0])
+def _shaft(name: str, stamp_ns: int, value: Pair, variance: Pair) -> Any:
+    return _joint(stamp_ns, name, position=nan, velocity=value[0])
+
+
+def _pitch(name: str, stamp_ns: int, value: Pair, variance: Pair) -> Any:
+    return _joint(stamp_ns, name, position=value[0], velocity=nan)
 
 
 def _rudder(stamp_ns: int, value: Pair, variance: Pair) -> Any:
@@ -205,7 +211,8 @@ _ENCODERS: dict[Channel, tuple[str, Callable[[int, Pair, Pair], Any]]] = {
     Channel.POSITION: (types.POSE_WITH_COVARIANCE, _position),
     Channel.POSITION_GEODETIC: (types.NAV_SAT_FIX, _fix),
     Channel.HEADING: (types.QUATERNION, _heading),
-    Channel.SHAFT: (types.JOINT_STATE, _shaft),
+    **{each: (types.JOINT_STATE, partial(_shaft, each.name.lower())) for each in SHAFTS},
+    **{each: (types.JOINT_STATE, partial(_pitch, each.name.lower())) for each in PITCHES},
     Channel.RUDDER: (types.JOINT_STATE, _rudder),
     Channel.WIND_APPARENT: (types.TWIST, _wind),
     Channel.DEPTH: (types.RANGE, _depth),

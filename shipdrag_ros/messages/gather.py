@@ -2,8 +2,9 @@
 """
 The numbers wanted out of the CDR bytes of many messages, compiled.
 
-One message or thousands, either byte order, strings and sequences of any
-length; bytes that are no message of the type are told and never read beyond.
+One message or thousands, either byte order, strings of any length; bytes that
+are no message of the type are told and never read beyond. Of JointState, whose
+names decide what is wanted, see `joints`.
 """
 
 from __future__ import annotations
@@ -31,28 +32,24 @@ class Found(IntEnum):
 
 _READ = int(Found.READ)
 _MALFORMED = int(Found.MALFORMED)
-_NO_JOINT = int(Found.NO_JOINT)
 _SECTION = int(Step.SECTION)
 _FLOAT64 = int(Step.FLOAT64)
 _FLOAT32 = int(Step.FLOAT32)
 _UINT8 = int(Step.UINT8)
 _INT8 = int(Step.INT8)
-_STRING = int(Step.STRING)
-_NAMES = int(Step.NAMES)
-_COLUMNS = 4
+COLUMNS = 4
 _VARIANCES = 2  # from this column on
-_BODY = ENCAPSULATION_BYTES
+BODY = ENCAPSULATION_BYTES
 _PADDING = PADDING_BYTES
-_TIME_BYTES = 8
-_SHORTEST_STRING = 5  # its length, and its zero
-_BAD = -1
+TIME_BYTES = 8
+BAD = -1
 
 # an unsigned index spares the test for a negative one, and the eight bytes become one load
 _U = np.uint64
 
 
 @compiled
-def _word(data: Any, place: int, big: bool) -> Any:
+def word(data: Any, place: int, big: bool) -> Any:
     at = _U(place)
     if big:
         return (
@@ -80,9 +77,9 @@ def _as_float32(bits: Any) -> Any:
 
 
 @compiled
-def _float64(data: Any, place: int, big: bool) -> Any:
-    first = _word(data, place, big)
-    second = _word(data, place + 4, big)
+def float64(data: Any, place: int, big: bool) -> Any:
+    first = word(data, place, big)
+    second = word(data, place + 4, big)
     if big:
         return _as_float64(first << _U(32) | second)
     return _as_float64(second << _U(32) | first)
@@ -90,7 +87,7 @@ def _float64(data: Any, place: int, big: bool) -> Any:
 
 @compiled
 def _float32(data: Any, place: int, big: bool) -> Any:
-    return np.float64(_as_float32(_word(data, place, big)))
+    return np.float64(_as_float32(word(data, place, big)))
 
 
 @compiled
@@ -120,98 +117,66 @@ def _is_utf8(data: Any, start: int, end: int) -> bool:
 
 
 @compiled
-def _aligned(at: int, size: int) -> int:
+def aligned(at: int, size: int) -> int:
     return (at + size - 1) & -size
 
 
 @compiled
-def _string_end(data: Any, body: int, at: int, size: int, big: bool) -> Any:
-    """Return the end of the string at a place, `_BAD` if there is none."""
+def string_end(data: Any, body: int, at: int, size: int, big: bool) -> Any:
+    """Return the end of the string at a place, `BAD` if there is none."""
     if at + 4 > size:
-        return _BAD
-    length = int(np.int64(_word(data, body + at, big)))
+        return BAD
+    length = int(np.int64(word(data, body + at, big)))
     end = at + 4 + length
     if length < 1 or end > size or data[_U(body + end - 1)] != 0:
-        return _BAD
-    return end if _is_utf8(data, body + at + 4, body + end - 1) else _BAD
+        return BAD
+    return end if _is_utf8(data, body + at + 4, body + end - 1) else BAD
 
 
 @compiled
-def _is_name(data: Any, start: int, end: int, name: Any) -> bool:
-    if end - start != len(name):
+def read_stamp(data: Any, start: int, end: int, i: Any, stamp_ns: Any) -> bool:
+    """Read the stamp of a message; False if it is none."""
+    body = start + BODY
+    if end - body < TIME_BYTES or data[_U(start)] != 0 or data[_U(start + 1)] > 1:
         return False
-    same = True
-    for i in range(len(name)):
-        same &= data[_U(start + i)] == name[i]
-    return same
+    big = data[_U(start + 1)] == 0
+    seconds = np.int64(np.int32(word(data, body, big)))
+    stamp_ns[i] = seconds * 1_000_000_000 + np.int64(word(data, body + 4, big))
+    return True
 
 
 @compiled
-def _read(
-    data: Any, start: int, end: int, steps: Any, name: Any, i: Any, stamp_ns: Any, rows: Any
-) -> int:
-    body = start + _BODY
-    size = end - body
-    if size < _TIME_BYTES or data[_U(start)] != 0 or data[_U(start + 1)] > 1:
+def _read(data: Any, start: int, end: int, steps: Any, i: Any, stamp_ns: Any, rows: Any) -> int:
+    if not read_stamp(data, start, end, i, stamp_ns):
         return _MALFORMED
+    body = start + BODY
+    size = end - body
     big = data[_U(start + 1)] == 0
-    seconds = np.int64(np.int32(_word(data, body, big)))
-    stamp_ns[i] = seconds * 1_000_000_000 + np.int64(_word(data, body + 4, big))
-    at = _string_end(data, body, _TIME_BYTES, size, big)
-    if at == _BAD:
+    at = string_end(data, body, TIME_BYTES, size, big)
+    if at == BAD:
         return _MALFORMED
     base = at
-    joint = -1
-    found = _READ
     for k in range(len(steps)):
         step, first, second = steps[k, 0], steps[k, 1], steps[k, 2]
         if step == _SECTION:
-            base = _aligned(at, first)
+            base = aligned(at, first)
             at = base + second
             if at > size:
                 return _MALFORMED
             base += body
         elif step == _FLOAT64:
-            rows[i, _U(second)] = _float64(data, base + first, big)
+            rows[i, _U(second)] = float64(data, base + first, big)
         elif step == _FLOAT32:
             rows[i, _U(second)] = _float32(data, base + first, big)
         elif step == _UINT8:
             rows[i, _U(second)] = np.float64(data[_U(base + first)])
         elif step == _INT8:
             rows[i, _U(second)] = np.float64(np.int8(data[_U(base + first)]))
-        elif step == _STRING:
-            at = _string_end(data, body, _aligned(at, 4), size, big)
-            if at == _BAD:
-                return _MALFORMED
         else:
-            at = _aligned(at, 4)
-            if at + 4 > size:
+            at = string_end(data, body, aligned(at, 4), size, big)
+            if at == BAD:
                 return _MALFORMED
-            count = np.int64(_word(data, body + at, big))
-            at += 4
-            if step == _NAMES:
-                if at + count * _SHORTEST_STRING > size:
-                    return _MALFORMED
-                for each in range(count):
-                    at = _aligned(at, 4)
-                    first = body + at + 4
-                    at = _string_end(data, body, at, size, big)
-                    if at == _BAD:
-                        return _MALFORMED
-                    if joint < 0 and _is_name(data, first, body + at - 1, name):
-                        joint = each
-                continue
-            if count > 0:
-                at = _aligned(at, 8)
-            if at + 8 * count > size:
-                return _MALFORMED
-            if second >= 0:
-                if joint < 0 or joint >= count:
-                    found = _NO_JOINT
-                else:
-                    rows[i, _U(second)] = _float64(data, body + at + 8 * joint, big)
-            at += 8 * count
-    return _MALFORMED if size - at > _PADDING else found
+    return _MALFORMED if size - at > _PADDING else _READ
 
 
 _BUFFER = nb.Array(nb.uint8, 1, 'C', readonly=True)
@@ -224,7 +189,6 @@ _SIGNATURE: Signature = nb.void(
     _PLACES,
     _PLACES,
     nb.Array(nb.int64, 2, 'C', readonly=True),
-    _BUFFER,
     nb.int64[::1],
     nb.float64[:, ::1],
     nb.uint8[::1],
@@ -238,7 +202,6 @@ def gather(
     end: Int64,
     place: Int64,
     steps: Int64,
-    name: UInt8,
     stamp_ns: Int64,
     rows: Float64,
     found: UInt8,
@@ -256,8 +219,6 @@ def gather(
         Which of them to read.
     steps : (k, 3) int64
         From `layout.steps`.
-    name : uint8
-        Of the joint, where the type has joints.
     stamp_ns : (n,) int64
         Filled with the stamps [ns].
     rows : (n, c) float64
@@ -271,7 +232,7 @@ def gather(
         rows[i, 0] = rows[i, 1] = 0.0
         for column in range(_VARIANCES, rows.shape[1]):
             rows[i, _U(column)] = np.nan
-        found[i] = _read(data, start[i], end[i], steps, name, i, stamp_ns, rows)
-        for column in range(_VARIANCES, _COLUMNS):
+        found[i] = _read(data, start[i], end[i], steps, i, stamp_ns, rows)
+        for column in range(_VARIANCES, COLUMNS):
             if not 0.0 < rows[i, _U(column)] < np.inf:
                 rows[i, _U(column)] = np.nan

@@ -2,7 +2,7 @@
 """
 Where the numbers wanted of a message type lie in its CDR bytes.
 
-Strings and sequences move what follows them, so that a layout is a list of
+Strings move what follows them, so that a layout is a list of
 steps through the bytes, made once a type from its definition.
 """
 
@@ -38,8 +38,6 @@ class Step(IntEnum):
     UINT8 = 3
     INT8 = 4
     STRING = 5
-    NAMES = 6  # sequence of strings, among them the joint's
-    NUMBERS = 7  # sequence of float64, of which the joint's is wanted; unused, column or -1
 
 
 _TAKEN = {
@@ -60,7 +58,7 @@ def steps(type_name: str, fields: Sequence[str]) -> Int64:
         A type that begins with a `std_msgs/Header`.
     fields
         What goes into which column, `pose.pose.position.x` or `twist.covariance[7]`
-        for instance; of a sequence, the element of the joint; '' for nothing.
+        for instance; '' for nothing.
 
     Returns
     -------
@@ -73,14 +71,11 @@ def steps(type_name: str, fields: Sequence[str]) -> Int64:
     for leaf in types.leaves(type_name):
         if leaf.path.startswith('header.'):
             continue
-        if leaf.kind == 'string' or leaf.length is None:
+        if leaf.length is None:
+            raise ValueError(f'{type_name}: {leaf.path} is a sequence, which has no fixed place')
+        if leaf.kind == 'string':
             section = []
-            if leaf.length is not None:
-                listed.append([Step.STRING, 0, 0])
-            elif leaf.kind == 'string':
-                listed.append([Step.NAMES, 0, 0])
-            else:
-                listed.append([Step.NUMBERS, 0, column.pop(leaf.path, -1)])
+            listed.append([Step.STRING, 0, 0])
             continue
         size = _BYTES[leaf.kind]
         if not section or size > section[1]:

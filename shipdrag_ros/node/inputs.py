@@ -68,7 +68,7 @@ class InputTopic:
     received, unused
         Messages heard; heard while not active or without a clock.
     unreadable
-        Messages that gave no sample, by reason.
+        Messages that gave no sample, by reason, and joints that have no place.
     rate_hz
         Messages a second of steady time, before the last `tick`.
     """

@@ -12,15 +12,19 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from shipdrag_ros.bags import InputCounts, ReplayResult
 from shipdrag_ros.coastdown.events import Event, Reset
+from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.report import words
 from shipdrag_ros.samples import MOTION_INPUTS
 
 _USED_ENOUGH = 0.5  # of the messages of an input; below it the cause is named
 _RESETS_SHOWN = 3
+_SURPLUS = Unreadable.SURPLUS_JOINT.value
 _CAUSE = {
     'type': 'of a type that this input is not accepted in; `shipdrag info` lists the types',
     'malformed': 'bytes that are no such message; check the driver and the recorder',
     'no_joint': 'without a joint of that name, or without its value; name it in the driver',
+    'surplus_joint': 'joints beyond the four shafts and four pitches that are read; name those to '
+    'be read shaft_1 to shaft_4 and pitch_1 to pitch_4',
     'duplicate': 'with the stamp of the message before; does the driver stamp each message?',
     'out_of_order': 'stamped before the message before; check the driver',
     'late': 'stamped long before the newest stamp of any input; set the clocks of the sensors '
@@ -49,11 +53,16 @@ def run_warnings(result: ReplayResult) -> tuple[str, ...]:
 
 def _inputs(inputs: Mapping[str, InputCounts]) -> Iterator[str]:
     for name, counts in inputs.items():
-        if counts.used >= _USED_ENOUGH * counts.messages or not counts.rejected:
+        rejected = dict(counts.rejected)
+        if surplus := rejected.pop(_SURPLUS, 0):
+            yield f'{name}: {surplus} readings left out: {_CAUSE[_SURPLUS]}'
+        readings = max(counts.messages, counts.used + sum(rejected.values()))
+        if counts.used >= _USED_ENOUGH * readings or not rejected:
             continue
-        reason, number = max(counts.rejected.items(), key=lambda item: item[1])
+        reason, number = max(rejected.items(), key=lambda item: item[1])
+        what = 'messages' if readings == counts.messages else 'readings'
         yield (
-            f'{name}: {counts.messages - counts.used} of {counts.messages} messages not used; '
+            f'{name}: {readings - counts.used} of {readings} {what} not used; '
             f'{number} {reason}: {_CAUSE[reason]}'
         )
     if not any(inputs[name].used for name in MOTION_INPUTS if name in inputs):

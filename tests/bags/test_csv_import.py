@@ -97,6 +97,10 @@ def test_delimiters_marks_and_line_ends(
         ('180\n', 'heading=1:deg', math.pi),
         ('60\n', 'shaft=1:rpm', 2 * math.pi),
         ('2\n', 'shaft=1:rad/s', 2.0),
+        ('2\n', 'shaft=1:rev/s', 4 * math.pi),
+        ('-80\n', 'pitch=1:%', -0.8),
+        ('0.7\n', 'pitch=1', 0.7),
+        ('180\n', 'pitch=1:deg', math.pi),
         ('90\n', 'rudder=1:deg', math.pi / 2),
         ('10\n', 'depth=1:ft', np.float32(3.048)),
         ('0.5\n', 'depth=1:km', 500.0),
@@ -105,6 +109,24 @@ def test_delimiters_marks_and_line_ends(
 def test_units(import_text: Import, text: str, name: str, value: float) -> None:
     _, block = import_text(text, name, rate_hz=1.0)
     assert block.value[0, 0] == pytest.approx(value, rel=1e-15)
+
+
+def test_several_shafts_and_their_pitch(import_text: Import) -> None:
+    text = 'p,s,a,b\n60,-120,50,25\n,90,0,x\n'
+    result, block = import_text(text, 'shaft=p,s:rpm', 'pitch=a:%,b:ratio', rate_hz=1)
+    assert block.channel.tolist() == [
+        *(Channel.SHAFT, Channel.SHAFT_2, Channel.PITCH, Channel.PITCH_2),
+        *(Channel.SHAFT_2, Channel.PITCH),
+    ]
+    turn = 2 * math.pi
+    np.testing.assert_allclose(
+        block.value[:, 0], [turn, -2 * turn, 0.5, 25.0, 1.5 * turn, 0.0], rtol=1e-15
+    )
+    assert result.written == {'shaft': 6}
+    assert {reason: each.count for reason, each in result.rejected['shaft'].items()} == {
+        'empty': 1,
+        'not a number': 1,
+    }
 
 
 def test_two_columns(import_text: Import) -> None:
@@ -241,11 +263,12 @@ def test_many_rows_are_the_same_rows(import_text: Import) -> None:
 
 
 def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -> None:
-    import_text('a,u\nx,1\n', 'shaft=u', rate_hz=2.0, where=[('a', 'x')])
+    text = 'a,u,v,p\nx,1,2,3\n'
+    import_text(text, 'shaft=u,v', 'pitch=p', rate_hz=2.0, where=[('a', 'x')])
     (run,) = open_runs([tmp_path / 'out.mcap'])
     assert yaml.safe_load(run.attachments['import.yaml']) == {
         'source': 'in.csv',
-        'inputs': {'shaft': ['u']},
+        'inputs': {'shaft': ['u', 'v'], 'pitch': ['p']},
         'time': None,
         'rate_hz': 2.0,
         'where': {'a': 'x'},
@@ -257,10 +280,13 @@ def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -
     [
         ('speed=u', "no input 'speed'; inputs are speed_through_water, "),
         ('position=x', r'expected 2 column\(s\), position=COLUMN'),
-        ('shaft=a,b', r'expected 1 column\(s\)'),
-        ('shaft=', r'expected 1 column\(s\)'),
-        ('shaft', r'expected 1 column\(s\)'),
-        ('shaft=n:rps', "no unit 'rps' here; units are rad/s, rpm"),
+        ('depth=a,b', r'expected 1 column\(s\), depth=COLUMN'),
+        ('shaft=a,b,c,d,e', r'expected 1 to 4 column\(s\), shaft=COLUMN'),
+        ('shaft=a,', r'expected 1 to 4 column\(s\)'),
+        ('shaft=', r'expected 1 to 4 column\(s\)'),
+        ('shaft', r'expected 1 to 4 column\(s\)'),
+        ('shaft=n:rps', "no unit 'rps' here; units are rad/s, rev/s, rpm"),
+        ('pitch=p:rpm', "no unit 'rpm' here; units are %, deg, rad, ratio"),
         ('depth=d:kn', "no unit 'kn' here"),
         ('position=x:m,y:deg', 'both columns in deg'),
         ('position=x:deg,y:m', 'both columns in deg'),
@@ -296,6 +322,7 @@ def test_times_that_say_nothing() -> None:
         ('1,2\n', ['shaft=1'], {'rate_hz': math.nan}, '--rate nan: expected'),
         ('1,2\n', [], {'rate_hz': 1}, 'no column is mapped'),
         ('1,2\n', ['shaft=1', 'shaft=2'], {'rate_hz': 1}, 'shaft=...: given 2 times'),
+        ('1,2\n', ['pitch=1', 'pitch=2'], {'rate_hz': 1}, 'pitch=...: given 2 times'),
         (
             't,u\na,1\nb,2\n',
             ['shaft=u'],

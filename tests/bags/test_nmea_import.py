@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.bags import Checksum, NmeaResult, import_nmea, open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
-from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
 
 KNOT = 1852 / 3600
 START = datetime(2024, 2, 28, 12, 0, 0, tzinfo=UTC)
@@ -168,6 +168,7 @@ def test_values_are_those_written(
         atol=1e-9,
     )
     np.testing.assert_allclose(value[Channel.SHAFT], [rpm / 10 * 2 * math.pi / 60, 0], **exact)
+    np.testing.assert_allclose(value[Channel.PITCH], [1.0, 0], **exact)
     np.testing.assert_allclose(value[Channel.RUDDER], [math.radians(rudder / 10), 0], **exact)
     np.testing.assert_allclose(
         value[Channel.DEPTH], [(depth + offset) / 10, 0], rtol=1e-7, atol=1e-7
@@ -237,6 +238,9 @@ def test_every_form(body: str, channel: Channel, value: float) -> None:
         ('HCHDG,10.0,1.0,,,', 'heading', 'HCHDG: deviation neither E nor W'),
         ('ERRPM,E,1,90.0,,A', 'shaft', 'ERRPM: not of a shaft'),
         ('ERRPM,S,1,90.0,,V', 'shaft', 'ERRPM: status V'),
+        ('ERRPM,S,5,90.0,,A', 'shaft', 'ERRPM: no number of a shaft from 0 to 4'),
+        ('ERRPM,S,-1,90.0,,A', 'shaft', 'ERRPM: no number of a shaft from 0 to 4'),
+        ('ERRPM,S,1,90.0,x,A', 'shaft', 'ERRPM: not a number'),
         ('AGRSA,5.0,V,,', 'rudder', 'AGRSA: status V'),
         ('WIMWV,10,T,5,N,A', 'wind_apparent', 'WIMWV: true wind, computed and not measured'),
         ('WIMWV,10,R,5,N,V', 'wind_apparent', 'WIMWV: status V'),
@@ -274,6 +278,25 @@ def test_a_heading_without_variation_is_marked() -> None:
 # sources
 
 
+def test_every_shaft_has_a_place_of_its_own() -> None:
+    log = []
+    for k in range(4):
+        log.append(rmc(k))
+        log += [
+            sentence(f'ERRPM,S,{number},{60 * (number + 1)},{20 * number},A')
+            for number in range(4)
+        ]
+        log.append(sentence('IIRPM,S,2,77,,A'))  # another account of one of them
+    result, block = run(lines(*log))
+    for number, shaft, pitch in zip((1, 2, 3, 0), SHAFTS, PITCHES, strict=True):
+        turns = of(block, shaft).value[:, 0] / (2 * math.pi)
+        np.testing.assert_allclose(turns, np.full(4, number + 1), rtol=1e-12)
+        np.testing.assert_allclose(of(block, pitch).value[:, 0], np.full(4, 0.2 * number))
+    assert result.sources['shaft'] == ', '.join(f'ERRPM shaft {number}' for number in (1, 2, 3, 0))
+    assert result.not_taken['shaft'] == {'IIRPM shaft 2': 4}
+    assert result.written['shaft'] == 32
+
+
 def test_an_input_has_one_source() -> None:
     gga = 'GGA,1200{:02d},4612.9,N,00610.1,E,1,08,1,,M,,M,,'
     log = []
@@ -291,10 +314,10 @@ def test_an_input_has_one_source() -> None:
         'speed_over_ground': 'GPRMC',
         'position': 'GPRMC',
         'heading': 'HCHDG',  # HDT has less than half as many
-        'shaft': 'ERRPM shaft 1',
+        'shaft': 'ERRPM shaft 1, ERRPM shaft 2',
     }
     assert result.not_taken['position'] == {'GNGGA': 8}
-    assert result.not_taken['shaft'] == {'ERRPM shaft 2': 8}
+    assert 'shaft' not in result.not_taken  # two shafts are no two accounts of one
     assert result.unknown_talkers == {'XX': 8}
     assert len(of(block, Channel.POSITION_GEODETIC)) == 8
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.bags import BagWriter, Recorded, ReplayResult, open_runs, replay
+from shipdrag_ros.bags import BagWriter, InputCounts, Recorded, ReplayResult, open_runs, replay
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event, Onset, Reset, Update
 from shipdrag_ros.errors import BagError, ParameterError, ShipFileError
-from shipdrag_ros.messages import encode
+from shipdrag_ros.messages import encode, types
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
@@ -168,6 +168,25 @@ def test_unreadable_messages_and_wrong_types_are_counted_among_the_rejected(
     assert result.inputs['shaft'].rejected == {'malformed': 2}
     assert result.inputs['depth'].rejected == {'type': 1}
     assert result.inputs['speed_through_water'].rejected == {'type': 1}
+
+
+def test_of_several_joints_a_message_each_reading_is_counted(tmp_path: Path, ship: Ship) -> None:
+    joints = ['shaft_port', 'pitch_port', *(f'shaft_{letter}' for letter in 'abcd')]
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for i in range(1, 11):
+            message = types.make(
+                types.JOINT_STATE,
+                header=types.header(i * 10**9, ''),
+                name=joints,
+                position=np.full(6, 0.5),
+                velocity=np.full(6, np.nan if i == 4 else 7.0),
+                effort=np.empty(0),
+            )
+            payload = types.serialize(types.JOINT_STATE, message)
+            bag.write('/shaft', types.JOINT_STATE, payload, log_ns=i * 10**9, publish_ns=i * 10**9)
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    counts = replay(run, ship=ship).inputs['shaft']
+    assert counts == InputCounts(10, 9 * 4 + 10, {'surplus_joint': 10, 'nan': 4})
 
 
 def test_a_bag_without_a_ship_file_asks_for_one(

@@ -16,7 +16,12 @@ from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, 
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.layout import steps
 
-SOURCES = [Source(name, type_name) for name, accepted in TOPICS.items() for type_name in accepted]
+SOURCES = [
+    Source(name, type_name)
+    for name, accepted in TOPICS.items()
+    for type_name in accepted
+    if name != 'shaft'  # of one message several samples: test_joints.py
+]
 IDS = [f'{source.input}-{source.type.split("/")[2]}' for source in SOURCES]
 EXAMPLES = settings(max_examples=25, deadline=None)
 
@@ -24,7 +29,7 @@ frames = st.text(st.characters(codec='utf-8', exclude_characters='\0'), max_size
 stamps = st.integers(-(2**31) * 10**9, (2**31 - 1) * 10**9 + 999_999_999)
 eight = st.lists(st.floats(width=32), min_size=8, max_size=8)
 numbers = st.lists(st.floats(), max_size=3)
-names = st.lists(st.sampled_from(['shaft', 'rudder', 'shaf', 'shaft ', '', 'ü']), max_size=4)
+names = st.lists(st.sampled_from(['rudder', 'rudde', 'rudder ', '', 'ü']), max_size=4)
 
 
 def fields(source: Source, message: Any) -> list[float] | None:
@@ -60,10 +65,12 @@ def fields(source: Source, message: Any) -> list[float] | None:
                     yaw = variance = nan
             taken = [yaw, 0.0, variance, nan]
         case 'JointState':
-            values = message.velocity if source.input == 'shaft' else message.position
-            if source.input not in message.name or message.name.index(source.input) >= len(values):
+            if 'rudder' not in message.name:
                 return None
-            taken = [values[message.name.index(source.input)], 0.0, nan, nan]
+            joint = message.name.index('rudder')
+            if joint >= len(message.position):
+                return None
+            taken = [message.position[joint], 0.0, nan, nan]
         case 'Range':
             taken = [message.range, 0.0, message.variance, nan]
     if source.input == 'speed_through_water':
@@ -192,9 +199,9 @@ def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(reference: Any) 
         good = reference.serialize(types.JOINT_STATE, message, little_endian=little)
         for at in range(12, len(good) - 3, 4):
             giant = good[:at] + (2**32 - 1).to_bytes(4, order) + good[at + 4 :]
-            decode(Source('shaft', types.JOINT_STATE), [giant], [0])
+            decode(Source('rudder', types.JOINT_STATE), [giant], [0])
         giant = good[:12] + (2**32 - 1).to_bytes(4, order) + good[16:]
-        decoded = decode(Source('shaft', types.JOINT_STATE), [giant], [0])
+        decoded = decode(Source('rudder', types.JOINT_STATE), [giant], [0])
         assert decoded.unreadable == {Unreadable.MALFORMED: 1}
 
 

@@ -11,6 +11,8 @@ from shipdrag_ros.messages import Unreadable
 from shipdrag_ros.report import warnings
 from shipdrag_ros.samples import Reason
 
+SURPLUS = Unreadable.SURPLUS_JOINT.value
+
 
 def told(inputs: dict[str, InputCounts], *events: Reset) -> tuple[str, ...]:
     result = SimpleNamespace(run=SimpleNamespace(warnings=('torn',)), inputs=inputs, events=events)
@@ -24,6 +26,20 @@ def test_a_sound_run_keeps_the_warnings_of_its_bag_alone() -> None:
 def test_the_most_frequent_reason_is_named_below_half() -> None:
     counts = {'position': InputCounts(100, 49, {'late': 11, 'future': 40})}
     assert told(counts)[1].startswith('position: 51 of 100 messages not used; 40 future: stamped')
+
+
+def test_joints_that_are_left_out_are_told_though_most_are_used() -> None:
+    (_, found) = told(
+        {'position': InputCounts(1, 1, {}), 'shaft': InputCounts(9, 36, {SURPLUS: 9})}
+    )
+    assert found.startswith('shaft: 9 readings left out: joints beyond')
+
+
+def test_of_several_readings_a_message_half_must_be_used() -> None:
+    good = {'position': InputCounts(1, 1, {})}
+    assert told(good | {'shaft': InputCounts(9, 18, {'nan': 18})}) == ('torn',)
+    (_, found) = told(good | {'shaft': InputCounts(9, 17, {'nan': 19})})
+    assert found.startswith('shaft: 19 of 36 readings not used; 19 nan')
 
 
 def test_nothing_to_estimate_from_is_told() -> None:

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Shafts, pitches and rudder out of the CDR bytes of JointState messages, compiled.
+
+Which joint is which channel: see `joint_names`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types as nb
+from numpy.typing import NDArray
+
+from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.messages.gather import (
+    BAD,
+    BODY,
+    COLUMNS,
+    TIME_BYTES,
+    Found,
+    aligned,
+    float64,
+    read_stamp,
+    string_end,
+    word,
+)
+from shipdrag_ros.messages.joint_names import BEYOND, FREE, NOT_OURS, PLACES, RUDDER, slot_of
+from shipdrag_ros.messages.types import PADDING_BYTES
+from shipdrag_ros.samples import PITCHES, SHAFTS, Channel, Float64, Int64, UInt8
+
+_CODES = np.array([*SHAFTS, *PITCHES, Channel.RUDDER], np.uint8)
+_READ = int(Found.READ)
+_MALFORMED = int(Found.MALFORMED)
+_NO_JOINT = int(Found.NO_JOINT)
+_PADDING = PADDING_BYTES
+_ARRAYS = 3  # position, velocity, effort
+# what is found in one message: the joint of each slot; the shafts and the pitches that take a free
+# place; length of each array, and where it begins
+_WAITING = len(_CODES)
+_LENGTH = _WAITING + 2 * PLACES
+_FIRST = _LENGTH + _ARRAYS
+_SCRATCH = _FIRST + _ARRAYS
+_SHORTEST_STRING = 5  # its length, and its zero
+
+_U = np.uint64
+
+
+class Joints(NamedTuple):
+    """
+    What messages hold beyond their first joint.
+
+    Attributes
+    ----------
+    message : (k,) intp
+        Which message each further sample is from; samples of one are in the order of
+        their channels.
+    code : (k,) uint8
+        Their `Channel`.
+    value : (k,) float64
+        Rate of turn [rad/s], or pitch.
+    surplus
+        Joints without a place.
+    """
+
+    message: NDArray[np.intp]
+    code: UInt8
+    value: Float64
+    surplus: int
+
+
+def read_joints(
+    data: UInt8,
+    start: Int64,
+    end: Int64,
+    place: NDArray[np.intp],
+    channel: Channel,
+    stamp_ns: Int64,
+    code: UInt8,
+    rows: Float64,
+    found: UInt8,
+) -> Joints:
+    """
+    Read the joints of some messages.
+
+    Parameters
+    ----------
+    data : (b,) uint8
+        The bytes they lie in.
+    start, end : (n,) int64
+        Where each begins and ends.
+    place : (m,) intp
+        Which of them to read.
+    channel
+        `SHAFT` for shafts and pitches, or `RUDDER`.
+    stamp_ns : (n,) int64
+        Filled with the stamps [ns].
+    code : (n,) uint8
+        Filled with the channel of the first joint of each.
+    rows : (n, c) float64
+        Filled with the value of the first joint of each, and what `gather` fills for
+        a single value without a variance.
+    found : (n,) uint8
+        Filled with a `Found` each.
+
+    Returns
+    -------
+    Joints
+        What there is besides the first joints.
+    """
+    rudder = channel is Channel.RUDDER
+    room = 0 if rudder else (2 * PLACES - 1) * len(place)
+    more = Joints(np.empty(room, np.intp), np.empty(room, np.uint8), np.empty(room), 0)
+    scratch = np.empty(_SCRATCH, np.int64)
+    count, surplus = _read_all(
+        data, start, end, place, rudder, stamp_ns, code, rows, found, scratch, *more[:3]
+    )
+    return Joints(more.message[:count], more.code[:count], more.value[:count], surplus)
+
+
+@compiled(inline=True, uncounted=True)
+def _give_places(scratch: Any, kind: int, waits: int, slots: int) -> tuple[int, int]:
+    """Give free places to the joints of a kind; return the slots taken, and what is left."""
+    given = 0
+    for slot in range(kind * PLACES, (kind + 1) * PLACES):
+        if not slots >> slot & 1 and given < min(waits, PLACES):
+            scratch[_U(slot)] = scratch[_U(_WAITING + kind * PLACES + given)]
+            slots |= 1 << slot
+            given += 1
+    return slots, waits - given
+
+
+@compiled(inline=True, uncounted=True)
+def _read_names(
+    data: Any, body: int, at: int, size: int, big: bool, rudder: bool, scratch: Any
+) -> tuple[int, int, int]:
+    """
+    Find the joint of each slot.
+
+    Returns the end of the names, `BAD` if they are none; the slots that have a joint,
+    one bit each; and how many joints have no place.
+    """
+    at = aligned(at, 4)
+    if at + 4 > size:
+        return BAD, 0, 0
+    count: Any = np.int64(word(data, body + at, big))
+    at += 4
+    if at + count * _SHORTEST_STRING > size:
+        return BAD, 0, 0
+    slots = shafts = pitches = surplus = 0
+    for each in range(count):
+        at = aligned(at, 4)
+        first = body + at + 4
+        at = string_end(data, body, at, size, big)
+        if at == BAD:
+            return BAD, 0, 0
+        kind, place = slot_of(data, first, body + at - 1, rudder)
+        if kind == NOT_OURS:
+            continue
+        if place == BEYOND:
+            surplus += 1
+        elif place != FREE and not slots >> (kind + place) & 1:
+            scratch[_U(kind + place)] = each
+            slots |= 1 << (kind + place)
+        elif kind == 0:
+            scratch[_U(_WAITING + min(shafts, PLACES - 1))] = each
+            shafts += 1
+        elif kind == PLACES:
+            scratch[_U(_WAITING + PLACES + min(pitches, PLACES - 1))] = each
+            pitches += 1
+    for kind, waits in ((0, shafts), (1, pitches)):
+        if waits:
+            slots, left = _give_places(scratch, kind, waits, slots)
+            surplus += left
+    return at, slots, surplus
+
+
+@compiled(inline=True, uncounted=True)
+def _read_arrays(data: Any, body: int, at: int, size: int, big: bool, scratch: Any) -> bool:
+    """Find position, velocity and effort; False if they do not fill the message."""
+    for k in range(_ARRAYS):
+        at = aligned(at, 4)
+        if at + 4 > size:
+            return False
+        count: Any = np.int64(word(data, body + at, big))
+        at += 4
+        if count > 0:
+            at = aligned(at, 8)
+        scratch[_U(_LENGTH + k)] = count
+        scratch[_U(_FIRST + k)] = body + at
+        at += 8 * count
+        if at > size:
+            return False
+    return size - at <= _PADDING
+
+
+_BUFFER = nb.Array(nb.uint8, 1, 'C', readonly=True)
+_PLACES_READ = nb.Array(nb.int64, 1, 'C', readonly=True)
+
+
+_SIGNATURE: Signature = nb.UniTuple(nb.int64, 2)(
+    _BUFFER,
+    _PLACES_READ,
+    _PLACES_READ,
+    _PLACES_READ,
+    nb.boolean,
+    nb.int64[::1],
+    nb.uint8[::1],
+    nb.float64[:, ::1],
+    nb.uint8[::1],
+    nb.int64[::1],
+    nb.int64[::1],
+    nb.uint8[::1],
+    nb.float64[::1],
+)
+
+
+@compiled(_SIGNATURE, uncounted=True)
+def _read_all(
+    data: UInt8,
+    start: Int64,
+    end: Int64,
+    place: Int64,
+    rudder: bool,
+    stamp_ns: Int64,
+    code: UInt8,
+    rows: Float64,
+    found: UInt8,
+    scratch: Int64,
+    more_message: Int64,
+    more_code: UInt8,
+    more_value: Float64,
+) -> tuple[int, int]:
+    """Read the joints of messages; return how many more there are, and how many surplus."""
+    more = 0
+    surplus = 0
+    for k in range(len(place)):
+        i = _U(place[_U(k)])
+        body = start[i] + BODY
+        size = end[i] - body
+        found[i] = _MALFORMED
+        if not read_stamp(data, start[i], end[i], i, stamp_ns):
+            continue
+        big = data[_U(start[i] + 1)] == 0
+        at = string_end(data, body, TIME_BYTES, size, big)
+        if at == BAD:
+            continue
+        at, slots, left = _read_names(data, body, at, size, big, rudder, scratch)
+        if at == BAD or not _read_arrays(data, body, at, size, big, scratch):
+            continue
+        surplus += left
+        found[i] = _NO_JOINT
+        for slot in range(RUDDER + 1):
+            which = 1 if slot < PLACES else 0  # the rate of a shaft, the angle of the others
+            joint = scratch[_U(slot)]
+            if not slots >> slot & 1 or joint >= scratch[_U(_LENGTH + which)]:
+                continue
+            value = float64(data, scratch[_U(_FIRST + which)] + 8 * joint, big)
+            if found[i] != _READ:
+                found[i] = _READ
+                code[i] = _CODES[_U(slot)]
+                rows[i, 0] = value
+                rows[i, 1] = 0.0
+                for column in range(2, COLUMNS):
+                    rows[i, _U(column)] = np.nan
+            else:
+                more_message[_U(more)] = np.int64(i)
+                more_code[_U(more)] = _CODES[_U(slot)]
+                more_value[_U(more)] = value
+                more += 1
+    return more, surplus
