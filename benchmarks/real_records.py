@@ -233,7 +233,7 @@ def show(record: Record, out: Path) -> Outcome:
     print(
         f'  valid {curve.speed_m_s[0]:.3f} to {curve.speed_m_s[-1]:.3f} m/s, Fr '
         f'{curve.froude[0]:.3f} to {curve.froude[-1]:.3f} ({found.froude_max_by.value}); the '
-        f'record reaches {found.curve.speed_m_s[-1]:.3f} m/s'
+        f'fit ends at {found.curve.speed_m_s[-1]:.3f} m/s'
     )
     c0, c1, c2 = second_opinion(found)
     cells = []

@@ -9,6 +9,7 @@ from shipdrag_ros.bags.csv_import import ImportResult, import_csv
 from shipdrag_ros.bags.damage import Damage, DamageKind
 from shipdrag_ros.bags.nmea_import import NmeaResult, import_nmea
 from shipdrag_ros.bags.nmea_log import Checksum
+from shipdrag_ros.bags.no_coastdown import why_no_coastdown
 from shipdrag_ros.bags.playback import InputCounts, ReplayResult, replay
 from shipdrag_ros.bags.reader import open_runs
 from shipdrag_ros.bags.recover import Recovery, recover
@@ -47,4 +48,5 @@ __all__ = [
     'parse_time',
     'recover',
     'replay',
+    'why_no_coastdown',
 ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shipdrag_ros.bags import (
@@ -14,6 +15,7 @@ from shipdrag_ros.bags import (
     coast_windows,
     open_runs,
     replay,
+    why_no_coastdown,
 )
 from shipdrag_ros.bags.playback import SHIP_FILE
 from shipdrag_ros.cli import diagnose_json
@@ -112,20 +114,27 @@ def _diagnosed(
 ) -> tuple[Diagnosis, Ship | None]:
     """Diagnose by what the records hold, and return the ship if one is known."""
     if given is None and window is None and not any(SHIP_FILE in run.attachments for run in runs):
-        return _sailing(runs), None
-    coasts, ship, parameters = _found(output, runs, given, window)
-    if not coasts:
-        return _sailing(runs), ship
-    if ship.baseline is None:
-        return diagnose_fitted(coasts, ship), ship
-    return diagnose(coasts, ship, parameters), ship
+        why = 'without a ship file none is looked for; give one with --ship FILE'
+        return _sailing(runs, f'No coastdown was found: {why}.'), None
+    seen = _found(output, runs, given, window)
+    if not seen.coasts:
+        return _sailing(runs, f'No coastdown was found {"; ".join(seen.without)}.'), seen.ship
+    if seen.ship.baseline is None:
+        found = diagnose_fitted(seen.coasts, seen.ship)
+    else:
+        found = diagnose(seen.coasts, seen.ship, seen.parameters)
+    unused = tuple(f'no coastdown was found {each}' for each in seen.without)
+    return replace(found, notes=(*found.notes, *unused)), seen.ship
 
 
-def _sailing(runs: Sequence[Run]) -> Diagnosis:
+def _sailing(runs: Sequence[Run], no_coastdown: str) -> Diagnosis:
     """Hold the logs against the ways over ground."""
     read = [(run.name, *accepted_samples(run)) for run in runs]
     records = [SailingRecord(name, block) for name, block, _ in read]
-    return diagnose_sailing(records, read[0][2])
+    try:
+        return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
+    except DiagnosisError as error:
+        raise DiagnosisError(f'{no_coastdown} Log and track: {error}') from error
 
 
 def coasts_of(
@@ -144,14 +153,25 @@ def coasts_of(
     DiagnosisError
         If there is none.
     """
-    coasts, ship, parameters = _found(output, runs, given, None)
-    if not coasts:
-        names = ', '.join(repr(each.name) for each in runs)
+    seen = _found(output, runs, given, None)
+    if not seen.coasts:
         raise DiagnosisError(
-            f'no coastdown in {names}: give a record in which the engine was stopped after '
-            'steady sailing; `shipdrag replay` shows what was found'
+            f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
+            'was stopped after steady sailing'
         )
-    return coasts, ship, parameters
+    for each in seen.without:
+        output.log(f'no coastdown was found {each}')
+    return seen.coasts, seen.ship, seen.parameters
+
+
+@dataclass(frozen=True)
+class _Found:
+    """The coastdowns of all bags, and of each bag without one its name and why."""
+
+    coasts: list[CoastRun]
+    ship: Ship
+    parameters: Parameters
+    without: tuple[str, ...]
 
 
 def _found(
@@ -159,9 +179,10 @@ def _found(
     runs: Sequence[Run],
     given: Ship | None,
     window: tuple[float, float] | None,
-) -> tuple[list[CoastRun], Ship, Parameters]:
+) -> _Found:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
+    without: list[str] = []
     ship, parameters = given, None
     for each in runs:
         with output.progress(f'replaying {each.name}') as progress:
@@ -173,16 +194,21 @@ def _found(
                 'rejected; it is diagnosed all the same'
             )
         windows = coast_windows(result)
+        if not windows:
+            without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
         for place, (_, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found))
     assert ship is not None
     assert parameters is not None
-    return coasts, ship, parameters
+    return _Found(coasts, ship, parameters, tuple(without))
 
 
 def _show(output: Output, found: Diagnosis) -> None:
+    if found.no_coastdown:
+        output.say(found.no_coastdown)
     output.say(diagnosis_words.sentence(found))
+    output.say(diagnosis_words.examined(found))
     if found.where is not None:
         output.say(f'Model and data disagree {diagnosis_words.place(found)}.')
     for note in found.notes:

@@ -43,6 +43,9 @@ def document(found: Diagnosis) -> dict[str, Any]:
             'held_out_after': _gap(found.held_out_after),
         },
         'baseline': found.baseline,
+        'coastdowns_used': found.coastdowns_used,
+        'examined': list(found.examined),
+        'no_coastdown': found.no_coastdown or None,
         'notes': list(found.notes),
     }
 

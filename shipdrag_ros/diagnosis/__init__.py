@@ -5,6 +5,8 @@ from shipdrag_ros.diagnosis.diagnose import CoastRun, diagnose, with_effects
 from shipdrag_ros.diagnosis.fitted_baseline import diagnose_fitted
 from shipdrag_ros.diagnosis.legs import SailingRecord
 from shipdrag_ros.diagnosis.result import (
+    FORCE,
+    LOG_TRACK,
     Advice,
     Candidate,
     Diagnosis,
@@ -17,6 +19,8 @@ from shipdrag_ros.diagnosis.sailing import diagnose_sailing
 from shipdrag_ros.diagnosis.traces import Compared, Trace
 
 __all__ = [
+    'FORCE',
+    'LOG_TRACK',
     'Advice',
     'Candidate',
     'CoastRun',

@@ -13,12 +13,21 @@ from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, where
 from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.result import Advice, Diagnosis, Named, Verdict, Where
+from shipdrag_ros.diagnosis.result import (
+    FORCE,
+    LOG_TRACK,
+    Advice,
+    Diagnosis,
+    Named,
+    Verdict,
+    Where,
+)
 from shipdrag_ros.diagnosis.search import search, with_more, with_pairs
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
 from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, odd
 from shipdrag_ros.errors import DiagnosisError, EstimationError
+from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
@@ -116,7 +125,15 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         best=_named(best, weighed),
         notes=notes,
         traces=traces(library.problem, as_stated.best, explained.best),
+        coastdowns_used=len(seen),
+        examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
     )
+
+
+def _has_both(run: Observation) -> bool:
+    """Tell whether a run has a log and the way over ground, to be held against each other."""
+    by_log = run.along.rows.kind == LOG
+    return bool(by_log.any() and not by_log.all())
 
 
 def _observed(

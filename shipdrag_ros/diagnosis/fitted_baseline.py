@@ -19,7 +19,7 @@ from scipy.special import logsumexp
 from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.coast_form import SHAPES, Coast, FormFit, FormProblem
 from shipdrag_ros.diagnosis.diagnose import CoastRun
-from shipdrag_ros.diagnosis.result import Diagnosis, Named, Verdict, Where
+from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Named, Verdict, Where
 from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Weighed, decide
 from shipdrag_ros.ship import Ship, Uncertain
 
@@ -98,6 +98,8 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
         baseline='fitted_here',
         best=named,
         notes=tuple(_notes(ship, seen, best if missing else nothing, by_log=by_log)),
+        coastdowns_used=len(seen),
+        examined=(FORCE,),
     )
 
 

@@ -10,6 +10,9 @@ from enum import StrEnum
 from shipdrag_ros.diagnosis.traces import Trace
 from shipdrag_ros.ship.sections import Uncertain
 
+FORCE = 'force'  # on the ship, against her baseline
+LOG_TRACK = 'log_track'  # the log against the way over ground
+
 
 class Verdict(StrEnum):
     """What is missing in the model."""
@@ -125,6 +128,13 @@ class Diagnosis:
         Each run, measured and simulated: before, and after the effects of `best`
         are added; after where nothing is missing: the baseline moved as far as
         the runs ask for; where it is unknown: with something smooth instead.
+    coastdowns_used
+        Number of coastdowns that the diagnosis rests on.
+    examined
+        Of `FORCE` and `LOG_TRACK`, what the runs could show; a verdict `none`
+        speaks of these alone.
+    no_coastdown
+        Where none is used: that none was found and why, a sentence.
     """
 
     verdict: Verdict
@@ -142,3 +152,6 @@ class Diagnosis:
     best: tuple[Named, ...] = ()
     notes: tuple[str, ...] = ()
     traces: tuple[Trace, ...] = ()
+    coastdowns_used: int = 0
+    examined: tuple[str, ...] = ()
+    no_coastdown: str = ''

@@ -17,7 +17,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.prior import UNNAMED_ODDS, nothing_missing
-from shipdrag_ros.diagnosis.result import Diagnosis, Gap, Named, Verdict, Where
+from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Gap, Named, Verdict, Where
 from shipdrag_ros.diagnosis.sailing_model import SMOOTH, LegFit, LegModel
 from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Weighed, decide, simplest
 from shipdrag_ros.parameters import Parameters
@@ -41,7 +41,12 @@ _TRACE = {
 _QUARTERS = ('east', 'north', 'west', 'south')
 
 
-def diagnose_sailing(records: Sequence[SailingRecord], parameters: Parameters) -> Diagnosis:
+def diagnose_sailing(
+    records: Sequence[SailingRecord],
+    parameters: Parameters,
+    *,
+    no_coastdown: str = 'No coastdown is used.',
+) -> Diagnosis:
     """
     Name what is wrong between log and the way over ground.
 
@@ -51,6 +56,8 @@ def diagnose_sailing(records: Sequence[SailingRecord], parameters: Parameters) -
         One or more, of the same ship; a current is stated along the first leg.
     parameters
         For the convention of the heading.
+    no_coastdown
+        For the reader: that there is no coastdown, and why.
 
     Raises
     ------
@@ -95,6 +102,8 @@ def diagnose_sailing(records: Sequence[SailingRecord], parameters: Parameters) -
             *_about(legs, len(cut)),
             *(_why(legs, fits, best) if missing else ()),
         ),
+        examined=(LOG_TRACK,),
+        no_coastdown=no_coastdown,
     )
 
 
@@ -157,8 +166,8 @@ def _where(legs: Legs, best: LegFit) -> Where:
 def _about(legs: Legs, outliers: int) -> list[str]:
     """Tell what was used."""
     found = [
-        f'no coastdown is used: log and way over ground are compared on {len(legs)} legs of '
-        f'{legs.length_s:.0f} s, whose direction is by {legs.direction}; left out: '
+        f'log and way over ground are compared on {len(legs)} legs of {legs.length_s:.0f} s, '
+        f'whose direction is by {legs.direction}; left out: '
         f'{told(legs.left_out)}' + (f', outlier {outliers}' if outliers else '')
     ]
     if legs.direction is Direction.UNKNOWN:

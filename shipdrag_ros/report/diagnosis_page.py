@@ -40,7 +40,9 @@ def write_diagnosis(
         title='What is missing in the model' + (f' of {ship.name}' if ship and ship.name else ''),
         ship='' if ship is None else words.ship_line(ship),
         runs=', '.join(trace.name for trace in found.traces),
+        no_coastdown=found.no_coastdown,
         sentence=told.sentence(found),
+        examined=told.examined(found),
         probabilities=Picture.of(
             diagnosis_pictures.probability_picture(told.answers(found)),
             'How probable each answer is.',

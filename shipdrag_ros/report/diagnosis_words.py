@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis import Candidate, Diagnosis, Named, Verdict
+from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, Named, Verdict
 from shipdrag_ros.report.words import plus_minus
 from shipdrag_ros.ship import CoefficientBaseline, Ship, Uncertain
 from shipdrag_ros.simulation.effect import Quantity
@@ -18,6 +18,7 @@ _CHANNELS = {
     'log_radar': 'between log and radar, which of them cannot be told',
     'force': 'in the force on the ship',
 }
+NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
 _LEAST = 0.001  # probability that is told
 _WORTH_A_WORD = 0.01
@@ -28,6 +29,11 @@ def sentence(found: Diagnosis) -> str:
     Return the verdict in a sentence.
     """
     match found.verdict:
+        case Verdict.NONE if found.nothing >= 0.5 and found.baseline == 'none':
+            return (
+                'Log and track agree: nothing is wrong between them that this record could show '
+                f'(probability {probability(found.nothing)}).'
+            )
         case Verdict.NONE if found.nothing >= 0.5:
             return (
                 'Model and data agree: nothing is missing that these runs could show '
@@ -38,7 +44,7 @@ def sentence(found: Diagnosis) -> str:
                 (
                     (each.words, each.probability)
                     for each in answers(found)
-                    if each.words != NOTHING
+                    if each.words not in (NOTHING, NOTHING_BETWEEN)
                 ),
                 key=lambda answer: answer[1],
             )
@@ -66,6 +72,17 @@ def sentence(found: Diagnosis) -> str:
             if first.names and found.unnamed < first.probability:
                 why = f' The likeliest of them, {names_text(first.names)}, leaves more than noise.'
             return f'Something is missing that is none of the known effects, {place(found)}.{why}'
+
+
+def examined(found: Diagnosis) -> str:
+    """
+    Say what was examined, and what was not.
+    """
+    parts = {FORCE: 'the force on the ship', LOG_TRACK: 'the log against the way over ground'}
+    seen = [words for part, words in parts.items() if part in found.examined]
+    unseen = [words for part, words in parts.items() if part not in found.examined]
+    said = f'Examined: {" and ".join(seen)}'
+    return f'{said}; not examined: {" and ".join(unseen)}.' if unseen else f'{said}.'
 
 
 def advice(found: Diagnosis) -> list[str]:
@@ -137,9 +154,13 @@ def answers(found: Diagnosis) -> tuple[Answer, ...]:
     """
     Return the candidates, then nothing and something unnamed, and what is left.
     """
-    told = [Answer(names_text(each.names), each.probability) for each in found.candidates]
+    nothing = NOTHING if found.baseline != 'none' else NOTHING_BETWEEN
+    told = [
+        Answer(names_text(each.names) if each.names else nothing, each.probability)
+        for each in found.candidates
+    ]
     if all(each.names for each in found.candidates):
-        told.append(Answer(NOTHING, found.nothing))
+        told.append(Answer(nothing, found.nothing))
     told.append(Answer(UNNAMED, found.unnamed))
     others = 1.0 - sum(each.probability for each in told)
     return (*told, Answer(OTHERS, others)) if others >= _LEAST else tuple(told)

@@ -103,7 +103,7 @@ def _notes(hulls: Sequence[Hull], missing: Sequence[str]) -> tuple[str, ...]:
     if bounds:
         notes.append(
             f'No steepest rise of r was found for {", ".join(bounds)}: its Fr_max is only the '
-            'highest speed of the record, a lower bound. Such a hull may stand higher than '
+            'highest speed of the fit, a lower bound. Such a hull may stand higher than '
             'shown, never lower; a coastdown from a higher speed would tell.'
         )
     notes.append(

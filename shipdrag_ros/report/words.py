@@ -23,6 +23,7 @@ from shipdrag_ros.ship import Ship
 M_S_PER_KNOT = 1852.0 / 3600.0
 _ROUNDING = 1e-6  # of a figure; what is larger has another cause
 _LIGHT_KG = 1e4
+_AROUND = 5  # readings, of which two may be bad
 
 ENDED_BY = {
     EndedBy.SPEED: 'the minimum speed was reached',
@@ -38,7 +39,7 @@ ENDED_BY = {
 }
 FROUDE_MAX_BY = {
     FroudeMax.INFLECTION: 'the steepest rise of r, beyond which it falls significantly',
-    FroudeMax.BRANCH_TOP: 'the highest speed of the record; no steepest rise was found',
+    FroudeMax.BRANCH_TOP: 'the highest speed of the fit; no steepest rise was found',
 }
 _STRAIGHT = {'s1_speed': 2, 's1_position': 3, 's1_joint': 3}  # coefficients of a constant r
 _ESTIMATORS = {
@@ -237,7 +238,8 @@ def _range_notes(estimate: Estimate) -> list[str]:
             for speed in (curve.speed_m_s[0], curve.speed_m_s[-1], fastest)
         )
         found.append(
-            f'Nothing is said outside {low} to {high} m/s; the record itself reaches {top} m/s.'
+            f'Nothing is said outside {low} to {high} m/s; the fit ends at {top} m/s'
+            f'{_fastest_reading(estimate, fastest)}.'
         )
     found.append(
         f'The upper end, Fr {estimate.froude_valid[1]:.3f}, is '
@@ -248,6 +250,18 @@ def _range_notes(estimate: Estimate) -> list[str]:
             'So it depends on the starting speed; hulls compared, it is only a lower bound.'
         )
     return found
+
+
+def _fastest_reading(estimate: Estimate, fastest_m_s: float) -> str:
+    """Tell the largest speed that was read, but for single bad readings."""
+    for name in ('speed_through_water', 'speed_over_ground'):
+        track = estimate.tracks.get(name)
+        if track is not None and len(track.measured) >= _AROUND:
+            around = np.lib.stride_tricks.sliding_window_view(track.measured, _AROUND)
+            read = float(np.median(around, axis=1).max())
+            text = speed_text(read, highest_m_s=fastest_m_s)
+            return f', {name} (medians of {_AROUND} readings) at {text} m/s'
+    return ''
 
 
 def _residual_notes(estimate: Estimate) -> list[str]:

@@ -86,6 +86,9 @@ def test_the_result_reads_well_and_says_the_same_to_the_machine(
     said = capsys.readouterr().out
     found = json.loads((tmp_path / 'found.json').read_text())
     assert found['verdict'] == 'named'
+    assert found['coastdowns_used'] == 1
+    assert found['examined'] == ['force', 'log_track']
+    assert found['no_coastdown'] is None
     (effect,) = found['effects']
     assert effect['name'] == 'current'
     assert found['gap']['before']['chi2_per_sample'] > 3.0
@@ -113,6 +116,7 @@ def test_the_log_alone_is_enough_and_nothing_named_is_not_written(
     assert main(['diagnose', str(clean), '--write', str(written)]) == 0
     captured = capsys.readouterr()
     assert captured.out.startswith('Model and data agree')
+    assert 'Examined: the force on the ship; not examined: the log against' in captured.out
     assert 'is not written' in captured.err
     assert not written.exists()
 
@@ -129,7 +133,20 @@ def test_neither_a_coastdown_nor_enough_sailing_is_an_error(
     steady_bag: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(['diagnose', str(steady_bag)]) == 1
-    assert 'give a longer record' in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert said.startswith('ERROR: No coastdown was found in ')
+    assert 'by speed_through_water nothing slowed' in said
+    assert 'give a longer record' in said
+
+
+def test_a_bag_without_a_coastdown_beside_one_with_is_told_of(
+    in_current: Path, steady_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert main(['diagnose', str(in_current), str(steady_bag)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith('Missing in the model: current')
+    assert f"no coastdown was found in '{steady_bag}': by speed_through_water nothing" in said
 
 
 def test_a_ship_without_baseline_gets_no_force_named(

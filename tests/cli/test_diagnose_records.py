@@ -51,7 +51,54 @@ def test_without_coastdown_and_ship_file_log_and_positions_are_compared(
     assert set(found['gap']) == GAPS
     assert found['gap']['held_out_before'] is None
     assert found['gap']['before']['rms_position_m'] is None
-    assert 'no coastdown is used' in capsys.readouterr().out
+    assert found['coastdowns_used'] == 0
+    assert found['examined'] == ['log_track']
+    said = capsys.readouterr().out
+    first = 'No coastdown was found: without a ship file none is looked for; give one with --ship'
+    assert said.startswith(first)
+    assert 'Examined: the log against the way over ground; not examined: the force' in said
+
+
+def sound(path: Path, slowing: bool) -> Path:
+    """An hour up and down with a log that reads right; slower by half in a turn if so asked."""
+    rng = np.random.default_rng(1)
+    time = np.arange(3600.0)
+    speed = np.full(len(time), 5.0)
+    if slowing:
+        speed[1820:2400] = 2.5
+    east = np.where(time // 600.0 % 2 == 0, speed, -speed)
+    place = np.array([np.cumsum(east), np.zeros(len(time))]).T
+    place += rng.normal(0.0, 1.0, place.shape)
+    log = speed + rng.normal(0.0, 0.05, len(time))
+    return bag(path, time, speed_through_water=log, position=place)
+
+
+@pytest.mark.parametrize('slowing', [False, True])
+def test_the_first_word_is_that_there_is_no_coastdown_and_why(
+    slowing: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sailed = sound(tmp_path / 'sailed.mcap', slowing)
+    ship, document = tmp_path / 'ship.yaml', tmp_path / 'found.json'
+    ship.write_text(MODEL)
+    page = tmp_path / 'page.html'
+    line = ['diagnose', str(sailed), '--ship', str(ship), '--report', str(page)]
+    assert main([*line, '--json', str(document)]) == 0
+    first, second, *_ = capsys.readouterr().out.splitlines()
+    why = 'nothing slowed: the speed never fell by more than'
+    if slowing:
+        why = 'the speed by speed_through_water fell most from 5.0'
+    assert first.startswith(f"No coastdown was found in '{sailed}': ")
+    assert why in first
+    assert 'nothing is missing' not in second
+    assert second.startswith('Log and track agree')
+    found = json.loads(document.read_text())
+    assert found['verdict'] == 'none'
+    assert found['coastdowns_used'] == 0
+    assert found['examined'] == ['log_track']
+    assert found['no_coastdown'] == first
+    text = page.read_text(encoding='utf-8')
+    assert text.index('No coastdown was found in') < text.index('Log and track agree')
+    assert 'not examined: the force on the ship' in text
 
 
 def test_what_needs_a_ship_file_says_so(

@@ -55,6 +55,23 @@ def test_the_sentence_gives_range_figure_and_force(coastdown: Coastdown, ship: S
     assert 'kN' not in words.result_sentence(coastdown)
 
 
+def test_the_top_of_the_fit_is_not_told_for_the_largest_reading(coastdown: Coastdown) -> None:
+    estimate = coastdown.estimate
+    assert estimate is not None
+    name = 'speed_through_water'
+    track = estimate.tracks[name]
+    read = np.minimum(track.fitted, 6.5)  # the fit overshoots what was read
+    read[100] = 30.0  # one bad reading
+    tracks = {name: replace(track, measured=read)}
+    notes = ' '.join(words.notes(replace(coastdown, estimate=replace(estimate, tracks=tracks))))
+    assert 'the fit ends at 8.20 m/s, speed_through_water (medians of 5 readings) at 6.50 m/s' in (
+        notes
+    )
+    bare = ' '.join(words.notes(replace(coastdown, estimate=replace(estimate, tracks={}))))
+    assert 'the fit ends at 8.20 m/s.' in bare
+    assert 'record itself reaches' not in notes + bare
+
+
 def test_a_model_ship_is_told_in_newtons_and_millimetres(coastdown: Coastdown) -> None:
     assert coastdown.estimate is not None
     curve = coastdown.estimate.curve
