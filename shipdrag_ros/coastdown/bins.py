@@ -194,26 +194,34 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
     slope, level, count
         Slope [m/s^2], speed at the newest bin [m/s] and bins used; NaN where
         fewer than four bins, or bins from less than 2/3 of the width, are there.
+
+    Notes
+    -----
+    Where a gap leaves too few bins, the window reaches back as far again: a
+    record that goes on after a gap has a slope at once.
     """
     speeds = bins.speeds[source]
     mask = len(speeds) - 1
-    before, newest = _span(bins, source, last, width)
-    low, high = speeds[before & mask], speeds[newest & mask]
-    count = high[COUNT] - low[COUNT]
-    if count < 4:
+    for reach in (width, 2 * width):
+        before, newest = _span(bins, source, last, reach)
+        low, high = speeds[before & mask], speeds[newest & mask]
+        count = high[COUNT] - low[COUNT]
+        if count < 4:
+            continue
+        while speeds[(newest - 1) & mask, COUNT] == high[COUNT]:
+            newest -= 1
+        oldest = before + 1
+        while speeds[oldest & mask, COUNT] == low[COUNT]:
+            oldest += 1
+        latest = high[TIME] - speeds[(newest - 1) & mask, TIME]
+        earliest = speeds[oldest & mask, TIME] - low[TIME]
+        if 3 * (latest - earliest) >= 2 * (width - 1) * PER_SECOND:
+            break
+    else:
         return np.nan, np.nan, count
-    while speeds[(newest - 1) & mask, COUNT] == high[COUNT]:
-        newest -= 1
-    oldest = before + 1
-    while speeds[oldest & mask, COUNT] == low[COUNT]:
-        oldest += 1
     # from the middle of the window and the newest speed on: the sums keep their digits
     middle = (last - width // 2) * PER_SECOND
-    below = speeds[(newest - 1) & mask]
-    latest, origin = high[TIME] - below[TIME], high[SPEED] - below[SPEED]
-    earliest = speeds[oldest & mask, TIME] - low[TIME]
-    if 3 * (latest - earliest) < 2 * (width - 1) * PER_SECOND:
-        return np.nan, np.nan, count
+    origin = high[SPEED] - speeds[(newest - 1) & mask, SPEED]
     time, speed = high[TIME] - low[TIME], high[SPEED] - low[SPEED]
     time_time = high[TIME_TIME] - low[TIME_TIME] - middle * (2 * time - count * middle)
     time_speed = (

@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 
@@ -406,11 +407,12 @@ def bend(
 
     Notes
     -----
-    Least squares of 1/v = polynomial + c max(0, t - s), s searched over all bins.
+    Least squares of 1/v = polynomial + c max(0, t - s), s searched over all bins, and over
+    each second of a gap between them.
     """
     time, speed = speeds(bins, source, first, last)
     inverse = 1.0 / np.maximum(speed, 0.5 * speed_min)
-    hinges = time[2:-2]
+    hinges = np.concatenate([np.arange(one, other - 0.5) for one, other in pairwise(time[2:-1])])
     ramp = np.maximum(0.0, time - hinges[:, np.newaxis])
     # what the polynomial explains is taken out of both
     basis, _ = np.linalg.qr(np.vander(time, degree + 1))
