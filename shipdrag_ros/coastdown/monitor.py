@@ -338,8 +338,10 @@ class Monitor:
             return events
         end_ns = int(self._memory.guard.last_ns[self._candidate.source])
         if self._onset is not None:
-            events += self._conclude(ended_by, end_ns, None)
-            self._stand_down()
+            doubt = None
+            if ended_by is not EndedBy.RESET:
+                doubt = self._withdrawn(End(ended_by, end_ns // SECOND_NS - 1))
+            events += self._conclude(ended_by, end_ns, doubt)
         elif self._candidate.noticed:
             age_s = end_ns // SECOND_NS - self._candidate.start
             text = f'{_CUT_SHORT[ended_by]} {age_s} s after it began, before it was confirmed'
@@ -349,10 +351,18 @@ class Monitor:
 
     def _end_at(self, end: End) -> list[Event]:
         assert self._candidate is not None
-        doubt = withdrawn(self._candidate, end, self._memory.bins, self._tuning, self._parameters)
-        events = self._conclude(end.ended_by, (end.last + 1) * SECOND_NS, doubt)
+        end_ns = (end.last + 1) * SECOND_NS
+        events = self._conclude(end.ended_by, end_ns, self._withdrawn(end))
         self._stand_down()
         return events
+
+    def _withdrawn(self, end: End) -> Doubt | None:
+        assert self._candidate is not None
+        bins = self._memory.bins
+        number = int(bins.closed[self._candidate.source])
+        return withdrawn(
+            self._candidate, end, bins, self._ship, self._tuning, self._parameters, number
+        )
 
     def _conclude(self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None) -> list[Event]:
         assert self._onset is not None
