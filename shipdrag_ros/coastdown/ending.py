@@ -34,7 +34,7 @@ _LENGTH_MIN = 0.5  # ... or was shorter than this, of confirm_s, ...
 # ... or if a constant force of this fraction of the first resistance drove, or braked, the ship;
 # wind and an exponent that is not as expected make up to 0.1 and -0.35
 _THRUST_MIN = 0.2
-_BRAKE_MIN = 0.5
+_BRAKE_MIN = 0.7
 _THROUGHOUT_MIN = 0.07  # likewise, where it ended in a steady speed, ...
 _CORNER = 9.0  # ... and chi^2 would gain no more than this from a later begin of that force
 _EARLIER_WINDOWS = 3  # slope windows before the newest one that say how it decelerated
@@ -99,7 +99,7 @@ def _departed(
     if span >= width:
         excess = _excess(bins, source, earlier, span, slope, level - 0.5 * slope * width)
         # while the thrust runs down the fall steepens
-        if told or span < _EARLIER_WINDOWS * width:
+        if span < _EARLIER_WINDOWS * width:
             excess = max(excess, 0.0)
         first = earlier - width
     long = 2 * round(parameters.confirm_s)
@@ -112,9 +112,10 @@ def _departed(
         first = start
     if excess > coasting.limits[0]:
         return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
-    # where nothing tells the heading, a turn shows in the speed alone
-    if -excess > coasting.limits[0] and not told:
-        return End(EndedBy.TURN, _bend(bins, coasting, tuning, first, number, sign=1))
+    if -excess > coasting.limits[0]:
+        # where nothing tells the heading, this is how a turn shows
+        cause = EndedBy.BRAKE if told else EndedBy.TURN
+        return End(cause, _bend(bins, coasting, tuning, first, number, sign=1))
     return None
 
 

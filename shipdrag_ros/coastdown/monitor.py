@@ -278,7 +278,9 @@ class Monitor:
         """Give a candidate up and say why."""
         assert self._candidate is not None
         start_ns = self._candidate.start * SECOND_NS
-        self._stand_down()
+        # the stop may be still to come, and the shafts then tell it
+        driven = doubt is None or doubt.reason in (Dismissal.THRUST, Dismissal.OTHER)
+        self._stand_down(driven=driven)
         if doubt is None:
             return []
         return self._dismissals.take(NotCoastdown(start_ns, end_ns, doubt.reason, doubt.text))
@@ -390,15 +392,18 @@ class Monitor:
             return [ended]
         return [ended, NotCoastdown(start_ns, end_ns, doubt.reason, failure or doubt.text)]
 
-    def _stand_down(self) -> None:
+    def _stand_down(self, *, driven: bool = False) -> None:
         """Watch for an onset again, once the ship has been steady."""
         watch = self._memory.watch
         watch.source[0] = NEVER
         watch.update_ns[0] = ALWAYS
-        # what a shaft alone proposed, and the speed did not bear out, leaves the speed as it was
-        if self._candidate is not None and (self._candidate.noticed or self._onset is not None):
-            watch.armed[0] = 0
-            watch.held[:] = self._candidate.limits
+        if self._candidate is not None:
+            # what a shaft alone proposed and the speed did not bear out changes nothing for it
+            if self._candidate.noticed or self._onset is not None:
+                watch.armed[0] = 0
+                watch.held[:] = self._candidate.limits
+            if not driven:
+                watch.armed[1] = 0
         self._candidate = self._onset = self._heading_rad = None
 
     def _clock_set(self, stop: int, channel: int, stamp_ns: int, receive_ns: int) -> str:
