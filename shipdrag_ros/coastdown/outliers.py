@@ -68,7 +68,7 @@ def fits(
 
     Changes nothing.
     """
-    count = past.count[channel]
+    count = past.readings[channel]
     last = (count - 1) % KEPT
     if channel < FIRST_TRACK:
         if a != 0.0 and abs(a - past.value[channel, last, 0]) <= past.gate[channel]:
@@ -140,7 +140,7 @@ def _agrees_with_accepted(
     past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
 ) -> bool:
     """Say whether a reading is near the last accepted one, or the median of the last few."""
-    count = past.count[channel]
+    count = past.readings[channel]
     if count < MIDDLE:
         return True
     last = (count - 1) % KEPT
@@ -203,7 +203,7 @@ def _is_new_truth(
     new = past.refused_new[channel] + (not _same_as_refused(past, channel, a, b))
     if 2 * new >= AGREED - 1:
         return True
-    natural = repeats_kept(past, channel, min(past.count[channel], KEPT), 0) > REPEATS
+    natural = repeats_kept(past, channel, min(past.readings[channel], KEPT), 0) > REPEATS
     return natural and (channel >= FIRST_TRACK or a != 0.0)
 
 
@@ -235,7 +235,7 @@ def _take(
 @compiled(uncounted=True)
 def _silent(past: Past, channel: int, stamp: int) -> bool:
     """Say whether so long nothing was heard that what was before says nothing."""
-    count = past.count[channel]
+    count = past.readings[channel]
     if count == 0:
         return False
     heard = max(past.stamp_ns[channel, (count - 1) % KEPT], past.heard_ns[channel])
@@ -271,7 +271,7 @@ def refuse(
     """
     past.heard_ns[channel] = stamp
     past.due_ns[channel] = _NEVER
-    if past.count[channel] > 0 and same_as_last(past, channel, a, b):
+    if past.readings[channel] > 0 and same_as_last(past, channel, a, b):
         return  # a sensor that sticks where it was
     refused = past.refused_count[channel]
     same = refused > 0 and _same_as_refused(past, channel, a, b)
