@@ -2,9 +2,9 @@
 """
 Salvage of a damaged bag: every whole message into a sound one.
 
-Messages of a chunk that is cut off or has a wrong checksum, and what had to be
-inferred, go into a bag of their own, so that nothing doubtful is taken for
-data.
+Messages of a chunk that is cut off or has a wrong checksum, messages between
+chunks, and what had to be inferred, go into a bag of their own, so that nothing
+doubtful is taken for data.
 """
 
 from __future__ import annotations
@@ -185,11 +185,13 @@ class _Salvage:
     def _walk(self, data: Buffer) -> None:
         if data[: len(MAGIC)] != MAGIC:
             self._damages.add(0, 'magic', DamageKind.MISSING)
+        chunked = False
         for found in self._scanner.walk(data, 0, len(data)):
             if found.opcode == MAGIC_PLACE:
                 continue
             self.records += found.opcode != GARBAGE
             if found.opcode == Opcode.CHUNK:
+                chunked = True
                 self._progress(found.offset, len(data))
                 self._chunk(data, found)
                 continue
@@ -198,7 +200,9 @@ class _Salvage:
             if found.opcode == GARBAGE or found.damage not in _WHOLE:
                 self.lost += found.end - found.offset
             else:
-                trust = Trust.READ if found.damage is None else Trust.DOUBTFUL
+                # a message between chunks may be an index of one, with one bit flipped
+                stray = chunked and found.opcode == Opcode.MESSAGE
+                trust = Trust.DOUBTFUL if stray or found.damage is not None else Trust.READ
                 self._record(data, found, trust, found.offset)
         if read_footer(data) is None:
             self._damages.add(len(data), 'footer', DamageKind.MISSING)
