@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import ast
 import os
+import random
 import re
 import shutil
 import subprocess
@@ -244,3 +245,109 @@ def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) ->
     assert 'Too many arguments for "whiten"' in told
     assert 'Argument 1 to "root" has incompatible type "str"' in told
     assert 'Missing positional argument "covariance" in call to "root"' in told
+
+
+# a live estimate, a final one and the noise of a diagnosis, printed to the last bit
+ESTIMATES = """
+import numpy as np
+from shipdrag_ros.diagnosis.noise import Colour, Damping, whiten
+from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+from shipdrag_ros.ship import Ship
+
+rng = np.random.default_rng(0)
+time_s = np.arange(0.0, 900.0, 2.0)
+n, stamps = len(time_s), (time_s * 1e9).astype(np.int64)
+coasting_s = np.maximum(time_s - 300.0, 0.0)
+way = np.minimum(time_s, 300.0) * 8.0 + 4000.0 * np.log1p(coasting_s / 500.0)
+speed = 8.0 / (1.0 + coasting_s / 500.0) + 0.05 * rng.standard_normal(n)
+place = np.column_stack([way, 0.3 * way]) / np.hypot(1.0, 0.3) + 5.0 * rng.standard_normal((n, 2))
+block = in_arrival_order([
+    Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed),
+    Block.of(Channel.POSITION, stamps, place),
+])
+window = Window.from_block(block, 300_000_000_000, 900_000_000_000, before_ns=0)
+ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
+for each in (estimate, estimate_final):
+    found = each(window, ship, Parameters())
+    print(found.estimator, found.curve.speed_m_s.tobytes().hex(),
+          found.curve.resistance_m_s2.tobytes().hex(), found.curve.sigma_m_s2.tobytes().hex())
+kind = np.where(np.arange(n) % 2, LOG, POSITION)
+colour = Colour(np.array([1e-3, 0.02, 0.05, 2.0]), np.array([90.0, 600.0, 50.0, 50.0]))
+table = np.array([speed, way])
+whiten(Rows(time_s, kind, speed), np.full(n, 0.01), colour,
+       Damping(np.full(n, 2e-3), np.full(n, 1.05)), table)
+print(table.tobytes().hex())
+"""
+# functions that call those of other files, and what they call
+CALLERS = ('estimation.motion_fit.solve', 'estimation.projection', 'estimation.robust')
+CALLEES = (
+    'estimation.motion_fit.coast',
+    'estimation.motion_fit.law',
+    'estimation.motion_fit.whitening',
+    'estimation.warped_model',
+    'regression.averaging',
+    'regression.refit',
+)
+
+
+@pytest.fixture(scope='module')
+def estimates(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """Return a full cache, and what is found with it: compiled here where it never was."""
+    result, _ = run(ROOT, ESTIMATES, timeout=800.0)
+    assert len(result) > 10_000
+    cache = tmp_path_factory.mktemp('kept')
+    for path in SOURCES:
+        module = '.'.join(path.relative_to(ROOT).with_suffix('').parts)
+        folder = subject._folder(module)
+        if folder is not None and folder.exists():
+            shutil.copytree(folder, cache / folder.name)
+    return cache, result
+
+
+@pytest.mark.timeout(900)
+def test_the_bits_of_an_estimate_do_not_depend_on_what_was_kept(
+    estimates: tuple[Path, str], tmp_path: Path
+) -> None:
+    """Callers are compiled anew, with half of their callees as they were kept and half anew."""
+    full, result = estimates
+    cache = tmp_path / 'cache'
+    shutil.copytree(full, cache)
+    of = {path: path.parent.name.rpartition('-')[0] for path in kept(cache)}
+    callers = [path for path in of if of[path] in CALLERS]
+    callees = [path for path in of if of[path] in CALLEES]
+    assert {of[path] for path in callers + callees} == {*CALLERS, *CALLEES}
+    for path in callers + random.Random(0).sample(callees, len(callees) // 2):
+        path.unlink()
+    assert run(ROOT, ESTIMATES, timeout=800.0, SHIPDRAG_CACHE_DIR=str(cache))[0] == result
+    assert all(path.exists() for path in callers)
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    ('module', 'old', 'new'),
+    [
+        ('estimation/robust.py', 'HUBER = 2.0', 'HUBER = 1.0'),
+        ('estimation/motion_fit/law.py', 's * s * b\n', 's * s * b * 1.01\n'),
+    ],
+)
+def test_an_edit_of_this_package_acts_at_once(
+    estimates: tuple[Path, str], tmp_path: Path, module: str, old: str, new: str
+) -> None:
+    """The live estimate differs, whose last step is in another file than what was edited."""
+    full, before = estimates
+    cache = tmp_path / 'cache'
+    shutil.copytree(full, cache)
+    shutil.copytree(
+        PACKAGE, tmp_path / 'shipdrag_ros', ignore=shutil.ignore_patterns('__pycache__')
+    )
+    live = ESTIMATES.replace('(estimate, estimate_final)', '(estimate,)')
+    settings = {'SHIPDRAG_CACHE_DIR': str(cache)}
+    same, _ = run(tmp_path, live, timeout=800.0, **settings)
+    assert same.split('\n')[0] == before.split('\n')[0]
+    assert len(kept(cache)) == len(kept(full))  # nothing was compiled: the place says nothing
+    edit(tmp_path / 'shipdrag_ros' / module, old, new)
+    after, _ = run(tmp_path, live, timeout=800.0, **settings)
+    assert after.split('\n')[0] != before.split('\n')[0]
