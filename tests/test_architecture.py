@@ -4,8 +4,12 @@
 from __future__ import annotations
 
 import ast
+import inspect
+import re
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -86,6 +90,47 @@ def test_imports_run_downward_and_stay_at_the_edges(path: Path) -> None:
 def test_every_room_has_a_floor() -> None:
     rooms = {room(path) for path in SOURCES} - {''}
     assert rooms <= set(FLOORS), f'give {rooms - set(FLOORS)} a floor'
+
+
+def doors() -> list[tuple[str, str]]:
+    """Return room and door of each row of the table in the map of the code."""
+    text = (ROOT / 'docs' / 'architecture.md').read_text(encoding='utf-8')
+    table = text[text.index('| room | door |') :].split('\n\n')[0]
+    found = []
+    for line in table.splitlines()[2:]:
+        place, listed = (cell.strip() for cell in line.strip('|').split('|'))
+        here = place.strip('`').removesuffix('/').removesuffix('.py').replace('/', '.')
+        for span in re.findall(r'`([^`]+)`', listed):
+            found += [(here, part) for part in span.split(' -> ')]
+    return found
+
+
+def test_every_room_has_a_door() -> None:
+    listed = {here.partition('.')[0] for here, _ in doors()}
+    assert listed == set(FLOORS) - {'errors', 'compiled', 'strict_yaml'}
+
+
+@pytest.mark.parametrize(('here', 'door'), doors())
+def test_every_door_opens(here: str, door: str) -> None:
+    if here == 'node':
+        pytest.importorskip('rclpy')
+    if door.endswith('/'):
+        assert (PACKAGE / here.replace('.', '/') / door).is_dir()
+        return
+    name, bracket, inside = door.partition('(')
+    found: Any = import_module(f'shipdrag_ros.{here}')
+    for part in name.split('.'):
+        if not hasattr(found, part):
+            found = import_module(f'{found.__name__}.{part}')
+        else:
+            found = getattr(found, part)
+    if bracket:
+        known = inspect.signature(found).parameters
+        words = [word.strip() for word in inside.rstrip(')').split(',') if word.strip()]
+        bound = 1 if inspect.isfunction(found) and 'self' in known else 0
+        assert len(words) + bound <= len(known)
+        for word in words:
+            assert not word.endswith('=') or word[:-1] in known
 
 
 @pytest.mark.parametrize(
