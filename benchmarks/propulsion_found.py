@@ -112,7 +112,7 @@ def main() -> None:
     given = parser.parse_args()
     first, quick = given.seed, given.quick
     parts = {
-        'stops': stops(range(first, first + (1 if quick else 6)), quick),
+        'stops': stops(range(first, first + (1 if quick else 12)), quick),
         'others': others(range(first, first + (1 if quick else 6)), quick),
         'steady': sailing(range(first, first + (1 if quick else 20))),
     }

@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -28,9 +30,21 @@ class Case:
     seed: int
 
     @property
+    def random(self) -> np.random.Generator:
+        """What decides everything else of it."""
+        name = f'{self.kind}|{self.hull}|{self.sea}'.encode()
+        return np.random.default_rng([self.seed, zlib.crc32(name)])
+
+    @cached_property
     def ship(self) -> Hull:
-        """The hull."""
-        return HULLS[self.hull]
+        """The hull, with lightly or heavily loaded propellers of high or low pitch."""
+        hull = HULLS[self.hull]
+        random = np.random.default_rng([self.seed, zlib.crc32(self.hull.encode())])
+        return replace(
+            hull,
+            disc_m2=hull.disc_m2 * float(random.uniform(0.65, 1.5)),
+            pitch_ratio=hull.pitch_ratio * float(random.uniform(0.85, 1.15)),
+        )
 
     @property
     def weather(self) -> Sea:
@@ -106,7 +120,7 @@ def _zero_pitch(draft: _Draft) -> None:
     draft.mode[:, draft.at :] = Mode.KEPT
     draft.pitch[:, draft.at :] = 0.0
     # revs are brought down after the pitch, as a combinator does
-    draft.ramp(draft.at + 5, 20, float(draft.random.uniform(0.5, 1.0)))
+    draft.ramp(draft.at + 5, 20, float(draft.random.uniform(0.35, 1.0)))
 
 
 def _staggered(draft: _Draft) -> None:
@@ -146,6 +160,7 @@ def _slow_down(fraction: float) -> Callable[[_Draft], None]:
 
 def _turn(degrees: float) -> Callable[[_Draft], None]:
     def act(draft: _Draft) -> None:
+        draft.hold = Hold.POWER
         rate = draft.random.uniform(0.12, 0.35) * 6.0 / draft.hull.length_m
         rate = float(np.clip(rate, np.radians(0.15), np.radians(1.2)))
         length = int(np.radians(degrees) / rate)

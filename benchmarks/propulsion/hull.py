@@ -106,19 +106,19 @@ HULLS = {
             name='tanker', length_m=130.0, volume_m3=11700.0, breadth_m=19.5, draught_m=6.2,
             surface_m2=3260.0, form=1.22, allowance=3.0e-4, wave=(3.4e-3, 0.068, 0.05),
             air_area_m2=350.0, added_mass=0.055, service_m_s=6.7, shafts=1, disc_m2=18.1,
-            pitch_ratio=0.75, wake=0.30, thrust_deduction=0.20, turn_loss=0.7,
+            pitch_ratio=0.75, wake=0.30, thrust_deduction=0.20, turn_loss=1.4,
         ),
         Hull(
             name='ferry', length_m=90.0, volume_m3=3510.0, breadth_m=16.0, draught_m=4.2,
             surface_m2=1520.0, form=1.14, allowance=4.0e-4, wave=(7.6e-3, 0.11, 0.15),
             air_area_m2=230.0, added_mass=0.045, service_m_s=8.2, shafts=2, disc_m2=13.2,
-            pitch_ratio=1.05, wake=0.12, thrust_deduction=0.12, turn_loss=0.8,
+            pitch_ratio=1.05, wake=0.12, thrust_deduction=0.12, turn_loss=1.5,
         ),
         Hull(
             name='workboat', length_m=23.0, volume_m3=140.0, breadth_m=6.8, draught_m=2.2,
             surface_m2=190.0, form=1.20, allowance=4.0e-4, wave=(1.25e-2, 0.13, 0.20),
             air_area_m2=40.0, added_mass=0.08, service_m_s=4.8, shafts=2, disc_m2=2.6,
-            pitch_ratio=0.90, wake=0.14, thrust_deduction=0.13, turn_loss=0.9,
+            pitch_ratio=0.90, wake=0.14, thrust_deduction=0.13, turn_loss=1.6,
         ),
     )
 }  # fmt: skip

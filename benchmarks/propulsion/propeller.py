@@ -5,7 +5,9 @@ A propeller in four quadrants and at any pitch: one blade element at 0.7 R.
 The blade is a thin plate of low aspect ratio in the flow of advance and
 rotation (Polhamus: potential lift and the suction of the edges), which holds for
 driving, windmilling, locked, reversed and at zero pitch alike. Its constants are
-set for K_T and K_Q of a four-bladed B-series screw of medium area ratio.
+set for K_T and K_Q of a four-bladed B-series screw of medium area ratio. Against the
+measured four quadrants of a B4-70 of pitch ratio 1.4 its C_T is off by 0.17 rms, of 0.51:
+deep in the stall it pulls a quarter to a third less.
 """
 
 from __future__ import annotations

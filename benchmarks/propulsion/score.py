@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from propulsion.cases import STOPS, Case
+from propulsion.cases import Case
 from propulsion.motion import ROW_S
 from propulsion.world import Truth, World, build, inputs, seconds
 from shipdrag_ros.coastdown import Monitor
@@ -67,6 +68,10 @@ class Row:
         2 sigma. NaN without.
     refused
         Coastdowns reported without an estimate.
+    withdrawn
+        Coastdowns taken back when they ended; they count as not reported.
+    said
+        What the program says of candidates that it dismissed.
     """
 
     case: Case
@@ -82,7 +87,9 @@ class Row:
     rms: float
     cover: float
     refused: int
+    withdrawn: int
     record_s: float
+    said: str
 
 
 def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) -> list[Row]:
@@ -99,13 +106,13 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         *monitor.update(in_arrival_order(inputs(world, instruments))),
         *monitor.finish(),
     ]
-    ended = [event for event in events if type(event).__name__ == 'Coastdown']
-    kept = [event for event in ended if event.estimate is not None]
+    ended = _named(events, 'Coastdown')
+    # a version of the program that takes nothing back says nothing of it
+    standing = [event for event in ended if not getattr(event, 'withdrawn', False)]
+    kept = [event for event in standing if event.estimate is not None]
     spans = [(seconds(event.start_ns), seconds(event.end_ns)) for event in kept]
     onsets = [
-        (seconds(event.start_ns), seconds(event.detected_ns))
-        for event in events
-        if type(event).__name__ == 'Onset'
+        (seconds(event.start_ns), seconds(event.detected_ns)) for event in _named(events, 'Onset')
     ]
     truth = world.truth
     why, best = _lacks(truth, spans)
@@ -132,8 +139,25 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         sum(_is_wrong(truth, span) for span in onsets),
         rms,
         cover,
-        len(ended) - len(kept),
+        len(standing) - len(kept),
+        len(ended) - len(standing),
         truth.seconds,
+        _said(truth, events),
+    )
+
+
+def _named(events: list[Any], name: str) -> list[Any]:
+    """Events by the name of their class: older versions have fewer."""
+    return [event for event in events if type(event).__name__ == name]
+
+
+def _said(truth: Truth, events: list[Any]) -> str:
+    """Why the program dismissed what overlaps the glide, in its own words."""
+    begin, end = truth.glide or (0.0, truth.seconds)
+    return '; '.join(
+        f'{event.reason.value}: {event.text}'
+        for event in _named(events, 'NotCoastdown')
+        if seconds(event.end_ns) > begin and seconds(event.start_ns) < end
     )
 
 
@@ -181,10 +205,3 @@ def _error(truth: Truth, estimate: Estimate) -> tuple[float, float]:
     off = curve.resistance_m_s2[inside] - true
     rms = float(np.sqrt(np.mean(off**2)) / true.max())
     return rms, float(np.mean(np.abs(off) <= 2.0 * curve.sigma_m_s2[inside]))
-
-
-def is_stop(case: Case) -> bool:
-    """
-    Return whether a case is one of the ways to stop.
-    """
-    return case.kind in STOPS

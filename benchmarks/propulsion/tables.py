@@ -9,6 +9,9 @@ import numpy as np
 
 from propulsion.score import FEWER, SUITES, WITH_HEADING, Row
 
+MIDDLE_S = 180.0
+LENGTHS_MIN = ((0, 3), (3, 5), (5, 10), (10, 60))
+
 
 def stops_tables(rows: list[Row]) -> list[str]:
     """
@@ -22,11 +25,15 @@ def stops_tables(rows: list[Row]) -> list[str]:
     lines += _by('way to stop', long, lambda row: row.case.kind, _share)
     lines += ['', 'by sea:', '', *_by('sea', long, lambda row: row.case.sea, _share)]
     lines += ['', 'by ship:', '', *_by('ship', long, lambda row: row.case.hull, _share)]
-    lines += ['', 'Found, all (glides from half a minute on):', '']
-    lines += _by('way to stop', glides, lambda row: row.case.kind, _share)
-    lines += ['', 'What the others lack, all / long:', '', *_why(glides)]
-    lines += ['', *_fewer(long, 'long'), '', *_fewer(glides, 'all')]
+    some = [row for row in glides if row.glide_s >= MIDDLE_S]
+    lines += ['', 'Found, glides of 3 min or more from any speed:', '']
+    lines += _by('way to stop', some, lambda row: row.case.kind, _share)
+    lines += ['', 'by length of the glide:', '', *_by('length', glides, _length, _share)]
+    lines += ['', 'What the others lack, from 3 min / long:', '', *_why(some)]
+    lines += ['', *_fewer(long, 'long'), '', *_fewer(some, 'from 3 min')]
+    lines += ['', *_fewer(glides, 'from half a minute')]
     lines += ['', 'Dating, long ones that are reported:', '', *_dating(long)]
+    lines += ['', 'Dating, from 3 min:', '', *_dating(some)]
     lines += ['', 'r, long ones that are found: against hull, mean wind and propeller:', '']
     lines += _accuracy(long)
     return lines
@@ -77,7 +84,8 @@ def steady_table(rows: list[Row]) -> list[str]:
         for name, what in (
             ('coastdowns left', lambda row: row.wrong),
             ('announced live', lambda row: row.wrong_live),
-            ('refused', lambda row: row.refused),
+            ('without estimate', lambda row: row.refused),
+            ('withdrawn', lambda row: row.withdrawn),
         )
     ]
     return lines + _table(columns, cells)
@@ -98,6 +106,11 @@ def _by(
         cells = [cell([row for row in some if row.suite == suite]) for suite in suites]
         lines.append([wanted or 'all', *cells])
     return _table([name, *suites], lines)
+
+
+def _length(row: Row) -> str:
+    minutes = row.glide_s / 60.0
+    return next(f'{a} to {b} min' for a, b in LENGTHS_MIN if minutes < b)
 
 
 def _share(rows: list[Row]) -> str:
@@ -124,6 +137,8 @@ def _why(rows: list[Row]) -> list[str]:
         lines.append([text, *cells])
     refused = [str(sum(row.refused for row in rows if row.suite == suite)) for suite in SUITES]
     lines.append(['(coastdowns without estimate)', *refused])
+    back = [str(sum(row.withdrawn for row in rows if row.suite == suite)) for suite in SUITES]
+    lines.append(['(coastdowns withdrawn)', *back])
     return _table(['', *SUITES], lines)
 
 

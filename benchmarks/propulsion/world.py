@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,8 +70,7 @@ def build(case: Case, hours: float = 8.0) -> World:
     """
     Make a case; its seed and name decide everything.
     """
-    name = f'{case.kind}|{case.hull}|{case.sea}'.encode()
-    random = np.random.default_rng([case.seed, zlib.crc32(name)])
+    random = case.random
     hull = case.ship
     plan_ = plan(case, random, hours)
     seconds = plan_.orders.mode.shape[1]
