@@ -33,6 +33,8 @@ class _Run:
     ship: str
     warnings: tuple[str, ...]
     coastdowns: tuple[_Coastdown, ...]
+    none_found: str
+    not_coastdowns: Table | None
     inputs: Table
     recorded: str
 
@@ -79,6 +81,12 @@ def _run(run: RunResult) -> _Run:
             _coastdown(number, coastdown, run)
             for number, coastdown in enumerate(run.coastdowns, start=1)
         ),
+        none_found=''
+        if run.coastdowns
+        else words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns)),
+        not_coastdowns=cells.not_coastdowns_table(run.not_coastdowns)
+        if run.not_coastdowns
+        else None,
         inputs=cells.inputs_table(run.inputs),
         recorded=words.recorded_sentence(run.recorded),
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from shipdrag_ros.bags import InputCounts, Recorded, ReplayResult
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
 from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.report.warnings import run_warnings
 from shipdrag_ros.ship import Ship
@@ -34,6 +34,10 @@ class RunResult:
         What is wrong with the run, a sentence each.
     truth
         The true curve, where the record is simulated.
+    not_coastdowns
+        What was nearly a coastdown, and what was cut, with why.
+    steady_lead_s
+        The longest that the ship was steady; None where no coastdown was looked for.
     """
 
     bag: str
@@ -43,6 +47,8 @@ class RunResult:
     recorded: Recorded
     warnings: tuple[str, ...] = ()
     truth: TrueCurve | None = None
+    not_coastdowns: tuple[NotCoastdown, ...] = ()
+    steady_lead_s: float | None = None
 
     @classmethod
     def of(cls, result: ReplayResult) -> RunResult:
@@ -64,4 +70,6 @@ class RunResult:
             recorded=result.recorded,
             warnings=run_warnings(result),
             truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
+            not_coastdowns=result.not_coastdowns,
+            steady_lead_s=result.steady_lead_s,
         )
