@@ -96,7 +96,8 @@ class Parameters:
     )
     shaft_stopped_fraction: float = _parameter(
         0.5,
-        'shaft speed, as a fraction of the steady one, below which the engine counts as stopped',
+        'shaft speed, as a fraction of the steady one, below half of which a propeller counts as '
+        'standing',
         low=0.05,
         high=0.9,
     )

@@ -57,8 +57,8 @@ class Bins(NamedTuple):
     closed : (channels,) int64
         The newest bin that is in the totals; NEVER where none is.
     places : (channels, slots, 4) int64
-        Totals up to a bin: bins, time [ms] and the two columns; cosine and sine for a heading,
-        the size of a shaft speed. Not of the speeds as read.
+        Totals up to a bin: bins, time [ms] and the two columns; cosine and sine for a
+        heading. Not of the speeds as read.
     speeds : (sources, slots, 5) int64
         Totals up to a bin: bins, time [ms], speed, time^2, time x speed. The speed from
         positions is by differences, left out where there are too few.
@@ -232,7 +232,7 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
 @njit(**INLINED, cache=True)
 def mean_turning(bins: Bins, channel: int, last: int, width: int) -> tuple[float, int]:
     """
-    Return the mean size of a shaft speed over the bins last - width + 1 .. last.
+    Return the mean of a shaft speed or pitch over the bins last - width + 1 .. last.
     """
     _, turning, _, count = mean_place(bins, channel, last, width)
     return turning, count

@@ -14,16 +14,20 @@ import math
 from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.bins import Bins, line
-from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy
 from shipdrag_ros.coastdown.memory import Tuning
-from shipdrag_ros.coastdown.onset import Candidate, bend
-from shipdrag_ros.coastdown.tracking import heading_is_told, shaft_rose_at, shaft_speed, turned_at
+from shipdrag_ros.coastdown.onset import Candidate, Doubt, bend
+from shipdrag_ros.coastdown.shafts import Thrust, all_stand, engaged_at
+from shipdrag_ros.coastdown.tracking import heading_is_told, turned_at
 from shipdrag_ros.parameters import Parameters
 
 # A ship that coasts decelerates no less than by the fourth power of its falling speed: more
 # than friction (2) and waves (3) make it.
 _EXPONENT = 4.0
 _EXPONENT_MIN = 1.0  # and no more than in proportion to it
+# What passed for a coastdown is withdrawn if it has cost less than this of the speed, ...
+_LOST_MIN = 0.05
+_LENGTH_MIN = 0.5  # ... or was shorter than this, of confirm_s
 _EARLIER_WINDOWS = 3  # slope windows before the newest one that say how it decelerated
 
 
@@ -49,10 +53,10 @@ def end_of(
         The candidate as it was confirmed.
     """
     start, width = coasting.start, tuning.slopes.width
-    steady = coasting.shaft
-    shaft, stopped = shaft_speed(bins, number), parameters.shaft_stopped_fraction * steady
-    if shaft > stopped:
-        return End(EndedBy.ENGINE, shaft_rose_at(bins, start, number, steady, width))
+    engaged = engaged_at(bins, coasting.drive, start, number)
+    if engaged is not None:
+        thrust, last = engaged
+        return End(EndedBy.ASTERN if thrust is Thrust.ASTERN else EndedBy.ENGINE, last)
     turned = turned_at(bins, start, number, width, parameters.turn_rad)
     if turned is not None:
         return End(EndedBy.TURN, turned)
@@ -61,8 +65,10 @@ def end_of(
         return End(EndedBy.SPEED, number)
     end = _departed(coasting, bins, tuning, parameters, number, slope, level)
     # where the shaft is seen to stand, it was not the engine
-    if end is not None and end.ended_by is EndedBy.ENGINE and shaft <= stopped:
-        return None
+    if end is not None and end.ended_by is EndedBy.ENGINE:
+        stands = 0.5 * parameters.shaft_stopped_fraction
+        if all_stand(bins, coasting.drive, number, stands):
+            return None
     return end
 
 
@@ -126,3 +132,40 @@ def _excess(bins: Bins, source: int, last: int, span: int, slope: float, speed: 
     slower = min(1.0, max(0.0, speed / middle))
     steepest, gentlest = (min(before, 0.0) * slower**p for p in (_EXPONENT_MIN, _EXPONENT))
     return float(slope - min(max(slope, steepest), gentlest))
+
+
+_WITHDRAWN_FOR = {
+    EndedBy.ENGINE: Dismissal.THRUST,
+    EndedBy.ASTERN: Dismissal.ASTERN,
+    EndedBy.BRAKE: Dismissal.BRAKE,
+    EndedBy.TURN: Dismissal.TURN,
+}
+
+
+def withdrawn(
+    coasted: Candidate, end: End, bins: Bins, tuning: Tuning, parameters: Parameters
+) -> Doubt | None:
+    """
+    Say why what has ended was no coastdown; None if it may be one.
+    """
+    reason = _WITHDRAWN_FOR.get(end.ended_by)
+    if reason is None:
+        return None
+    width, length = tuning.slopes.width, end.last - coasted.start + 1
+    before = line(bins, coasted.source, coasted.start - 1, width)[1]
+    after = line(bins, coasted.source, end.last, max(min(width, length), 6))[1]
+    lost = 1.0 - after / before
+    if end.ended_by is EndedBy.ENGINE and lost < _LOST_MIN:
+        return Doubt(
+            Dismissal.SETTLED,
+            f'the speed settled after {lost:.1%} of it was lost, less than {_LOST_MIN:.0%}: the '
+            'power was reduced, not cut',
+        )
+    shortest = _LENGTH_MIN * parameters.confirm_s
+    if length < shortest:
+        return Doubt(
+            reason,
+            f'it lasted {length} s, less than {shortest:.0f} s, before it ended '
+            f'({end.ended_by.value})',
+        )
+    return None

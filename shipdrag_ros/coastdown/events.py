@@ -95,9 +95,10 @@ class Coastdown:
 
     `estimate` is None where none was possible; `failure` then says why.
     `onset_detected_ns` is None where the window was given; `heading_rad` (yaw, REP-103, at the
-    start) where there is no heading. `cuts` are parts of the stretch as it was found or given
-    that are no coastdown: they lie before `start_ns` and after `end_ns`, or are the reason why
-    there is no estimate.
+    start) where there is no heading. One that was `withdrawn` turned out to be none: a
+    `NotCoastdown` says why. `cuts` are parts of the stretch as it was found or given that are no
+    coastdown, before `start_ns` and after `end_ns`; or all of what speaks against one that was
+    withdrawn.
     """
 
     start_ns: int
@@ -107,6 +108,7 @@ class Coastdown:
     estimate: Estimate | None
     failure: str | None = None
     heading_rad: float | None = None
+    withdrawn: bool = False
     cuts: tuple[NotCoastdown, ...] = ()
 
     @property

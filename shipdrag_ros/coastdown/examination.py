@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.driving import gone_s, thrust
+from shipdrag_ros.coastdown.driving import gone_s, thrust, turns_on
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.force_law import departures
@@ -31,6 +31,10 @@ LEAST_READINGS = 8  # of the speed, or positions, in what is kept
 LEAST_FALL = 0.05  # of the speed, from the first to the last tenth of what is kept
 _ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are told
 _AT_REST = 0.1  # of the highest speed of the stretch: what is slower from its start is no coast
+_IDLING = (
+    'the shaft turns on as before and no pitch is known: by the speed the propeller is taken to '
+    'idle at zero pitch'
+)
 _SLIVER = 0.01  # of a stretch
 _SPAN = tuple[int, int]
 
@@ -61,7 +65,9 @@ class Examination:
 
 class Examined(NamedTuple):
     """
-    An examination, and the estimate from what was kept; None where `failure` says why.
+    An examination, and the estimate from what was kept.
+
+    `failure` says why there is none; `refused` that nothing of it is a coastdown.
     """
 
     start_ns: int
@@ -69,6 +75,7 @@ class Examined(NamedTuple):
     cuts: tuple[NotCoastdown, ...]
     estimate: Estimate | None
     failure: str | None
+    refused: bool
 
 
 def estimate_examined(
@@ -106,7 +113,14 @@ def estimate_examined(
         else:
             if examined.notes:
                 estimate = replace(estimate, notes=(*examined.notes, *estimate.notes))
-    return Examined(examined.start_ns, examined.end_ns, examined.cuts, estimate, failure)
+    return Examined(
+        examined.start_ns,
+        examined.end_ns,
+        examined.cuts,
+        estimate,
+        failure,
+        examined.failure is not None,
+    )
 
 
 def examine(
@@ -134,9 +148,10 @@ def examine(
     """
     steady = steady and window.before is not None
     whole = (window.start_ns, window.end_ns)
+    idling = steady and turns_on(window)
     cuts = [
         *gaps(window, parameters),
-        *thrust(window, ship, steady=steady),
+        *([] if idling else thrust(window, ship, steady=steady)),
         *astern(window, parameters),
     ]
     top = float(np.max(np.abs(readings(window)[1]), initial=0.0))
@@ -152,6 +167,8 @@ def examine(
     failure = _refusal(window, kept, cuts) if cuts else None
     start_ns, end_ns = whole if failure or kept is None else kept
     notes = () if best is None else tuple(best.notes)
+    if idling:
+        notes = (*notes, _IDLING)
     return Examination(start_ns, end_ns, tuple(cuts), failure, notes)
 
 

@@ -34,7 +34,6 @@ from shipdrag_ros.samples import ABSURD_SPEED_M_S, Channel, Int64
 
 _GEODETIC = int(Channel.POSITION_GEODETIC)
 _HEADING = int(Channel.HEADING)
-_SHAFT = int(Channel.SHAFT)
 _CIRCLE = 360 * 10**11
 _FARTHEST = 9e18  # beyond it there is no integer for a value
 _FASTEST = int(ABSURD_SPEED_M_S * PER_UNIT)
@@ -84,9 +83,7 @@ def close(bins: Bins, channel: int, width: int) -> int:
         return int(number)
     places = bins.places[channel]
     mask = len(places) - 1
-    if channel == _SHAFT:
-        a = abs(a)
-    elif channel == _GEODETIC and before != NEVER:
+    if channel == _GEODETIC and before != NEVER:
         # on the branch of the bin before
         turned = places[before & mask, B] - places[(before - 1) & mask, B] - b
         b += (turned + _CIRCLE // 2) // _CIRCLE * _CIRCLE

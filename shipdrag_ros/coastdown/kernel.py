@@ -41,6 +41,10 @@ from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
 SHAFT_TURNING_RAD_S = 0.5
 
 _SHAFT = int(Channel.SHAFT)
+_SHAFT_2 = int(Channel.SHAFT_2)  # this channel and those after it are shafts and pitches
+_PITCH = int(Channel.PITCH)  # and these are pitches
+_PITCH_MIN = 1e-3
+_SLOWED = 0.85  # of the steady shaft speed or pitch: worth a look at the speed
 _ACCEPTED = int(Reason.ACCEPTED)
 
 
@@ -55,7 +59,7 @@ class Stop(IntEnum):
     SILENCE = 3  # the speed source has stopped
     BIN = 4  # a bin of the watched source has closed
     SLOPE = 5  # the speed falls faster than chance explains
-    SHAFT = 6  # the shaft has slowed down
+    SHAFT = 6  # a shaft has slowed down, or its pitch was taken back
 
 
 _FULL = int(Stop.FULL)
@@ -77,16 +81,6 @@ def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
     return best == source
 
 
-@njit(**UNCOUNTED)
-def _shaft_tells(bins: Bins, tuning: Tuning, number: int) -> bool:
-    """Say whether a stop of the engine would show in the shaft speed."""
-    last = newest_bin(bins, _SHAFT)
-    if last < number - tuning.data_stop_ns // SECOND_NS:
-        return False
-    turning, count = mean_turning(bins, _SHAFT, last, tuning.slopes.width)
-    return bool(count > 0 and turning >= SHAFT_TURNING_RAD_S)
-
-
 @njit(**INLINED)
 def _look_at_speed(
     bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
@@ -99,8 +93,6 @@ def _look_at_speed(
     elif watched != source:
         return 0
     learn(steadiness, tuning.slopes, bins, source, number)
-    if watched == source:
-        return _BIN
     watch.seen_source[0] = source
     watch.seen[0] = number
     limits = steadiness.limit[source]
@@ -119,19 +111,23 @@ def _look_at_speed(
             steady = False
     if steady and number % (1 << (SCALES - 1)) == 0:  # all windows were looked at
         watch.armed[0] = 1
-    if (
-        falls
-        and watch.armed[0]
-        and watch.level[0] > tuning.speed_min
-        and not _shaft_tells(bins, tuning, number)
-    ):
-        return _SLOPE
-    return 0
+    fast = watch.level[0] > tuning.speed_min
+    falls = falls and watch.armed[0] != 0 and fast
+    watch.falls[0] = falls
+    if watched != NEVER or falls or not fast or watch.armed[0] == 0:
+        watch.lead[0] = NEVER
+    else:
+        if watch.lead[0] == NEVER:
+            watch.lead[0] = number
+        watch.lead[1] = max(watch.lead[1], number - watch.lead[0])
+    if watched != NEVER:
+        return _BIN
+    return _SLOPE if falls else 0
 
 
 @njit(**INLINED)
-def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int:
-    """Judge a closed bin of the shaft speed; return a `Stop` code, 0 to go on."""
+def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, number: int) -> int:
+    """Judge a closed bin of a shaft speed or a pitch; return a `Stop` code, 0 to go on."""
     if (
         watch.source[0] != NEVER
         or watch.seen[0] < number - tuning.data_stop_ns // SECOND_NS
@@ -140,11 +136,10 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, number: int) -> int
         return 0
     # half a window ago, so that a shaft that runs down slowly is not its own measure
     width = tuning.slopes.width
-    steady, count = mean_turning(bins, _SHAFT, number - (width + 1) // 2, width)
-    if count < 3 or steady < SHAFT_TURNING_RAD_S:
+    steady, count = mean_turning(bins, channel, number - (width + 1) // 2, width)
+    if count < 3 or abs(steady) < (_PITCH_MIN if channel >= _PITCH else SHAFT_TURNING_RAD_S):
         return 0
-    if mean_turning(bins, _SHAFT, number, 1)[0] < tuning.shaft_stopped * steady:
-        watch.shaft[0] = steady
+    if mean_turning(bins, channel, number, 1)[0] / steady < _SLOWED:
         return _SHAFT_SLOWED
     return 0
 
@@ -197,8 +192,8 @@ def _walk(
                 closed = close(bins, c, tuning.slopes.width)
                 if c < SOURCES:
                     stop = _look_at_speed(bins, steadiness, watch, tuning, c, closed)
-                elif c == _SHAFT:
-                    stop = _look_at_shaft(bins, watch, tuning, closed)
+                elif c == _SHAFT or c >= _SHAFT_2:
+                    stop = _look_at_shaft(bins, watch, tuning, c, closed)
                 if stop != 0:
                     break
             add(bins, c, number, stamp, a, b)
@@ -220,7 +215,7 @@ def _walk(
 _SLOPES = Slopes.of(Parameters())
 _SIGNATURE = types.UniTuple(types.int64, 2)(
     typeof(Memory.fresh(_SLOPES, seconds=1, tally=Tally.fresh())),
-    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0, 0.0)),
+    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0)),
     CHANNEL_CODES,
     STAMPS,
     STAMPS,

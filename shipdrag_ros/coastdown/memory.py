@@ -24,7 +24,7 @@ RECENT = 16  # samples of each channel that its rate and clock offset are taken 
 
 class Watch(NamedTuple):
     """
-    What the walk looks out for, and what it saw; arrays of one but for `held`.
+    What the walk looks out for, and what it saw; arrays of one but for `held` and `lead`.
 
     Attributes
     ----------
@@ -41,8 +41,11 @@ class Watch(NamedTuple):
         Speed source and number of the bin looked at last.
     level : float64
         Speed there [m/s].
-    shaft : float64
-        Steady rate of turn before the shaft slowed down [rad/s].
+    falls : int64
+        1 where the speed fell faster than chance explains, at that bin.
+    lead : (2,) int64
+        Since which bin the ship has been steady, NEVER if it is not; the longest that it was
+        [bins].
     """
 
     source: Int64
@@ -52,7 +55,8 @@ class Watch(NamedTuple):
     seen_source: Int64
     seen: Int64
     level: Float64
-    shaft: Float64
+    falls: Int64
+    lead: Int64
 
     @classmethod
     def fresh(cls) -> Watch:
@@ -67,7 +71,8 @@ class Watch(NamedTuple):
             np.full(1, NEVER),
             np.full(1, NEVER),
             np.full(1, np.nan),
-            np.full(1, np.nan),
+            np.zeros(1, np.int64),
+            np.array([NEVER, 0]),
         )
 
 
@@ -134,8 +139,6 @@ class Tuning(NamedTuple):
         Of the tests and of the slopes.
     data_stop_ns
         Silence that stops a source [ns].
-    shaft_stopped
-        Fraction of the steady shaft speed.
     speed_min
         Speed below which nothing starts [m/s].
     """
@@ -143,5 +146,4 @@ class Tuning(NamedTuple):
     limits: Limits
     slopes: Slopes
     data_stop_ns: int
-    shaft_stopped: float
     speed_min: float

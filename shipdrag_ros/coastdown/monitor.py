@@ -14,10 +14,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import Bins, line, warm
-from shipdrag_ros.coastdown.ending import End, end_of
+from shipdrag_ros.coastdown.bins import warm
+from shipdrag_ros.coastdown.dismissals import Dismissals
+from shipdrag_ros.coastdown.ending import End, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
     Coastdown,
+    Dismissal,
     EndedBy,
     Event,
     NoEstimate,
@@ -31,8 +33,9 @@ from shipdrag_ros.coastdown.examination import estimate_examined
 from shipdrag_ros.coastdown.health import InputHealth, input_health
 from shipdrag_ros.coastdown.kernel import Stop, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
-from shipdrag_ros.coastdown.onset import Candidate, Verdict, judge, propose
+from shipdrag_ros.coastdown.onset import Candidate, Doubt, Verdict, judge, propose
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
+from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
 from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits
@@ -45,9 +48,11 @@ from shipdrag_ros.ship import Ship
 
 Estimator = Callable[[Window, Ship, Parameters], Estimate]
 
-# A power reduction that passed for a coastdown and has cost no more than this is withdrawn.
-WITHDRAWN_BELOW = 0.05
-_SHAFT = int(Channel.SHAFT)
+_CUT_SHORT = {
+    EndedBy.DATA_STOP: 'the speed fell silent',
+    EndedBy.RESET: 'the memory was reset',
+    EndedBy.RECORD_END: 'the record ended',
+}
 
 
 class Monitor:
@@ -87,7 +92,6 @@ class Monitor:
             Limits.of(parameters),
             slopes,
             round(parameters.data_stop_s * SECOND_NS),
-            parameters.shaft_stopped_fraction,
             float(ship.speed(parameters.froude_min)),
         )
         self._seconds = (
@@ -103,6 +107,18 @@ class Monitor:
         self._candidate: Candidate | None = None
         self._onset: Onset | None = None
         self._heading_rad: float | None = None
+        self._dismissals = Dismissals(self._steady_ns)
+
+    @property
+    def steady_lead_s(self) -> float:
+        """
+        The longest that the ship was steady since the start or the last reset [s].
+
+        An onset needs `slope_window_s` of it.
+        """
+        lead = int(self._memory.watch.lead[1])
+        # the first slope is that of the window before
+        return float(lead + self._tuning.slopes.width) if lead else 0.0
 
     @property
     def state(self) -> State:
@@ -164,10 +180,9 @@ class Monitor:
             elif stop == Stop.SILENCE:
                 events += self._stop_at_last_sample(EndedBy.DATA_STOP)
             elif stop == Stop.SLOPE:
-                self._propose(int(self._memory.watch.seen[0]), np.nan)
+                self._propose(int(self._memory.watch.seen[0]), noticed=True)
             elif stop == Stop.SHAFT:
-                number = int(self._memory.bins.filling[_SHAFT])
-                self._propose(number, float(self._memory.watch.shaft[0]))
+                self._propose(int(self._memory.bins.filling[channel[at]]), noticed=False)
             else:
                 arrival = int(receive_ns[at])
                 events += self.reset(
@@ -186,6 +201,7 @@ class Monitor:
             For whoever reads the events.
         """
         events = self._stop_at_last_sample(EndedBy.RESET)
+        events += self._dismissals.flush()
         self._memory = self._fresh(self._memory.tally)
         return [*events, Reset(receive_ns, reason)]
 
@@ -193,7 +209,7 @@ class Monitor:
         """
         End the record, and a coastdown that runs.
         """
-        return self._stop_at_last_sample(EndedBy.RECORD_END)
+        return self._stop_at_last_sample(EndedBy.RECORD_END) + self._dismissals.flush()
 
     def ended_window(self, ended: Coastdown) -> Window:
         """
@@ -218,11 +234,11 @@ class Monitor:
         )
         self._memory = self._memory._replace(store=store)
 
-    def _propose(self, number: int, shaft: float) -> None:
+    def _propose(self, number: int, *, noticed: bool) -> None:
         watch, bins = self._memory.watch, self._memory.bins
         source = int(watch.seen_source[0])
         watch.source[0] = source
-        seen = self._knowing_chance(Candidate(source, number, shaft))
+        seen = self._knowing_chance(Candidate(source, number, Drive(), noticed))
         self._candidate = propose(bins, self._tuning, seen, number)
 
     def _knowing_chance(self, candidate: Candidate) -> Candidate:
@@ -242,14 +258,32 @@ class Monitor:
         number = int(bins.filling[self._candidate.source])
         if self._onset is not None:
             end = end_of(self._candidate, bins, tuning, parameters, number)
-            return [] if end is None else [self._end_at(end)]
-        candidate = self._knowing_chance(self._candidate)
-        verdict, self._candidate = judge(candidate, bins, self._ship, tuning, parameters, number)
-        if verdict is Verdict.DISMISSED:
-            self._stand_down()
-        elif verdict is Verdict.CONFIRMED:
+            return [] if end is None else self._end_at(end)
+        candidate = self._candidate
+        if not candidate.noticed and self._memory.watch.falls[0]:
+            # from here on as if the speed alone had made it one
+            candidate = replace(
+                candidate, noticed=True, start=number, spread=np.nan, trials=0, doubt=None
+            )
+            candidate = propose(bins, tuning, self._knowing_chance(candidate), number)
+        found = judge(
+            self._knowing_chance(candidate), bins, self._ship, tuning, parameters, number
+        )
+        self._candidate = found.candidate
+        if found.verdict is Verdict.DISMISSED:
+            return self._dismiss(found.doubt, (number + 1) * SECOND_NS)
+        if found.verdict is Verdict.CONFIRMED:
             return [self._begin(self._candidate, number)]
         return []
+
+    def _dismiss(self, doubt: Doubt | None, end_ns: int) -> list[Event]:
+        """Give a candidate up and say why."""
+        assert self._candidate is not None
+        start_ns = self._candidate.start * SECOND_NS
+        self._stand_down()
+        if doubt is None:
+            return []
+        return self._dismissals.take(NotCoastdown(start_ns, end_ns, doubt.reason, doubt.text))
 
     def _begin(self, candidate: Candidate, number: int) -> Onset:
         onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)
@@ -301,35 +335,42 @@ class Monitor:
     def _stop_at_last_sample(self, ended_by: EndedBy) -> list[Event]:
         """End what runs, if anything, at the last sample of its speed source."""
         events: list[Event] = []
-        if self._onset is not None and self._candidate is not None:
-            end_ns = int(self._memory.guard.last_ns[self._candidate.source])
-            events.append(self._conclude(ended_by, end_ns, None))
+        if self._candidate is None:
+            self._stand_down()
+            return events
+        end_ns = int(self._memory.guard.last_ns[self._candidate.source])
+        if self._onset is not None:
+            events += self._conclude(ended_by, end_ns, None)
+            self._stand_down()
+        elif self._candidate.noticed:
+            age_s = end_ns // SECOND_NS - self._candidate.start
+            text = f'{_CUT_SHORT[ended_by]} {age_s} s after it began, before it was confirmed'
+            events += self._dismiss(Doubt(Dismissal.GAP, text), end_ns)
         self._stand_down()
         return events
 
-    def _end_at(self, end: End) -> Event:
+    def _end_at(self, end: End) -> list[Event]:
         assert self._candidate is not None
-        withdrawn = None
-        if end.ended_by is EndedBy.ENGINE:
-            withdrawn = _too_little_lost(
-                self._memory.bins, self._candidate, self._tuning.slopes.width, end.last
-            )
-        event = self._conclude(end.ended_by, (end.last + 1) * SECOND_NS, withdrawn)
+        doubt = withdrawn(self._candidate, end, self._memory.bins, self._tuning, self._parameters)
+        events = self._conclude(end.ended_by, (end.last + 1) * SECOND_NS, doubt)
         self._stand_down()
-        return event
+        return events
 
-    def _conclude(self, ended_by: EndedBy, end_ns: int, failure: str | None) -> Coastdown:
+    def _conclude(self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None) -> list[Event]:
         assert self._onset is not None
-        start_ns, final = self._onset.start_ns, None
+        start_ns, final, failure = self._onset.start_ns, None, None
         cuts: tuple[NotCoastdown, ...] = ()
-        if failure is None:
+        if doubt is None:
             window = self._window(end_ns, before_ns=self._steady_ns)
-            first_ns, end_ns, cuts, final, failure = estimate_examined(
-                window, self._ship, self._parameters, self._final_estimator
-            )
-            if first_ns != window.start_ns:  # which is later where an old part has rolled out
-                start_ns = first_ns
-        return Coastdown(
+            found = estimate_examined(window, self._ship, self._parameters, self._final_estimator)
+            cuts, final, failure, end_ns = found.cuts, found.estimate, found.failure, found.end_ns
+            if found.start_ns != window.start_ns:  # later too where an old part has rolled out
+                start_ns = found.start_ns
+            refused = found.refused
+        else:
+            failure, refused = f'withdrawn: {doubt.text}', True
+            cuts = (NotCoastdown(start_ns, end_ns, doubt.reason, failure),)
+        ended = Coastdown(
             start_ns,
             end_ns,
             self._onset.detected_ns,
@@ -337,15 +378,18 @@ class Monitor:
             final,
             failure,
             self._heading_rad,
-            cuts=cuts,
+            refused,
+            cuts,
         )
+        return [ended, *cuts]
 
     def _stand_down(self) -> None:
         """Watch for an onset again, once the ship has been steady."""
         watch = self._memory.watch
         watch.source[0] = NEVER
         watch.update_ns[0] = ALWAYS
-        if self._candidate is not None:
+        # what a shaft alone proposed, and the speed did not bear out, leaves the speed as it was
+        if self._candidate is not None and (self._candidate.noticed or self._onset is not None):
             watch.armed[0] = 0
             watch.held[:] = self._candidate.limits
         self._candidate = self._onset = self._heading_rad = None
@@ -357,16 +401,3 @@ class Monitor:
             return f'{Channel(channel).input}: the stamp went back by {back * 1e-9:.3f} s'
         back = int(guard.arrival_ns[0]) - receive_ns
         return f'the time of arrival went back by {back * 1e-9:.3f} s'
-
-
-def _too_little_lost(bins: Bins, candidate: Candidate, width: int, last: int) -> str | None:
-    """Say why what ended by the engine was no coastdown; None if it may be one."""
-    _, before, _ = line(bins, candidate.source, candidate.start - 1, width)
-    _, after, _ = line(bins, candidate.source, last, min(width, last - candidate.start + 1))
-    lost = 1.0 - after / before
-    if lost >= WITHDRAWN_BELOW:
-        return None
-    return (
-        f'withdrawn: the speed settled after {lost:.1%} of it was lost, less than '
-        f'{WITHDRAWN_BELOW:.0%}: the power was reduced, not cut'
-    )

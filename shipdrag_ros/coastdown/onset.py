@@ -2,11 +2,15 @@
 """
 Has a coastdown begun, and when?
 
-A fall of the speed that chance does not explain, or of the shaft speed, makes a
-candidate. Turns and slow-downs make candidates too: what tells them apart is
-the law of the deceleration. A ship that coasts follows v' = -c v^p with p about
-2 (friction) to 3 (waves); one that nears a new steady speed stops decelerating
-while it is still fast, as if p were large.
+A fall of the speed that chance does not explain, or of a shaft or its pitch,
+makes a candidate. Turns and slow-downs make candidates too: what tells them
+apart is the law of the deceleration. A ship that coasts follows v' = -c v^p
+with p about 2 (friction) to 3 (waves); one that nears a new steady speed stops
+decelerating while it is still fast, as if p were large.
+
+Shafts are evidence and have no veto: they date the stop, a propeller that
+stands or follows the ship confirms it sooner, one that seems to drive asks
+for more of the law of the speed. Only a reversed one speaks for itself.
 """
 
 from __future__ import annotations
@@ -18,19 +22,34 @@ from enum import Enum
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, line, speeds
+from shipdrag_ros.coastdown.events import Dismissal
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
-from shipdrag_ros.coastdown.tracking import SHAFT_S, shaft_fell_at, shaft_speed, turned_at
+from shipdrag_ros.coastdown.shafts import (
+    SHAFT_S,
+    UNTOLD,
+    Drive,
+    Propulsion,
+    Seen,
+    Thrust,
+    propulsion,
+    steady_drive,
+)
+from shipdrag_ros.coastdown.tracking import turned_at
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed settles
+# A ship that is stopped by more than the water decelerates this much more than expected, ...
+_BRAKED = 1.5
+_BRAKE_EXPONENT = 1.0  # ... and by a force that falls less than in proportion to the speed
 _LAW_BINS_MIN = 6
 _GUARD = 0.1  # of confirm_s: the thrust runs down first
 _TRIALS = 3  # after confirm_s, twice and three times as long
 _PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by then
+_APART = 3  # slope windows that the dates of shaft and speed may be apart
 
 
 class Verdict(Enum):
@@ -39,6 +58,27 @@ class Verdict(Enum):
     PENDING = 'pending'
     CONFIRMED = 'confirmed'
     DISMISSED = 'dismissed'
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """What speaks against a coastdown; `text` is one sentence with figures."""
+
+    reason: Dismissal
+    text: str
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """
+    What has become of a candidate, with its start as it is known now.
+
+    `doubt` is there where it was dismissed, unless it is not worth a word.
+    """
+
+    verdict: Verdict
+    candidate: Candidate
+    doubt: Doubt | None = None
 
 
 @dataclass(frozen=True)
@@ -52,8 +92,10 @@ class Candidate:
         Speed source.
     start
         Its first bin, as far as is known.
-    shaft
-        Steady shaft speed before it [rad/s]; NaN where the speed alone speaks.
+    drive
+        Steady drive of the propellers before it.
+    noticed
+        Whether the speed made it a candidate; if not, a shaft alone did.
     limits
         Size of a slope that chance did not explain before it, over one, two and
         four times slope_window_s [m/s^2]; NaN while unknown.
@@ -63,20 +105,19 @@ class Candidate:
         First bin in which it is judged.
     trials
         How often its deceleration was judged.
+    doubt
+        Why the last of these did not show a coastdown.
     """
 
     source: int
     start: int
-    shaft: float
+    drive: Drive
+    noticed: bool
     limits: tuple[float, ...] = ()
     spread: float = math.nan
     judged_from: int = NEVER
     trials: int = 0
-
-    @property
-    def by_shaft(self) -> bool:
-        """Whether the shaft made it a candidate."""
-        return not math.isnan(self.shaft)
+    doubt: Doubt | None = None
 
     def falls(self, bins: Bins, number: int, width: int) -> bool:
         """
@@ -109,12 +150,14 @@ def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candida
         As seen, its start being `number`.
     """
     width = tuning.slopes.width
-    if seen.by_shaft:
-        start = shaft_fell_at(bins, number, seen.shaft, width)
-        return replace(seen, start=start, judged_from=number + SHAFT_S - 1)
+    if not seen.noticed:
+        drive = steady_drive(bins, number - (width + 1) // 2, width)
+        return replace(seen, drive=drive, judged_from=number + SHAFT_S - 1)
     # the window that shows the fall holds its start, and one as long before it the steady speed
     span = seen.falls_over(bins, number, width, 1.0) or width
     start = change_point(bins, seen.source, number - 2 * span, number, tuning.speed_min)
+    if not seen.drive.known:
+        seen = replace(seen, drive=steady_drive(bins, start - (width + 1) // 2, width))
     return replace(seen, start=start)
 
 
@@ -125,84 +168,180 @@ def judge(
     tuning: Tuning,
     parameters: Parameters,
     number: int,
-) -> tuple[Verdict, Candidate]:
+) -> Judgement:
     """
     Judge a candidate when bin `number` has closed.
-
-    Returns
-    -------
-    verdict, candidate
-        The candidate with its start as it is known now.
     """
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
-    pending, dismissed = (Verdict.PENDING, candidate), (Verdict.DISMISSED, candidate)
+    pending = Judgement(Verdict.PENDING, candidate)
     if number < candidate.judged_from:  # the clock of the speed may be slower than the shaft's
         return pending
-    level = line(bins, candidate.source, number, width)[1]
-    if (
-        level < tuning.speed_min
-        or turned_at(bins, candidate.start, number, width, parameters.turn_rad) is not None
-    ):
-        return dismissed
+    told = _propulsion(candidate, bins, tuning, parameters, number)
+    doubt = _spoiled(candidate, told, bins, tuning, parameters, number)
+    if doubt is not None:
+        return Judgement(Verdict.DISMISSED, candidate, doubt)
+    if told.stop is not None:
+        candidate = replace(candidate, start=told.stop)
     falls = candidate.falls(bins, number, width)
     age = number - candidate.start
-    if candidate.by_shaft:
-        turning = shaft_speed(bins, number) / candidate.shaft
-        if turning > parameters.shaft_stopped_fraction or age > _PATIENCE * confirm:
-            return dismissed
-        if not falls:
-            return pending
-        if turning < 0.5 * parameters.shaft_stopped_fraction:
-            return Verdict.CONFIRMED, candidate
-    elif not falls:
-        return dismissed
+    off = told.thrust in (Thrust.STANDS, Thrust.WINDMILLS)
+    if off and falls:
+        return Judgement(Verdict.CONFIRMED, candidate)
+    if not candidate.noticed:
+        if told is UNTOLD:  # it turns on as before
+            return Judgement(Verdict.DISMISSED, candidate)
+        if age > _PATIENCE * confirm:
+            return Judgement(Verdict.DISMISSED, candidate, _no_fall(told, age))
+    if not falls:
+        if off or not candidate.noticed:
+            return Judgement(Verdict.PENDING, candidate)
+        return Judgement(Verdict.DISMISSED, candidate, _settled(candidate, bins, width, number))
     if age < confirm * (candidate.trials + 1):
-        return pending
+        return Judgement(Verdict.PENDING, candidate)
+    return _tried(candidate, told, bins, ship, tuning, parameters, number)
 
-    if candidate.by_shaft:
-        start = candidate.start
-    else:
+
+def _tried(
+    candidate: Candidate,
+    told: Propulsion,
+    bins: Bins,
+    ship: Ship,
+    tuning: Tuning,
+    parameters: Parameters,
+    number: int,
+) -> Judgement:
+    """Judge the deceleration once more."""
+    width, confirm = tuning.slopes.width, round(parameters.confirm_s)
+    if told.stop is None:
         start = change_point(
             bins, candidate.source, candidate.start - 2 * width, number, tuning.speed_min
         )
-    tried = replace(candidate, start=start)
-    if 2 * (number - start) < confirm * (2 * candidate.trials + 1):
-        return Verdict.PENDING, tried  # chance made it a candidate, then it began in earnest
-    tried = replace(tried, trials=candidate.trials + 1)
-    if _coasts(tried, bins, ship, tuning, parameters, number):
-        return Verdict.CONFIRMED, tried
-    return Verdict.DISMISSED if tried.trials == _TRIALS else Verdict.PENDING, tried
+        candidate = replace(candidate, start=start)
+    if 2 * (number - candidate.start) < confirm * (2 * candidate.trials + 1):
+        # chance made it a candidate, then it began in earnest
+        return Judgement(Verdict.PENDING, candidate)
+    candidate = replace(candidate, trials=candidate.trials + 1)
+    # a governor, or a controllable propeller at zero pitch that holds its speed: ask for more
+    strict = told.thrust is Thrust.REDUCED and candidate.trials < _TRIALS
+    doubt = _misses(candidate, bins, ship, tuning, parameters, number, strict=strict)
+    if told.thrust is Thrust.ON:
+        doubt = Doubt(Dismissal.THRUST, f'a propeller drove on, {told.text}')
+    elif told.thrust is Thrust.REDUCED and doubt is not None:
+        doubt = Doubt(Dismissal.THRUST, f'{doubt.text}; the shaft held its speed, {told.text}')
+    candidate = replace(candidate, doubt=doubt)
+    if doubt is None:
+        return Judgement(Verdict.CONFIRMED, candidate)
+    if candidate.trials == _TRIALS:
+        return Judgement(Verdict.DISMISSED, candidate, doubt)
+    return Judgement(Verdict.PENDING, candidate)
 
 
-def _coasts(
+def _propulsion(
+    candidate: Candidate, bins: Bins, tuning: Tuning, parameters: Parameters, number: int
+) -> Propulsion:
+    """Say what the propellers do, where that goes with what the speed does."""
+    width = tuning.slopes.width
+    told = propulsion(
+        bins,
+        candidate.drive,
+        Seen(candidate.source, candidate.start, candidate.spread),
+        number,
+        width=width,
+        stands=0.5 * parameters.shaft_stopped_fraction,
+    )
+    if told.stop is None or not candidate.noticed:
+        return told
+    # a shaft that stopped long before, or after, the ship slowed down tells of something else
+    return told if abs(told.stop - candidate.start) <= _APART * width else UNTOLD
+
+
+def _spoiled(
+    candidate: Candidate,
+    told: Propulsion,
+    bins: Bins,
+    tuning: Tuning,
+    parameters: Parameters,
+    number: int,
+) -> Doubt | None:
+    """Say what makes a candidate no coastdown whatever its speed does."""
+    width = tuning.slopes.width
+    if told.thrust is Thrust.ASTERN:
+        return Doubt(
+            Dismissal.ASTERN,
+            f'a propeller was reversed, {told.text}',
+        )
+    level = line(bins, candidate.source, number, width)[1]
+    if level < tuning.speed_min:
+        return Doubt(
+            Dismissal.SLOW,
+            f'the speed was {level:.2f} m/s, below the minimum of {tuning.speed_min:.2f} m/s',
+        )
+    if turned_at(bins, candidate.start, number, width, parameters.turn_rad) is not None:
+        return Doubt(
+            Dismissal.TURN,
+            f'the ship turned by more than {math.degrees(parameters.turn_rad):.0f} deg',
+        )
+    return None
+
+
+def _no_fall(told: Propulsion, age: int) -> Doubt:
+    """Say that the propeller slowed down, the ship did not."""
+    if told.thrust is Thrust.ON:
+        return Doubt(Dismissal.THRUST, f'a propeller drove on for {age} s, {told.text}')
+    return Doubt(
+        Dismissal.OTHER,
+        f'the shaft slowed down, {told.text}, yet for {age} s the speed did not fall by more '
+        'than chance explains',
+    )
+
+
+def _settled(candidate: Candidate, bins: Bins, width: int, number: int) -> Doubt:
+    """Say that the speed falls no longer, after how much of it was lost."""
+    if candidate.doubt is not None:
+        return candidate.doubt
+    before = line(bins, candidate.source, candidate.start - 1, width)[1]
+    level = line(bins, candidate.source, number, width)[1]
+    known = '' if math.isnan(before) else f' from {before:.2f}'
+    return Doubt(
+        Dismissal.SETTLED,
+        f'the speed fell{known} to {level:.2f} m/s in {number - candidate.start} s and then no '
+        'longer',
+    )
+
+
+def _misses(
     candidate: Candidate,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
     parameters: Parameters,
     number: int,
-) -> bool:
-    """Say whether the speed since the start looks like a coastdown."""
+    *,
+    strict: bool,
+) -> Doubt | None:
+    """Say where the speed since the start does not look like a coastdown."""
     age = number - candidate.start
     # the longer it lasts, the longer the span that its present slope can be taken over
     span = max(tuning.slopes.width, 2 * age // 3)
     slope, level, _ = line(bins, candidate.source, number, span)
     _, before, _ = line(bins, candidate.source, candidate.start - 1, tuning.slopes.width)
     middle = level - 0.5 * slope * span
-    if not before > level > 0.0 or not slope < 0.0:
-        return False
+    if math.isnan(before):
+        return Doubt(
+            Dismissal.LEAD_IN,
+            f'no {tuning.slopes.width} s of steady speed before it to compare with',
+        )
+    guard = round(_GUARD * parameters.confirm_s)
+    time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
+    found = law(time, speed) if len(time) >= _LAW_BINS_MIN else None
+    if found is None or not (before > level > 0.0 and slope < 0.0 and found.slope < 0.0):
+        return Doubt(
+            Dismissal.SETTLED,
+            f'the speed did not fall steadily, {before:.2f} to {level:.2f} m/s in {age} s',
+        )
     expected = expect(ship, before)
     lost = (before - level) / expected.loss(before, age)
     falling = -slope / expect(ship, middle).deceleration_m_s2
-    as_expected = min(lost, falling) > expected.fraction_min
-
-    guard = round(_GUARD * parameters.confirm_s)
-    time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
-    if len(time) < _LAW_BINS_MIN:
-        return False
-    found = law(time, speed)
-    if not (found.slope < 0.0 < found.speed):
-        return False
     # a curvature is the difference of the slopes of two halves
     half = 0.5 * float(time[-1] - time[0])
     sd = (
@@ -211,11 +350,27 @@ def _coasts(
         * (tuning.slopes.width / half**2)
         * (found.speed / found.slope**2)
     )
+    if min(lost, falling) > _BRAKED and found.exponent + 2.0 * sd < _BRAKE_EXPONENT:
+        return Doubt(
+            Dismissal.BRAKE,
+            f'it slowed {min(lost, falling):.1f} times faster than the water makes it, by a force '
+            f'that hardly fell with the speed (exponent {found.exponent:.1f} ± {sd:.1f})',
+        )
     excess = found.exponent - expect(ship, found.speed).exponent
-    if as_expected:
-        return excess - sd < EXCESS_MAX
-    # a ship that is heavier than its file says: the law alone, once there is enough of it
-    return candidate.trials > 1 and excess + sd < EXCESS_MAX
+    if min(lost, falling) > expected.fraction_min:
+        passes = excess + (sd if strict else -sd) < EXCESS_MAX
+    else:
+        # a ship that is heavier than its file says: the law alone, once there is enough of it
+        passes = candidate.trials > 1 and not strict and excess + sd < EXCESS_MAX
+    if passes:
+        return None
+    return Doubt(
+        Dismissal.SETTLED,
+        f'it slowed {min(lost, falling):.2f} times as fast as a coastdown of this ship, from '
+        f'{before:.2f} to {level:.2f} m/s in {age} s, by a force with exponent '
+        f'{found.exponent:.1f} ± {sd:.1f} of the speed where the water has '
+        f'{found.exponent - excess:.1f}: power was reduced, or the ship turned',
+    )
 
 
 def change_point(bins: Bins, source: int, first: int, last: int, speed_min: float) -> int:

@@ -1,16 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Heading, course and shaft speed, read from the bins.
+Heading and course, read from the bins.
 
-A turn and an engine that is engaged again spoil a coastdown; both are told by
-comparing the bins since the onset with those before it.
+A turn spoils a coastdown; it is told by comparing the bins since the onset with
+those before it.
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
 
 from shipdrag_ros.coastdown.bins import (
     FIRST_TRACK,
@@ -18,15 +16,12 @@ from shipdrag_ros.coastdown.bins import (
     Bins,
     displacement,
     mean_place,
-    mean_turning,
     newest_bin,
 )
 from shipdrag_ros.samples import Channel
 
-SHAFT_S = 3  # the shaft is averaged over this long, so that one bad reading engages no engine
 HEADING_BEFORE_S = 60  # the heading of a coastdown is the mean over this long before it
 _HEADING = int(Channel.HEADING)
-_SHAFT = int(Channel.SHAFT)
 _YAW_S = 5  # headings are averaged over this long: a ship yaws in the waves
 
 
@@ -132,52 +127,3 @@ def _course(bins: Bins, track: int, last: int, half: int) -> float:
 def _apart(one: float, other: float) -> float:
     """Return the size of the angle between two directions [rad]."""
     return abs(math.remainder(one - other, 2.0 * math.pi))
-
-
-def shaft_speed(bins: Bins, number: int, width: int = SHAFT_S) -> float:
-    """
-    Return the mean size of the shaft speed up to a bin [rad/s]; NaN without any.
-    """
-    return float(mean_turning(bins, _SHAFT, number, width)[0])
-
-
-def shaft_fell_at(bins: Bins, number: int, steady: float, width: int) -> int:
-    """
-    Return the first bin in which the shaft was slower than its steady speed.
-
-    Parameters
-    ----------
-    number
-        A bin in which it has slowed down.
-    steady
-        [rad/s]
-    width
-        How many bins to search.
-    """
-    for at in range(number, number - width, -1):
-        if mean_turning(bins, _SHAFT, at, 1)[0] >= 0.9 * steady:
-            return at + 1
-    return number
-
-
-def shaft_rose_at(bins: Bins, start: int, number: int, steady: float, width: int) -> int:
-    """
-    Return the last bin before the shaft speed rose again.
-
-    Parameters
-    ----------
-    start
-        First bin of the coastdown.
-    number
-        A bin in which the shaft turns again.
-    steady
-        Shaft speed before the coastdown [rad/s].
-    width
-        How many bins to search.
-    """
-    first = max(start, number - width)
-    slow = np.nanmin([mean_turning(bins, _SHAFT, at, 1)[0] for at in range(first, number + 1)])
-    for at in range(number, first, -1):
-        if mean_turning(bins, _SHAFT, at, 1)[0] <= slow + 0.1 * steady:
-            return at
-    return first

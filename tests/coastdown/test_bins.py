@@ -148,7 +148,7 @@ def test_headings_are_averaged_on_the_circle() -> None:
     np.testing.assert_allclose(abs(np.arctan2(sine, cosine)), np.pi, rtol=1e-12)
 
 
-def test_a_shaft_that_turns_astern_turns() -> None:
+def test_a_shaft_that_turns_astern_keeps_its_sign() -> None:
     bins = binned(int(Channel.SHAFT), np.arange(10.0), np.full(10, -3.0))
     turning, count = mean_turning(bins, int(Channel.SHAFT), FIRST + 8, 4)
-    assert (turning, count) == (3.0, 4)
+    assert (turning, count) == (-3.0, 4)
