@@ -19,7 +19,7 @@ from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.force_law import departures
 from shipdrag_ros.coastdown.instruments import astern, gaps, rudder, turns
-from shipdrag_ros.coastdown.readings import readings
+from shipdrag_ros.coastdown.readings import binned, readings
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
@@ -35,6 +35,7 @@ _IDLING = (
     'the shaft turns on as before and no pitch is known: by the speed the propeller is taken to '
     'idle at zero pitch'
 )
+_SHOWN = 300  # means of the speed
 _SLIVER = 0.01  # of a stretch
 _SPAN = tuple[int, int]
 
@@ -76,6 +77,7 @@ class Examined(NamedTuple):
     estimate: Estimate | None
     failure: str | None
     refused: bool
+    stretch: tuple[tuple[int, float], ...]
 
 
 def estimate_examined(
@@ -120,6 +122,16 @@ def estimate_examined(
         estimate,
         failure,
         examined.failure is not None,
+        _shown(window) if examined.cuts else (),
+    )
+
+
+def _shown(window: Window) -> tuple[tuple[int, float], ...]:
+    """Return the speed of a whole window, for a picture."""
+    time_s, speed = binned(*readings(window), _SHOWN)
+    return tuple(
+        (window.start_ns + round(t * SECOND_NS), v)
+        for t, v in zip(time_s.tolist(), speed.tolist(), strict=True)
     )
 
 

@@ -360,10 +360,12 @@ class Monitor:
         assert self._onset is not None
         start_ns, final, failure = self._onset.start_ns, None, None
         cuts: tuple[NotCoastdown, ...] = ()
+        stretch: tuple[tuple[int, float], ...] = ()
         if doubt is None:
             window = self._window(end_ns, before_ns=self._steady_ns)
             found = estimate_examined(window, self._ship, self._parameters, self._final_estimator)
             cuts, final, failure, end_ns = found.cuts, found.estimate, found.failure, found.end_ns
+            stretch = found.stretch
             if found.start_ns != window.start_ns:  # later too where an old part has rolled out
                 start_ns = found.start_ns
             refused = found.refused
@@ -380,6 +382,7 @@ class Monitor:
             self._heading_rad,
             refused,
             cuts,
+            stretch,
         )
         return [ended, *cuts]
 

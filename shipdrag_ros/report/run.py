@@ -34,6 +34,8 @@ class RunResult:
         What is wrong with the run, a sentence each.
     truth
         The true curve, where the record is simulated.
+    span_ns
+        First and last time of arrival in the bag [ns]; None where it is empty.
     """
 
     bag: str
@@ -43,6 +45,7 @@ class RunResult:
     recorded: Recorded
     warnings: tuple[str, ...] = ()
     truth: TrueCurve | None = None
+    span_ns: tuple[int, int] | None = None
 
     @classmethod
     def of(cls, result: ReplayResult) -> RunResult:
@@ -64,4 +67,5 @@ class RunResult:
             recorded=result.recorded,
             warnings=run_warnings(result),
             truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
+            span_ns=run.span_ns,
         )
