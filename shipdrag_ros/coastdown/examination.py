@@ -35,6 +35,7 @@ _IDLING = (
     'the shaft turns on as before and no pitch is known: by the speed the propeller is taken to '
     'idle at zero pitch'
 )
+_MANY = 20  # readings that must be left by them, since fewer tell less than the turn spoils
 _SHOWN = 300  # means of the speed
 _SLIVER = 0.01  # of a stretch
 _SPAN = tuple[int, int]
@@ -253,8 +254,8 @@ def _steered(
             continue
         left = max(_left(span, [*cuts, *found]), key=_length, default=None)
         if left is not None and _length(left) >= _ENOUGH * _length(span):
-            start, end, _ = _ends(window.part(*left))
-            if start - end >= _ENOUGH * (first - last):
+            start, end, count = _ends(window.part(*left))
+            if count >= _MANY and start - end >= _ENOUGH * (first - last):
                 cuts += found
                 continue
         notes.append(f'{found[0].text}: the drag of drifting and turning is part of r')
