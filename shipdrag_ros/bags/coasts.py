@@ -55,8 +55,8 @@ def coast_windows(result: ReplayResult) -> list[tuple[Coastdown, Window]]:
     Returns
     -------
     list of (coastdown, window)
-        In their order; the window holds what was accepted, and the record
-        before it.
+        In their order, without those withdrawn; the window holds what was
+        accepted, and the record before it.
 
     Notes
     -----
@@ -67,7 +67,11 @@ def coast_windows(result: ReplayResult) -> list[tuple[Coastdown, Window]]:
     apart = bool(clocks_apart(result))
     if apart and not any(each.ended_by is EndedBy.GIVEN for each in coastdowns):
         coastdowns = _look_anew(result) or coastdowns
-    return [(coastdown, _window(result, coastdown, apart)) for coastdown in coastdowns]
+    return [
+        (coastdown, _window(result, coastdown, apart))
+        for coastdown in coastdowns
+        if not coastdown.withdrawn
+    ]
 
 
 def _look_anew(result: ReplayResult) -> tuple[Coastdown, ...]:

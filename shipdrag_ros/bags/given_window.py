@@ -105,7 +105,7 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         window = Window.from_block(accepted, start_ns, end_ns, before_ns=before_ns)
     except ValueError:  # accepted stamps ascend but for this
         failure = 'a clock was set in the window; choose one before or after'
-        found = Examined(start_ns, end_ns, (), None, failure)
+        found = Examined(start_ns, end_ns, (), None, failure, refused=False, stretch=())
     else:
         found = estimate_examined(window, ship, parameters, estimate_final, steady=False)
     heading = _heading(accepted, found.start_ns)
@@ -117,7 +117,9 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         found.estimate,
         found.failure,
         None if heading is None else rep103_yaw(heading, parameters.heading_convention),
+        withdrawn=found.refused,
         cuts=found.cuts,
+        stretch=found.stretch,
     )
 
 

@@ -224,7 +224,7 @@ def _in_window(
         ship,
         parameters,
         (coastdown,),
-        (coastdown,),
+        (coastdown, *coastdown.cuts),
         _counts(run, samples.inputs, used, rejected),
         Recorded(0, 0, None),
     )

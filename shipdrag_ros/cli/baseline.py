@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli.arguments import add_json, add_remap, bag, new_file
+from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
 from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, Learnt, learn_baseline
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.report.cells import Table
@@ -31,7 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'relative_sd is kept. Without a baseline in the ship file, r(v) of the runs is written '
         'as a table.'
     )
-    parser.add_argument('bags', nargs='+', type=bag, metavar='BAG', help='MCAP or rosbag2')
+    parser.add_argument(
+        'bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'MCAP or rosbag2; {HELP}'
+    )
     parser.add_argument(
         '--ship',
         required=True,
@@ -61,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
             f'{str(options.out)!r} is the ship file itself, with what was known before; '
             'write to another file'
         )
-    runs = open_runs(options.bags, remap=dict(options.remap))
+    runs = open_windowed(options.bags, remap=dict(options.remap))
     coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship))
     found = learn_baseline(coasts, ship, parameters)
     options.out.write_text(found.ship.to_yaml(), encoding='utf-8')

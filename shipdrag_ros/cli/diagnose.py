@@ -9,18 +9,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shipdrag_ros.bags import (
-    Run,
+    ReplayResult,
     accepted_samples,
     clocks_apart,
     coast_windows,
-    open_runs,
     replay,
     why_no_coastdown,
 )
 from shipdrag_ros.bags.playback import SHIP_FILE
 from shipdrag_ros.cli import diagnose_json
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, bag, number, unused_file
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.windowed import HELP, Span, WindowedRun, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis import (
     CoastRun,
     Diagnosis,
@@ -34,6 +34,7 @@ from shipdrag_ros.diagnosis import (
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report import diagnosis_cells, diagnosis_words
+from shipdrag_ros.report.cuts import cut_lines
 from shipdrag_ros.report.diagnosis_page import write_diagnosis
 from shipdrag_ros.report.diagnosis_score import Score
 from shipdrag_ros.ship import Ship
@@ -52,7 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'coastdown the log is held against the way over ground, for which neither baseline nor '
         'ship file is needed.'
     )
-    parser.add_argument('bags', nargs='+', type=bag, metavar='BAG', help='MCAP or rosbag2')
+    parser.add_argument(
+        'bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'MCAP or rosbag2; {HELP}'
+    )
     parser.add_argument(
         '--ship',
         type=Path,
@@ -72,7 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs=2,
         type=number(0.0, unit='s'),
         metavar=('START', 'END'),
-        help='the coastdown [s from the start of each bag], without looking for one',
+        help='the coastdown [s from the start of each bag without a window of its own], without '
+        'looking for one; what in it is no coastdown is cut',
     )
     add_remap(parser)
     add_json(parser)
@@ -84,13 +88,13 @@ def run(options: argparse.Namespace) -> int:
     """
     output = Output(options.json)
     given = None if options.ship is None else Ship.load(options.ship)
-    runs = open_runs(options.bags, remap=dict(options.remap))
     window = None if options.window is None else tuple(options.window)
-    found, ship = _diagnosed(output, runs, given, window)
+    runs = open_windowed(options.bags, remap=dict(options.remap), window=window)
+    found, ship = _diagnosed(output, runs, given)
     if ship is None and options.write is not None:
         raise DiagnosisError(
-            f'no ship file is attached to {runs[0].name!r}, and --write needs one; give it with '
-            '--ship FILE'
+            f'no ship file is attached to {runs[0].run.name!r}, and --write needs one; give it '
+            'with --ship FILE'
         )
     _show(output, found)
     if options.report is not None:
@@ -108,15 +112,15 @@ def run(options: argparse.Namespace) -> int:
 
 def _diagnosed(
     output: Output,
-    runs: Sequence[Run],
+    runs: Sequence[WindowedRun],
     given: Ship | None,
-    window: tuple[float, float] | None,
 ) -> tuple[Diagnosis, Ship | None]:
     """Diagnose by what the records hold, and return the ship if one is known."""
-    if given is None and window is None and not any(SHIP_FILE in run.attachments for run in runs):
+    windowed = any(window is not None for _, window in runs)
+    if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
         return _sailing(runs, f'No coastdown was found: {why}.'), None
-    seen = _found(output, runs, given, window)
+    seen = _found(output, runs, given)
     if not seen.coasts:
         return _sailing(runs, f'No coastdown was found {"; ".join(seen.without)}.'), seen.ship
     if seen.ship.baseline is None:
@@ -127,9 +131,9 @@ def _diagnosed(
     return replace(found, notes=(*found.notes, *unused)), seen.ship
 
 
-def _sailing(runs: Sequence[Run], no_coastdown: str) -> Diagnosis:
+def _sailing(runs: Sequence[WindowedRun], no_coastdown: str) -> Diagnosis:
     """Hold the logs against the ways over ground."""
-    read = [(run.name, *accepted_samples(run)) for run in runs]
+    read = [(run.name, *accepted_samples(run)) for run, _ in runs]
     records = [SailingRecord(name, block) for name, block, _ in read]
     try:
         return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
@@ -138,7 +142,7 @@ def _sailing(runs: Sequence[Run], no_coastdown: str) -> Diagnosis:
 
 
 def coasts_of(
-    output: Output, runs: Sequence[Run], given: Ship | None
+    output: Output, runs: Sequence[WindowedRun], given: Ship | None
 ) -> tuple[list[CoastRun], Ship, Parameters]:
     """
     Find the coastdowns of all bags.
@@ -153,7 +157,7 @@ def coasts_of(
     DiagnosisError
         If there is none.
     """
-    seen = _found(output, runs, given, None)
+    seen = _found(output, runs, given)
     if not seen.coasts:
         raise DiagnosisError(
             f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
@@ -176,15 +180,14 @@ class _Found:
 
 def _found(
     output: Output,
-    runs: Sequence[Run],
+    runs: Sequence[WindowedRun],
     given: Ship | None,
-    window: tuple[float, float] | None,
 ) -> _Found:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
     without: list[str] = []
     ship, parameters = given, None
-    for each in runs:
+    for each, window in runs:
         with output.progress(f'replaying {each.name}') as progress:
             result = replay(each, ship=ship, window=window, progress=progress)
         ship, parameters = ship or result.ship, parameters or result.parameters
@@ -193,6 +196,7 @@ def _found(
                 f'{each.name}: the clock of {name} is too slow or too fast, and on board it is '
                 'rejected; it is diagnosed all the same'
             )
+        _tell_cuts(output, result, window)
         windows = coast_windows(result)
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
@@ -202,6 +206,19 @@ def _found(
     assert ship is not None
     assert parameters is not None
     return _Found(coasts, ship, parameters, tuple(without))
+
+
+def _tell_cuts(output: Output, result: ReplayResult, window: Span | None) -> None:
+    """Tell what of the coastdowns was cut; a window of which nothing is left is an error."""
+    name = result.run.name
+    for coastdown in result.coastdowns:
+        if window is not None and coastdown.withdrawn:
+            raise DiagnosisError(
+                f'{name!r}: no coastdown from {window[0]:g} to {window[1]:g} s: '
+                f'{coastdown.failure}; give another window'
+            )
+        for line in cut_lines(coastdown, result.run.span_ns):
+            output.log(f'{name}: {line}')
 
 
 def _show(output: Output, found: Diagnosis) -> None:

@@ -9,10 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.bags import Run, open_runs, replay
+from shipdrag_ros.bags import Run, replay
 from shipdrag_ros.cli import replay_json, replay_text
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, bag, number
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number
 from shipdrag_ros.cli.output import Output, json_text
+from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report.hulls import Ranking, rank
@@ -37,10 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         'bags',
         nargs='+',
-        type=bag,
+        type=windowed_bag,
         metavar='BAG',
         help='MCAP file or rosbag2 directory; each is a run of its own, parts of one recording '
-        'are joined',
+        f'are joined; {HELP}',
     )
     parser.add_argument(
         '--ship',
@@ -60,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number(0.0, unit='s'),
         metavar=('START', 'END'),
         help='estimate from this part [s from the start of the bag], without looking for a '
-        'coastdown',
+        'coastdown, of each bag without a window of its own; what in it is no coastdown is cut',
     )
     add_remap(parser)
     parser.add_argument(
@@ -91,8 +92,8 @@ def run(options: argparse.Namespace) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
     window = None if options.window is None else tuple(options.window)
     results = [
-        replay_run(each, output, ship=ship, parameters=parameters, window=window)
-        for each in open_runs(options.bags, remap=dict(options.remap))
+        replay_run(each, output, ship=ship, parameters=parameters, window=own)
+        for each, own in open_windowed(options.bags, remap=dict(options.remap), window=window)
     ]
     ranking = rank(results) if options.compare else None
 
@@ -151,7 +152,9 @@ def _beyond(run: Run, end_s: float) -> str:
     length_s = (run.span_ns[1] - run.span_ns[0]) * 1e-9
     if end_s <= length_s + _LATE_S:
         return ''
-    return f'--window ends at {end_s:g} s; the bag ends at {length_s:.1f} s, and the window there'
+    return (
+        f'the window ends at {end_s:g} s; the bag ends at {length_s:.1f} s, and the window there'
+    )
 
 
 def write_results(

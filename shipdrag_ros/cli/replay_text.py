@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.report import cells, words
+from shipdrag_ros.report.cuts import cut_lines
 from shipdrag_ros.report.hulls import Ranking
 from shipdrag_ros.report.run import RunResult
 from shipdrag_ros.report.together import Together
@@ -22,6 +23,8 @@ def show_run(output: Output, run: RunResult) -> None:
         output.say(words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns)))
     for number, coastdown in enumerate(run.coastdowns, start=1):
         output.heading(f'Coastdown {number}')
+        for line in cut_lines(coastdown, run.span_ns):
+            output.say(line)
         output.table(cells.facts(coastdown))
         output.say(words.result_sentence(coastdown, mass_kg=run.ship.mass_kg))
         if coastdown.estimate is not None:

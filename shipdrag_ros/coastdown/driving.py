@@ -29,6 +29,7 @@ _RISES = 1.3  # a shaft that the water turns does not go faster again
 _JOIN = 0.05  # of the window: pauses of the thrust no longer than this are part of it
 _DIAMETER = 0.05  # of a propeller, of the length, where it is not stated
 _SLIP = 0.1  # of the ship's speed: a screw that goes forward by less can drive nothing
+_FEW = 0.05  # of the readings may be bad
 _RUN_DOWNS, _ONSET_S = 5.0, 30.0
 
 
@@ -75,6 +76,26 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
             reason = Dismissal.ASTERN if is_astern else Dismissal.THRUST
             found.append(cut_of(window, start_s, end_s, reason, text))
     return found
+
+
+def turns_on(window: Window) -> bool:
+    """
+    Say whether all shafts turn on throughout as in the steady record before.
+
+    Where no pitch is known that says nothing: a controllable propeller may be at
+    zero pitch, and only the speed can tell.
+    """
+    heard = False
+    for number, shaft in enumerate(window.shafts):
+        past = window.before.shafts[number] if window.before is not None else shaft
+        if not len(shaft) or not len(past):
+            continue
+        if len(window.pitches[number]):
+            return False
+        heard = True
+        if np.quantile(np.abs(shaft.value), _FEW) < _DRIVING * np.median(np.abs(past.value)):
+            return False
+    return heard
 
 
 def gone_s(ship: Ship) -> float:

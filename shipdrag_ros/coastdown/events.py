@@ -96,9 +96,10 @@ class Coastdown:
     `estimate` is None where none was possible; `failure` then says why.
     `onset_detected_ns` is None where the window was given; `heading_rad` (yaw, REP-103, at the
     start) where there is no heading. One that was `withdrawn` turned out to be none: a
-    `NotCoastdown` says why. `cuts` are parts of the stretch as it was found or given that are
-    no coastdown: they lie before `start_ns` and after `end_ns`, or are the reason why there is
-    no estimate.
+    `NotCoastdown` says why. `cuts` are parts of the stretch as it was found or given that are no
+    coastdown, before `start_ns` and after `end_ns`; or all of what speaks against one that was
+    withdrawn. Where there are any, `stretch` shows the whole of it: times [ns] and mean speeds
+    [m/s].
     """
 
     start_ns: int
@@ -110,6 +111,7 @@ class Coastdown:
     heading_rad: float | None = None
     withdrawn: bool = False
     cuts: tuple[NotCoastdown, ...] = ()
+    stretch: tuple[tuple[int, float], ...] = ()
 
     @property
     def cut_at_start(self) -> bool:

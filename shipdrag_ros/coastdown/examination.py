@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.driving import gone_s, thrust
+from shipdrag_ros.coastdown.driving import gone_s, thrust, turns_on
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.force_law import departures
 from shipdrag_ros.coastdown.instruments import astern, gaps, rudder, turns
-from shipdrag_ros.coastdown.readings import readings
+from shipdrag_ros.coastdown.readings import binned, readings
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
@@ -31,6 +31,12 @@ LEAST_READINGS = 8  # of the speed, or positions, in what is kept
 LEAST_FALL = 0.05  # of the speed, from the first to the last tenth of what is kept
 _ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are told
 _AT_REST = 0.1  # of the highest speed of the stretch: what is slower from its start is no coast
+_IDLING = (
+    'the shaft turns on as before and no pitch is known: by the speed the propeller is taken to '
+    'idle at zero pitch'
+)
+_MANY = 20  # readings that must be left by them, since fewer tell less than the turn spoils
+_SHOWN = 300  # means of the speed
 _SLIVER = 0.01  # of a stretch
 _SPAN = tuple[int, int]
 
@@ -61,7 +67,9 @@ class Examination:
 
 class Examined(NamedTuple):
     """
-    An examination, and the estimate from what was kept; None where `failure` says why.
+    An examination, and the estimate from what was kept.
+
+    `failure` says why there is none; `refused` that nothing of it is a coastdown.
     """
 
     start_ns: int
@@ -69,6 +77,8 @@ class Examined(NamedTuple):
     cuts: tuple[NotCoastdown, ...]
     estimate: Estimate | None
     failure: str | None
+    refused: bool
+    stretch: tuple[tuple[int, float], ...]
 
 
 def estimate_examined(
@@ -106,7 +116,24 @@ def estimate_examined(
         else:
             if examined.notes:
                 estimate = replace(estimate, notes=(*examined.notes, *estimate.notes))
-    return Examined(examined.start_ns, examined.end_ns, examined.cuts, estimate, failure)
+    return Examined(
+        examined.start_ns,
+        examined.end_ns,
+        examined.cuts,
+        estimate,
+        failure,
+        examined.failure is not None,
+        _shown(window) if examined.cuts else (),
+    )
+
+
+def _shown(window: Window) -> tuple[tuple[int, float], ...]:
+    """Return the speed of a whole window, for a picture."""
+    time_s, speed = binned(*readings(window), _SHOWN)
+    return tuple(
+        (window.start_ns + round(t * SECOND_NS), v)
+        for t, v in zip(time_s.tolist(), speed.tolist(), strict=True)
+    )
 
 
 def examine(
@@ -134,9 +161,10 @@ def examine(
     """
     steady = steady and window.before is not None
     whole = (window.start_ns, window.end_ns)
+    idling = steady and turns_on(window)
     cuts = [
         *gaps(window, parameters),
-        *thrust(window, ship, steady=steady),
+        *([] if idling else thrust(window, ship, steady=steady)),
         *astern(window, parameters),
     ]
     top = float(np.max(np.abs(readings(window)[1]), initial=0.0))
@@ -152,6 +180,8 @@ def examine(
     failure = _refusal(window, kept, cuts) if cuts else None
     start_ns, end_ns = whole if failure or kept is None else kept
     notes = () if best is None else tuple(best.notes)
+    if idling:
+        notes = (*notes, _IDLING)
     return Examination(start_ns, end_ns, tuple(cuts), failure, notes)
 
 
@@ -224,8 +254,8 @@ def _steered(
             continue
         left = max(_left(span, [*cuts, *found]), key=_length, default=None)
         if left is not None and _length(left) >= _ENOUGH * _length(span):
-            start, end, _ = _ends(window.part(*left))
-            if start - end >= _ENOUGH * (first - last):
+            start, end, count = _ends(window.part(*left))
+            if count >= _MANY and start - end >= _ENOUGH * (first - last):
                 cuts += found
                 continue
         notes.append(f'{found[0].text}: the drag of drifting and turning is part of r')

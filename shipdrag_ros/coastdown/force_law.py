@@ -209,11 +209,15 @@ def departures(time_s: Float64, speed: Float64, expected: Callable[[float], floa
         if cut is None:
             break
         if cut.at_end:
-            first, cut = first, replace(cut, end_s=last)
+            cut = replace(cut, end_s=last)
             last = cut.start_s
         else:
             cut = replace(cut, start_s=first)
             first = cut.end_s
+        if cuts and (cut.reason, cut.at_end) == (cuts[-1].reason, cuts[-1].at_end):
+            before = cuts.pop()
+            start_s, end_s = min(cut.start_s, before.start_s), max(cut.end_s, before.end_s)
+            cut = replace(before, start_s=start_s, end_s=end_s)
         cuts.append(cut)
     return cuts
 
@@ -235,7 +239,7 @@ def _rise(t: Float64, v: Float64) -> Cut | None:
         return None
     return Cut(
         float(t[0]),
-        float(t[top]),
+        float(t[top] + 0.5 * (t[1] - t[0])),
         False,
         Dismissal.LEAD_IN,
         f'the speed rises from {v[0]:.3g} to {v[top]:.3g} m/s: the coast is after it',

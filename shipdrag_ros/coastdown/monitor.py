@@ -372,15 +372,18 @@ class Monitor:
         assert self._onset is not None
         start_ns, final, failure = self._onset.start_ns, None, None
         cuts: tuple[NotCoastdown, ...] = ()
+        stretch: tuple[tuple[int, float], ...] = ()
         if doubt is None:
             window = self._window(end_ns, before_ns=self._steady_ns)
-            first_ns, end_ns, cuts, final, failure = estimate_examined(
-                window, self._ship, self._parameters, self._final_estimator
-            )
-            if first_ns != window.start_ns:  # which is later where an old part has rolled out
-                start_ns = first_ns
+            found = estimate_examined(window, self._ship, self._parameters, self._final_estimator)
+            cuts, final, failure, end_ns = found.cuts, found.estimate, found.failure, found.end_ns
+            stretch = found.stretch
+            if found.start_ns != window.start_ns:  # later too where an old part has rolled out
+                start_ns = found.start_ns
+            refused = found.refused
         else:
-            failure = f'withdrawn: {doubt.text}'
+            failure, refused = f'withdrawn: {doubt.text}', True
+            cuts = (NotCoastdown(start_ns, end_ns, doubt.reason, failure),)
         ended = Coastdown(
             start_ns,
             end_ns,
@@ -389,12 +392,11 @@ class Monitor:
             final,
             failure,
             self._heading_rad,
-            doubt is not None,
+            refused,
             cuts,
+            stretch,
         )
-        if doubt is None:
-            return [ended]
-        return [ended, NotCoastdown(start_ns, end_ns, doubt.reason, failure or doubt.text)]
+        return [ended, *cuts]
 
     def _stand_down(self, *, driven: bool = False) -> None:
         """Watch for an onset again, once the ship has been steady."""

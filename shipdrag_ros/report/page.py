@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shipdrag_ros.coastdown.events import Coastdown
-from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.report import cells, pictures, words
 from shipdrag_ros.report.cells import Table
+from shipdrag_ros.report.cuts import cut_lines, cut_picture
 from shipdrag_ros.report.document import Picture, write_page
 from shipdrag_ros.report.hulls import Ranking
 from shipdrag_ros.report.run import RunResult
@@ -20,6 +20,7 @@ from shipdrag_ros.report.together import together
 @dataclass(frozen=True)
 class _Coastdown:
     heading: str
+    cuts: tuple[str, ...]
     sentence: str
     facts: Table
     pictures: tuple[Picture, ...]
@@ -99,16 +100,26 @@ def _coastdown(number: int, coastdown: Coastdown, run: RunResult) -> _Coastdown:
         curve = cells.curve_table(estimate.valid_curve, truth=run.truth)
     return _Coastdown(
         heading=f'Coastdown {number}: {words.utc(coastdown.start_ns)}',
+        cuts=cut_lines(coastdown, run.span_ns),
         sentence=words.result_sentence(coastdown, mass_kg=run.ship.mass_kg),
         facts=cells.facts(coastdown),
-        pictures=() if estimate is None else tuple(_pictures(estimate, run)),
+        pictures=tuple(_pictures(coastdown, run)),
         curve=curve,
         notes=words.notes(coastdown),
     )
 
 
-def _pictures(estimate: Estimate, run: RunResult) -> Iterator[Picture]:
+def _pictures(coastdown: Coastdown, run: RunResult) -> Iterator[Picture]:
     """Draw what there are data for."""
+    if coastdown.stretch:
+        yield Picture.of(
+            cut_picture(coastdown, run.span_ns),
+            'Speed over the whole stretch. Hatched: what was cut, and why; only the rest is '
+            'taken for a coastdown.',
+        )
+    estimate = coastdown.estimate
+    if estimate is None:
+        return
     if len(estimate.curve):
         yield Picture.of(
             pictures.resistance_picture(estimate, mass_kg=run.ship.mass_kg, truth=run.truth),

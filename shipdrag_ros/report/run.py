@@ -38,6 +38,8 @@ class RunResult:
         What was nearly a coastdown, and what was cut, with why.
     steady_lead_s
         The longest that the ship was steady; None where no coastdown was looked for.
+    span_ns
+        First and last time of arrival in the bag [ns]; None where it is empty.
     """
 
     bag: str
@@ -49,6 +51,7 @@ class RunResult:
     truth: TrueCurve | None = None
     not_coastdowns: tuple[NotCoastdown, ...] = ()
     steady_lead_s: float | None = None
+    span_ns: tuple[int, int] | None = None
 
     @classmethod
     def of(cls, result: ReplayResult) -> RunResult:
@@ -72,4 +75,5 @@ class RunResult:
             truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
             not_coastdowns=result.not_coastdowns,
             steady_lead_s=result.steady_lead_s,
+            span_ns=run.span_ns,
         )

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.bags import BagWriter, Recorded, open_runs, replay
-from shipdrag_ros.coastdown.events import EndedBy, Event
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, Event
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
@@ -23,7 +23,7 @@ START_NS = 1_700_000_000_000_000_000
 BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass(value=0.1))
 
 
-def notes(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> str:
+def coasted(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> Coastdown:
     """Coast for 100 s with this heading, and after 100 s turn right round."""
     time_s = np.arange(200.0)
     stamps = START_NS + (time_s * 1e9).astype(np.int64)
@@ -42,7 +42,7 @@ def notes(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> str:
     (run,) = open_runs([path])
     (coastdown,) = replay(run, ship=BOAT, parameters=parameters, window=(0.0, 99.0)).coastdowns
     assert coastdown.estimate is not None, coastdown.failure
-    return ' '.join(coastdown.estimate.notes)
+    return coastdown
 
 
 @pytest.mark.parametrize(
@@ -54,24 +54,34 @@ def test_a_turn_inside_the_window(
 ) -> None:
     # across the cut at 180 degrees, where the reading jumps
     yaw = np.pi - 0.1 + np.linspace(0.0, np.radians(swing_deg), 100)
-    said = notes(tmp_path / 'a.mcap', yaw, Parameters(turn_rad=turn_rad))
-    assert (f'swings over {swing_deg:.0f} degrees' in said) is told
-    assert ('swings' in said) is told
+    coastdown = coasted(tmp_path / 'a.mcap', yaw, Parameters(turn_rad=turn_rad))
+    assert ([cut.reason for cut in coastdown.cuts] == [Dismissal.TURN]) is told
+    assert (coastdown.end_ns == START_NS + 99 * 10**9) is not told
+    if told:
+        assert f'swings over {swing_deg:.0f} degrees' in coastdown.cuts[0].text
+        assert coastdown.end_ns == pytest.approx(START_NS + 66e9, abs=2e9)
+
+
+def test_a_turn_all_the_time_is_told_and_not_cut(tmp_path: Path) -> None:
+    coastdown = coasted(tmp_path / 'a.mcap', np.linspace(0.0, 3.0, 100), Parameters())
+    assert coastdown.cuts == ()
+    assert coastdown.estimate is not None
+    assert 'swings over 17' in coastdown.estimate.notes[0]
 
 
 def test_a_window_is_estimated_without_an_onset(recording: tuple[Path, list[Event]]) -> None:
     (run,) = open_runs([recording[0]])
-    result = replay(run, window=(410.0, 1000.0))
+    result = replay(run, window=(430.0, 1000.0))
     (coastdown,) = result.coastdowns
     assert coastdown.ended_by is EndedBy.GIVEN
     assert coastdown.onset_detected_ns is None
-    assert coastdown.start_ns == START_NS + 410_000_000_000
+    assert coastdown.start_ns == START_NS + 430_000_000_000
     assert coastdown.end_ns == START_NS + 1_000_000_000_000
     assert coastdown.estimate is not None
     assert coastdown.heading_rad == pytest.approx(0.7, abs=0.005)
-    assert coastdown.estimate.samples['speed_through_water'] == 591
+    assert coastdown.estimate.samples['speed_through_water'] == 571
     assert result.recorded == Recorded(0, 0, None)
-    shorter = replay(run, window=(410.0, 700.0)).coastdowns[0].estimate
+    shorter = replay(run, window=(430.0, 700.0)).coastdowns[0].estimate
     assert shorter is not None
     assert shorter.curve.speed_m_s[0] > coastdown.estimate.curve.speed_m_s[0]
 

@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.bags import BagWriter, open_runs
+from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.windowed import WindowedBag, open_windowed
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
@@ -73,7 +74,8 @@ def test_a_log_that_is_rejected_on_board_is_told_of_and_diagnosed(
     slow_ns = np.where(block.channel == Channel.SPEED_THROUGH_WATER, 20_000_000_000, 0)
     with BagWriter(tmp_path / 'slow.mcap') as bag:
         bag.write_samples(replace(block, stamp_ns=block.stamp_ns - slow_ns))
-    (coast,), _, _ = coasts_of(Output(), open_runs([tmp_path / 'slow.mcap']), ship)
+    bag = WindowedBag(tmp_path / 'slow.mcap', None)
+    (coast,), _, _ = coasts_of(Output(), open_windowed([bag], remap={}), ship)
     assert len(coast.window.speed_through_water.value) > 350
     assert 'the clock of speed_through_water is too slow or too fast' in capsys.readouterr().err
 

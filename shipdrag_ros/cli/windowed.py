@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags with a window each: `BAG@START:END`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.cli.arguments import bag
+
+Span = tuple[float, float]
+HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
+
+
+class WindowedBag(NamedTuple):
+    """A bag, and the window of it that was given, [s] from its start."""
+
+    path: Path
+    window: Span | None
+
+
+class WindowedRun(NamedTuple):
+    """A run, and the window of it that was given, [s] from its start."""
+
+    run: Run
+    window: Span | None
+
+
+def windowed_bag(text: str) -> WindowedBag:
+    """
+    Read `BAG` or `BAG@START:END`; a file of that very name is meant before all.
+    """
+    path = bag(text)
+    name, at, window = text.rpartition('@')
+    if not at or ':' not in window or path.exists():
+        return WindowedBag(path, None)
+    start, _, end = window.partition(':')
+    try:
+        span = (float(start), float(end))
+    except ValueError:
+        span = (math.nan, math.nan)
+    if not name or not all(map(math.isfinite, span)):
+        raise argparse.ArgumentTypeError(
+            f'{text!r}: the window {window!r} is not START:END in s from the start of the bag, '
+            f'as in {name or "BAG"}@120:900'
+        )
+    if not 0.0 <= span[0] < span[1]:
+        raise argparse.ArgumentTypeError(
+            f'{text!r}: the window runs from {span[0]:g} to {span[1]:g} s; expected 0 <= START < '
+            'END, in s from the start of the bag'
+        )
+    return WindowedBag(bag(name), span)
+
+
+def open_windowed(
+    bags: Sequence[WindowedBag], *, remap: Mapping[str, str], window: Span | None = None
+) -> list[WindowedRun]:
+    """
+    Open bags in the order given.
+
+    Parameters
+    ----------
+    bags
+        From `windowed_bag`. One with a window is a run of its own, and may be given
+        again with another window; parts of one recording are joined among the others.
+    remap
+        Recorded topic -> input.
+    window
+        Of the bags without a window of their own.
+
+    Raises
+    ------
+    BagError
+        If one cannot be read.
+    """
+    whole = [each.path for each in bags if each.window is None]
+    left = open_runs(whole, remap=remap) if whole else []
+    found = []
+    for each in bags:
+        if each.window is not None:
+            runs = open_runs([each.path], remap=remap)
+            found += [WindowedRun(run, each.window) for run in runs]
+            continue
+        files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
+        here = [run for run in left if any(file.is_relative_to(files) for file in run.paths)]
+        found += [WindowedRun(run, window) for run in here]
+        left = [run for run in left if run not in here]
+    return found + [WindowedRun(run, window) for run in left]
