@@ -41,7 +41,7 @@ from shipdrag_ros.ship import Ship
 
 NAME = 'motion'
 _CURVE_POINTS = 257
-_QUIET_S = 5.0  # an onset known worse than this: the last seconds before it teach nothing
+_QUIET_S = 5.0  # before the stop the last seconds teach nothing; more where it is known worse
 
 
 def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
@@ -66,7 +66,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     run_down = RunDown.of(window, ship)
     record = Record.of(window, run_down, parameters)
     guess = Guess.of(record.coast, float(ship.n_r(1.0)))
-    notes = [*window.notes, *ship.warnings, f'{run_down.source}']
+    notes = [*window.notes, *ship.warnings, *run_down.notes]
     # first the coastdown alone, as if nothing but sensor noise disturbed
     alone = record.without_steady()
     first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess))
@@ -96,11 +96,11 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
 def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> Disturbance:
     """Learn the disturbances of the steady record, damped as a plain fit has it."""
     damping, inertia = plain.damping(plain.unknowns[plain.law.size + V0 :][:1])
-    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else 0.0
+    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else -_QUIET_S
     keep = record.steady.time_s < quiet
     steady = record.steady
     rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
-    variance = record.variance(rows, record.steady_count[keep])
+    variance = record.variance(rows, record.steady_weight[keep])
     return learn(rows, variance, damping_1_s=float(damping[0]), inertia=float(inertia[0]))
 
 
@@ -152,7 +152,8 @@ def _result(
     for name in record.white_sd:
         chosen = problem.rows.kind == KINDS[name]
         chosen[: len(record.steady.time_s)] = False
-        noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen])))
+        worth = np.concatenate([record.steady_weight, record.coast_weight])[chosen]
+        noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen] * worth)))
     current = found.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
     stamps = np.concatenate(list(record.stamps.values()))
     return Estimate(

@@ -17,7 +17,8 @@ from shipdrag_ros.estimation.motion_fit.coast import (
     LOG_SCALE,
     ONSET,
     POSITION,
-    RUN_DOWN,
+    THRUST,
+    THRUST_FAST,
     V0,
     X0,
     Rows,
@@ -29,6 +30,7 @@ from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.record import Record
+from shipdrag_ros.estimation.motion_fit import run_down as stop
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.motion_fit.solve import fit
 from shipdrag_ros.estimation.motion_fit.weighing import drop_gross, weigh
@@ -93,13 +95,16 @@ class Problem:
         steady, coast = record.steady, record.coast
         rows = Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast)))
         variance = np.concatenate(
-            [record.variance(steady, record.steady_count), record.variance(coast)]
+            [
+                record.variance(steady, record.steady_weight),
+                record.variance(coast, record.coast_weight),
+            ]
         )
         extras = [V0]
-        if run_down.run_down_sd_s > 0.0:
-            extras.append(RUN_DOWN)
+        if run_down.shaft_s > 0.0:
+            extras += [THRUST, THRUST_FAST]
         # without thrust and steady record a later stop is but a higher speed
-        if run_down.stop_sd_s > 0.0 and (run_down.run_down_s > 0.0 or len(steady.time_s)):
+        if run_down.stop_sd_s > 0.0 and (run_down.shaft_s > 0.0 or len(steady.time_s)):
             extras.append(ONSET)
         kinds = set(coast.kind.tolist())
         if POSITION in kinds:
@@ -110,7 +115,6 @@ class Problem:
         typical = max(float(coast.time_s[-1]), 1e-3) / 25.0
         grid = typical * np.expm1(np.linspace(0.0, math.log1p(end / typical), _STEPS + 1))
         ones = np.ones(len(variance))
-        thrust = 1.0 if run_down.run_down_s > 0.0 else 0.0
         v_ref = guess.speed_m_s
         return cls(
             rows,
@@ -119,7 +123,7 @@ class Problem:
             Noise(variance, CALM, ones, ones),
             run_down,
             guess,
-            Law(np.array(FIRST, np.int64), v_ref, thrust, ship.n_r_polynomial()),
+            Law(np.array(FIRST, np.int64), v_ref, run_down.shaft_s, ship.n_r_polynomial()),
             Humps.between(guess.lowest, float(ship.froude(v_ref))),
             tuple(extras),
         )
@@ -189,7 +193,8 @@ class Problem:
         unknowns = np.zeros(size + EXTRAS)
         unknowns[FIRST.index(2)] = self._unit_m_s2
         unknowns[size + V0] = self.guess.speed_m_s
-        unknowns[size + RUN_DOWN] = max(self.run_down.run_down_s, 1e-3)
+        if self.run_down.shaft_s > 0.0:
+            unknowns[size + THRUST], unknowns[size + THRUST_FAST] = stop.THRUST[0], stop.THRUST_FAST[0]
         unknowns[size + X0] = self.guess.first_m
         return unknowns
 
@@ -244,12 +249,13 @@ class Problem:
         return np.array([*range(k), *(k + extra for extra in self.extras)], np.int64)
 
     def _prior(self, law: Law) -> Float64:
-        """Return mean and precision of what is known before, (2, k + 6)."""
+        """Return mean and precision of what is known before, (2, k + 7)."""
         k = law.size
         prior = np.zeros((2, k + EXTRAS))
         for extra, mean, sd in (
-            (RUN_DOWN, self.run_down.run_down_s, self.run_down.run_down_sd_s),
-            (ONSET, 0.0, self.run_down.stop_sd_s),
+            (THRUST, *stop.THRUST),
+            (THRUST_FAST, *stop.THRUST_FAST),
+            (ONSET, 0.0, self.run_down.stop_doubt_s),
             (LOG_SCALE, 0.0, _SCALE_SD),
         ):
             prior[:, k + extra] = mean, 1.0 / sd**2 if sd > 0.0 else 0.0

@@ -32,6 +32,6 @@ def test_a_propeller_that_the_water_turns_does_not_hide_the_run_down(turned: flo
     onset_s = STOP_S + 15.0
     window = Window.from_block(block, round(onset_s * 1e9), round(2100 * 1e9), before_ns=0)
     found = RunDown.of(window, SHIP)
-    assert found.source == 'the run-down of the thrust is that of the shaft'
+    assert found.shaft_s == found.run_down_s
     assert found.run_down_s == pytest.approx(10.0, rel=0.1)
     assert found.stop_ns * 1e-9 == pytest.approx(STOP_S, abs=1.0)
