@@ -27,7 +27,7 @@ from rich.console import Console
 from rich.table import Table
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.estimation import Window, estimate_final, motion_fit
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -217,21 +217,23 @@ class Score:
     covered: float
     sigma: float
     took_s: float
-    failed: int
+    failed: int  # no fit of the motion, or no estimate at all
 
 
 def score(hull: Hull, law: Law, case: Case, n: int, runs: int) -> Score:
     """Estimate many coastdowns and compare."""
     ship = ship_of(hull, case)
     largest = float(true_r(hull, law, np.array(hull.speed_m_s)))
-    errors, covered, sigmas, took = [], [], [], []
+    errors, covered, sigmas, took, fitted = [], [], [], [], 0
     for seed in range(runs):
         window = record(hull, law, case, n, seed)
         begin = time.perf_counter()
         try:
-            curve = estimate_final(window, ship, Parameters()).valid_curve
+            estimate = estimate_final(window, ship, Parameters())
         except EstimationError:
             continue
+        fitted += estimate.estimator == motion_fit.NAME
+        curve = estimate.valid_curve
         took.append(time.perf_counter() - begin)
         speeds = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], 200)
         error = np.interp(speeds, curve.speed_m_s, curve.resistance_m_s2)
@@ -247,7 +249,7 @@ def score(hull: Hull, law: Law, case: Case, n: int, runs: int) -> Score:
         float(np.mean(covered)),
         float(np.sqrt(np.mean(np.array(sigmas) ** 2))),
         float(np.median(took)),
-        runs - len(errors),
+        runs - fitted,
     )
 
 

@@ -29,12 +29,16 @@ def _rounding(value: Float64) -> float:
     return 1e-14 * float(max(1e-6, np.abs(value).max()))
 
 
-@njit('f8(f8[::1])', cache=True)
-def _spread(value: Float64) -> float:
-    """Standard deviation of noise on a smooth curve, from second differences."""
+@njit('f8(f8[::1], f8[::1])', cache=True)
+def _spread(value: Float64, root: Float64) -> float:
+    """Noise on a smooth curve, from second differences, where the root of the weight is 1."""
     if len(value) < 3:
         return 1.0
-    second = value[2:] - 2.0 * value[1:-1] + value[:-2]
+    second = np.empty(len(value) - 2)
+    for i in range(len(second)):
+        of_three = 1.0 / root[i] ** 2 + 4.0 / root[i + 1] ** 2 + 1.0 / root[i + 2] ** 2
+        second[i] = value[i + 2] - 2.0 * value[i + 1] + value[i]
+        second[i] *= math.sqrt(6.0 / of_three)
     spread = np.median(np.abs(second)) / _OF_MEDIAN
     if spread == 0.0:  # readings repeat, being rounded
         spread = math.sqrt(np.mean(second * second))
@@ -53,7 +57,7 @@ def despike(value: Float64) -> Float64:
     """
     Replace spikes by the median of five, to start from.
     """
-    limit = _SPIKE * _spread(value)
+    limit = _SPIKE * _spread(value, np.ones(len(value)))
     clean = value.copy()
     for i in range(2, len(value) - 2):
         middle = _median_of_five(value[i - 2], value[i - 1], value[i], value[i + 1], value[i + 2])
@@ -101,7 +105,7 @@ def _inflation(residual: Float64, weight: Float64) -> float:
 
 def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, Float64, Float64]]:
     @njit(
-        'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], f8[::1], '
+        'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], f8[::1], '
         'f8[::1])',
         cache=True,
     )
@@ -109,6 +113,7 @@ def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, F
         rows: Float64,
         value: Float64,
         clean: Float64,
+        stated: Float64,
         count: Int64,
         known_sd: Float64,
         columns: Int64,
@@ -124,6 +129,8 @@ def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, F
             Columns of the model at the samples, kind after kind.
         value, clean : (n,)
             Measured, and without spikes.
+        stated : (n,)
+            Weight by the variances that samples state.
         count : (kinds,) int64
             Samples of each kind.
         known_sd : (kinds,)
@@ -162,9 +169,10 @@ def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, F
                 last = first + count[kind]
                 if last == first:
                     continue
-                part = residual[first:last]
+                root = np.sqrt(stated[first:last])
+                part = residual[first:last] * root
                 if turn == 0:
-                    found = _spread(value[first:last])
+                    found = _spread(value[first:last], root)
                 else:
                     found = max(_robust_sd(part), _rounding(value[first:last]))
                     found *= math.sqrt(n / max(n - free, 1.0))
@@ -173,7 +181,7 @@ def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, F
                     scale = known_sd[kind]
                 inside = psi = total = 0.0
                 for i in range(first, last):
-                    size = abs(residual[i]) / scale
+                    size = abs(part[i - first]) / scale
                     w = _weight(size)
                     weight[i] = w
                     total += w
@@ -191,7 +199,7 @@ def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, F
                 if turn > 0:
                     factor /= _inflation(part, weight[first:last])
                 for i in range(first, last):
-                    weight[i] *= factor
+                    weight[i] *= factor * stated[i]
                 noise_sd[kind], used_sd[kind] = found, scale
                 first = last
             if turn < _PASSES:

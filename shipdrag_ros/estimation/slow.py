@@ -113,7 +113,7 @@ class Slow:
         variance = np.empty(len(weight))
         for kind in inputs.used:
             part = inputs.part(kind)
-            best = weight[part].max()
+            best = (weight[part] / inputs.stated[part]).max()
             white = self.white_sd.get(KINDS[kind], 1.0 / math.sqrt(best))
             variance[part] = white**2 / np.maximum(weight[part] / best, _LOST)
         order = np.argsort(inputs.time_s, kind='stable')

@@ -22,7 +22,7 @@ from shipdrag_ros.estimation.motion_fit.coast import (
 )
 from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.motion_fit.guess import Guess
-from shipdrag_ros.estimation.motion_fit.learning import learn
+from shipdrag_ros.estimation.motion_fit.learning import ENGINE_HOLD, learn
 from shipdrag_ros.estimation.motion_fit.problem import (
     Problem,
     fit_robustly,
@@ -107,7 +107,10 @@ def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> Disturbanc
 def _disturbance_note(about: Disturbance, steady_s: float) -> str:
     found = []
     if about.gust_m_s2:
-        found.append(f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s')
+        found.append(
+            f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s (the engine taken to '
+            f'hold the speed, so that it is damped {ENGINE_HOLD:g} times as by the hull; 1 to 2 is usual)'
+        )
     if about.water_m_s:
         found.append(f'the log by {about.water_m_s:.2g} m/s over {about.water_s:.0f} s')
     return (

@@ -29,6 +29,7 @@ from shipdrag_ros.estimation.motion_fit.families import FIRST, POWERS, Humps
 from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.law import Law
+from shipdrag_ros.estimation.motion_fit.learning import ENGINE_HOLD
 from shipdrag_ros.estimation.motion_fit.record import Record
 from shipdrag_ros.estimation.motion_fit import run_down as stop
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
@@ -103,8 +104,8 @@ class Problem:
         extras = [V0]
         if run_down.shaft_s > 0.0:
             extras += [THRUST, THRUST_FAST]
-        # without thrust and steady record a later stop is but a higher speed
-        if run_down.stop_sd_s > 0.0 and (run_down.shaft_s > 0.0 or len(steady.time_s)):
+        # without a steady record a later stop is but a higher speed, or more thrust
+        if run_down.stop_sd_s > 0.0 and len(steady.time_s):
             extras.append(ONSET)
         kinds = set(coast.kind.tolist())
         if POSITION in kinds:
@@ -136,6 +137,7 @@ class Problem:
             plain.law, plain.unknowns, self.grid_s, self.rows, np.zeros(0, np.int64)
         )
         damping, inertia = plain.damping(speed)
+        damping[: self.steady] *= ENGINE_HOLD
         return replace(self, noise=Noise(self.noise.variance, about, damping, inertia))
 
     def weighted(self, variance: Float64) -> Problem:
@@ -201,6 +203,9 @@ class Problem:
     def fit_first(self, start: Float64) -> tuple[FittedMotion | None, Float64]:
         """
         Fit the first family, None where that fails; return whitened residuals too.
+
+        How the thrust ended is held as it is most likely: without the priors of the whole law
+        it cannot be told from the highest powers.
         """
         converged, _, unknowns, covariance, white = fit(
             self.first,
@@ -208,7 +213,7 @@ class Problem:
             self.grid_s,
             self.rows,
             self.noise,
-            self._active(self.first),
+            self._active(self.first, held=(THRUST, THRUST_FAST)),
             self._prior(self.first),
             _ITERATIONS,
         )
@@ -244,9 +249,10 @@ class Problem:
     def _unit_m_s2(self) -> float:
         return self.guess.quadratic_1_m * self.guess.speed_m_s**2
 
-    def _active(self, law: Law) -> Int64:
+    def _active(self, law: Law, held: tuple[int, ...] = ()) -> Int64:
         k = law.size
-        return np.array([*range(k), *(k + extra for extra in self.extras)], np.int64)
+        extras = [k + extra for extra in self.extras if extra not in held]
+        return np.array([*range(k), *extras], np.int64)
 
     def _prior(self, law: Law) -> Float64:
         """Return mean and precision of what is known before, (2, k + 7)."""

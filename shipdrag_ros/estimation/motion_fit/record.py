@@ -107,7 +107,7 @@ class Record:
             weight = stated_weight(
                 np.concatenate([before_s, time_s]),
                 np.concatenate([before, value]),
-                _of_speed_or_track(np.concatenate([variance, series.variance])),
+                np.concatenate([variance, series.variance]),
             )
             white[name] = known[name] or max(
                 weighted_white_sd(np.concatenate([before, value]), weight),
@@ -166,11 +166,6 @@ def _merge(parts: list[tuple[Float64, int, Float64, Float64]]) -> tuple[Rows, Fl
     weight = np.concatenate([part[3] for part in parts])
     order = np.argsort(time_s, kind='stable')
     return Rows(time_s[order], kind[order], value[order]), weight[order]
-
-
-def _of_speed_or_track(variance: Float64) -> Float64:
-    """Return one variance a sample: of a position, the mean of both coordinates."""
-    return variance if variance.ndim == 1 else variance.mean(axis=1)
 
 
 def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> float:

@@ -13,10 +13,11 @@ from shipdrag_ros.ship import Ship
 
 ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the fit finds it
 # Of a and b in `coast`, before the fit: mean and sd. Their impulse, a + b / 3 run-downs of the
-# shaft, is 0.42 +- 0.48: from below 0 (the propeller brakes before it stands) and 0 (gone at
-# once) over 1/2 (the square of the shaft speed) to 1 (as the shaft) and somewhat more.
-THRUST = (0.25, 0.4)
-THRUST_FAST = (0.5, 0.8)
+# shaft, is 0.42 +- 0.81: below 0 (the propeller brakes before it stands), 0 (gone at once), 1/2
+# (the square of the shaft speed), 1 (as the shaft) are all within one standard deviation. With
+# half of it a shaft would make r worse than none where the law is one of the extremes.
+THRUST = (0.25, 0.7)
+THRUST_FAST = (0.5, 1.2)
 _SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
 _KEPT = 0.05  # of the steady shaft speed: less is not told
 

@@ -64,7 +64,7 @@ def find_fall(before: Series | None, series: Series, start_ns: int) -> Fall | No
     time_s = np.concatenate([(part.time_ns - start_ns) * 1e-9 for part in parts])
     shaft: Float64 = np.abs(np.concatenate([part.value for part in parts]))
     steady = shaft[: len(parts[0])] if has_before else shaft[:_FEW]
-    high = float(np.median(steady))
+    high = float(np.median(steady) if has_before else steady.max())
     low = float(np.median(np.abs(series.value)))
     if not low < _FALLEN * high:
         return None

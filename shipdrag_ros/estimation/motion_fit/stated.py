@@ -26,8 +26,10 @@ def stated_weight(time_s: Float64, value: Float64, variance: Float64) -> Float64
 
     Parameters
     ----------
-    time_s, value, variance : (n,)
-        In ascending time; a variance that is not above 0 and finite is not stated.
+    time_s, value : (n,)
+        In ascending time.
+    variance : (n,), of a position (n, 2)
+        One that is not above 0 and finite is not stated.
 
     Returns
     -------
@@ -40,8 +42,9 @@ def stated_weight(time_s: Float64, value: Float64, variance: Float64) -> Float64
     of a polynomial follows that of the stated variance; before, 1 +- 0.5, and within 0 to 1.
     """
     ones = np.ones(len(value))
-    if len(value) <= _ORDER or not variance[0] > 0.0 or np.all(variance == variance[0]):
+    if len(value) <= _ORDER or not np.all(variance[0] > 0.0) or np.all(variance == variance[0]):
         return ones
+    variance = variance.reshape(len(value), -1).mean(axis=1)
     if not np.all(np.isfinite(variance) & (variance > 0.0)):
         return ones
     log = np.log(np.clip(variance / np.median(variance), 1.0 / _RANGE, _RANGE))
