@@ -133,9 +133,7 @@ def follow(hull: Hull, law: Law) -> Motion:
 
     def rate(t: float, v: float) -> float:
         thrust = largest * law.thrust(shaft(t, v), v / v0)
-        return float(
-            (thrust - np.interp(v, table_m_s, table)) / np.interp(v, table_m_s, inertia)
-        )
+        return float((thrust - np.interp(v, table_m_s, table)) / np.interp(v, table_m_s, inertia))
 
     h = run_down_s / 30.0
     time_s = np.arange(0.0, hull.duration_s + h, h)
@@ -149,9 +147,7 @@ def follow(hull: Hull, law: Law) -> Motion:
         d = rate(t + h, v + h * c)
         x += h * v + h * h * (a + b + c) / 6.0
         v += h * (a + 2.0 * b + 2.0 * c + d) / 6.0
-    return Motion(
-        time_s, speed, distance, np.array([shaft(t, u) for t, u in zip(time_s, speed)])
-    )
+    return Motion(time_s, speed, distance, np.array([shaft(t, u) for t, u in zip(time_s, speed)]))
 
 
 def true_r(hull: Hull, law: Law, speed_m_s: Float64) -> Float64:
@@ -287,8 +283,8 @@ def main() -> None:
             )
         Console(width=190).print(table)
     print(
-        'RMSE over the valid range, evenly in speed, in % of the largest r; sigma: the stated one, '
-        'rms.\ncover: share of the range where +-2 sigma (repeatable) holds the truth.'
+        'RMSE over the valid range, evenly in speed, in % of the largest r; sigma: the stated '
+        'one, rms.\ncover: share of the range where +-2 sigma (repeatable) holds the truth.'
     )
 
 

@@ -105,8 +105,8 @@ def _inflation(residual: Float64, weight: Float64) -> float:
 
 def _compile_robust_fit(sources: str) -> Callable[..., tuple[Float64, Float64, Float64, Float64]]:
     @njit(
-        'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], f8[::1], '
-        'f8[::1])',
+        'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], '
+        'f8[::1], f8[::1])',
         cache=True,
     )
     def robust_fit(

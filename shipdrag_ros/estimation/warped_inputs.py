@@ -118,7 +118,9 @@ def gather(window: Window, parameters: Parameters) -> Inputs:
     values = [_along(one) if kind == POSITION else one.value for kind, one in used.items()]
     scale = TimeScale.of(*(one.time_ns for one in used.values()))
     speed_sd = parameters.speed_sigma_m_s
-    time_s = [(one.time_ns - scale.first_ns) * 1e-9 for one in used.values()]
+    time_s: list[Float64] = [
+        np.asarray((one.time_ns - scale.first_ns) * 1e-9, np.float64) for one in used.values()
+    ]
     stated = [
         stated_weight(when, value, one.variance)
         for when, value, one in zip(time_s, values, used.values())

@@ -8,6 +8,9 @@ random numbers.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
@@ -20,15 +23,16 @@ from shipdrag_ros.estimation.motion_fit.coast import (
     Rows,
     predict,
 )
-from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
-from shipdrag_ros.estimation.motion_fit.guess import Guess
-from shipdrag_ros.estimation.motion_fit.learning import ENGINE_HOLD, learn
-from shipdrag_ros.estimation.motion_fit.problem import (
-    Problem,
+from shipdrag_ros.estimation.motion_fit.colour import Colour
+from shipdrag_ros.estimation.motion_fit.first_fits import (
     fit_robustly,
     weigh_disturbed,
     with_log_scale,
 )
+from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
+from shipdrag_ros.estimation.motion_fit.guess import Guess
+from shipdrag_ros.estimation.motion_fit.learning import ENGINE_HOLD, learn
+from shipdrag_ros.estimation.motion_fit.problem import Problem
 from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
 from shipdrag_ros.estimation.motion_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.motion_fit.steady import LEAST_S
@@ -80,7 +84,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         record = alone
         notes.append(
             'there is no steady record before the onset to learn slow disturbances from: the '
-            'band holds the noise of the sensors alone'
+            'band holds what scatters in the window alone'
         )
     full = problem
     first, problem = with_log_scale(problem.condensed(first), first)
@@ -90,7 +94,14 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
             f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
             'deviations), taken out'
         )
-    return _result(problem.average(first), full, record, window, ship, parameters, tuple(notes))
+    found = problem.average(first)
+    colours = full.colours(found)
+    most = max(colour.inflation for colour in colours.values())
+    if most > 1.0:
+        # the figure stays: whether the sensor errs slowly or the ship is pushed is not known
+        found = replace(found, covariance=most * found.covariance)
+        notes += _colour_notes(colours)
+    return _result(found, full, record, window, ship, parameters, tuple(notes))
 
 
 def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> Disturbance:
@@ -108,8 +119,8 @@ def _disturbance_note(about: Disturbance, steady_s: float) -> str:
     found = []
     if about.gust_m_s2:
         found.append(
-            f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s (the engine taken to '
-            f'hold the speed, so that it is damped {ENGINE_HOLD:g} times as by the hull; 1 to 2 is usual)'
+            f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s (the engine is '
+            f'taken to damp the speed {ENGINE_HOLD:g} times as the hull does; 1 to 2 is usual)'
         )
     if about.water_m_s:
         found.append(f'the log by {about.water_m_s:.2g} m/s over {about.water_s:.0f} s')
@@ -117,6 +128,17 @@ def _disturbance_note(about: Disturbance, steady_s: float) -> str:
         f'disturbances learnt from {steady_s:.0f} s of steady record: '
         f'{" and ".join(found) or "none but the noise of the sensors"}'
     )
+
+
+def _colour_notes(colours: dict[int, Colour]) -> list[str]:
+    names = {kind: name for name, kind in KINDS.items()}
+    return [
+        f'what the fit leaves of {names[kind]} is not independent from sample to sample: its '
+        f'means over {colour.block} scatter {math.sqrt(colour.inflation):.2g} times as much as '
+        'independent ones; the band is widened for that'
+        for kind, colour in colours.items()
+        if colour.inflation > 1.0
+    ]
 
 
 def _result(

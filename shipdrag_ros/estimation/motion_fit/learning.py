@@ -71,7 +71,8 @@ def learn(rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float) 
 
     Notes
     -----
-    The hull's damping is taken `ENGINE_HOLD` times, the middle of what engines do. The mean speed, the first position and the current are profiled out
+    The hull's damping is taken `ENGINE_HOLD` times, the middle of what engines do.
+    The mean speed, the first position and the current are profiled out
     (restricted likelihood). None, a gust force, the water's speed, or both: by
     Akaike's criterion. The correlation times have a broad log-normal prior,
     without which a short record lets them run away.

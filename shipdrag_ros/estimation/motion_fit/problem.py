@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.motion_fit.averaging import average
 from shipdrag_ros.estimation.motion_fit.coast import (
     CURRENT,
@@ -24,6 +23,7 @@ from shipdrag_ros.estimation.motion_fit.coast import (
     Rows,
     predict,
 )
+from shipdrag_ros.estimation.motion_fit.colour import Colour, colour_of
 from shipdrag_ros.estimation.motion_fit.condensing import means
 from shipdrag_ros.estimation.motion_fit.families import FIRST, POWERS, Humps
 from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
@@ -31,10 +31,8 @@ from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.learning import ENGINE_HOLD
 from shipdrag_ros.estimation.motion_fit.record import Record
-from shipdrag_ros.estimation.motion_fit import run_down as stop
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.motion_fit.solve import fit
-from shipdrag_ros.estimation.motion_fit.weighing import drop_gross, weigh
 from shipdrag_ros.estimation.motion_fit.whitening import (
     CALM,
     Disturbance,
@@ -45,10 +43,8 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
 _STEPS = 72  # of the integration, longer as the ship slows down
-_ROUNDS, _ROUNDS_DISTURBED = 3, 2  # of the weights
 _ITERATIONS = 30
 _SCALE_SD = 0.02  # of a log's scale, before the fit
-_SCALE_SIGNIFICANT = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -155,6 +151,15 @@ class Problem:
         result: Float64 = table[0]
         return result
 
+    def colours(self, found: FittedMotion) -> dict[int, Colour]:
+        """
+        Return by how much what a fit leaves of the coastdown is correlated, for each input.
+        """
+        white = self.residual(found).reshape(1, -1)
+        whiten(self.rows, white, self.noise)
+        kind, left = self.rows.kind[self.steady :], white[0, self.steady :]
+        return {int(of): colour_of(left[kind == of]) for of in np.unique(kind)}
+
     def condensed(self, near: FittedMotion) -> Problem:
         """
         Return the problem with the coastdown condensed to a row a step and input.
@@ -195,8 +200,8 @@ class Problem:
         unknowns = np.zeros(size + EXTRAS)
         unknowns[FIRST.index(2)] = self._unit_m_s2
         unknowns[size + V0] = self.guess.speed_m_s
-        if self.run_down.shaft_s > 0.0:
-            unknowns[size + THRUST], unknowns[size + THRUST_FAST] = stop.THRUST[0], stop.THRUST_FAST[0]
+        for extra, mean, _ in self.run_down.priors:
+            unknowns[size + extra] = mean
         unknowns[size + X0] = self.guess.first_m
         return unknowns
 
@@ -258,80 +263,6 @@ class Problem:
         """Return mean and precision of what is known before, (2, k + 7)."""
         k = law.size
         prior = np.zeros((2, k + EXTRAS))
-        for extra, mean, sd in (
-            (THRUST, *stop.THRUST),
-            (THRUST_FAST, *stop.THRUST_FAST),
-            (ONSET, 0.0, self.run_down.stop_doubt_s),
-            (LOG_SCALE, 0.0, _SCALE_SD),
-        ):
+        for extra, mean, sd in (*self.run_down.priors, (LOG_SCALE, 0.0, _SCALE_SD)):
             prior[:, k + extra] = mean, 1.0 / sd**2 if sd > 0.0 else 0.0
         return prior
-
-
-def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
-    """
-    Fit the first family; weigh the rows on the way.
-
-    Returns
-    -------
-    first, problem
-        With the variance of each input as it scatters, larger for outliers
-        (Huber's weights).
-
-    Raises
-    ------
-    EstimationError
-        If the fit does not converge.
-    """
-    base = problem.noise.variance.copy()
-    weight = np.ones(len(base))
-    start = problem.start()
-    unknown = problem.first.size + len(problem.extras)
-    crude = FittedMotion(problem.first, start, np.zeros((len(start), len(start))))
-    drop_gross(problem.residual(crude), problem.rows.kind, weight)
-    for _ in range(_ROUNDS):
-        problem = problem.weighted(base / weight)
-        first, white = problem.fit_first(start)
-        if first is None:
-            raise EstimationError(
-                'the equation of motion could not be fitted to the window: give one coastdown, '
-                'with the engine stopped; leave out an input that moves otherwise, as a path '
-                'does that drifts sideways; or set `estimator` to warped or one of s1_speed, '
-                's1_position, s1_joint'
-            )
-        start = first.unknowns
-        weigh(white, problem.rows.kind, problem.steady, unknown, base, weight)
-    assert first is not None
-    return first, problem.weighted(base / weight)
-
-
-def weigh_disturbed(problem: Problem, near: FittedMotion) -> Problem:
-    """
-    Weigh the rows by what a fit leaves that slow disturbances do not explain.
-    """
-    base = problem.noise.variance.copy()
-    weight = np.ones(len(base))
-    residual = problem.residual(near)
-    unknown = problem.first.size + len(problem.extras)
-    for _ in range(_ROUNDS_DISTURBED):
-        problem = problem.weighted(base / weight)
-        white = residual.reshape(1, -1).copy()
-        whiten(problem.rows, white, problem.noise)
-        weigh(white[0], problem.rows.kind, problem.steady, unknown, base, weight)
-    return problem.weighted(base / weight)
-
-
-def with_log_scale(problem: Problem, first: FittedMotion) -> tuple[FittedMotion, Problem]:
-    """
-    Take the scale of the log as unknown where the data show that it is not 1.
-    """
-    if CURRENT not in problem.extras:
-        return first, problem
-    scaled = replace(problem, extras=(*problem.extras, LOG_SCALE))
-    found, _ = scaled.fit_first(first.unknowns)
-    if found is None:
-        return first, problem
-    scale, sd = found.unknown(LOG_SCALE)
-    if abs(scale) <= _SCALE_SIGNIFICANT * sd:
-        return first, problem
-    return found, scaled

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from shipdrag_ros.estimation.motion_fit.coast import ONSET, THRUST, THRUST_FAST
 from shipdrag_ros.estimation.motion_fit.shaft_fall import Fall, find_fall, say
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import SHAFTS
@@ -16,8 +17,8 @@ ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the 
 # shaft, is 0.42 +- 0.81: below 0 (the propeller brakes before it stands), 0 (gone at once), 1/2
 # (the square of the shaft speed), 1 (as the shaft) are all within one standard deviation. With
 # half of it a shaft would make r worse than none where the law is one of the extremes.
-THRUST = (0.25, 0.7)
-THRUST_FAST = (0.5, 1.2)
+_THRUST = (0.25, 0.7)
+_THRUST_FAST = (0.5, 1.2)
 _SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
 _KEPT = 0.05  # of the steady shaft speed: less is not told
 
@@ -73,7 +74,7 @@ class RunDown:
             return cls(window.start_ns, ONSET_SD_S, 0.0, 0.0, 0.0, (note, *others))
         run_down_s = ship.propulsion.run_down_s
         note = (
-            f'the thrust is taken to end within about the {run_down_s:.3g} s of the ship file; how '
+            f'the thrust is taken to end within about {run_down_s:.3g} s, by the ship file: how '
             'it does is fitted'
         )
         return cls(
@@ -113,9 +114,11 @@ class RunDown:
         )
 
     @property
-    def stop_doubt_s(self) -> float:
-        """Standard deviation of the stop where the shape of the fall is in doubt too."""
-        return self.stop_sd_s + _SHAPE * self.shaft_s if self.stop_sd_s > 0.0 else 0.0
+    def priors(self) -> tuple[tuple[int, float, float], ...]:
+        """Mean and sd of each unknown of the stop, 0 where it is not fitted."""
+        thrust = ((THRUST, *_THRUST), (THRUST_FAST, *_THRUST_FAST)) if self.shaft_s > 0.0 else ()
+        doubt_s = self.stop_sd_s + _SHAPE * self.shaft_s if self.stop_sd_s > 0.0 else 0.0
+        return (*thrust, (ONSET, 0.0, doubt_s))
 
 
 def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:

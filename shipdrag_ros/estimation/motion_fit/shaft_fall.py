@@ -189,5 +189,7 @@ def say(name: str, shaft: Series, window: Window) -> str:
 def _ratio(series: Series) -> float:
     """Return the value in the last fifth over that in the first."""
     part = max(len(series) // 5, 1)
-    first, last = (float(np.median(np.abs(of))) for of in (series.value[:part], series.value[-part:]))
+    first, last = (
+        float(np.median(np.abs(of))) for of in (series.value[:part], series.value[-part:])
+    )
     return last / first if first > 0.0 else np.inf
