@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from shipdrag_ros.estimation.motion_fit.coast import ONSET, THRUST, THRUST_FAST
 from shipdrag_ros.estimation.motion_fit.shaft_fall import Fall, find_fall, say
 from shipdrag_ros.estimation.window import Window
@@ -21,6 +23,7 @@ _THRUST = (0.25, 0.7)
 _THRUST_FAST = (0.5, 1.2)
 _SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
 _KEPT = 0.05  # of the steady shaft speed: less is not told
+_FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,7 @@ class RunDown:
         others = tuple(_others(window, {number for number, _, _ in falls}))
         if falls:
             _, seen, fall = max(falls, key=lambda one: one[2].stop_s)
+            others += tuple(_kept(window, falls))
             return cls._of_fall(window, ship, seen, fall, others)
         if window.before is None:
             note = 'the thrust is taken to have ended before the window'
@@ -96,11 +100,6 @@ class RunDown:
                 f'{seen} shows the stop and runs down in {fall.run_down_s:.2g} s; the thrust may '
                 'be gone at once or follow it: that is fitted, and in the band'
             ]
-        if fall.kept > _KEPT:
-            notes.append(
-                f'{seen} stays at {100.0 * fall.kept:.0f} % of its steady value: what a propeller '
-                'that the water turns resists is part of r'
-            )
         run_down_s, run_down_sd_s = fall.run_down_s, fall.run_down_sd_s
         if ship.propulsion is None:
             run_down_s = run_down_sd_s = 0.5 * run_down_s
@@ -135,11 +134,21 @@ def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:
             yield min(of_propeller, key=lambda one: one[2].stop_s)
 
 
+def _kept(window: Window, falls: list[tuple[int, str, Fall]]) -> Iterator[str]:
+    """Yield what the shafts show that fell, but go on turning."""
+    for number, name, fall in falls:
+        after_s = fall.stop_s + _FALLEN * fall.run_down_s
+        since_ns = window.start_ns + round(after_s * 1e9)
+        shaft = window.shafts[number]
+        if fall.kept > _KEPT and 'shaft' in name and np.any(shaft.time_ns >= since_ns):
+            yield say(name, shaft, window, since_ns)
+
+
 def _others(window: Window, fallen: set[int]) -> Iterator[str]:
     """Yield what the shafts show that do not fall."""
     for number, shaft in enumerate(window.shafts):
         if len(shaft) and number not in fallen:
-            yield say(_name(window, 'shaft', number), shaft, window)
+            yield say(_name(window, 'shaft', number), shaft, window, window.start_ns)
 
 
 def _name(window: Window, what: str, number: int) -> str:

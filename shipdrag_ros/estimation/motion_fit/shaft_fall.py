@@ -17,7 +17,7 @@ _SOON = (8.0, 16.0)  # after the fall, in half-lives
 _ROUNDS = 3
 _LEAST_SD = 0.01  # of the run-down, relative: no shaft falls exactly so
 _FEW = 3  # samples that tell a level
-_LONGEST = 0.25  # of the window: what falls more slowly falls with the ship
+_LONGEST = 0.15  # of the window: what falls more slowly falls with the ship
 _STANDS_RAD_S = 0.5  # no propeller of a ship drives at less
 _SLOWED, _ALIKE = 0.85, 0.2  # a ship has slowed down; a shaft has, as much
 _MAD_TO_SD = 1.4826
@@ -158,9 +158,9 @@ def _fit_fall(
     )
 
 
-def say(name: str, shaft: Series, window: Window) -> str:
+def say(name: str, shaft: Series, window: Window, since_ns: int) -> str:
     """
-    Say what a shaft shows that does not fall as at a stop.
+    Say what a shaft shows that turns on, or does not turn.
 
     Parameters
     ----------
@@ -168,28 +168,29 @@ def say(name: str, shaft: Series, window: Window) -> str:
         Of the shaft, for the sentence.
     shaft
         In the window.
+    since_ns
+        From when on it is looked at.
     """
-    rate = np.abs(shaft.value)
+    rate = np.abs(shaft.value[shaft.time_ns >= since_ns])
     low, high = (float(value) for value in np.quantile(rate, (0.05, 0.95)))
     if high < _STANDS_RAD_S:
         return f'{name} stands in the window: the thrust had ended before it'
-    turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s in the window'
+    turns = f'{name} turns on at {low:.3g} to {high:.3g} rad/s'
     for speed in (window.speed_through_water, window.speed_over_ground):
-        if len(speed) >= _FEW:
-            slowed, of_shaft = _ratio(speed), _ratio(shaft)
+        later = speed.value[speed.time_ns >= since_ns]
+        if len(later) >= _FEW:
+            slowed, of_shaft = _ratio(later), _ratio(rate)
             if slowed < _SLOWED and abs(of_shaft / slowed - 1.0) < _ALIKE:
                 return f'{turns}, as the water turns it: the drag of its propeller is part of r'
             break
     return (
-        f'{turns} and does not run down as at an engine stop: if it drives the ship, r is off by '
-        'its thrust; give a window that begins after the shaft has stopped'
+        f'{turns} and not as the water turns it: if it drives the ship, r is off by its thrust; '
+        'give a window that begins after the shaft has stopped'
     )
 
 
-def _ratio(series: Series) -> float:
+def _ratio(value: Float64) -> float:
     """Return the value in the last fifth over that in the first."""
-    part = max(len(series) // 5, 1)
-    first, last = (
-        float(np.median(np.abs(of))) for of in (series.value[:part], series.value[-part:])
-    )
+    part = max(len(value) // 5, 1)
+    first, last = (float(np.median(np.abs(of))) for of in (value[:part], value[-part:]))
     return last / first if first > 0.0 else np.inf
