@@ -21,6 +21,7 @@ ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the 
 # half of it a shaft would make r worse than none where the law is one of the extremes.
 _THRUST = (0.25, 0.7)
 _THRUST_FAST = (0.5, 1.2)
+_UNSEEN = 0.6  # of these sds where the stop is not seen: its time takes up the impulse
 _SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
 _KEPT = 0.05  # of the steady shaft speed: less is not told
 _FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven
@@ -115,7 +116,12 @@ class RunDown:
     @property
     def priors(self) -> tuple[tuple[int, float, float], ...]:
         """Mean and sd of each unknown of the stop, 0 where it is not fitted."""
-        thrust = ((THRUST, *_THRUST), (THRUST_FAST, *_THRUST_FAST)) if self.shaft_s > 0.0 else ()
+        part = _UNSEEN if self.stop_sd_s >= ONSET_SD_S else 1.0
+        thrust = tuple(
+            (unknown, mean, part * sd)
+            for unknown, (mean, sd) in ((THRUST, _THRUST), (THRUST_FAST, _THRUST_FAST))
+            if self.shaft_s > 0.0
+        )
         doubt_s = self.stop_sd_s + _SHAPE * self.shaft_s if self.stop_sd_s > 0.0 else 0.0
         return (*thrust, (ONSET, 0.0, doubt_s))
 

@@ -175,7 +175,7 @@ def say(name: str, shaft: Series, window: Window, since_ns: int) -> str:
     low, high = (float(value) for value in np.quantile(rate, (0.05, 0.95)))
     if high < _STANDS_RAD_S:
         return f'{name} stands in the window: the thrust had ended before it'
-    turns = f'{name} turns on at {low:.3g} to {high:.3g} rad/s'
+    turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s'
     for speed in (window.speed_through_water, window.speed_over_ground):
         later = speed.value[speed.time_ns >= since_ns]
         if len(later) >= _FEW:
