@@ -7,11 +7,16 @@ from dataclasses import replace
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import motion_fit
+from shipdrag_ros.estimation.agreement import widened
 from shipdrag_ros.estimation.choice import estimate
+from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
+
+_RUN_DOWNS = 4.0  # of the shaft, after which no thrust is left
+_LATE_S = 10.0  # an onset found from the speed is hardly later
 
 
 def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
@@ -27,7 +32,8 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
     parameters
         `estimator`: `auto` stands for the fit of the equation of motion here;
         any other is used as during the coastdown. Where the fit fails, the
-        estimate during the coastdown is kept, and a note says why.
+        estimate during the coastdown is kept, and a note says why. Where both
+        disagree, the band is widened.
 
     Raises
     ------
@@ -37,8 +43,22 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
     if parameters.estimator != 'auto':
         return estimate(window, ship, parameters)
     try:
-        return motion_fit.estimate(window, ship, parameters)
+        found = motion_fit.estimate(window, ship, parameters)
     except EstimationError as error:
         found = estimate(window, ship, parameters)
         note = f'not fitted as a motion, so as during the coastdown: {error}'
         return replace(found, notes=(*found.notes, note))
+    try:
+        other = estimate(window, ship, parameters)
+    except EstimationError as error:
+        note = f'not compared with the estimate during the coastdown, which failed: {error}'
+        return replace(found, notes=(*found.notes, note))
+    return widened(found, other, _without_thrust_m_s(found, window, ship))
+
+
+def _without_thrust_m_s(found: Estimate, window: Window, ship: Ship) -> float:
+    """Return the speed at which the thrust has surely ended, as far as the stop is known."""
+    run_down = RunDown.of(window, ship)
+    after_s = _RUN_DOWNS * run_down.shaft_s + min(run_down.stop_sd_s, _LATE_S)
+    curve = found.curve
+    return float(curve.speed_m_s[-1] - after_s * curve.resistance_m_s2[-1])

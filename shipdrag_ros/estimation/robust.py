@@ -27,12 +27,16 @@ def _rounding(value: Float64) -> float:
     return 1e-14 * float(max(1e-6, np.abs(value).max()))
 
 
-@compiled('f8(f8[::1])')
-def _spread(value: Float64) -> float:
-    """Standard deviation of noise on a smooth curve, from second differences."""
+@compiled('f8(f8[::1], f8[::1])')
+def _spread(value: Float64, root: Float64) -> float:
+    """Noise on a smooth curve, from second differences, where the root of the weight is 1."""
     if len(value) < 3:
         return 1.0
-    second = value[2:] - 2.0 * value[1:-1] + value[:-2]
+    second = np.empty(len(value) - 2)
+    for i in range(len(second)):
+        of_three = 1.0 / root[i] ** 2 + 4.0 / root[i + 1] ** 2 + 1.0 / root[i + 2] ** 2
+        second[i] = value[i + 2] - 2.0 * value[i + 1] + value[i]
+        second[i] *= math.sqrt(6.0 / of_three)
     spread = np.median(np.abs(second)) / _OF_MEDIAN
     if spread == 0.0:  # readings repeat, being rounded
         spread = math.sqrt(np.mean(second * second))
@@ -51,7 +55,7 @@ def despike(value: Float64) -> Float64:
     """
     Replace spikes by the median of five, to start from.
     """
-    limit = _SPIKE * _spread(value)
+    limit = _SPIKE * _spread(value, np.ones(len(value)))
     clean = value.copy()
     for i in range(2, len(value) - 2):
         middle = _median_of_five(value[i - 2], value[i - 1], value[i], value[i + 1], value[i + 2])
@@ -98,13 +102,14 @@ def _inflation(residual: Float64, weight: Float64) -> float:
 
 
 @compiled(
-    'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], f8[::1], '
-    'f8[::1])',
+    'UniTuple(f8[::1], 4)(f8[:, ::1], f8[::1], f8[::1], f8[::1], i8[::1], f8[::1], i8[::1], '
+    'f8[::1], f8[::1])',
 )
 def robust_fit(
     rows: Float64,
     value: Float64,
     clean: Float64,
+    stated: Float64,
     count: Int64,
     known_sd: Float64,
     columns: Int64,
@@ -120,6 +125,8 @@ def robust_fit(
         Columns of the model at the samples, kind after kind.
     value, clean : (n,)
         Measured, and without spikes.
+    stated : (n,)
+        Weight by the variances that samples state.
     count : (kinds,) int64
         Samples of each kind.
     known_sd : (kinds,)
@@ -157,9 +164,10 @@ def robust_fit(
             last = first + count[kind]
             if last == first:
                 continue
-            part = residual[first:last]
+            root = np.sqrt(stated[first:last])
+            part = residual[first:last] * root
             if turn == 0:
-                found = _spread(value[first:last])
+                found = _spread(value[first:last], root)
             else:
                 found = max(_robust_sd(part), _rounding(value[first:last]))
                 found *= math.sqrt(n / max(n - free, 1.0))
@@ -168,7 +176,7 @@ def robust_fit(
                 scale = known_sd[kind]
             inside = psi = total = 0.0
             for i in range(first, last):
-                size = abs(residual[i]) / scale
+                size = abs(part[i - first]) / scale
                 w = _weight(size)
                 weight[i] = w
                 total += w
@@ -186,7 +194,7 @@ def robust_fit(
             if turn > 0:
                 factor /= _inflation(part, weight[first:last])
             for i in range(first, last):
-                weight[i] *= factor
+                weight[i] *= factor * stated[i]
             noise_sd[kind], used_sd[kind] = found, scale
             first = last
         if turn < _PASSES:

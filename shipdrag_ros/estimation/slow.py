@@ -81,7 +81,7 @@ class Slow:
         rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
         about = learn(
             rows,
-            record.variance(rows, record.steady_count[keep]),
+            record.variance(rows, record.steady_weight[keep]),
             damping_1_s=2.0 / coast_s,
             inertia=1.0 + float(ship.n_r(speed_m_s)),
         )
@@ -113,7 +113,7 @@ class Slow:
         variance = np.empty(len(weight))
         for kind in inputs.used:
             part = inputs.part(kind)
-            best = weight[part].max()
+            best = (weight[part] / inputs.stated[part]).max()
             white = self.white_sd.get(KINDS[kind], 1.0 / math.sqrt(best))
             variance[part] = white**2 / np.maximum(weight[part] / best, _LOST)
         order = np.argsort(inputs.time_s, kind='stable')
@@ -130,7 +130,7 @@ class Slow:
 def _wanders(speed: Series) -> bool:
     """Say whether the slowest waves in means exceed what the noise of samples explains."""
     time_s = (speed.time_ns - speed.time_ns[0]) * 1e-9
-    _, mean, count = condense(time_s, speed.value)
+    _, mean, count = condense(time_s, speed.value, np.ones(len(time_s)), 0.0)
     away = (mean - np.average(mean, weights=count)) * np.sqrt(count)
     bins = len(away)
     number = np.arange(1, min(_WAVES, bins - 1) + 1)

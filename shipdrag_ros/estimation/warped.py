@@ -186,6 +186,7 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
         rows,
         inputs.value,
         inputs.clean,
+        inputs.stated,
         inputs.count,
         inputs.known_sd,
         columns,

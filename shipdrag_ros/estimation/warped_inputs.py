@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.motion_fit.stated import stated_weight
 from shipdrag_ros.estimation.projection import project
 from shipdrag_ros.estimation.robust import despike
 from shipdrag_ros.estimation.warped_model import OVER_GROUND, POSITION, THROUGH_WATER
@@ -35,6 +36,8 @@ class Inputs:
         From the first stamp.
     value, clean : (n,)
         Speed [m/s] or distance along the track [m], and without spikes.
+    stated : (n,)
+        Weight by the variances that samples state, 1 for the typical one.
     count : (3,) int64
         Samples of each kind.
     known_sd : (3,)
@@ -48,6 +51,7 @@ class Inputs:
     time_s: Float64
     value: Float64
     clean: Float64
+    stated: Float64
     count: Int64
     known_sd: Float64
     notes: tuple[str, ...]
@@ -114,12 +118,20 @@ def gather(window: Window, parameters: Parameters) -> Inputs:
     values = [_along(one) if kind == POSITION else one.value for kind, one in used.items()]
     scale = TimeScale.of(*(one.time_ns for one in used.values()))
     speed_sd = parameters.speed_sigma_m_s
+    time_s: list[Float64] = [
+        np.asarray((one.time_ns - scale.first_ns) * 1e-9, np.float64) for one in used.values()
+    ]
+    stated = [
+        stated_weight(when, value, one.variance)
+        for when, value, one in zip(time_s, values, used.values())
+    ]
     return Inputs(
         scale,
         tuple(used[k].time_ns if k in used else np.empty(0, np.int64) for k in range(len(KINDS))),
-        np.concatenate([(one.time_ns - scale.first_ns) * 1e-9 for one in used.values()]),
+        np.concatenate(time_s),
         np.concatenate(values),
         np.concatenate([despike(value) for value in values]),
+        np.concatenate(stated),
         np.array([len(used[k]) if k in used else 0 for k in range(len(KINDS))]),
         np.array([parameters.position_sigma_m, speed_sd, speed_sd]),
         tuple(notes),

@@ -13,6 +13,7 @@ from shipdrag_ros.estimation.motion_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.slow import Slow
 from shipdrag_ros.estimation.warped_inputs import gather
+from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -98,7 +99,7 @@ def test_a_short_record_teaches_nothing(coast: Any, ship: Ship) -> None:
     late_ns = START_NS - 200 * 10**9
     log = window.before.speed_through_water
     late = log.time_ns >= late_ns
-    short = replace(log, time_ns=log.time_ns[late], value=log.value[late])
+    short = Series(log.time_ns[late], log.value[late], log.variance[late])
     before = replace(window.before, start_ns=late_ns, speed_through_water=short)
     found = warped.estimate(replace(window, before=before), ship, Parameters())
     assert not any('slow disturbances' in note for note in found.notes)

@@ -16,8 +16,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.motion_fit.first_fits import fit_robustly
 from shipdrag_ros.estimation.motion_fit.guess import Guess
-from shipdrag_ros.estimation.motion_fit.problem import Problem, fit_robustly
+from shipdrag_ros.estimation.motion_fit.problem import Problem
 from shipdrag_ros.estimation.motion_fit.record import Record
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.parameters import Parameters

@@ -2,10 +2,14 @@
 """
 Compiled integration of the equation of motion, with its sensitivities.
 
-    (1 + n_r(v)) dv/dt = -r(v) + a r(v0) exp(-t / T),    r(v) = sum of c_k (v / v_ref)^k
+    (1 + n_r(v)) dv/dt = -r(v) + r(v0) (a exp(-t / T) + b exp(-3 t / T)),
+    r(v) = sum of c_k (v / v_ref)^k
 
-The last term is the thrust of an engine that runs down, a = 1; with a = 0 it has
-ended at once. Time t counts from the engine stop; before it the speed is v0.
+The last term is the thrust left while the shaft runs down with the time constant T. How it
+follows the shaft is not known: a and b are fitted. As a power 1, 2, 3 of the shaft speed:
+(a, b) = (1, 0), about (0.25, 0.75), (0, 1); gone at once: (0, 0); what an open-water line
+K_T = k0 - k1 J leaves, negative before the shaft stands: about (-0.7, 1.7). Time t counts from
+the engine stop; before it the speed is v0.
 """
 
 from __future__ import annotations
@@ -19,10 +23,10 @@ from shipdrag_ros.estimation.motion_fit.law import Law, shapes
 from shipdrag_ros.samples import Float64, Int64
 
 # Columns of the unknowns behind the k coefficients.
-V0, RUN_DOWN, ONSET, X0, CURRENT, LOG_SCALE = range(6)
-EXTRAS = 6
-_SHORTEST_S = 0.1  # run-down: a shorter one ends at once
-_OF_MOTION = 2  # of these, the ones that change the motion by themselves
+V0, THRUST, THRUST_FAST, ONSET, X0, CURRENT, LOG_SCALE = range(7)
+EXTRAS = 7
+_FAST = 3.0  # of the second part of the thrust: the power of the shaft that falls fastest
+_OF_MOTION = 3  # of these, the ones that change the motion by themselves
 
 LOG, OVER_GROUND, POSITION = range(3)  # kinds of rows
 KIND_COUNT = 3
@@ -78,13 +82,13 @@ def _rates(
         r += unknowns[j] * work[0, j]
         slope += unknowns[j] * work[1, j]
     slope /= law.v_ref_m_s
-    thrust = 0.0
-    if law.thrust != 0.0:
-        run_down = max(unknowns[k + RUN_DOWN], _SHORTEST_S)
-        thrust = law.thrust * np.exp(-t / run_down)
-        rate[1 + k + RUN_DOWN] = thrust * at_start[k] * t / run_down**2 / inertia
-    else:
-        rate[1 + k + RUN_DOWN] = 0.0
+    thrust, slow, fast = 0.0, 0.0, 0.0
+    if law.run_down_s > 0.0:
+        slow = np.exp(-t / law.run_down_s)
+        fast = np.exp(-_FAST * t / law.run_down_s)
+        thrust = unknowns[k + THRUST] * slow + unknowns[k + THRUST_FAST] * fast
+    rate[1 + k + THRUST] = at_start[k] * slow / inertia
+    rate[1 + k + THRUST_FAST] = at_start[k] * fast / inertia
     acceleration = (thrust * at_start[k] - r) / inertia
     by_v = (-slope - n_r_slope * acceleration) / inertia
     rate[0] = acceleration
@@ -104,8 +108,8 @@ def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Fl
 
     Returns
     -------
-    state, rate : (m, 2 (k + 3))
-        (v, dv/du, x, dx/du), u the k coefficients, v0 and T; x is 0 at 0.
+    state, rate : (m, 2 (k + 4))
+        (v, dv/du, x, dx/du), u the k coefficients, v0, a and b; x is 0 at 0.
 
     Notes
     -----

@@ -8,6 +8,9 @@ random numbers.
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
@@ -20,15 +23,16 @@ from shipdrag_ros.estimation.motion_fit.coast import (
     Rows,
     predict,
 )
-from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
-from shipdrag_ros.estimation.motion_fit.guess import Guess
-from shipdrag_ros.estimation.motion_fit.learning import learn
-from shipdrag_ros.estimation.motion_fit.problem import (
-    Problem,
+from shipdrag_ros.estimation.motion_fit.colour import Colour
+from shipdrag_ros.estimation.motion_fit.first_fits import (
     fit_robustly,
     weigh_disturbed,
     with_log_scale,
 )
+from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
+from shipdrag_ros.estimation.motion_fit.guess import Guess
+from shipdrag_ros.estimation.motion_fit.learning import ENGINE_HOLD, learn
+from shipdrag_ros.estimation.motion_fit.problem import Problem
 from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
 from shipdrag_ros.estimation.motion_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.motion_fit.steady import LEAST_S
@@ -41,7 +45,7 @@ from shipdrag_ros.ship import Ship
 
 NAME = 'motion'
 _CURVE_POINTS = 257
-_QUIET_S = 5.0  # an onset known worse than this: the last seconds before it teach nothing
+_QUIET_S = 5.0  # before the stop the last seconds teach nothing; more where it is known worse
 
 
 def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
@@ -66,7 +70,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     run_down = RunDown.of(window, ship)
     record = Record.of(window, run_down, parameters)
     guess = Guess.of(record.coast, float(ship.n_r(1.0)))
-    notes = [*window.notes, *ship.warnings, f'{run_down.source}']
+    notes = [*window.notes, *ship.warnings, *run_down.notes]
     # first the coastdown alone, as if nothing but sensor noise disturbed
     alone = record.without_steady()
     first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess))
@@ -80,7 +84,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         record = alone
         notes.append(
             'there is no steady record before the onset to learn slow disturbances from: the '
-            'band holds the noise of the sensors alone'
+            'band holds what scatters in the window alone'
         )
     full = problem
     first, problem = with_log_scale(problem.condensed(first), first)
@@ -90,30 +94,51 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
             f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
             'deviations), taken out'
         )
-    return _result(problem.average(first), full, record, window, ship, parameters, tuple(notes))
+    found = problem.average(first)
+    colours = full.colours(found)
+    most = max(colour.inflation for colour in colours.values())
+    if most > 1.0:
+        # the figure stays: whether the sensor errs slowly or the ship is pushed is not known
+        found = replace(found, covariance=most * found.covariance)
+        notes += _colour_notes(colours)
+    return _result(found, full, record, window, ship, parameters, tuple(notes))
 
 
 def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> Disturbance:
     """Learn the disturbances of the steady record, damped as a plain fit has it."""
     damping, inertia = plain.damping(plain.unknowns[plain.law.size + V0 :][:1])
-    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else 0.0
+    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else -_QUIET_S
     keep = record.steady.time_s < quiet
     steady = record.steady
     rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
-    variance = record.variance(rows, record.steady_count[keep])
+    variance = record.variance(rows, record.steady_weight[keep])
     return learn(rows, variance, damping_1_s=float(damping[0]), inertia=float(inertia[0]))
 
 
 def _disturbance_note(about: Disturbance, steady_s: float) -> str:
     found = []
     if about.gust_m_s2:
-        found.append(f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s')
+        found.append(
+            f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s (the engine is '
+            f'taken to damp the speed {ENGINE_HOLD:g} times as the hull does; 1 to 2 is usual)'
+        )
     if about.water_m_s:
         found.append(f'the log by {about.water_m_s:.2g} m/s over {about.water_s:.0f} s')
     return (
         f'disturbances learnt from {steady_s:.0f} s of steady record: '
         f'{" and ".join(found) or "none but the noise of the sensors"}'
     )
+
+
+def _colour_notes(colours: dict[int, Colour]) -> list[str]:
+    names = {kind: name for name, kind in KINDS.items()}
+    return [
+        f'what the fit leaves of {names[kind]} is not independent from sample to sample: its '
+        f'means over {colour.block} scatter {math.sqrt(colour.inflation):.2g} times as much as '
+        'independent ones; the band is widened for that'
+        for kind, colour in colours.items()
+        if colour.inflation > 1.0
+    ]
 
 
 def _result(
@@ -152,7 +177,8 @@ def _result(
     for name in record.white_sd:
         chosen = problem.rows.kind == KINDS[name]
         chosen[: len(record.steady.time_s)] = False
-        noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen])))
+        worth = np.concatenate([record.steady_weight, record.coast_weight])[chosen]
+        noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen] * worth)))
     current = found.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
     stamps = np.concatenate(list(record.stamps.values()))
     return Estimate(

@@ -21,8 +21,8 @@ class Law(NamedTuple):
         Of the speed, ascending.
     v_ref_m_s
         Speed that the powers are relative to.
-    thrust
-        The a of `coast`: 1 or 0.
+    run_down_s
+        Time constant of the shaft, the T of `coast`; 0: the thrust ended at once.
     n_r : (j,)
         Polynomial of n_r in v, lowest power first.
     humps
@@ -34,7 +34,7 @@ class Law(NamedTuple):
 
     powers: Int64
     v_ref_m_s: float
-    thrust: float
+    run_down_s: float
     n_r: Float64
     humps: int = 0
     first_hump: float = 0.0
@@ -107,7 +107,7 @@ def spread(shape: Float64, unknowns: Float64, covariance: Float64) -> tuple[Floa
     ----------
     shape : (m, k)
         What the coefficients are multiplied by.
-    unknowns, covariance : (k + 6,), (k + 6, k + 6)
+    unknowns, covariance : (k + 7,), (k + 7, k + 7)
     """
     m, k = shape.shape
     value, sd = np.empty(m), np.empty(m)

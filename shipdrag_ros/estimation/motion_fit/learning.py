@@ -21,6 +21,9 @@ from shipdrag_ros.samples import Float64, Int64
 
 _TYPICAL_S = 240.0  # correlation time; known from experience within a factor of e
 _SHORTEST_S, _LONGEST_S = 15.0, 3000.0
+# At steady speed an engine that holds torque, power or revs gives more thrust to a ship that is
+# slowed: the speed is damped 1 to 2 times as much as the hull's resistance says.
+ENGINE_HOLD = 1.4
 _OFFSETS = (-1.0, -0.25, 0.5, 1.25)  # of the logarithms, in averaging
 _LARGEST = 12.0  # logarithm
 _CLOSE = 0.05  # of the logarithms and of the criterion, in searching
@@ -64,16 +67,18 @@ def learn(rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float) 
     variance : (n,)
         Of their white noise.
     damping_1_s, inertia
-        dr/dv over 1 + n_r [1/s] and 1 + n_r at the steady speed.
+        dr/dv over 1 + n_r [1/s] and 1 + n_r at the steady speed, of the hull alone.
 
     Notes
     -----
+    The hull's damping is taken `ENGINE_HOLD` times, the middle of what engines do.
     The mean speed, the first position and the current are profiled out
     (restricted likelihood). None, a gust force, the water's speed, or both: by
     Akaike's criterion. The correlation times have a broad log-normal prior,
     without which a short record lets them run away.
     """
     n = len(rows.time_s)
+    damping_1_s = ENGINE_HOLD * damping_1_s
     position, log = rows.kind == POSITION, rows.kind == LOG
     columns = [rows.value, np.where(position, rows.time_s, 1.0)]
     if position.any():

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.motion_fit.averaging import average
 from shipdrag_ros.estimation.motion_fit.coast import (
     CURRENT,
@@ -17,21 +16,23 @@ from shipdrag_ros.estimation.motion_fit.coast import (
     LOG_SCALE,
     ONSET,
     POSITION,
-    RUN_DOWN,
+    THRUST,
+    THRUST_FAST,
     V0,
     X0,
     Rows,
     predict,
 )
+from shipdrag_ros.estimation.motion_fit.colour import Colour, colour_of
 from shipdrag_ros.estimation.motion_fit.condensing import means
 from shipdrag_ros.estimation.motion_fit.families import FIRST, POWERS, Humps
 from shipdrag_ros.estimation.motion_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.motion_fit.guess import Guess
 from shipdrag_ros.estimation.motion_fit.law import Law
+from shipdrag_ros.estimation.motion_fit.learning import ENGINE_HOLD
 from shipdrag_ros.estimation.motion_fit.record import Record
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.motion_fit.solve import fit
-from shipdrag_ros.estimation.motion_fit.weighing import drop_gross, weigh
 from shipdrag_ros.estimation.motion_fit.whitening import (
     CALM,
     Disturbance,
@@ -42,10 +43,8 @@ from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
 _STEPS = 72  # of the integration, longer as the ship slows down
-_ROUNDS, _ROUNDS_DISTURBED = 3, 2  # of the weights
 _ITERATIONS = 30
 _SCALE_SD = 0.02  # of a log's scale, before the fit
-_SCALE_SIGNIFICANT = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -93,13 +92,16 @@ class Problem:
         steady, coast = record.steady, record.coast
         rows = Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast)))
         variance = np.concatenate(
-            [record.variance(steady, record.steady_count), record.variance(coast)]
+            [
+                record.variance(steady, record.steady_weight),
+                record.variance(coast, record.coast_weight),
+            ]
         )
         extras = [V0]
-        if run_down.run_down_sd_s > 0.0:
-            extras.append(RUN_DOWN)
-        # without thrust and steady record a later stop is but a higher speed
-        if run_down.stop_sd_s > 0.0 and (run_down.run_down_s > 0.0 or len(steady.time_s)):
+        if run_down.shaft_s > 0.0:
+            extras += [THRUST, THRUST_FAST]
+        # without a steady record a later stop is but a higher speed, or more thrust
+        if run_down.stop_sd_s > 0.0 and len(steady.time_s):
             extras.append(ONSET)
         kinds = set(coast.kind.tolist())
         if POSITION in kinds:
@@ -110,7 +112,6 @@ class Problem:
         typical = max(float(coast.time_s[-1]), 1e-3) / 25.0
         grid = typical * np.expm1(np.linspace(0.0, math.log1p(end / typical), _STEPS + 1))
         ones = np.ones(len(variance))
-        thrust = 1.0 if run_down.run_down_s > 0.0 else 0.0
         v_ref = guess.speed_m_s
         return cls(
             rows,
@@ -119,7 +120,7 @@ class Problem:
             Noise(variance, CALM, ones, ones),
             run_down,
             guess,
-            Law(np.array(FIRST, np.int64), v_ref, thrust, ship.n_r_polynomial()),
+            Law(np.array(FIRST, np.int64), v_ref, run_down.shaft_s, ship.n_r_polynomial()),
             Humps.between(guess.lowest, float(ship.froude(v_ref))),
             tuple(extras),
         )
@@ -132,6 +133,7 @@ class Problem:
             plain.law, plain.unknowns, self.grid_s, self.rows, np.zeros(0, np.int64)
         )
         damping, inertia = plain.damping(speed)
+        damping[: self.steady] *= ENGINE_HOLD
         return replace(self, noise=Noise(self.noise.variance, about, damping, inertia))
 
     def weighted(self, variance: Float64) -> Problem:
@@ -148,6 +150,15 @@ class Problem:
         table, _ = predict(found.law, found.unknowns, self.grid_s, self.rows, none)
         result: Float64 = table[0]
         return result
+
+    def colours(self, found: FittedMotion) -> dict[int, Colour]:
+        """
+        Return by how much what a fit leaves of the coastdown is correlated, for each input.
+        """
+        white = self.residual(found).reshape(1, -1)
+        whiten(self.rows, white, self.noise)
+        kind, left = self.rows.kind[self.steady :], white[0, self.steady :]
+        return {int(of): colour_of(left[kind == of]) for of in np.unique(kind)}
 
     def condensed(self, near: FittedMotion) -> Problem:
         """
@@ -189,13 +200,17 @@ class Problem:
         unknowns = np.zeros(size + EXTRAS)
         unknowns[FIRST.index(2)] = self._unit_m_s2
         unknowns[size + V0] = self.guess.speed_m_s
-        unknowns[size + RUN_DOWN] = max(self.run_down.run_down_s, 1e-3)
+        for extra, mean, _ in self.run_down.priors:
+            unknowns[size + extra] = mean
         unknowns[size + X0] = self.guess.first_m
         return unknowns
 
     def fit_first(self, start: Float64) -> tuple[FittedMotion | None, Float64]:
         """
         Fit the first family, None where that fails; return whitened residuals too.
+
+        How the thrust ended is held as it is most likely: without the priors of the whole law
+        it cannot be told from the highest powers.
         """
         converged, _, unknowns, covariance, white = fit(
             self.first,
@@ -203,7 +218,7 @@ class Problem:
             self.grid_s,
             self.rows,
             self.noise,
-            self._active(self.first),
+            self._active(self.first, held=(THRUST, THRUST_FAST)),
             self._prior(self.first),
             _ITERATIONS,
         )
@@ -239,87 +254,15 @@ class Problem:
     def _unit_m_s2(self) -> float:
         return self.guess.quadratic_1_m * self.guess.speed_m_s**2
 
-    def _active(self, law: Law) -> Int64:
+    def _active(self, law: Law, held: tuple[int, ...] = ()) -> Int64:
         k = law.size
-        return np.array([*range(k), *(k + extra for extra in self.extras)], np.int64)
+        extras = [k + extra for extra in self.extras if extra not in held]
+        return np.array([*range(k), *extras], np.int64)
 
     def _prior(self, law: Law) -> Float64:
-        """Return mean and precision of what is known before, (2, k + 6)."""
+        """Return mean and precision of what is known before, (2, k + 7)."""
         k = law.size
         prior = np.zeros((2, k + EXTRAS))
-        for extra, mean, sd in (
-            (RUN_DOWN, self.run_down.run_down_s, self.run_down.run_down_sd_s),
-            (ONSET, 0.0, self.run_down.stop_sd_s),
-            (LOG_SCALE, 0.0, _SCALE_SD),
-        ):
+        for extra, mean, sd in (*self.run_down.priors, (LOG_SCALE, 0.0, _SCALE_SD)):
             prior[:, k + extra] = mean, 1.0 / sd**2 if sd > 0.0 else 0.0
         return prior
-
-
-def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
-    """
-    Fit the first family; weigh the rows on the way.
-
-    Returns
-    -------
-    first, problem
-        With the variance of each input as it scatters, larger for outliers
-        (Huber's weights).
-
-    Raises
-    ------
-    EstimationError
-        If the fit does not converge.
-    """
-    base = problem.noise.variance.copy()
-    weight = np.ones(len(base))
-    start = problem.start()
-    unknown = problem.first.size + len(problem.extras)
-    crude = FittedMotion(problem.first, start, np.zeros((len(start), len(start))))
-    drop_gross(problem.residual(crude), problem.rows.kind, weight)
-    for _ in range(_ROUNDS):
-        problem = problem.weighted(base / weight)
-        first, white = problem.fit_first(start)
-        if first is None:
-            raise EstimationError(
-                'the equation of motion could not be fitted to the window: give one coastdown, '
-                'with the engine stopped; leave out an input that moves otherwise, as a path '
-                'does that drifts sideways; or set `estimator` to warped or one of s1_speed, '
-                's1_position, s1_joint'
-            )
-        start = first.unknowns
-        weigh(white, problem.rows.kind, problem.steady, unknown, base, weight)
-    assert first is not None
-    return first, problem.weighted(base / weight)
-
-
-def weigh_disturbed(problem: Problem, near: FittedMotion) -> Problem:
-    """
-    Weigh the rows by what a fit leaves that slow disturbances do not explain.
-    """
-    base = problem.noise.variance.copy()
-    weight = np.ones(len(base))
-    residual = problem.residual(near)
-    unknown = problem.first.size + len(problem.extras)
-    for _ in range(_ROUNDS_DISTURBED):
-        problem = problem.weighted(base / weight)
-        white = residual.reshape(1, -1).copy()
-        whiten(problem.rows, white, problem.noise)
-        weigh(white[0], problem.rows.kind, problem.steady, unknown, base, weight)
-    return problem.weighted(base / weight)
-
-
-def with_log_scale(problem: Problem, first: FittedMotion) -> tuple[FittedMotion, Problem]:
-    """
-    Take the scale of the log as unknown where the data show that it is not 1.
-    """
-    if CURRENT not in problem.extras:
-        return first, problem
-    scaled = replace(problem, extras=(*problem.extras, LOG_SCALE))
-    found, _ = scaled.fit_first(first.unknowns)
-    if found is None:
-        return first, problem
-    scale, sd = found.unknown(LOG_SCALE)
-    if abs(scale) <= _SCALE_SIGNIFICANT * sd:
-        return first, problem
-    return found, scaled

@@ -11,7 +11,12 @@ import numpy as np
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
-from shipdrag_ros.estimation.motion_fit.steady import condense, steady_since, white_sd
+from shipdrag_ros.estimation.motion_fit.stated import stated_weight
+from shipdrag_ros.estimation.motion_fit.steady import (
+    condense,
+    steady_since,
+    weighted_white_sd,
+)
 from shipdrag_ros.estimation.track import along_track
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
@@ -21,6 +26,7 @@ from shipdrag_ros.samples import Float64, Int64
 KINDS = {'speed_through_water': LOG, 'speed_over_ground': OVER_GROUND, 'position': POSITION}
 LEAST_STAMPS = 12  # of an input: fewer do not tell its noise
 _TRACK_ORDER = 8  # of the polynomials of a track that bends
+_FINE_S = 60.0  # of the steady record, its end, in which the stop may be
 
 
 @dataclass(frozen=True)
@@ -32,17 +38,18 @@ class Record:
     ----------
     steady, coast
         Times count from the stop as far as known.
-    steady_count : (m,)
-        How many samples each steady row is the mean of.
+    steady_weight, coast_weight : (m,), (n,)
+        How many samples of typical stated variance each row is worth.
     white_sd
-        Standard deviation of the white noise of each input used.
+        Standard deviation of the white noise of each input used, of such a sample.
     stamps
         Stamps of each input used, in the window.
     """
 
     steady: Rows
-    steady_count: Int64
+    steady_weight: Float64
     coast: Rows
+    coast_weight: Float64
     white_sd: dict[str, float]
     stamps: dict[str, Int64]
 
@@ -78,36 +85,46 @@ class Record:
             'position': parameters.position_sigma_m,
         }
         since = -np.inf if window.before is None else _steady_since(window, inputs, zero_ns)
-        steady: list[tuple[Float64, int, Float64, Int64]] = []
-        coast: list[tuple[Float64, int, Float64, Int64]] = []
+        steady: list[tuple[Float64, int, Float64, Float64]] = []
+        coast: list[tuple[Float64, int, Float64, Float64]] = []
         white: dict[str, float] = {}
         for name, series in inputs.items():
             time_s = _seconds(series.time_ns, zero_ns)
             before_s: Float64 = np.empty(0)
-            before = series.value[:0]
+            before, variance = series.value[:0], series.variance[:0]
             if window.before is not None:
                 earlier: Series = getattr(window.before, name)
                 before_s = _seconds(earlier.time_ns, zero_ns)
                 keep = before_s >= since
                 before_s, before = before_s[keep], earlier.value[keep]
+                variance = earlier.variance[keep]
             value = series.value
             if name == 'position':
                 both = _distance(
                     np.concatenate([before_s, time_s]), np.concatenate([before, value])
                 )
                 before, value = both[: len(before_s)], both[len(before_s) :]
-            white[name] = known[name] or max(
-                white_sd(np.concatenate([before, value])), 1e-6 * float(np.ptp(value)), 1e-9
+            weight = stated_weight(
+                np.concatenate([before_s, time_s]),
+                np.concatenate([before, value]),
+                np.concatenate([variance, series.variance]),
             )
-            coast.append((time_s, KINDS[name], value, np.ones(len(time_s), np.int64)))
+            white[name] = known[name] or max(
+                weighted_white_sd(np.concatenate([before, value]), weight),
+                1e-6 * float(np.ptp(value)),
+                1e-9,
+            )
+            coast.append((time_s, KINDS[name], value, weight[len(before_s) :]))
             if len(before_s):
-                mean_s, mean, count = condense(before_s, before)
-                steady.append((mean_s, KINDS[name], mean, count))
-        steady_rows, steady_count = _merge(steady)
+                means = condense(before_s, before, weight[: len(before_s)], _FINE_S)
+                steady.append((means[0], KINDS[name], *means[1:]))
+        steady_rows, steady_weight = _merge(steady)
+        coast_rows, coast_weight = _merge(coast)
         return cls(
             steady_rows,
-            steady_count,
-            _merge(coast)[0],
+            steady_weight,
+            coast_rows,
+            coast_weight,
             white,
             {name: series.time_ns for name, series in inputs.items()},
         )
@@ -121,17 +138,17 @@ class Record:
         """
         Return the coastdown alone.
         """
-        rows, count = _merge([])
-        return replace(self, steady=rows, steady_count=count)
+        rows, weight = _merge([])
+        return replace(self, steady=rows, steady_weight=weight)
 
-    def variance(self, rows: Rows, count: Int64 | int = 1) -> Float64:
+    def variance(self, rows: Rows, weight: Float64) -> Float64:
         """
-        Return the variance of the white noise of rows.
+        Return the variance of the white noise of rows that are worth so many samples.
         """
         of_kind = np.zeros(len(KINDS))
         for name, sd in self.white_sd.items():
             of_kind[KINDS[name]] = sd**2
-        result: Float64 = of_kind[rows.kind] / count
+        result: Float64 = of_kind[rows.kind] / weight
         return result
 
 
@@ -139,16 +156,16 @@ def _seconds(time_ns: Int64, zero_ns: int) -> Float64:
     return np.asarray((time_ns - zero_ns) * 1e-9, np.float64)
 
 
-def _merge(parts: list[tuple[Float64, int, Float64, Int64]]) -> tuple[Rows, Int64]:
+def _merge(parts: list[tuple[Float64, int, Float64, Float64]]) -> tuple[Rows, Float64]:
     """Sort rows of several inputs by time; ties keep the order of the inputs."""
     if not parts:
-        return Rows(np.empty(0), np.empty(0, np.int64), np.empty(0)), np.empty(0, np.int64)
+        return Rows(np.empty(0), np.empty(0, np.int64), np.empty(0)), np.empty(0)
     time_s = np.concatenate([part[0] for part in parts])
     kind = np.concatenate([np.full(len(part[0]), part[1], np.int64) for part in parts])
     value = np.concatenate([part[2] for part in parts])
-    count = np.concatenate([part[3] for part in parts])
+    weight = np.concatenate([part[3] for part in parts])
     order = np.argsort(time_s, kind='stable')
-    return Rows(time_s[order], kind[order], value[order]), count[order]
+    return Rows(time_s[order], kind[order], value[order]), weight[order]
 
 
 def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> float:

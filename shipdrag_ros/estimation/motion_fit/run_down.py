@@ -1,23 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The engine stop: when it was, and how fast the thrust ran down."""
+"""The engine stop: when it was, and what is known of the thrust after it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.estimation.motion_fit.coast import ONSET, THRUST, THRUST_FAST
+from shipdrag_ros.estimation.motion_fit.shaft_fall import Fall, find_fall, say
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import SHAFTS
 from shipdrag_ros.ship import Ship
 
-_BAND = (0.08, 0.92)  # of the fall of the shaft speed from which its decay is found
-_FALLEN = 0.8  # of the steady shaft speed: at more the engine was not stopped
-_EARLIEST_S = 300.0  # before the onset as found
-_SOON = (8.0, 16.0)  # after the fall, in half-lives
-_ROUNDS = 3
-_LEAST_SD = 0.01  # of the run-down, relative: no shaft falls exactly so
 ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the fit finds it
+# Of a and b in `coast`, before the fit: mean and sd. Their impulse, a + b / 3 run-downs of the
+# shaft, is 0.42 +- 0.81: below 0 (the propeller brakes before it stands), 0 (gone at once), 1/2
+# (the square of the shaft speed), 1 (as the shaft) are all within one standard deviation. With
+# half of it a shaft would make r worse than none where the law is one of the extremes.
+_THRUST = (0.25, 0.7)
+_THRUST_FAST = (0.5, 1.2)
+_UNSEEN = 0.6  # of these sds where the stop is not seen: its time takes up the impulse
+_SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
+_KEPT = 0.05  # of the steady shaft speed: less is not told
+_FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven
 
 
 @dataclass(frozen=True)
@@ -32,155 +39,125 @@ class RunDown:
     stop_sd_s
         Its standard deviation; 0: not fitted.
     run_down_s, run_down_sd_s
-        Time constant of the thrust and its standard deviation; 0: the thrust
-        ended at once.
-    source
-        For the notes.
+        Time constant of the thrust and its standard deviation, for a thrust
+        that falls as an exponential; 0: the thrust ended at once. The fit of
+        the motion takes `shaft_s` instead.
+    shaft_s
+        Time constant of the shaft; how the thrust follows it is fitted. 0: the
+        thrust ended at once.
+    notes
+        A sentence each.
     """
 
     stop_ns: int
     stop_sd_s: float
     run_down_s: float
     run_down_sd_s: float
-    source: str
+    shaft_s: float
+    notes: tuple[str, ...]
 
     @classmethod
     def of(cls, window: Window, ship: Ship) -> RunDown:
         """
-        Learn of the stop from the shaft, or else take what the ship file states.
+        Learn of the stop from shafts and pitches, or else take what the ship file states.
 
-        That the thrust runs down as the shaft does is what `propulsion` in the
-        ship file says. Without it the thrust may end at any time up to then.
+        Of several propellers the stop is that of the last; of shaft speed and
+        pitch of one, whichever falls first. Without `propulsion` in the ship
+        file the thrust may end at any time up to the run-down of the shaft.
         """
-        found = _from_shaft(window)
-        if found is not None and ship.propulsion is None and found.run_down_s > 0.0:
-            return found._loosened()
-        if found is not None:
-            return found
+        falls = list(_falls(window))
+        others = tuple(_others(window, {number for number, _, _ in falls}))
+        if falls:
+            _, seen, fall = max(falls, key=lambda one: one[2].stop_s)
+            others += tuple(_kept(window, falls))
+            return cls._of_fall(window, ship, seen, fall, others)
         if window.before is None:
-            return cls(
-                window.start_ns,
-                0.0,
-                0.0,
-                0.0,
-                'the thrust is taken to have ended before the window',
-            )
+            note = 'the thrust is taken to have ended before the window'
+            return cls(window.start_ns, 0.0, 0.0, 0.0, 0.0, others or (note,))
         if ship.propulsion is None:
-            return cls(window.start_ns, ONSET_SD_S, 0.0, 0.0, 'the thrust is taken to end at once')
+            note = 'the thrust is taken to end at once'
+            return cls(window.start_ns, ONSET_SD_S, 0.0, 0.0, 0.0, (note, *others))
+        run_down_s = ship.propulsion.run_down_s
+        note = (
+            f'the thrust is taken to end within about {run_down_s:.3g} s, by the ship file: how '
+            'it does is fitted'
+        )
         return cls(
             window.start_ns,
             ONSET_SD_S,
-            ship.propulsion.run_down_s,
+            run_down_s,
             ship.propulsion.sd,
-            'the run-down of the thrust is that of the ship file',
+            run_down_s,
+            (note, *others),
         )
 
-    def _loosened(self) -> RunDown:
-        half_s = 0.5 * self.run_down_s
-        return replace(
-            self,
-            run_down_s=half_s,
-            run_down_sd_s=half_s,
-            source='the thrust is taken to run down as fast as the shaft or faster',
+    @classmethod
+    def _of_fall(
+        cls, window: Window, ship: Ship, seen: str, fall: Fall, others: tuple[str, ...]
+    ) -> RunDown:
+        notes = [f'{seen} shows the time of the stop']
+        if fall.run_down_s > 0.0:
+            notes = [
+                f'{seen} shows the stop and runs down in {fall.run_down_s:.2g} s; the thrust may '
+                'be gone at once or follow it: that is fitted, and in the band'
+            ]
+        run_down_s, run_down_sd_s = fall.run_down_s, fall.run_down_sd_s
+        if ship.propulsion is None:
+            run_down_s = run_down_sd_s = 0.5 * run_down_s
+        return cls(
+            window.start_ns + round(fall.stop_s * 1e9),
+            fall.stop_sd_s,
+            run_down_s,
+            run_down_sd_s,
+            fall.run_down_s,
+            (*notes, *others),
         )
 
-
-def _kept_up(time_s: Float64, shaft: Float64, high: float, low: float) -> Float64:
-    """
-    Return the shaft speed that the water keeps up, as a line from the fall on.
-
-    A propeller that the water turns slows down with the ship; that is not the
-    run-down of the engine.
-
-    Parameters
-    ----------
-    time_s, shaft : (n,)
-    high, low
-        Before the stop, and a first guess.
-
-    Returns
-    -------
-    (n,)
-    """
-    kept = np.full(len(time_s), low)
-    near = time_s > -_EARLIEST_S
-    for _ in range(_ROUNDS):
-        half = np.flatnonzero(near & (shaft < 0.5 * (high + kept)))
-        if len(half) == 0:
-            break
-        full = np.flatnonzero(shaft[: half[0]] > 0.95 * high + 0.05 * kept[: half[0]])
-        if len(full) == 0:
-            break
-        after = (time_s - time_s[half[0]]) / (time_s[half[0]] - time_s[full[-1]])
-        soon = (after > _SOON[0]) & (after < _SOON[1])
-        if soon.sum() < 3:
-            break
-        slope, level = np.polyfit(after[soon], shaft[soon], 1)
-        top = _FALLEN * high
-        kept = np.clip(level + min(slope, 0.0) * np.clip(after, 0.0, _SOON[1]), 0.0, top)
-    return kept
-
-
-def _from_shaft(window: Window) -> RunDown | None:
-    """Fit an exponential fall to the shaft speed; None if it shows none."""
-    if window.before is None:
-        return None
-    time_ns: Int64 = np.concatenate([window.before.shaft.time_ns, window.shaft.time_ns])
-    shaft: Float64 = np.abs(np.concatenate([window.before.shaft.value, window.shaft.value]))
-    steady = window.before.shaft.value
-    if len(steady) < 3 or len(window.shaft) < 3:
-        return None
-    time_s = np.asarray((time_ns - window.start_ns) * 1e-9, np.float64)
-    high = float(np.median(np.abs(steady)))
-    low = float(np.median(np.abs(window.shaft.value)))
-    if not low < _FALLEN * high:
-        return None
-    kept = _kept_up(time_s, shaft, high, low)
-    noise = float(np.median(np.abs(np.abs(steady) - high))) * 1.4826 / (high - low)
-    fall = (shaft - kept) / (high - kept)
-    # the last stay at full speed ends where the fall begins
-    below = np.flatnonzero((fall < 0.5) & (time_s > -_EARLIEST_S))
-    if len(below) == 0 or below[0] == 0:
-        return None
-    middle = int(below[0])
-    inside = (fall > max(_BAND[0], 5.0 * noise)) & (fall < min(_BAND[1], 1.0 - 5.0 * noise))
-    first = last = middle
-    while first > 0 and inside[first - 1]:
-        first -= 1
-    while last < len(fall) and inside[last]:
-        last += 1
-    part = slice(first, last)
-    count = last - first
-    gap_s = float(time_s[middle] - time_s[middle - 1])
-    if count < 3:
-        # fallen between two samples
-        stop_s = 0.5 * float(time_s[middle] + time_s[middle - 1])
-        return RunDown(
-            window.start_ns + round(stop_s * 1e9),
-            gap_s / np.sqrt(12.0),
-            0.0,
-            0.0,
-            'the shaft shows the time of the stop',
+    @property
+    def priors(self) -> tuple[tuple[int, float, float], ...]:
+        """Mean and sd of each unknown of the stop, 0 where it is not fitted."""
+        part = _UNSEEN if self.stop_sd_s >= ONSET_SD_S else 1.0
+        thrust = tuple(
+            (unknown, mean, part * sd)
+            for unknown, (mean, sd) in ((THRUST, _THRUST), (THRUST_FAST, _THRUST_FAST))
+            if self.shaft_s > 0.0
         )
-    # a line through ln(fall), whose error is noise / fall
-    y, weight = np.log(fall[part]), fall[part] ** 2
-    centre = float((weight * time_s[part]).sum() / weight.sum())
-    t = time_s[part] - centre
-    slope = float((weight * t * y).sum() / (weight * t * t).sum())
-    level = float((weight * y).sum() / weight.sum())
-    if not slope < 0.0:
-        return None
-    misfit = y - level - slope * t
-    spread = max(noise**2, float((weight * misfit**2).sum()) / max(count - 2, 1))
-    slope_sd = np.sqrt(spread / float((weight * t * t).sum()))
-    run_down_s = -1.0 / slope
-    stop_s = centre + level * run_down_s
-    level_sd = np.sqrt(spread / float(weight.sum()))
-    return RunDown(
-        window.start_ns + round(stop_s * 1e9),
-        float(np.hypot(level_sd * run_down_s, slope_sd * run_down_s**2 * abs(level)))
-        + _LEAST_SD * run_down_s,
-        run_down_s,
-        float(slope_sd * run_down_s**2) + _LEAST_SD * run_down_s,
-        'the run-down of the thrust is that of the shaft',
-    )
+        doubt_s = self.stop_sd_s + _SHAPE * self.shaft_s if self.stop_sd_s > 0.0 else 0.0
+        return (*thrust, (ONSET, 0.0, doubt_s))
+
+
+def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:
+    """Yield number, name and fall of each propeller that shows one."""
+    before = window.before
+    for number in range(len(SHAFTS)):
+        of_propeller = []
+        for what, all_of in (('shaft', 'shafts'), ('pitch', 'pitches')):
+            earlier = None if before is None else getattr(before, all_of)[number]
+            fall = find_fall(earlier, getattr(window, all_of)[number], window.start_ns)
+            if fall is not None:
+                of_propeller.append((number, _name(window, what, number), fall))
+        if of_propeller:
+            yield min(of_propeller, key=lambda one: one[2].stop_s)
+
+
+def _kept(window: Window, falls: list[tuple[int, str, Fall]]) -> Iterator[str]:
+    """Yield what the shafts show that fell, but go on turning."""
+    for number, name, fall in falls:
+        after_s = fall.stop_s + _FALLEN * fall.run_down_s
+        since_ns = window.start_ns + round(after_s * 1e9)
+        shaft = window.shafts[number]
+        if fall.kept > _KEPT and 'shaft' in name and np.any(shaft.time_ns >= since_ns):
+            yield say(name, shaft, window, since_ns)
+
+
+def _others(window: Window, fallen: set[int]) -> Iterator[str]:
+    """Yield what the shafts show that do not fall."""
+    for number, shaft in enumerate(window.shafts):
+        if len(shaft) and number not in fallen:
+            yield say(_name(window, 'shaft', number), shaft, window, window.start_ns)
+
+
+def _name(window: Window, what: str, number: int) -> str:
+    """Return how to speak of a shaft or pitch."""
+    several = sum(len(shaft) > 0 for shaft in window.shafts) > 1
+    return f'the {what} of propeller {number + 1}' if several else f'the {what}'

@@ -16,6 +16,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64, Int64
 
 BIN_S = 30.0  # a steady record is condensed to its means over this
+FINE_S = 5.0  # near the stop
 LEAST_S = 300.0  # of record from which a disturbance can be learnt
 _BLOCK_S = 60.0
 _UNSTEADY = 0.06  # of the speed: a block that differs by more ends the steady record
@@ -24,7 +25,6 @@ _OUTLIER = 5.0  # robust standard deviations
 _MAD_TO_SD = 1.4826
 
 
-@compiled
 def white_sd(value: Float64) -> float:
     """
     Return the standard deviation of white noise on a smooth signal.
@@ -33,6 +33,19 @@ def white_sd(value: Float64) -> float:
     ----------
     value : (n,)
         In ascending time.
+    """
+    return float(weighted_white_sd(value, np.ones(len(value))))
+
+
+@compiled
+def weighted_white_sd(value: Float64, weight: Float64) -> float:
+    """
+    Return the standard deviation of white noise on a smooth signal, at a weight of 1.
+
+    Parameters
+    ----------
+    value, weight : (n,)
+        In ascending time; the variance is that at a weight of 1 over the weight.
 
     Notes
     -----
@@ -41,7 +54,8 @@ def white_sd(value: Float64) -> float:
     if len(value) < 4:
         return 0.0
     second = value[2:] - 2.0 * value[1:-1] + value[:-2]
-    size = np.abs(second)
+    spread = (1.0 / weight[2:] + 4.0 / weight[1:-1] + 1.0 / weight[:-2]) / 6.0
+    size = np.abs(second) / np.sqrt(spread)
     typical = _MAD_TO_SD * np.median(size)
     if typical > 0.0:
         size = size[size < 4.0 * typical]
@@ -110,32 +124,47 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
 
 
 @compiled
-def condense(time_s: Float64, value: Float64) -> tuple[Float64, Float64, Int64]:
+def condense(
+    time_s: Float64, value: Float64, weight: Float64, fine_s: float
+) -> tuple[Float64, Float64, Float64]:
     """
     Return means over `BIN_S` of a record that is steady or moves evenly.
 
     Parameters
     ----------
-    time_s, value : (n,)
-        n >= 1.
+    time_s, value, weight : (n,)
+        n >= 1; the weight is 1 for a sample that is as good as most.
+    fine_s
+        At the end of the record means are over `FINE_S` for so long: the stop
+        may have been earlier than it was taken for.
 
     Returns
     -------
-    time_s, value, count : (b,)
+    time_s, value, weight : (b,)
+        The weight is the sum of those of the samples.
     """
     # outliers are told from what is near in time: the record may drift
     edges = _parts(time_s, 2.0 * _BLOCK_S)
     near = np.interp(time_s, block_medians(time_s, edges), block_medians(value, edges))
     away = np.abs(value - near)
     keep = away <= _OUTLIER * _MAD_TO_SD * np.median(away)
-    time_s, value = time_s[keep], value[keep]
-    edges = _parts(time_s, BIN_S)
-    count = np.diff(edges)
-    mean_s, mean = np.empty(len(count)), np.empty(len(count))
-    for i in range(len(count)):
-        mean_s[i] = time_s[edges[i] : edges[i + 1]].mean()
-        mean[i] = value[edges[i] : edges[i + 1]].mean()
-    return mean_s, mean, count
+    time_s, value, weight = time_s[keep], value[keep], weight[keep]
+    split = len(time_s)
+    if fine_s > 0.0:
+        split = np.searchsorted(time_s, time_s[-1] - fine_s)
+    edges = np.zeros(1, np.int64)
+    if split > 0:
+        edges = _parts(time_s[:split], BIN_S)
+    if split < len(time_s):
+        edges = np.concatenate((edges, split + _parts(time_s[split:], FINE_S)[1:]))
+    bins = len(edges) - 1
+    mean_s, mean, total = np.zeros(bins), np.zeros(bins), np.zeros(bins)
+    for i in range(bins):
+        for j in range(edges[i], edges[i + 1]):
+            total[i] += weight[j]
+            mean_s[i] += weight[j] * time_s[j]
+            mean[i] += weight[j] * value[j]
+    return mean_s / total, mean / total, total
 
 
 @compiled

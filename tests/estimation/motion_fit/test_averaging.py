@@ -24,7 +24,7 @@ N = 400
 def rows() -> Rows:
     time_s = np.linspace(0.0, 1500.0, N)
     kind = np.full(N, LOG)
-    truth = np.array([0.0, 0.03, 0.01, 0.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    truth = np.array([0.0, 0.03, 0.01, 0.0, 8.0, *np.zeros(EXTRAS - 1)])
     empty = Rows(time_s, kind, np.zeros(N))
     _, speed = predict(LAW, truth, GRID_S, empty, np.zeros(0, np.int64))
     noise = 0.05 * np.random.default_rng(0).standard_normal(N)
@@ -34,7 +34,7 @@ def rows() -> Rows:
 def averaged(
     rows: Rows, precision: list[list[float]], mean: list[list[float]] | None = None
 ) -> tuple[bool, Float64, Float64]:
-    start = np.array([0.0, 0.04, 0.0, 0.0, 8.1, 0.0, 0.0, 0.0, 0.0, 0.0])
+    start = np.array([0.0, 0.04, 0.0, 0.0, 8.1, *np.zeros(EXTRAS - 1)])
     calm = Noise(np.full(N, 0.05**2), CALM, np.ones(N), np.ones(N))
     held = np.array(precision)
     priors = Priors(np.zeros_like(held) if mean is None else np.array(mean), held)

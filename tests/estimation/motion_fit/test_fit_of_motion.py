@@ -10,7 +10,7 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final, motion_fit
-from shipdrag_ros.estimation.motion_fit.coast import LOG, Rows, integrate, predict
+from shipdrag_ros.estimation.motion_fit.coast import EXTRAS, LOG, Rows, integrate, predict
 from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.learning import learn
 from shipdrag_ros.estimation.motion_fit.solve import cholesky_solve
@@ -193,8 +193,8 @@ def test_the_final_figure_is_the_fit_unless_another_is_asked_for(coast, ship) ->
 
 
 def test_sensitivities_are_the_derivatives() -> None:
-    law = Law(np.array([1, 2, 4]), 8.0, 1.0, np.array([0.05, 0.01]))
-    unknowns = np.array([0.002, 0.012, 0.006, 8.1, 9.0, 0.4, 20.0, 0.2, 0.0])
+    law = Law(np.array([1, 2, 4]), 8.0, 9.0, np.array([0.05, 0.01]))
+    unknowns = np.array([0.002, 0.012, 0.006, 8.1, 0.3, 0.5, 0.4, 20.0, 0.2, 0.0])
     grid = np.linspace(0.0, 600.0, 200)
     time_s = np.array([-5.0, 3.0, 100.0, 100.0, 400.0])
     rows = Rows(time_s, np.array([LOG, LOG, 1, 2, 2]), np.zeros(5))
@@ -215,7 +215,7 @@ def test_sensitivities_are_the_derivatives() -> None:
 
 def test_the_integration_is_of_fourth_order() -> None:
     law = Law(np.array([2]), 8.0, 0.0, np.array([0.0]))
-    unknowns = np.array([0.032, 8.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    unknowns = np.array([0.032, 8.0, *np.zeros(EXTRAS - 1)])
     exact = 8.0 / (1.0 + 0.032 / 8.0 * 1000.0)
     errors = [
         abs(integrate(law, unknowns, np.linspace(0.0, 1000.0, n + 1))[0][-1, 0] - exact)

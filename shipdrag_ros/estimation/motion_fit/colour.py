@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Residuals that are not independent from sample to sample: how much worse their means are."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.samples import Float64
+
+_LEAST_BLOCKS = 16  # of a size: fewer do not tell their scatter
+_BY_CHANCE = 3.5  # standard deviations of that scatter: less is chance
+
+
+class Colour(NamedTuple):
+    """
+    What means of neighbours scatter more than those of independent residuals.
+
+    Attributes
+    ----------
+    inflation
+        Of the variance; 1 where chance explains it.
+    block
+        Samples in those means.
+    """
+
+    inflation: float
+    block: int
+
+
+def colour_of(white: Float64) -> Colour:
+    """
+    Return the largest excess scatter of means over blocks that chance does not explain.
+
+    Parameters
+    ----------
+    white : (n,)
+        Residuals over their standard deviation, in ascending time.
+
+    Notes
+    -----
+    Of independent residuals the variance of the mean of B is 1/B of their variance, with a
+    relative standard deviation of sqrt(2 B / n). Blocks of 2, 4, 8 ..: about one false
+    alarm in a hundred fits.
+    """
+    found = Colour(1.0, 1)
+    n = len(white)
+    mean_square = float((white * white).mean()) if n else 0.0
+    block = 2
+    while block * _LEAST_BLOCKS <= n and mean_square > 0.0:
+        count = n // block
+        means = white[: count * block].reshape(count, block).mean(axis=1)
+        ratio = block * float((means * means).mean()) / mean_square
+        if ratio > max(found.inflation, 1.0 + _BY_CHANCE * np.sqrt(2.0 * block / n)):
+            found = Colour(ratio, block)
+        block *= 2
+    return found
