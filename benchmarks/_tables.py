@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from shipdrag_ros.samples import Float64
@@ -15,6 +15,26 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]
     """
     lines = [columns, ['---'] * len(columns), *rows]
     return [f'| {" | ".join(map(str, line))} |' for line in lines]
+
+
+def put(page: Path, blocks: Mapping[str, str]) -> None:
+    """
+    Write into a page what stands between `<!-- NAME -->` and `<!-- end NAME -->`.
+
+    Raises
+    ------
+    ValueError
+        If the page lacks the markers of a block.
+    """
+    text = page.read_text(encoding='utf-8')
+    for name, made in blocks.items():
+        begin, end = f'<!-- {name} -->\n', f'\n<!-- end {name} -->'
+        before, found, rest = text.partition(begin)
+        _, closed, after = rest.partition(end)
+        if not (found and closed):
+            raise ValueError(f'{page}: no {begin.strip()} .. {end.strip()}')
+        text = f'{before}{begin}{made}{end}{after}'
+    page.write_text(text, encoding='utf-8')
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Float64) -> None:

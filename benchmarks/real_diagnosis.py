@@ -4,7 +4,7 @@ What `shipdrag diagnose` says of two measured records, as a user would run it.
 
 A yacht's log with no coastdown in it, and the coast of a model ship without a
 stated baseline. Reads the folder that SHIPDRAG_DATA names and draws nothing at
-random.
+random. `--write` puts it into docs/real_records.md.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from real_records import DATA, MODEL_SHIP, run_command
+from _tables import put
+from real_records import DATA, MODEL_SHIP, PAGE, run_command
 
 IMPORT_LOG = f'shipdrag import ${DATA}/psaros_lake_geneva.nmea.gz -o yacht.mcap'
 DIAGNOSE_LOG = 'shipdrag diagnose yacht.mcap'
@@ -40,40 +41,51 @@ def diagnosed(name: str, *, data: Path, out: Path) -> dict[str, Any]:
     return found
 
 
-def show(name: str, found: dict[str, Any]) -> None:
+def block(found: dict[str, Any]) -> str:
     """
-    Print what was found.
+    Return what was found as it stands in docs/real_records.md.
     """
-    print(f'{name}: {found["verdict"]}, baseline {found["baseline"]}')
+    first = found['no_coastdown'] or f'{found["coastdowns_used"]} coastdown(s) used.'
+    lines = [f'{first} Verdict `{found["verdict"]}`, baseline `{found["baseline"]}`.', '']
     for effect in found['effects']:
         sizes = ', '.join(
-            f'{key} {size["value"]:.4f} sd {size["sd"]:.4f}'
+            f'{key} {size["value"]:.3f} ± {size["sd"]:.3f} (one standard deviation)'
             for key, size in effect['parameters'].items()
         )
-        print(f'  {effect["name"]}: {sizes}')
-    for candidate in found['candidates']:
-        print(f'  {" + ".join(candidate["names"])}: {candidate["probability"]:.3f}')
-    for when in ('before', 'after'):
-        gap = found['gap'][when]
-        print(
-            f'  {when}: {1000.0 * gap["rms_speed_m_s"]:.1f} mm/s rms, '
-            f'chi2 {gap["chi2_per_sample"]:.2f} a sample'
-        )
-    for note in [*found['notes'], *(f'would decide: {each}' for each in found['would_decide'])]:
-        print(f'  {note}')
+        lines.append(f'- {effect["name"]}: {sizes}, probability {effect["probability"]:.3f}')
+    candidates = ', '.join(
+        f'{" + ".join(each["names"])} {each["probability"]:.3f}' for each in found['candidates']
+    )
+    lines.append(f'- candidates: {candidates}')
+    gaps = [
+        f'{when} {1000.0 * gap["rms_speed_m_s"]:.1f} mm/s rms, chi2 {gap["chi2_per_sample"]:.2f}'
+        for when in ('before', 'after')
+        if (gap := found['gap'][when])
+    ]
+    lines.append(f'- gap: {"; ".join(gaps)}')
+    decides = (f'would decide: {each}' for each in found['would_decide'])
+    lines += [f'- {line}' for line in (*found['notes'], *decides)]
+    return '\n'.join(lines)
 
 
 def main() -> None:
     """
     Run both.
     """
-    argparse.ArgumentParser(description=__doc__).parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--write', action='store_true', help=f'into {PAGE.name} as well')
+    options = parser.parse_args()
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set')
         return
+    blocks = {}
     for name in RECORDS:
         with TemporaryDirectory() as folder:
-            show(name, diagnosed(name, data=Path(os.environ[DATA]), out=Path(folder)))
+            found = diagnosed(name, data=Path(os.environ[DATA]), out=Path(folder))
+        blocks[name] = block(found)
+        print(f'{name}\n\n{blocks[name]}\n')
+    if options.write:
+        put(PAGE, blocks)
 
 
 if __name__ == '__main__':

@@ -4,7 +4,8 @@ Measured records, imported and replayed as a user would.
 
 Reads the folder that SHIPDRAG_DATA names. Prints what became of each record, and
 a second opinion on each r(v); writes bags, reports and pictures. Nothing is
-drawn at random but the noise of the simulated ship (seed 1).
+drawn at random but the noise of the simulated ship (seed 1). `--write` puts the
+tables into docs/real_records.md.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 
 import numpy as np
 from _second_opinion import second_opinion
+from _tables import put, table
 
 from shipdrag_ros.bags import ReplayResult, open_runs, replay
 from shipdrag_ros.cli import main as shipdrag
@@ -31,8 +33,15 @@ from shipdrag_ros.report import pictures, words
 from shipdrag_ros.report.run import RunResult
 
 ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / 'docs' / 'real_records.md'
 DATA = 'SHIPDRAG_DATA'
 SIMULATED = 'config/vitus_bering.yaml'
+
+
+RECORD_HEAD = table(
+    ('record', 'fit, order', 'valid [m/s]', 'r at m/s: ± 2 sigma (second opinion)', 'w [%]'), ()
+)
+DEFAULT_HEAD = table(('record', 'published problem', 'default, final figure', 'default, live'), ())
 
 
 @dataclass(frozen=True)
@@ -361,7 +370,9 @@ def main() -> None:
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'real_records')
-    out = parser.parse_args().out
+    parser.add_argument('--write', action='store_true', help=f'the tables into {PAGE.name}')
+    options = parser.parse_args()
+    out = options.out
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')
         return
@@ -381,14 +392,15 @@ def main() -> None:
     show_repeats(found, ['usv_test_6', 'usv_test_8', 'usv_test_10'], 0.8)
     show_repeats(found, ['car_2', 'car_3'], 7.0)
     show_repeats(found, ['car_michelin60a', 'car_michelin60a1'], 4.0)
-    print('\n| record | fit, order | valid [m/s] | r at m/s: ± 2 sigma (second opinion) | w [%] |')
-    print('| --- | --- | --- | --- | --- |')
-    for outcome in found.values():
-        print(outcome.line)
-    print('\n| record | published problem | default, final figure | default, live |')
-    print('| --- | --- | --- | --- |')
-    for record in RECORDS:
-        print(default_line(record, found[record.name].estimate, out))
+    published = [*RECORD_HEAD, *(outcome.line for outcome in found.values())]
+    default = [
+        *DEFAULT_HEAD,
+        *(default_line(record, found[record.name].estimate, out) for record in RECORDS),
+    ]
+    blocks = {'published problems': '\n'.join(published), 'defaults': '\n'.join(default)}
+    print('', *blocks.values(), sep='\n')
+    if options.write:
+        put(PAGE, blocks)
     draw(out, data)
 
 

@@ -70,7 +70,7 @@ class Coast:
         Raises
         ------
         DiagnosisError
-            If there are too few speeds.
+            If there are too few speeds, or none ahead.
         """
         window = run.window
         by_log = len(window.speed_through_water) >= 2 * _LEAST_ROWS
@@ -86,6 +86,10 @@ class Coast:
         when, mean, count = bin_means(time, series.value, edges)
         top = int(np.argmax(mean))  # until then the thrust has not run down
         yaw = window.heading.value
+        if not mean[top] > 0.0:
+            raise DiagnosisError(
+                f'{run.name}: the speed is never above 0: give a record of a ship under way ahead'
+            )
         if len(mean) - top < _LEAST_ROWS:
             raise DiagnosisError(
                 f'{run.name}: the speed is highest {when[top]:.0f} s after the begin and there '
@@ -222,9 +226,10 @@ class FormProblem:
         self, parts: tuple[str, ...], mean: Float64, sd: Float64, z: Float64
     ) -> tuple[float, Float64, Float64]:
         measured = np.concatenate([coast.speed_m_s for coast in self.seen])
-        residual = measured - self._predict(parts, (mean + sd * z)[:, None])[:, 0]
-        white = self._whiten(residual)
-        cost = float(white @ white + z @ z)
+        with np.errstate(over='ignore', invalid='ignore'):  # a motion that runs away is no fit
+            residual = measured - self._predict(parts, (mean + sd * z)[:, None])[:, 0]
+            white = self._whiten(residual)
+            cost = float(white @ white + z @ z)
         return cost if math.isfinite(cost) else math.inf, residual, white
 
     def _slopes(self, parts: tuple[str, ...], value: Float64, step: Float64) -> Float64:

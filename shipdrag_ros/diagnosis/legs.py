@@ -204,7 +204,7 @@ class _Cut:
         ground = window.position if by_place else window.speed_over_ground
         if len(window.speed_through_water) < _SAMPLES or len(ground) < _SAMPLES:
             raise DiagnosisError(
-                f'{record.name!r} has no coastdown, and {len(window.speed_through_water)} '
+                f'{record.name!r} has {len(window.speed_through_water)} '
                 f'speeds through water beside {len(ground)} positions or speeds over ground: '
                 'give a coastdown (engine stopped after steady sailing), say with --window where '
                 'it is, or give a record of sailing with both a log and positions'

@@ -119,7 +119,7 @@ def test_without_coastdown_and_positions_it_says_what_to_give(
     assert main(['diagnose', str(path)]) == 1
     error = capsys.readouterr().err
     assert 'ERROR: ' in error
-    assert 'has no coastdown' in error
+    assert 'No coastdown was found' in error
     assert '--window' in error
 
 

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""No verb shows a user a warning of Python or numpy, whatever it is given."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.cli import main
+from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+
+NOT_SHOWN = (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning)
+SHIP = 'name: Odd\nlength_m: 10.0\ndisplaced_volume_m3: 12.0\nadded_mass: {model: constant}\n'
+ESTIMATORS = ('auto', 'warped', 'motion', 's1_speed', 's1_joint', 's1_position')
+DATA = 'SHIPDRAG_DATA'
+
+
+def told(*line: str) -> list[str]:
+    """Run a verb, which may refuse its input, and return the warnings that a user would see."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter('always')
+        assert main(line) in (0, 1)
+    return [
+        f'{each.filename}:{each.lineno}: {each.message}'
+        for each in caught
+        if not issubclass(each.category, NOT_SHOWN)
+    ]
+
+
+def glide(time_s: Float64) -> Float64:
+    """Ten minutes at 4 m/s, then slower and slower."""
+    after = np.maximum(time_s - 600.0, 0.0)
+    return 4.0 / (1.0 + after / 100.0)
+
+
+def odd(speed: Float64, seed: int = 1) -> dict[str, Float64]:
+    """Return a log and positions of a motion, with some noise."""
+    rng = np.random.default_rng(seed)
+    place = np.array([np.cumsum(speed), np.zeros(len(speed))]).T
+    return {
+        'speed_through_water': speed + rng.normal(0.0, 0.02, len(speed)),
+        'position': place + rng.normal(0.0, 1.0, (len(speed), 2)),
+        'heading': rng.normal(0.0, 0.01, len(speed)),
+    }
+
+
+TIME = np.arange(1200.0)
+RECORDS: dict[str, dict[str, Float64]] = {
+    'glide': odd(glide(TIME)),
+    'exact': {'speed_through_water': glide(TIME)},
+    'positions': {'position': odd(glide(TIME))['position']},
+    'at rest': {'speed_through_water': 0.0 * TIME, 'position': np.zeros((len(TIME), 2))},
+    'even': {'speed_through_water': 0.0 * TIME + 3.0},
+    'astern': odd(-glide(TIME)),
+    'through zero': odd(glide(TIME) - 1.5),
+    'faster': odd(0.5 + 0.005 * TIME),
+    'steps': {'speed_through_water': np.round(glide(TIME), 0)},
+    'few': {name: value[:7] for name, value in odd(glide(TIME)).items()},
+    'one': {name: value[:1] for name, value in odd(glide(TIME)).items()},
+    'far': {'position': np.column_stack([1e7 + TIME * 1e3, 0.0 * TIME])},
+    'zeros': {'speed_through_water': np.where(TIME % 7 == 0, 0.0, glide(TIME))},
+    'gaps': {'speed_through_water': np.where(TIME % 100 < 40, np.nan, glide(TIME))},
+}
+
+
+@pytest.fixture
+def ship(tmp_path: Path) -> Path:
+    path = tmp_path / 'ship.yaml'
+    path.write_text(SHIP.replace('{model: constant}', '{model: constant, value: 0.1, sd: 0.02}'))
+    return path
+
+
+@pytest.mark.parametrize('name', RECORDS)
+def test_odd_records(name: str, ship: Path, tmp_path: Path) -> None:
+    values = RECORDS[name]
+    count = len(next(iter(values.values())))
+    stamps = (1e9 * TIME[:count]).astype(np.int64) + 10**18
+    bag = str(tmp_path / 'odd.mcap')
+    with BagWriter(Path(bag)) as writer:
+        blocks = [Block.of(Channel[key.upper()], stamps, each) for key, each in values.items()]
+        writer.write_samples(in_arrival_order(blocks))
+    page = str(tmp_path / 'page.html')
+    said = told('replay', bag, '--ship', str(ship), '--report', page)
+    said += told('diagnose', bag, '--ship', str(ship), '--report', page)
+    for start, end in ((0, 1200), (610, 1200), (700, 720)):
+        window = ('--window', str(start), str(end))
+        for estimator in ESTIMATORS if start == 610 else ESTIMATORS[:1]:
+            parameters = tmp_path / 'parameters.yaml'
+            parameters.write_text(f'estimator: {estimator}\nfroude_min: 0.001\n')
+            more = ('--parameters', str(parameters), '--json', str(tmp_path / 'found.json'))
+            said += told('replay', bag, '--ship', str(ship), *window, *more)
+        said += told('diagnose', bag, '--ship', str(ship), *window)
+    said += told('info', bag) + told('check', bag)
+    assert said == []
+
+
+@pytest.mark.parametrize(
+    ('table', 'columns', 'window'),
+    [
+        ('blueboat_218_10hz.csv', '--time t --map speed_through_water=surge', (0, 44.8)),
+        ('blueboat_221_10hz.csv', '--time t --map speed_through_water=surge', (30.5, 58)),
+        ('esso_osaka_3m_180s_10hz.csv', '--time t_s --map speed_through_water=u_mps', (50, 112)),
+        ('car/Michelin60B.csv', '--rate 1 --map speed_over_ground=1:km/h', (0, 160)),
+    ],
+)
+@pytest.mark.skipif(DATA not in os.environ, reason=f'needs the folder of records in {DATA}')
+def test_measured_records(
+    table: str, columns: str, window: tuple[float, float], ship: Path, tmp_path: Path
+) -> None:
+    source, bag = str(Path(os.environ[DATA]) / table), str(tmp_path / 'run.mcap')
+    said = told('import', source, '-o', bag, *columns.split(), '--ship', str(ship))
+    page = str(tmp_path / 'page.html')
+    for chosen in ((), ('--window', *map(str, window))):
+        said += told('replay', bag, *chosen, '--report', page)
+        said += told('diagnose', bag, *chosen, '--report', page)
+    assert said == []
