@@ -31,7 +31,14 @@ def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
     coastdown_bag: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     found = replay(capsys, coastdown_bag)
-    assert set(found) == {'coastdowns', 'combined', 'inputs', 'recorded', 'warnings'}
+    assert set(found) == {
+        'coastdowns',
+        'not_coastdowns',
+        'combined',
+        'inputs',
+        'recorded',
+        'warnings',
+    }
     assert found['combined'] is None
     assert found['warnings'] == []
     assert found['recorded'] == {

@@ -243,18 +243,12 @@ def test_a_monitor_that_starts_later_says_the_same(
     part, _ = run(ship, [later])
     known_ns = START_NS + start_s * S + Monitor(ship, QUICK).history_ns
 
-    spans = Onset | Coastdown | NotCoastdown
-
     def known(events) -> list:
+        spans = Onset | Coastdown | NotCoastdown
         return [
             event
             for event in events
-            if (
-                event.start_ns
-                if isinstance(event, Onset | Coastdown | NotCoastdown)
-                else event.stamp_ns
-            )
-            >= known_ns
+            if (event.start_ns if isinstance(event, spans) else event.stamp_ns) >= known_ns
         ]
 
     assert bits(known(part)) == bits(known(whole))
