@@ -10,10 +10,10 @@ import numpy as np
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.samples import Float64
 
-# Differences over the root of the sum of both variances; they share the data, so that a clean
-# record makes less. Largest of each of 1100 simulated clean coastdowns (three ships, 100 and 500
-# samples; white noise, run-down, current, outliers, gusts learnt): 1.2 in 95 %, 2.2 at most, above
-# `TOLD` in 3. Chosen on those.
+# Differences over the root of the sum of both variances; both share the data, so that a clean
+# record makes less. Chosen on 1000 simulated clean coastdowns (four ships, 100 and 500 samples,
+# seeds 0..24; white noise, steady record, run-down, current and outliers, gusts learnt), of which
+# 1 is taken to disagree.
 TOLD = 2.0
 _POINTS = 65  # evenly in speed, of the comparison
 

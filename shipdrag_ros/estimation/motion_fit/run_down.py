@@ -24,6 +24,7 @@ _THRUST_FAST = (0.5, 1.2)
 _UNSEEN = 0.6  # of these sds where the stop is not seen: its time takes up the impulse
 _SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
 _KEPT = 0.05  # of the steady shaft speed: less is not told
+_AT_START = 1.0  # run-downs after the start of a window: a stop by then is at the start
 _FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven
 
 
@@ -70,7 +71,14 @@ class RunDown:
         if falls:
             _, seen, fall = max(falls, key=lambda one: one[2].stop_s)
             others += tuple(_kept(window, falls))
-            return cls._of_fall(window, ship, seen, fall, others)
+            if window.before is not None or fall.stop_s <= _AT_START * fall.run_down_s:
+                return cls._of_fall(window, ship, seen, fall, others)
+            # nothing is known of the speed before it
+            note = (
+                f'{seen} shows an engine stop {fall.stop_s:.3g} s after the start of the window: '
+                'r is off by the thrust before it; give a window that begins after it'
+            )
+            return cls(window.start_ns, 0.0, 0.0, 0.0, 0.0, (note, *others))
         if window.before is None:
             note = 'the thrust is taken to have ended before the window'
             return cls(window.start_ns, 0.0, 0.0, 0.0, 0.0, others or (note,))

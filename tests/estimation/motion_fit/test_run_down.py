@@ -123,6 +123,13 @@ def test_a_shaft_that_runs_down_in_the_window_is_seen_without_a_record_before_it
     assert found.stop_ns * 1e-9 == pytest.approx(STOP_S, abs=1.0)
 
 
+def test_a_stop_inside_a_window_without_a_record_before_it_is_said() -> None:
+    window = cut(series(Channel.SHAFT, TIME, falling(TIME, STOP_S + 300.0)), before=False)
+    found = RunDown.of(window, SHIP)
+    assert found.shaft_s == 0.0
+    assert 'an engine stop 300 s after the start of the window' in found.notes[0]
+
+
 def test_without_any_shaft_the_thrust_is_taken_to_have_ended() -> None:
     window = cut(series(Channel.SPEED_THROUGH_WATER, TIME, SPEED), before=False)
     found = RunDown.of(window, SHIP)
