@@ -14,7 +14,9 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 import os
+import sys
 import time
 from dataclasses import fields
 from multiprocessing import get_context
@@ -105,27 +107,30 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--quick', action='store_true', help='a small part, under a minute')
     parser.add_argument('--seed', type=int, default=1, help='first seed')
+    parser.add_argument('--seeds', type=int, default=12, help='each is 72 coastdowns')
     parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1)
     parser.add_argument('--part', nargs='+', default=['stops', 'others', 'steady'])
     parser.add_argument('--kind', help='only kinds that hold this text')
     parser.add_argument('--name', default='propulsion_found', help='of the files in out/')
     given = parser.parse_args()
     first, quick = given.seed, given.quick
+    n = 1 if quick else given.seeds
     parts = {
-        'stops': stops(range(first, first + (1 if quick else 12)), quick),
-        'others': others(range(first, first + (1 if quick else 6)), quick),
-        'steady': sailing(range(first, first + (1 if quick else 20))),
+        'stops': stops(range(first, first + n), quick),
+        'others': others(range(first, first + (n + 1) // 2), quick),
+        'steady': sailing(range(first, first + (1 if quick else math.ceil(5 * n / 3)))),
     }
     tables = {'stops': stops_tables, 'others': others_tables, 'steady': steady_table}
     began = time.perf_counter()
     score(Case('declutched', 'ferry', 'calm', 1), {'both': ('log', 'track')})  # compiles
-    lines = [f'first seed {first}{", quick" if quick else ""}; update_s 60']
+    lines = [f'{n} seeds from {first}{", quick" if quick else ""}; update_s 60']
     rows: list[Row] = []
     for part in given.part:
         cases = [case for case in parts[part] if not given.kind or given.kind in case.kind]
         found = run(cases, given.jobs)
         rows += found
         lines += tables[part](found)
+        print(f'{part}: {len(cases)} cases', file=sys.stderr, flush=True)
     lines += ['', f'{time.perf_counter() - began:.0f} s, {given.jobs} processes']
     OUT.mkdir(exist_ok=True)
     text = '\n'.join(lines)
