@@ -91,6 +91,7 @@ def _look_at_speed(
         if not _is_primary(bins, tuning, source, number):
             return 0
     elif watched != source:
+        learn(steadiness, tuning.slopes, bins, source, number)  # should the one watched fail
         return 0
     learn(steadiness, tuning.slopes, bins, source, number)
     watch.seen_source[0] = source

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import warm
+from shipdrag_ros.coastdown.bins import SOURCES, newest_bin, warm
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.ending import End, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
@@ -178,7 +178,8 @@ class Monitor:
             elif stop == Stop.BIN:
                 events += self._judge()
             elif stop == Stop.SILENCE:
-                events += self._stop_at_last_sample(EndedBy.DATA_STOP)
+                if not self._fall_back():
+                    events += self._stop_at_last_sample(EndedBy.DATA_STOP)
             elif stop == Stop.SLOPE:
                 self._propose(int(self._memory.watch.seen[0]), noticed=True)
             elif stop == Stop.SHAFT:
@@ -286,6 +287,27 @@ class Monitor:
         if doubt is None:
             return []
         return self._dismissals.take(NotCoastdown(start_ns, end_ns, doubt.reason, doubt.text))
+
+    def _fall_back(self) -> bool:
+        """Go on with another speed source where the one watched has failed, if there is one."""
+        assert self._candidate is not None
+        steadiness, bins = self._memory.steadiness, self._memory.bins
+        failed = self._candidate.source
+        newest = max(newest_bin(bins, source) for source in range(SOURCES))
+        for source in range(SOURCES):
+            limits = steadiness.limit[source]
+            recent = newest_bin(bins, source) > newest - self._tuning.slopes.width
+            if source == failed or not recent or np.isnan(limits[0]):
+                continue
+            self._memory.watch.source[0] = source
+            self._candidate = replace(
+                self._candidate,
+                source=source,
+                limits=tuple(float(limit) for limit in limits),
+                spread=float(steadiness.spread[source, 0]),
+            )
+            return True
+        return False
 
     def _begin(self, candidate: Candidate, number: int) -> Onset:
         onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)

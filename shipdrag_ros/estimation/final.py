@@ -9,6 +9,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import motion_fit
 from shipdrag_ros.estimation.agreement import widened
 from shipdrag_ros.estimation.choice import estimate
+from shipdrag_ros.estimation.coverage import coverage_notes
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
@@ -40,6 +41,11 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
     EstimationError
         If the window does not hold a coastdown that can be estimated.
     """
+    found = _estimate(window, ship, parameters)
+    return replace(found, notes=(*found.notes, *coverage_notes(window)))
+
+
+def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     if parameters.estimator != 'auto':
         return estimate(window, ship, parameters)
     try:

@@ -105,6 +105,15 @@ def test_a_line_needs_points_over_the_window() -> None:
     assert not np.isnan(line(bins, LOG, FIRST + 98, WIDTH)[0])
 
 
+def test_a_line_reaches_back_over_a_gap() -> None:
+    times = np.delete(np.arange(200.0), np.arange(80, 130))
+    bins = binned(LOG, times, 0.1 * times)
+    slope, level, count = line(bins, LOG, FIRST + 160, 60)
+    assert count == 70
+    np.testing.assert_allclose([slope, level], [0.1, 16.0], rtol=1e-6)
+    assert np.isnan(line(bins, LOG, FIRST + 129, 60)[0])
+
+
 def test_old_bins_are_overwritten_and_not_mistaken_for_new_ones() -> None:
     bins = binned(LOG, np.arange(100.0), 0.1 * np.arange(100.0), size=63)
     assert len(speeds(bins, LOG, FIRST, FIRST + 98)[1]) == 63
