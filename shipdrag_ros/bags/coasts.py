@@ -90,7 +90,7 @@ def _look_anew(result: ReplayResult) -> tuple[Coastdown, ...]:
         else:
             events += monitor.update(_arrived_later(item))
     events += monitor.finish()
-    return tuple(event for event in events if isinstance(event, Coastdown))
+    return tuple(event for event in events if isinstance(event, Coastdown) and not event.withdrawn)
 
 
 def _refuse(window: Window, ship: Ship, parameters: Parameters) -> Estimate:

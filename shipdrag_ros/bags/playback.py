@@ -15,7 +15,7 @@ from shipdrag_ros.bags.comparison import Comparison, Recorded
 from shipdrag_ros.bags.given_window import estimate_window, read_window
 from shipdrag_ros.bags.run import Inputs, ResetMark, Run
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Event, Update
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, Event, NotCoastdown, Update
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import DEFAULT_NODE, TOPICS, outputs
 from shipdrag_ros.parameters import Parameters
@@ -51,13 +51,15 @@ class ReplayResult:
     ship, parameters
         What was used.
     coastdowns
-        In their order.
+        In their order, without those that were withdrawn.
     events
         All events but the updates, which recorded outputs stand for.
     inputs
         Messages counted, of inputs that have any.
     recorded
         Comparison with the outputs in the bag.
+    steady_lead_s
+        The longest that the ship was steady; None where no coastdown was looked for.
     """
 
     run: Run
@@ -67,6 +69,27 @@ class ReplayResult:
     events: tuple[Event, ...]
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
+    steady_lead_s: float | None = None
+
+    @property
+    def not_coastdowns(self) -> tuple[NotCoastdown, ...]:
+        """
+        What was nearly a coastdown, and what was cut, in the order of their start.
+        """
+        found = [event for event in self.events if isinstance(event, NotCoastdown)]
+        needed_s = self.parameters.slope_window_s
+        if (
+            self.steady_lead_s is not None
+            and self.steady_lead_s < needed_s
+            and not self.coastdowns
+            and self.run.span_ns is not None
+        ):
+            text = (
+                f'the ship was never steady for longer than {self.steady_lead_s:.0f} s; an onset '
+                f'can be found after {needed_s:.0f} s of it'
+            )
+            found.append(NotCoastdown(*self.run.span_ns, Dismissal.LEAD_IN, text))
+        return tuple(sorted(found, key=lambda one: one.start_ns))
 
 
 def replay(
@@ -142,7 +165,7 @@ def _as_on_board(
         for event in events:
             if not isinstance(event, Update):
                 kept.append(event)
-            if isinstance(event, Coastdown):
+            if isinstance(event, Coastdown) and not event.withdrawn:
                 coastdowns.append(event)
             if own:
                 for message in outputs(event, node=run.node or DEFAULT_NODE):
@@ -168,6 +191,7 @@ def _as_on_board(
         tuple(kept),
         _counts(run, inputs, used, rejected),
         comparison.finish(),
+        monitor.steady_lead_s,
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from shipdrag_ros.bags import InputCounts, Recorded
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.report.hulls import Ranking
 from shipdrag_ros.report.run import RunResult
@@ -27,6 +27,9 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
     found = {
         'coastdowns': [
             _coastdown(run.bag, coastdown) for run in runs for coastdown in run.coastdowns
+        ],
+        'not_coastdowns': [
+            _not_coastdown(run.bag, dismissed) for run in runs for dismissed in run.not_coastdowns
         ],
         'combined': _combined(together(runs).combined),
         'inputs': _inputs([run.inputs for run in runs]),
@@ -114,6 +117,16 @@ def _coastdown(bag: str, coastdown: Coastdown) -> dict[str, Any]:
         'noise_sd': estimate.noise_sd,
         'current_m_s': current,
         'notes': estimate.notes,
+    }
+
+
+def _not_coastdown(bag: str, dismissed: NotCoastdown) -> dict[str, Any]:
+    return {
+        'bag': bag,
+        'start_ns': dismissed.start_ns,
+        'end_ns': dismissed.end_ns,
+        'reason': dismissed.reason.value,
+        'text': dismissed.text,
     }
 
 

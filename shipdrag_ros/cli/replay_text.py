@@ -20,7 +20,7 @@ def show_run(output: Output, run: RunResult) -> None:
     for warning in run.warnings:
         output.say(f'Warning: {warning}')
     if not run.coastdowns:
-        output.say('No coastdown found.')
+        output.say(words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns)))
     for number, coastdown in enumerate(run.coastdowns, start=1):
         output.heading(f'Coastdown {number}')
         for line in cut_lines(coastdown, run.span_ns):
@@ -31,6 +31,9 @@ def show_run(output: Output, run: RunResult) -> None:
             output.table(cells.curve_table(coastdown.estimate.valid_curve, truth=run.truth))
         for note in words.notes(coastdown):
             output.say(f'- {note}')
+    if run.dismissed:
+        output.heading('What is no coastdown')
+        output.table(cells.not_coastdowns_table(run.dismissed))
     output.heading('Messages')
     output.table(cells.inputs_table(run.inputs))
     output.say(words.recorded_sentence(run.recorded))

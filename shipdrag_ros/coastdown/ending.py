@@ -15,11 +15,14 @@ from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.bins import Bins, line
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy
+from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.onset import Candidate, Doubt, bend
+from shipdrag_ros.coastdown.settling import Force, constant_force
 from shipdrag_ros.coastdown.shafts import Thrust, all_stand, engaged_at
 from shipdrag_ros.coastdown.tracking import heading_is_told, turned_at
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
 
 # A ship that coasts decelerates no less than by the fourth power of its falling speed: more
 # than friction (2) and waves (3) make it.
@@ -27,7 +30,13 @@ _EXPONENT = 4.0
 _EXPONENT_MIN = 1.0  # and no more than in proportion to it
 # What passed for a coastdown is withdrawn if it has cost less than this of the speed, ...
 _LOST_MIN = 0.05
-_LENGTH_MIN = 0.5  # ... or was shorter than this, of confirm_s
+_LENGTH_MIN = 0.5  # ... or was shorter than this, of confirm_s, ...
+# ... or if a constant force of this fraction of the first resistance drove, or braked, the ship;
+# wind and an exponent that is not as expected make up to 0.1 and -0.35
+_THRUST_MIN = 0.2
+_BRAKE_MIN = 0.7
+_THROUGHOUT_MIN = 0.07  # likewise, where it ended in a steady speed, ...
+_CORNER = 9.0  # ... and chi^2 would gain no more than this from a later begin of that force
 _EARLIER_WINDOWS = 3  # slope windows before the newest one that say how it decelerated
 
 
@@ -90,7 +99,7 @@ def _departed(
     if span >= width:
         excess = _excess(bins, source, earlier, span, slope, level - 0.5 * slope * width)
         # while the thrust runs down the fall steepens
-        if told or span < _EARLIER_WINDOWS * width:
+        if span < _EARLIER_WINDOWS * width:
             excess = max(excess, 0.0)
         first = earlier - width
     long = 2 * round(parameters.confirm_s)
@@ -103,9 +112,10 @@ def _departed(
         first = start
     if excess > coasting.limits[0]:
         return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
-    # where nothing tells the heading, a turn shows in the speed alone
-    if -excess > coasting.limits[0] and not told:
-        return End(EndedBy.TURN, _bend(bins, coasting, tuning, first, number, sign=1))
+    if -excess > coasting.limits[0]:
+        # where nothing tells the heading, this is how a turn shows
+        cause = EndedBy.BRAKE if told else EndedBy.TURN
+        return End(cause, _bend(bins, coasting, tuning, first, number, sign=1))
     return None
 
 
@@ -143,14 +153,22 @@ _WITHDRAWN_FOR = {
 
 
 def withdrawn(
-    coasted: Candidate, end: End, bins: Bins, tuning: Tuning, parameters: Parameters
+    coasted: Candidate,
+    end: End,
+    bins: Bins,
+    ship: Ship,
+    tuning: Tuning,
+    parameters: Parameters,
+    number: int,
 ) -> Doubt | None:
     """
     Say why what has ended was no coastdown; None if it may be one.
+
+    Parameters
+    ----------
+    number
+        The newest bin, at which the end was seen.
     """
-    reason = _WITHDRAWN_FOR.get(end.ended_by)
-    if reason is None:
-        return None
     width, length = tuning.slopes.width, end.last - coasted.start + 1
     before = line(bins, coasted.source, coasted.start - 1, width)[1]
     after = line(bins, coasted.source, end.last, max(min(width, length), 6))[1]
@@ -161,11 +179,70 @@ def withdrawn(
             f'the speed settled after {lost:.1%} of it was lost, less than {_LOST_MIN:.0%}: the '
             'power was reduced, not cut',
         )
+    reason = _WITHDRAWN_FOR.get(end.ended_by)
     shortest = _LENGTH_MIN * parameters.confirm_s
-    if length < shortest:
+    if reason is not None and length < shortest:
         return Doubt(
             reason,
             f'it lasted {length} s, less than {shortest:.0f} s, before it ended '
             f'({end.ended_by.value})',
         )
+    return _forced(coasted, end, bins, ship, tuning, parameters, number)
+
+
+def _forced(
+    coasted: Candidate,
+    end: End,
+    bins: Bins,
+    ship: Ship,
+    tuning: Tuning,
+    parameters: Parameters,
+    number: int,
+) -> Doubt | None:
+    """Say that a constant force acted beside the water all the time."""
+    width = tuning.slopes.width
+    first = coasted.start + round(0.1 * parameters.confirm_s)
+    faster = line(bins, coasted.source, coasted.start - 1, width)[1]
+    if math.isnan(faster):
+        faster = tuning.speed_min
+    exponent = expect(ship, 0.85 * faster).exponent
+
+    def force(last: int) -> Force | None:
+        return constant_force(
+            bins,
+            coasted.source,
+            first,
+            last,
+            exponent=exponent,
+            spread=coasted.spread,
+            width=width,
+        )
+
+    within = force(end.last)
+    if within is not None and within.low > _THRUST_MIN:
+        return _driven(within)
+    if within is not None and within.high < -_BRAKE_MIN:
+        return Doubt(
+            Dismissal.BRAKE,
+            f'a force of {-within.fraction:.2f} times the first resistance held the ship back '
+            'however slow she was: a brake, or a propeller astern',
+        )
+    if end.ended_by is not EndedBy.ENGINE:
+        return None
+    # with what came after: an engine that is engaged again leaves a corner, one that was never
+    # cut does not
+    throughout = force(number)
+    if throughout is not None and throughout.low > _THROUGHOUT_MIN and throughout.later < _CORNER:
+        return _driven(throughout)
     return None
+
+
+def _driven(force: Force) -> Doubt:
+    share = (
+        'as if the resistance did not grow with the speed'
+        if math.isinf(force.fraction)
+        else f'as with {force.fraction:.2f} ± {force.sd:.2f} of the steady thrust left'
+    )
+    return Doubt(
+        Dismissal.THRUST, f'the speed settled from the start on, {share}: power was reduced'
+    )

@@ -110,7 +110,7 @@ def _look_at_speed(
         if slope < -0.5 * limits[scale] or slope < -0.5 * watch.held[scale]:
             steady = False
     if steady and number % (1 << (SCALES - 1)) == 0:  # all windows were looked at
-        watch.armed[0] = 1
+        watch.armed[:] = 1
     fast = watch.level[0] > tuning.speed_min
     falls = falls and watch.armed[0] != 0 and fast
     watch.falls[0] = falls
@@ -130,6 +130,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     """Judge a closed bin of a shaft speed or a pitch; return a `Stop` code, 0 to go on."""
     if (
         watch.source[0] != NEVER
+        or watch.armed[1] == 0
         or watch.seen[0] < number - tuning.data_stop_ns // SECOND_NS
         or not watch.level[0] > tuning.speed_min
     ):

@@ -24,7 +24,7 @@ RECENT = 16  # samples of each channel that its rate and clock offset are taken 
 
 class Watch(NamedTuple):
     """
-    What the walk looks out for, and what it saw; arrays of one but for `held` and `lead`.
+    What the walk looks out for, and what it saw; arrays of one but for those with a shape.
 
     Attributes
     ----------
@@ -32,8 +32,9 @@ class Watch(NamedTuple):
         The speed source of a candidate or coastdown; NEVER while there is none.
     update_ns : int64
         When the next estimate is due; ALWAYS if none is.
-    armed : int64
-        0 after a candidate or coastdown until the speed has been steady again.
+    armed : (2,) int64
+        0 after a candidate or coastdown until the speed has been steady again: for the speed,
+        and for the shafts.
     held : (SCALES,) float64
         The limits of that candidate: it is part of the record that later limits are learnt
         from, and would make a fall that goes on look steady [m/s^2].
@@ -66,7 +67,7 @@ class Watch(NamedTuple):
         return cls(
             np.full(1, NEVER),
             np.full(1, ALWAYS),
-            np.ones(1, np.int64),
+            np.ones(2, np.int64),
             np.full(SCALES, np.nan),
             np.full(1, NEVER),
             np.full(1, NEVER),

@@ -280,7 +280,9 @@ class Monitor:
         """Give a candidate up and say why."""
         assert self._candidate is not None
         start_ns = self._candidate.start * SECOND_NS
-        self._stand_down()
+        # the stop may be still to come, and the shafts then tell it
+        driven = doubt is None or doubt.reason in (Dismissal.THRUST, Dismissal.OTHER)
+        self._stand_down(driven=driven)
         if doubt is None:
             return []
         return self._dismissals.take(NotCoastdown(start_ns, end_ns, doubt.reason, doubt.text))
@@ -340,8 +342,10 @@ class Monitor:
             return events
         end_ns = int(self._memory.guard.last_ns[self._candidate.source])
         if self._onset is not None:
-            events += self._conclude(ended_by, end_ns, None)
-            self._stand_down()
+            doubt = None
+            if ended_by is not EndedBy.RESET:
+                doubt = self._withdrawn(End(ended_by, end_ns // SECOND_NS - 1))
+            events += self._conclude(ended_by, end_ns, doubt)
         elif self._candidate.noticed:
             age_s = end_ns // SECOND_NS - self._candidate.start
             text = f'{_CUT_SHORT[ended_by]} {age_s} s after it began, before it was confirmed'
@@ -351,10 +355,18 @@ class Monitor:
 
     def _end_at(self, end: End) -> list[Event]:
         assert self._candidate is not None
-        doubt = withdrawn(self._candidate, end, self._memory.bins, self._tuning, self._parameters)
-        events = self._conclude(end.ended_by, (end.last + 1) * SECOND_NS, doubt)
+        end_ns = (end.last + 1) * SECOND_NS
+        events = self._conclude(end.ended_by, end_ns, self._withdrawn(end))
         self._stand_down()
         return events
+
+    def _withdrawn(self, end: End) -> Doubt | None:
+        assert self._candidate is not None
+        bins = self._memory.bins
+        number = int(bins.closed[self._candidate.source])
+        return withdrawn(
+            self._candidate, end, bins, self._ship, self._tuning, self._parameters, number
+        )
 
     def _conclude(self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None) -> list[Event]:
         assert self._onset is not None
@@ -386,15 +398,18 @@ class Monitor:
         )
         return [ended, *cuts]
 
-    def _stand_down(self) -> None:
+    def _stand_down(self, *, driven: bool = False) -> None:
         """Watch for an onset again, once the ship has been steady."""
         watch = self._memory.watch
         watch.source[0] = NEVER
         watch.update_ns[0] = ALWAYS
-        # what a shaft alone proposed, and the speed did not bear out, leaves the speed as it was
-        if self._candidate is not None and (self._candidate.noticed or self._onset is not None):
-            watch.armed[0] = 0
-            watch.held[:] = self._candidate.limits
+        if self._candidate is not None:
+            # what a shaft alone proposed and the speed did not bear out changes nothing for it
+            if self._candidate.noticed or self._onset is not None:
+                watch.armed[0] = 0
+                watch.held[:] = self._candidate.limits
+            if not driven:
+                watch.armed[1] = 0
         self._candidate = self._onset = self._heading_rad = None
 
     def _clock_set(self, stop: int, channel: int, stamp_ns: int, receive_ns: int) -> str:

@@ -251,8 +251,12 @@ def _propulsion(
     )
     if told.stop is None or not candidate.noticed:
         return told
-    # a shaft that stopped long before, or after, the ship slowed down tells of something else
-    return told if abs(told.stop - candidate.start) <= _APART * width else UNTOLD
+    # a shaft that stopped long before the ship slowed down, or after, tells of something else;
+    # of several, others have stopped before
+    late = told.stop - candidate.start
+    if late < -_APART * width or (late > _APART * width and candidate.drive.known == 1):
+        return UNTOLD
+    return told
 
 
 def _spoiled(

@@ -77,9 +77,9 @@ class Drive:
     pitch: tuple[float, ...] = (math.nan,) * len(SHAFTS)
 
     @property
-    def known(self) -> bool:
-        """Whether any shaft told that it drove."""
-        return not all(math.isnan(turning) for turning in self.turning)
+    def known(self) -> int:
+        """How many shafts told that they drove."""
+        return sum(not math.isnan(turning) for turning in self.turning)
 
 
 @dataclass(frozen=True)

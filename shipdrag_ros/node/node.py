@@ -25,7 +25,16 @@ from std_srvs.srv import Trigger
 from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.errors import ShipdragError, ShipFileError
-from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
+from shipdrag_ros.messages import (
+    OUTPUT_TOPICS,
+    TOPICS,
+    EventKind,
+    OutputMessage,
+    OutputTopic,
+    Source,
+    read_event,
+)
+from shipdrag_ros.messages.topics import EVENTS
 from shipdrag_ros.node import diagnostics
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.inputs import InputTopic, message_class
@@ -251,6 +260,10 @@ class CoastdownNode(LifecycleNode):
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:
+        if message.type == EVENTS.type:
+            note = read_event(message.payload)
+            if note.kind is EventKind.DISMISSED:
+                self.get_logger().info(note.text)
         if self.context.ok():  # after an outside shutdown the bag alone gets the last figures
             self._outputs[message.topic].publish(message.payload)
 

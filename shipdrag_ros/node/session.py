@@ -46,7 +46,7 @@ class Session:
         Full name of the node.
     ended
         Called after each coastdown with all of its samples; not after one that
-        a reset ended, which has dropped them.
+        was withdrawn, or that a reset ended, which has dropped them.
 
     Attributes
     ----------
@@ -142,6 +142,7 @@ class Session:
                 self._ended is not None
                 and isinstance(event, Coastdown)
                 and event.ended_by is not EndedBy.RESET
+                and not event.withdrawn
             ):
                 self._ended(event, self.monitor.ended_window(event))
 

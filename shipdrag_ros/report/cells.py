@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from shipdrag_ros.bags import InputCounts
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.report import words
@@ -128,6 +128,24 @@ def inputs_table(inputs: Mapping[str, InputCounts]) -> Table:
                 ', '.join(f'{n} {reason}' for reason, n in counts.rejected.items() if n) or '-',
             )
             for name, counts in inputs.items()
+        ),
+    )
+
+
+def not_coastdowns_table(dismissed: Sequence[NotCoastdown]) -> Table:
+    """
+    Show what was nearly a coastdown, or was cut, and why.
+    """
+    return Table(
+        ('from', 'for', 'reason', 'why'),
+        tuple(
+            (
+                words.utc(one.start_ns),
+                words.duration(max(one.end_ns - one.start_ns, 0) * 1e-9),
+                one.reason.value,
+                one.text,
+            )
+            for one in dismissed
         ),
     )
 

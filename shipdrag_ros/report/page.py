@@ -34,6 +34,8 @@ class _Run:
     ship: str
     warnings: tuple[str, ...]
     coastdowns: tuple[_Coastdown, ...]
+    none_found: str
+    not_coastdowns: Table | None
     inputs: Table
     recorded: str
 
@@ -80,6 +82,10 @@ def _run(run: RunResult) -> _Run:
             _coastdown(number, coastdown, run)
             for number, coastdown in enumerate(run.coastdowns, start=1)
         ),
+        none_found=''
+        if run.coastdowns
+        else words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns)),
+        not_coastdowns=cells.not_coastdowns_table(run.dismissed) if run.dismissed else None,
         inputs=cells.inputs_table(run.inputs),
         recorded=words.recorded_sentence(run.recorded),
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from shipdrag_ros.bags import InputCounts, Recorded, ReplayResult
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
 from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.report.warnings import run_warnings
 from shipdrag_ros.ship import Ship
@@ -36,6 +36,10 @@ class RunResult:
         The true curve, where the record is simulated.
     span_ns
         First and last time of arrival in the bag [ns]; None where it is empty.
+    not_coastdowns
+        What was nearly a coastdown, and what was cut, with why.
+    steady_lead_s
+        The longest that the ship was steady; None where no coastdown was looked for.
     """
 
     bag: str
@@ -46,6 +50,14 @@ class RunResult:
     warnings: tuple[str, ...] = ()
     truth: TrueCurve | None = None
     span_ns: tuple[int, int] | None = None
+    not_coastdowns: tuple[NotCoastdown, ...] = ()
+    steady_lead_s: float | None = None
+
+    @property
+    def dismissed(self) -> tuple[NotCoastdown, ...]:
+        """What is no coastdown, without what is told as cut off one."""
+        told = [cut for coastdown in self.coastdowns for cut in coastdown.cuts]
+        return tuple(one for one in self.not_coastdowns if one not in told)
 
     @classmethod
     def of(cls, result: ReplayResult) -> RunResult:
@@ -68,4 +80,6 @@ class RunResult:
             warnings=run_warnings(result),
             truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
             span_ns=run.span_ns,
+            not_coastdowns=result.not_coastdowns,
+            steady_lead_s=result.steady_lead_s,
         )

@@ -156,6 +156,26 @@ def recorded_sentence(recorded: Recorded) -> str:
     )
 
 
+def no_coastdown_sentence(steady_lead_s: float | None, dismissed: int) -> str:
+    """
+    Say that no coastdown was found, and what was looked at.
+
+    Parameters
+    ----------
+    steady_lead_s
+        The longest that the ship was steady [s]; None where that was not looked for.
+    dismissed
+        How many stretches were looked at and dismissed.
+    """
+    known = [] if steady_lead_s is None else [f'longest steady sailing {duration(steady_lead_s)}']
+    if dismissed:
+        stretches = 'one stretch was' if dismissed == 1 else f'{dismissed} stretches were'
+        known.append(f'{stretches} looked at and dismissed, see below')
+    else:
+        known.append('nothing in it looked like one')
+    return f'No coastdown found: {"; ".join(known)}.'
+
+
 def result_sentence(coastdown: Coastdown, *, mass_kg: float | None = None) -> str:
     """
     Say in one sentence what a coastdown gave.

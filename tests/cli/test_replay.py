@@ -104,7 +104,7 @@ def test_the_words_give_every_figure(
 def test_no_coastdown_is_a_result(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert replay(capsys, steady_bag)['coastdowns'] == []
     assert main(['replay', str(steady_bag)]) == 0
-    assert 'No coastdown found.' in capsys.readouterr().out
+    assert 'No coastdown found: longest steady sailing ' in capsys.readouterr().out
 
 
 def test_a_given_window_is_estimated_as_it_is(

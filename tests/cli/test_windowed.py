@@ -88,3 +88,8 @@ def test_what_is_cut_is_said_first_in_text_and_report(
     text = page.read_text(encoding='utf-8')
     assert text.index('is taken for a coastdown') < text.index('The resistance is known')
     assert 'Hatched: what was cut, and why' in text
+    found = replayed(capsys, f'{coastdown_bag}@100:1200')
+    (coastdown,) = found['coastdowns']
+    before = [each for each in found['not_coastdowns'] if each['reason'] == 'thrust']
+    assert [each['end_ns'] for each in before] == [coastdown['start_ns']]
+    assert 'rpm), which is thrust' in before[0]['text']

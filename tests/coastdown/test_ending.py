@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, NotCoastdown, Onset
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, Turn
@@ -136,9 +136,11 @@ def test_an_engaged_engine_shows_in_the_speed(watch, record, thrust: float, seed
     assert 360.0 <= end_s(coastdown) <= 405.0
 
 
-@pytest.mark.parametrize('shaft', [1.0, -0.8])
+@pytest.mark.parametrize(
+    ('shaft', 'by'), [(1.0, EndedBy.ENGINE), (0.3, EndedBy.ENGINE), (-0.8, EndedBy.ASTERN)]
+)
 def test_an_engaged_engine_shows_in_the_shaft_at_once(
-    watch, record, sensors, shaft: float
+    watch, record, sensors, shaft: float, by: EndedBy
 ) -> None:
     block = record(
         sensors=(sensors['log'], sensors['shaft']),
@@ -146,7 +148,7 @@ def test_an_engaged_engine_shows_in_the_shaft_at_once(
         duration_s=420.0,
     )
     coastdown = the_coastdown(watch(block))
-    assert coastdown.ended_by is EndedBy.ENGINE
+    assert coastdown.ended_by is by
     assert 395.0 <= end_s(coastdown) <= 402.0
 
 
@@ -174,6 +176,43 @@ def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn(watch, record, sen
     assert coastdown.estimate is None
     assert coastdown.failure is not None
     assert coastdown.failure.startswith('withdrawn')
+
+
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('left', [0.3, 0.5])
+def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn_when_it_settles(
+    watch, record, left: float, seed: int
+) -> None:
+    order = EngineOrder(0.0, shaft=left**0.5, thrust=left)
+    events = watch(record(orders=(order,), duration_s=2400.0, seed=seed))
+    ended = [event for event in events if isinstance(event, Coastdown)]
+    assert all(event.withdrawn for event in ended)
+    dismissed = [event for event in events if isinstance(event, NotCoastdown)]
+    assert dismissed
+    assert {event.reason for event in dismissed} <= {Dismissal.THRUST, Dismissal.SETTLED}
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_coastdown_that_ends_with_the_engine_is_not_withdrawn(watch, record, seed: int) -> None:
+    # engaged at the thrust of the speed that she then has: the speed settles at once
+    block = record(
+        orders=(STOP, EngineOrder(300.0, shaft=0.6, thrust=0.4)), duration_s=1500.0, seed=seed
+    )
+    coastdown = the_coastdown(watch(block))
+    assert coastdown.ended_by is EndedBy.ENGINE
+    assert not coastdown.withdrawn
+    assert 260.0 <= end_s(coastdown) <= 310.0
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_what_stops_a_ship_on_a_straight_course_is_a_brake(
+    watch, record, sensors, seed: int
+) -> None:
+    brake = EngineOrder(400.0, shaft=0.0, thrust=-1.5)
+    block = record(sensors=(sensors['log'], sensors['compass']), orders=(STOP, brake), seed=seed)
+    coastdown = the_coastdown(watch(block))
+    assert coastdown.ended_by is EndedBy.BRAKE
+    assert 380.0 <= end_s(coastdown) <= 405.0
 
 
 def test_several_coastdowns_in_one_record(watch, record) -> None:

@@ -12,7 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset, Reset, Update
+from shipdrag_ros.coastdown.events import (
+    Coastdown,
+    EndedBy,
+    NotCoastdown,
+    Onset,
+    Reset,
+    Update,
+)
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.simulation import EngineOrder, Sensor, Turn
@@ -236,11 +243,17 @@ def test_a_monitor_that_starts_later_says_the_same(
     part, _ = run(ship, [later])
     known_ns = START_NS + start_s * S + Monitor(ship, QUICK).history_ns
 
+    spans = Onset | Coastdown | NotCoastdown
+
     def known(events) -> list:
         return [
             event
             for event in events
-            if (event.start_ns if isinstance(event, Onset | Coastdown) else event.stamp_ns)
+            if (
+                event.start_ns
+                if isinstance(event, Onset | Coastdown | NotCoastdown)
+                else event.stamp_ns
+            )
             >= known_ns
         ]
 

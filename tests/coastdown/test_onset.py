@@ -8,12 +8,19 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.bins import Bins
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Onset, State
+from shipdrag_ros.coastdown.events import (
+    Coastdown,
+    Dismissal,
+    EndedBy,
+    NotCoastdown,
+    Onset,
+    State,
+)
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.onset import bend, change_point, law
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
     EngineOrder,
@@ -37,6 +44,25 @@ def refuse(window, ship, parameters):
 
 def onsets(events):
     return [event for event in events if isinstance(event, Onset)]
+
+
+def dismissed(events):
+    return [event for event in events if isinstance(event, NotCoastdown)]
+
+
+def with_shaft(block: Block, stamp_ns, turning) -> Block:
+    """Add a shaft speed [rad/s] to a record."""
+    return in_arrival_order([block, Block.of(Channel.SHAFT, stamp_ns, turning)])
+
+
+def following(block: Block, fraction: float):
+    """A shaft that runs down to a fraction of its turns per way, and then follows the ship."""
+    second = (block.stamp_ns - START_NS) / S - 900.0
+    way = np.minimum(1.0, 1.0 / (1.0 + np.maximum(second, 0.0) / 410.0))
+    low = fraction * way
+    down = np.where(second < 0.0, 1.0, low + (1.0 - low) * np.exp(-np.maximum(second, 0.0) / 5.0))
+    noise = 0.005 * np.random.default_rng(1).standard_normal(len(block))
+    return block.stamp_ns, 11.0 * down * (1.0 + noise)
 
 
 def after_s(ns: int, lead_in_s: float) -> float:
@@ -116,39 +142,146 @@ def test_a_shaft_that_is_ahead_of_a_slow_log_tells_the_onset(
     assert coastdown.ended_by is EndedBy.RECORD_END
 
 
-def test_shaft_stopped_fraction_says_when_it_has_stopped(watch, record, sensors) -> None:
-    # an engine that only slows down, to 0.2 of its speed
+def test_shaft_stopped_fraction_says_when_it_stands(watch, record, sensors) -> None:
+    # a shaft that creeps on at 0.2 of its speed
     block = record(
         sensors=(sensors['log'], sensors['shaft']),
         orders=(EngineOrder(0.0, shaft=0.2, thrust=0.0),),
     )
-    assert len(onsets(watch(block))) == 1
-    assert onsets(watch(block, Parameters(shaft_stopped_fraction=0.15))) == []
+    (soon,) = onsets(watch(block))
+    (late,) = onsets(watch(block, Parameters(shaft_stopped_fraction=0.15)))
+    assert after_s(soon.detected_ns, 900.0) <= 45.0
+    assert after_s(late.detected_ns, 900.0) >= 85.0
 
 
-def test_a_windmilling_shaft_is_judged_by_the_speed(watch, record, sensors) -> None:
-    block = record(
-        sensors=(sensors['log'], sensors['shaft']),
-        orders=(EngineOrder(0.0, shaft=0.4, thrust=0.0),),
-    )
-    (onset,) = onsets(watch(block))
-    assert -1.0 <= after_s(onset.start_ns, 900.0) <= 3.0
-    assert 100.0 <= after_s(onset.detected_ns, 900.0) <= 130.0
-    # the same shaft, but it still drives
+@pytest.mark.parametrize('fraction', [0.35, 0.5, 0.65, 0.8])
+def test_a_windmilling_shaft_dates_the_stop(watch, record, sensors, fraction: float) -> None:
+    block = record(sensors=(sensors['log'],))
+    stamps, turning = following(block, fraction)
+    (onset,) = onsets(watch(with_shaft(block, stamps, turning)))
+    assert -2.0 <= after_s(onset.start_ns, 900.0) <= 5.0
+    assert 80.0 <= after_s(onset.detected_ns, 900.0) <= 130.0
+
+
+def test_a_shaft_that_holds_its_speed_asks_for_more(watch, record, sensors) -> None:
+    # the propeller is driven at half of its speed
     driven = record(
         sensors=(sensors['log'], sensors['shaft']),
         orders=(EngineOrder(0.0, shaft=0.4, thrust=0.5),),
     )
-    assert onsets(watch(driven)) == []
+    events = watch(driven)
+    assert onsets(events) == []
+    assert Dismissal.THRUST in {one.reason for one in dismissed(events)}
 
 
-def test_a_turning_shaft_vetoes_the_speed(watch, record, sensors) -> None:
-    # the shaft turns on as if nothing had happened: whatever slows the ship is no coastdown
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('shaft', [0.9, 1.0])
+def test_a_shaft_that_turns_on_has_no_veto(
+    watch, record, sensors, shaft: float, seed: int
+) -> None:
+    # a controllable propeller at zero pitch that nobody tells of: as with the speed alone
     block = record(
         sensors=(sensors['log'], sensors['shaft']),
-        orders=(EngineOrder(0.0, shaft=1.0, thrust=0.0),),
+        orders=(EngineOrder(0.0, shaft=shaft, thrust=0.0),),
+        seed=seed,
     )
-    assert onsets(watch(block)) == []
+    (onset,) = onsets(watch(block))
+    (alone,) = onsets(watch(block[block.channel == LOG]))
+    assert abs(onset.start_ns - alone.start_ns) <= 6 * S
+    assert after_s(onset.detected_ns, 900.0) <= 260.0
+
+
+def test_a_stuck_shaft_loses_nothing(watch, record) -> None:
+    block = record()
+    alone = watch(block)
+    for value in (0.0, 11.0, -11.0):
+        stuck = with_shaft(block, block.stamp_ns, np.full(len(block), value))
+        assert onsets(watch(stuck)) == onsets(alone)
+
+
+def test_pitch_to_zero_dates_the_stop(watch, record) -> None:
+    block = record()
+    second = (block.stamp_ns - START_NS) / S - 900.0
+    noise = 0.003 * np.random.default_rng(2).standard_normal(len(block))
+    turning = 11.0 * (1.0 + noise)
+    pitch = 0.8 * np.clip(1.0 - second / 12.0, 0.0, 1.0) + noise
+    both = with_shaft(block, block.stamp_ns, turning)
+    both = in_arrival_order([both, Block.of(Channel.PITCH, block.stamp_ns, pitch)])
+    (onset,) = onsets(watch(both))
+    assert -1.0 <= after_s(onset.start_ns, 900.0) <= 5.0
+    assert after_s(onset.detected_ns, 900.0) <= 45.0
+
+
+@pytest.mark.parametrize('apart_s', [20.0, 90.0, 300.0])
+def test_of_several_shafts_the_last_that_stops_counts(watch, record, apart_s: float) -> None:
+    orders = (
+        EngineOrder(0.0, shaft=1.0, thrust=0.5),
+        EngineOrder(apart_s, shaft=0.0, thrust=0.0),
+    )
+    block = record(orders=orders, duration_s=1200.0)
+    second = (block.stamp_ns - START_NS) / S - 900.0
+    rng = np.random.default_rng(4)
+    turning = [
+        11.0 * np.where(second < stop, 1.0, np.exp(-np.maximum(second - stop, 0.0) / 8.0))
+        * (1.0 + 0.003 * rng.standard_normal(len(block)))
+        for stop in (0.0, apart_s)
+    ]  # fmt: skip
+    both = in_arrival_order(
+        [
+            block,
+            Block.of(Channel.SHAFT, block.stamp_ns, turning[0]),
+            Block.of(Channel.SHAFT_2, block.stamp_ns, turning[1]),
+        ]
+    )
+    (onset,) = onsets(watch(both))
+    assert -1.0 <= after_s(onset.start_ns, 900.0) - apart_s <= 5.0
+    # while the second drives on, nothing is announced
+    assert after_s(onset.detected_ns, 900.0) >= apart_s
+
+
+def test_one_shaft_of_two_is_no_coastdown(watch, record) -> None:
+    block = record(orders=(EngineOrder(0.0, shaft=1.0, thrust=0.5),), duration_s=1800.0)
+    second = (block.stamp_ns - START_NS) / S - 900.0
+    rng = np.random.default_rng(4)
+    noise = 1.0 + 0.003 * rng.standard_normal((2, len(block)))
+    stopped = 11.0 * np.where(second < 0.0, 1.0, np.exp(-np.maximum(second, 0.0) / 8.0))
+    both = in_arrival_order(
+        [
+            block,
+            Block.of(Channel.SHAFT, block.stamp_ns, stopped * noise[0]),
+            Block.of(Channel.SHAFT_2, block.stamp_ns, 11.0 * noise[1]),
+        ]
+    )
+    events = watch(both)
+    assert onsets(events) == []
+    assert Dismissal.THRUST in {one.reason for one in dismissed(events)}
+
+
+@pytest.mark.parametrize('wait_s', [0.0, 30.0])
+def test_a_crash_stop_and_its_end_are_no_coastdown(watch, record, sensors, wait_s: float) -> None:
+    orders = (
+        EngineOrder(0.0, shaft=0.0, thrust=0.0),
+        EngineOrder(wait_s + 1.0, shaft=-0.6, thrust=-0.6),
+        EngineOrder(wait_s + 150.0, shaft=0.0, thrust=0.0),
+    )
+    events = watch(record(sensors=(sensors['log'], sensors['shaft']), orders=orders))
+    assert [e for e in events if isinstance(e, Coastdown) and not e.withdrawn] == []
+    assert Dismissal.ASTERN in {one.reason for one in dismissed(events)}
+
+
+def test_what_is_dismissed_is_told_with_figures(watch, record, sensors) -> None:
+    (one, *_) = dismissed(watch(record(orders=(EngineOrder(0.0, shaft=0.7, thrust=0.49),))))
+    assert one.reason is Dismissal.SETTLED
+    assert -60.0 <= after_s(one.start_ns, 900.0) <= 60.0
+    assert ' m/s' in one.text
+    turn = record(
+        sensors=(sensors['log'], sensors['compass']),
+        orders=(),
+        turns=(Turn(0.0, 150.0, 0.015, drag_area_m2=12.0),),
+    )
+    assert Dismissal.TURN in {one.reason for one in dismissed(watch(turn))}
+    short = dismissed(watch(record(duration_s=60.0)))
+    assert [one.reason for one in short] == [Dismissal.GAP]
 
 
 def test_a_shaft_sensor_that_reads_nothing_does_not_veto(watch, record, sensors) -> None:

@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, NoEstimate, Onset, Reset, Update
+from shipdrag_ros.coastdown.events import (
+    Coastdown,
+    Dismissal,
+    EndedBy,
+    NoEstimate,
+    NotCoastdown,
+    Onset,
+    Reset,
+    Update,
+)
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
 from shipdrag_ros.messages import (
     EventKind,
@@ -144,6 +153,7 @@ def test_a_coastdown_without_estimate_says_why() -> None:
     [
         (Onset(5, 9), EventKind.ONSET, 9),
         (NoEstimate(7, 'why'), EventKind.NO_ESTIMATE, 7),
+        (NotCoastdown(5, 9, Dismissal.TURN, 'why'), EventKind.DISMISSED, 9),
         (Reset(8, 'why'), EventKind.RESET, 8),
     ],
 )

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.report.hulls import rank
 from shipdrag_ros.report.page import write_report
 from shipdrag_ros.report.run import RunResult
@@ -63,9 +64,12 @@ def test_names_from_outside_are_text_and_nothing_else(
 def test_a_record_without_coastdown_is_a_result(
     run: RunResult, tmp_path: Path, read_page: ReadPage
 ) -> None:
-    write_report(tmp_path / 'report.html', [replace(run, coastdowns=())])
+    dismissed = NotCoastdown(0, 60 * 10**9, Dismissal.TURN, 'the ship turned by 90 deg')
+    none = replace(run, coastdowns=(), not_coastdowns=(dismissed,), steady_lead_s=345.0)
+    write_report(tmp_path / 'report.html', [none])
     page = read_page(tmp_path / 'report.html')
-    assert 'No coastdown was found in this record.' in page.text
+    assert 'No coastdown found: longest steady sailing 345 s; one stretch was looked' in page.text
+    assert 'the ship turned by 90 deg' in page.text
     assert page.images == []
 
 
