@@ -31,9 +31,9 @@ def show_run(output: Output, run: RunResult) -> None:
             output.table(cells.curve_table(coastdown.estimate.valid_curve, truth=run.truth))
         for note in words.notes(coastdown):
             output.say(f'- {note}')
-    if run.not_coastdowns:
+    if run.dismissed:
         output.heading('What is no coastdown')
-        output.table(cells.not_coastdowns_table(run.not_coastdowns))
+        output.table(cells.not_coastdowns_table(run.dismissed))
     output.heading('Messages')
     output.table(cells.inputs_table(run.inputs))
     output.say(words.recorded_sentence(run.recorded))

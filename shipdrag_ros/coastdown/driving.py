@@ -25,6 +25,7 @@ _DRIVING = 0.9  # of the turns a metre that drive the ship: the water alone turn
 _STEADY = 0.97  # of its speed a ship keeps that is driven evenly
 _TOLD = 1.1  # the speed falls by so much: then a shaft can be seen to follow it
 _FOLLOWS = 0.5  # power of the ship's speed by which a shaft falls at least, if not driven
+_RUNS_DOWN = 4.0  # by which one falls that an engine lets run down
 _RISES = 1.3  # a shaft that the water turns does not go faster again
 _JOIN = 0.05  # of the window: pauses of the thrust no longer than this are part of it
 _DIAMETER = 0.05  # of a propeller, of the length, where it is not stated
@@ -163,7 +164,7 @@ def _driven(
     for first, last in runs(fast & ~drives & inside, time_s, 0.0):
         run = slice(first, last + 1)
         drives[run] |= _is_driven(
-            size[run], turning[run], np.abs(speed[run]), known=usual is not None
+            size[run], turning[run], np.abs(speed[run]), known=usual is not None, steady=steady
         )
     return drives
 
@@ -191,7 +192,7 @@ def _usual_turns(
 
 
 def _is_driven(
-    size: Float64, turning: Float64, speed: Float64, *, known: bool
+    size: Float64, turning: Float64, speed: Float64, *, known: bool, steady: bool
 ) -> NDArray[np.bool_]:
     """Judge one run of a turning shaft by whether it follows the ship's speed."""
     rises = size > _RISES * np.minimum.accumulate(size)
@@ -201,7 +202,7 @@ def _is_driven(
     slowed = _fall(size, some)
     if fell > _TOLD:
         power = math.log(max(slowed, 1e-9)) / math.log(fell)
-        follows = power >= _FOLLOWS
+        follows = power >= _FOLLOWS and (steady or power < _RUNS_DOWN)
     else:
         # what turns with the water does not make the ship faster
         follows = known and slowed < _RISES and fell > _STEADY

@@ -26,7 +26,9 @@ _EDGE = 3  # bins at least on each side of a change
 _POWERS = (0, 1, 2, 4)
 _STEEPEST_POWER = 5.0
 _NEAR = 6  # bins after a change
-SIGNIFICANT = 30.0  # gain that chance does not reach: at most 26 in 300 simulated coastdowns
+SIGNIFICANT = 60.0  # gain of a change: chance reaches it in 1 clean coastdown of 100 or less
+STRONG = 20.0  # the same where the deceleration grows to `_STRONGLY` times what it was
+_STRONGLY = 4.0
 _QUICKER = 1.5  # times the deceleration before: no hump of wave making does that
 _GENTLER = 0.4  # of the least that coasting on leaves
 _SURE = 5.0  # standard deviations of a bin
@@ -36,6 +38,7 @@ _AT_REST = 0.05  # of the highest speed
 _AT_REST_BINS = 3
 # deceleration over what is usual for her
 _DRIVEN = 0.5
+_IDLE = 0.15
 _USUAL = 2.0
 _HELD = 3.0
 _ALIKE = 0.9  # most that neighbours may be alike before slow noise is taken for a law
@@ -254,15 +257,19 @@ def _departure(
     if len(slow):
         t, v = t[: slow[0] + _AT_REST_BINS], v[: slow[0] + _AT_REST_BINS]
     change = change_point(t, v)
-    if change is None or change.gain < bar:
+    if change is None:
         return None
     usual = max(expected(max(change.speed, 1e-6)), 1e-12)
     here, there = change.before / usual, change.after_at_once / usual
+    if here > _IDLE and there > _STRONGLY * here:
+        bar = min(bar, STRONG)
+    if change.gain < bar:
+        return None
     then = (
         f'at {change.speed:.3g} m/s she slows by {_shown(change.before)} m/s² up to there and '
         f'by {_shown(change.after_at_once)} m/s² after it'
     )
-    if change.quickens and here < _DRIVEN:
+    if change.quickens and here < (_DRIVEN if there < _HELD else _IDLE):
         text = f'{then}: she hardly slows at first, as if driven'
         return Cut(float(t[0]), change.at_s, False, Dismissal.LEAD_IN, text)
     if change.quickens:

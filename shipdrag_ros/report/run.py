@@ -34,12 +34,12 @@ class RunResult:
         What is wrong with the run, a sentence each.
     truth
         The true curve, where the record is simulated.
+    span_ns
+        First and last time of arrival in the bag [ns]; None where it is empty.
     not_coastdowns
         What was nearly a coastdown, and what was cut, with why.
     steady_lead_s
         The longest that the ship was steady; None where no coastdown was looked for.
-    span_ns
-        First and last time of arrival in the bag [ns]; None where it is empty.
     """
 
     bag: str
@@ -49,9 +49,15 @@ class RunResult:
     recorded: Recorded
     warnings: tuple[str, ...] = ()
     truth: TrueCurve | None = None
+    span_ns: tuple[int, int] | None = None
     not_coastdowns: tuple[NotCoastdown, ...] = ()
     steady_lead_s: float | None = None
-    span_ns: tuple[int, int] | None = None
+
+    @property
+    def dismissed(self) -> tuple[NotCoastdown, ...]:
+        """What is no coastdown, without what is told as cut off one."""
+        told = [cut for coastdown in self.coastdowns for cut in coastdown.cuts]
+        return tuple(one for one in self.not_coastdowns if one not in told)
 
     @classmethod
     def of(cls, result: ReplayResult) -> RunResult:
@@ -73,7 +79,7 @@ class RunResult:
             recorded=result.recorded,
             warnings=run_warnings(result),
             truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
+            span_ns=run.span_ns,
             not_coastdowns=result.not_coastdowns,
             steady_lead_s=result.steady_lead_s,
-            span_ns=run.span_ns,
         )

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A window for each bag, where bags are given."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipdrag_ros.cli import main
+from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
+
+
+def test_a_bag_may_carry_its_window(tmp_path: Path) -> None:
+    assert windowed_bag('a.mcap') == WindowedBag(Path('a.mcap'), None)
+    assert windowed_bag('a.mcap@12.5:90') == WindowedBag(Path('a.mcap'), (12.5, 90.0))
+    assert windowed_bag('x@y/a.mcap@0:1e3') == WindowedBag(Path('x@y/a.mcap'), (0.0, 1000.0))
+    assert windowed_bag('me@home.mcap') == WindowedBag(Path('me@home.mcap'), None)
+    named = tmp_path / 'a@1:2'
+    named.touch()
+    assert windowed_bag(str(named)) == WindowedBag(named, None)
+    assert windowed_bag(f'{named}@3:4') == WindowedBag(named, (3.0, 4.0))
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('a.mcap@90:12', 'runs from 90 to 12 s; expected 0 <= START < END'),
+        ('a.mcap@5:5', 'runs from 5 to 5 s'),
+        ('a.mcap@-1:5', 'runs from -1 to 5 s'),
+        ('a.mcap@1:', "the window '1:' is not START:END in s"),
+        ('a.mcap@1:x', "the window '1:x' is not START:END in s"),
+        ('a.mcap@1:nan', 'is not START:END'),
+        ('@1:2', 'is not START:END'),
+    ],
+)
+def test_a_wrong_window_is_named(text: str, said: str) -> None:
+    with pytest.raises(argparse.ArgumentTypeError) as error:
+        windowed_bag(text)
+    assert said in str(error.value)
+
+
+def test_runs_come_in_the_order_given(coastdown_bag: Path, tmp_path: Path) -> None:
+    other = tmp_path / 'other.mcap'
+    shutil.copy(coastdown_bag, other)
+    given = [WindowedBag(other, (400.0, 900.0)), WindowedBag(coastdown_bag, None)]
+    given.append(WindowedBag(other, (500.0, 1000.0)))
+    found = open_windowed(given, remap={}, window=(450.0, 800.0))
+    assert [(run.name, window) for run, window in found] == [
+        (str(other), (400.0, 900.0)),
+        (str(coastdown_bag), (450.0, 800.0)),
+        (str(other), (500.0, 1000.0)),
+    ]
+
+
+def replayed(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
+    assert main(['replay', *words, '--json']) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_replay_takes_each_window(coastdown_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bags = [f'{coastdown_bag}@430:900', f'{coastdown_bag}@500:1200']
+    found = replayed(capsys, *bags, '--window', '0', '1')['coastdowns']
+    first, second = ((each['end_ns'] - each['start_ns']) * 1e-9 for each in found)
+    assert (first, second) == (pytest.approx(470.0), pytest.approx(700.0))
+    assert {each['ended_by'] for each in found} == {'given'}
+
+
+def test_a_window_outside_of_the_bag_is_an_error(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['replay', f'{coastdown_bag}@99999:100000']) == 1
+    assert 'window 99999 to 100000 s' in capsys.readouterr().err
+
+
+def test_what_is_cut_is_said_first_in_text_and_report(
+    coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / 'a.html'
+    assert main(['replay', f'{coastdown_bag}@100:1200', '--report', str(page)]) == 0
+    said = capsys.readouterr().out
+    assert 'Of 100.0 s to 1200.0 s only' in said
+    assert said.index('is taken for a coastdown') < said.index('The resistance is known')
+    text = page.read_text(encoding='utf-8')
+    assert text.index('is taken for a coastdown') < text.index('The resistance is known')
+    assert 'Hatched: what was cut, and why' in text
+    found = replayed(capsys, f'{coastdown_bag}@100:1200')
+    (coastdown,) = found['coastdowns']
+    before = [each for each in found['not_coastdowns'] if each['reason'] == 'thrust']
+    assert [each['end_ns'] for each in before] == [coastdown['start_ns']]
+    assert 'rpm), which is thrust' in before[0]['text']
