@@ -15,6 +15,7 @@ from shipdrag_ros.samples import MOTION_INPUTS, Block, Float64
 _BIN_S = 10.0
 _GLIDE_S = 600.0  # within which a ship that glides has slowed
 _SLOWED = 0.1  # of the speed; what falls less is the sea
+_TOLD = 3  # of the stretches that were dismissed
 _LEAD_WINDOWS = 2.0  # lengths of the slope test that a steady lead has at least
 
 
@@ -45,6 +46,8 @@ def why_no_coastdown(result: ReplayResult) -> str:
     str
         Part of a sentence.
     """
+    if result.not_coastdowns:
+        return _dismissed(result)
     block, _ = accepted_samples(result.run)
     if not len(block):
         return f'no message of {", ".join(MOTION_INPUTS)} could be used'
@@ -73,6 +76,20 @@ def why_no_coastdown(result: ReplayResult) -> str:
         f'{fell}, but not as after an engine stop from steady sailing (less power, a turn, '
         'unsteady speed before); if it was one, say so with --window START END'
     )
+
+
+def _dismissed(result: ReplayResult) -> str:
+    """Say what was nearly a coastdown, and why it is none."""
+    first_ns = result.run.span_ns[0] if result.run.span_ns else 0
+    told = [
+        f'from {(one.start_ns - first_ns) * 1e-9:.0f} to {(one.end_ns - first_ns) * 1e-9:.0f} s '
+        f'it was none ({one.reason.value}): {one.text}'
+        for one in result.not_coastdowns[:_TOLD]
+    ]
+    more = len(result.not_coastdowns) - _TOLD
+    if more > 0:
+        told.append(f'and {more} more, which `shipdrag replay` lists')
+    return '; '.join(told)
 
 
 def _largest_fall(block: Block) -> tuple[str, _Fall | None]:
