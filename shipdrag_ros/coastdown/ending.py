@@ -19,7 +19,7 @@ from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.onset import Candidate, Doubt, bend
 from shipdrag_ros.coastdown.settling import Force, constant_force
-from shipdrag_ros.coastdown.shafts import Thrust, all_stand, engaged_at
+from shipdrag_ros.coastdown.shafts import Seen, Thrust, all_stand, engaged_at, propulsion
 from shipdrag_ros.coastdown.tracking import heading_is_told, turned_at
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -32,9 +32,9 @@ _EXPONENT_MIN = 1.0  # and no more than in proportion to it
 _LOST_MIN = 0.05
 _LENGTH_MIN = 0.5  # ... or was shorter than this, of confirm_s, ...
 # ... or if a constant force of this fraction of the first resistance drove, or braked, the ship;
-# wind and an exponent that is not as expected make up to 0.1 and -0.35
+# wind and an exponent that is not as expected make up to 0.1 and -0.35, a gale -1
 _THRUST_MIN = 0.2
-_BRAKE_MIN = 0.7
+_BRAKE_MIN = 1.2
 _THROUGHOUT_MIN = 0.07  # likewise, where it ended in a steady speed, ...
 _CORNER = 9.0  # ... and chi^2 would gain no more than this from a later begin of that force
 _EARLIER_WINDOWS = 3  # slope windows before the newest one that say how it decelerated
@@ -201,6 +201,12 @@ def _forced(
 ) -> Doubt | None:
     """Say that a constant force acted beside the water all the time."""
     width = tuning.slopes.width
+    stands = 0.5 * parameters.shaft_stopped_fraction
+    # where the shafts are seen to do nothing, a constant force is the wind
+    seen = Seen(coasted.source, coasted.start, coasted.spread)
+    told = propulsion(bins, coasted.drive, seen, end.last, width=width, stands=stands).thrust
+    if told in (Thrust.STANDS, Thrust.WINDMILLS):
+        return None
     first = coasted.start + round(0.1 * parameters.confirm_s)
     faster = line(bins, coasted.source, coasted.start - 1, width)[1]
     if math.isnan(faster):

@@ -94,13 +94,15 @@ def _look_at_speed(
         learn(steadiness, tuning.slopes, bins, source, number)  # should the one watched fail
         return 0
     learn(steadiness, tuning.slopes, bins, source, number)
+    before = watch.seen[0] if watch.seen_source[0] == source else NEVER
     watch.seen_source[0] = source
     watch.seen[0] = number
     limits = steadiness.limit[source]
     steady, falls = True, False
     for scale in range(SCALES):
-        # a longer window changes more slowly: one look in two, one in four
-        if number % (1 << scale) != 0:
+        # a longer window changes more slowly: one look in two seconds, one in four; a sensor
+        # may read at odd seconds only
+        if number >> scale == before >> scale:
             continue
         slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
         if scale == 0:
@@ -110,7 +112,7 @@ def _look_at_speed(
         falls = falls or slope < -limits[scale]
         if slope < -0.5 * limits[scale] or slope < -0.5 * watch.held[scale]:
             steady = False
-    if steady and number % (1 << (SCALES - 1)) == 0:  # all windows were looked at
+    if steady and number >> (SCALES - 1) != before >> (SCALES - 1):  # all were looked at
         watch.armed[:] = 1
     fast = watch.level[0] > tuning.speed_min
     falls = falls and watch.armed[0] != 0 and fast

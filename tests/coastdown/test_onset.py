@@ -418,3 +418,13 @@ def test_outliers_do_not_hide_an_onset(watch, record, sensors) -> None:
         for seed in range(6)
     ]
     assert sum(found) >= 5
+
+
+@pytest.mark.parametrize('phase', [0, 1])
+def test_a_log_that_reads_every_other_second_is_armed_again(watch, record, phase: int) -> None:
+    # a slow-down is dismissed, then the engine stops
+    orders = (EngineOrder(0.0, shaft=0.9, thrust=0.8), EngineOrder(1500.0, shaft=0.0, thrust=0.0))
+    block = record(orders=orders, lead_in_s=1200.0, duration_s=2400.0)
+    second = (block.stamp_ns - START_NS) // S
+    (onset,) = onsets(watch(block[second % 2 == phase]))
+    assert abs(after_s(onset.start_ns, 1200.0) - 1500.0) <= 15.0
