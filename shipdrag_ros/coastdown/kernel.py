@@ -243,8 +243,17 @@ def _compile(sources: str) -> Callable[..., tuple[int, int]]:
     return cast(Callable[..., tuple[int, int]], compiled)
 
 
-_SOURCES = ('past', 'outliers', 'validate')
-_SOURCES += ('bins', 'filling', 'ring', 'steadiness', 'memory', 'kernel')
+_SOURCES = (
+    'past',
+    'outliers',
+    'validate',
+    'bins',
+    'filling',
+    'ring',
+    'steadiness',
+    'memory',
+    'kernel',
+)
 
 # compiled on import, so that no coastdown waits for it
 walk = _compile(digest('samples.py', *(f'coastdown/{name}.py' for name in _SOURCES)))
