@@ -68,7 +68,7 @@ def fits(
 
     Changes nothing.
     """
-    count = past.readings[channel]
+    count = past.accepted[channel]
     last = (count - 1) % KEPT
     if channel < FIRST_TRACK:
         if a != 0.0 and abs(a - past.value[channel, last, 0]) <= past.gate[channel]:
@@ -81,7 +81,7 @@ def fits(
         x, y = a - past.value[channel, last, 0], b - past.value[channel, last, 1]
         if (abs(x) + abs(y)) * M_PER_DEGREE <= past.gate[channel]:
             return True
-    return _may_be(past, channel, stamp, a, b, variance_a, variance_b)
+    return bool(_may_be(past, channel, stamp, a, b, variance_a, variance_b))
 
 
 @compiled(inline=True, uncounted=True)
@@ -112,7 +112,7 @@ def _may_be(
     past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
 ) -> bool:
     """Judge a reading with all there is."""
-    return (
+    return bool(
         _silent(past, channel, stamp)
         or _agrees_with_accepted(past, channel, stamp, a, b, variance_a, variance_b)
         or _is_new_truth(past, channel, stamp, a, b, variance_a, variance_b)
@@ -140,7 +140,7 @@ def _agrees_with_accepted(
     past: Past, channel: int, stamp: int, a: float, b: float, variance_a: float, variance_b: float
 ) -> bool:
     """Say whether a reading is near the last accepted one, or the median of the last few."""
-    count = past.readings[channel]
+    count = past.accepted[channel]
     if count < MIDDLE:
         return True
     last = (count - 1) % KEPT
@@ -157,7 +157,7 @@ def _agrees_with_accepted(
         width = _width(past, channel, gap, variance_a, variance_b)
     middle_a = median(past, channel, count, 0, last_a)
     middle_b = median(past, channel, count, 1, last_b)
-    return apart(channel, a, b, middle_a, middle_b) <= width
+    return bool(apart(channel, a, b, middle_a, middle_b) <= width)
 
 
 @compiled(uncounted=True)
@@ -185,7 +185,7 @@ def _agrees_with_refused(
         before = (count - 2) % AGREED
         width += abs(past.refused[channel, last, 0] - past.refused[channel, before, 0])
     last_a, last_b = past.refused[channel, last, 0], past.refused[channel, last, 1]
-    return apart(channel, a, b, last_a, last_b) <= width
+    return bool(apart(channel, a, b, last_a, last_b) <= width)
 
 
 @compiled(uncounted=True)
@@ -203,7 +203,7 @@ def _is_new_truth(
     new = past.refused_new[channel] + (not _same_as_refused(past, channel, a, b))
     if 2 * new >= AGREED - 1:
         return True
-    natural = repeats_kept(past, channel, min(past.readings[channel], KEPT), 0) > REPEATS
+    natural = repeats_kept(past, channel, min(past.accepted[channel], KEPT), 0) > REPEATS
     return natural and (channel >= FIRST_TRACK or a != 0.0)
 
 
@@ -235,7 +235,7 @@ def _take(
 @compiled(uncounted=True)
 def _silent(past: Past, channel: int, stamp: int) -> bool:
     """Say whether so long nothing was heard that what was before says nothing."""
-    count = past.readings[channel]
+    count = past.accepted[channel]
     if count == 0:
         return False
     heard = max(past.stamp_ns[channel, (count - 1) % KEPT], past.heard_ns[channel])
@@ -271,7 +271,7 @@ def refuse(
     """
     past.heard_ns[channel] = stamp
     past.due_ns[channel] = _NEVER
-    if past.readings[channel] > 0 and same_as_last(past, channel, a, b):
+    if past.accepted[channel] > 0 and same_as_last(past, channel, a, b):
         return  # a sensor that sticks where it was
     refused = past.refused_count[channel]
     same = refused > 0 and _same_as_refused(past, channel, a, b)

@@ -51,7 +51,7 @@ class Past(NamedTuple):
         The last accepted readings, number n in slot n % KEPT.
     stamp_ns : (channels, KEPT) int64
         Their stamps [ns].
-    readings : (channels,) int64
+    accepted : (channels,) int64
         How many were accepted since all was learnt anew.
     gate : (channels,)
         Difference of successive readings that noise explains [m/s or m]; inf while unknown.
@@ -79,7 +79,7 @@ class Past(NamedTuple):
 
     value: Float64
     stamp_ns: Int64
-    readings: Int64
+    accepted: Int64
     gate: Float64
     rate: Float64
     learn_ns: Int64
@@ -130,7 +130,7 @@ def learn_anew(past: Past, channel: int) -> None:
     """
     Forget all readings of a channel.
     """
-    past.readings[channel] = 0
+    past.accepted[channel] = 0
     past.gate[channel] = np.inf
     past.rate[channel] = 0.0
     past.due_ns[channel] = _NEVER
@@ -146,12 +146,12 @@ def keep(past: Past, channel: int, stamp: int, a: float, b: float) -> None:
     """
     Keep an accepted reading where nothing else is due.
     """
-    count = past.readings[channel]
+    count = past.accepted[channel]
     slot = count % KEPT
     past.value[channel, slot, 0] = a
     past.value[channel, slot, 1] = b
     past.stamp_ns[channel, slot] = stamp
-    past.readings[channel] = count + 1
+    past.accepted[channel] = count + 1
 
 
 @compiled(uncounted=True)
@@ -159,7 +159,7 @@ def keep_and_learn(past: Past, channel: int, stamp: int, a: float, b: float) -> 
     """
     Keep an accepted reading, and learn from it what is due.
     """
-    count = past.readings[channel]
+    count = past.accepted[channel]
     if count > 0 and same_as_last(past, channel, a, b):
         past.repeats[channel] += 1
     else:
@@ -180,7 +180,7 @@ def same_as_last(past: Past, channel: int, a: float, b: float) -> bool:
     """
     Say whether a reading is the last accepted one again; there must be one.
     """
-    last = (past.readings[channel] - 1) % KEPT
+    last = (past.accepted[channel] - 1) % KEPT
     return bool(
         a == past.value[channel, last, 0]
         and (channel < FIRST_TRACK or b == past.value[channel, last, 1])
@@ -225,7 +225,7 @@ def _insert(scratch: Float64, count: int, value: float) -> None:
 @compiled(uncounted=True)
 def repeats_kept(past: Past, channel: int, kept: int, newest: int) -> int:
     """Count repeats among the readings kept, without the `newest` ones."""
-    number, repeats = past.readings[channel] - newest, 0
+    number, repeats = past.accepted[channel] - newest, 0
     for i in range(kept - newest - 1):
         one, other = (number - 1 - i) % KEPT, (number - 2 - i) % KEPT
         repeats += past.value[channel, one, 0] == past.value[channel, other, 0] and (
@@ -237,7 +237,7 @@ def repeats_kept(past: Past, channel: int, kept: int, newest: int) -> int:
 @compiled(uncounted=True)
 def _is_stuck(past: Past, channel: int) -> int:
     """Say whether repeats that go on are odd for this sensor; 1 or 0."""
-    kept, run = min(past.readings[channel], KEPT), STUCK + 1
+    kept, run = min(past.accepted[channel], KEPT), STUCK + 1
     if kept - run < _WITNESSES:
         return 0
     return int(repeats_kept(past, channel, kept, run) <= REPEATS)
@@ -246,7 +246,7 @@ def _is_stuck(past: Past, channel: int) -> int:
 @compiled(uncounted=True)
 def _learn(past: Past, channel: int) -> None:
     """Learn the gate, and the speed of a track, from the readings kept."""
-    count = past.readings[channel]
+    count = past.accepted[channel]
     kept = min(count, KEPT)
     if kept < MIDDLE:
         return
