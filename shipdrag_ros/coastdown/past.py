@@ -31,7 +31,7 @@ STUCK = 6  # repeats in a row that a sensor that does not repeat makes when it s
 REPEATS = 2  # among the readings kept: a sensor that repeats more often does so by its nature
 
 _NEVER = -(2**62)
-_LEARN_NS = 64_000_000_000
+_LEARN_NS = 128_000_000_000
 _WITNESSES = 16  # readings before a run of repeats that tell whether it is natural
 _OF_MEDIAN = 0.6745  # median of the size of a normal variable, in standard deviations
 _OF_QUARTILE = 1.1503  # its upper quartile
@@ -170,7 +170,7 @@ def keep_and_learn(past: Past, channel: int, stamp: int, a: float, b: float) -> 
     if past.repeats[channel] == STUCK:
         past.stuck[channel] = _is_stuck(past, channel)
     if count < KEPT or stamp >= past.learn_ns[channel]:
-        _learn(past, channel)
+        learn_gate(past, channel)
         past.learn_ns[channel] = (stamp // _LEARN_NS + 1) * _LEARN_NS
     quiet = count >= KEPT and past.repeats[channel] == 0 and past.doubts[channel] == 0
     past.due_ns[channel] = past.learn_ns[channel] if quiet else _NEVER
@@ -245,8 +245,10 @@ def _is_stuck(past: Past, channel: int) -> int:
 
 
 @njit(**UNCOUNTED)
-def _learn(past: Past, channel: int) -> None:
-    """Learn the gate, and the speed of a track, from the readings kept."""
+def learn_gate(past: Past, channel: int) -> None:
+    """
+    Learn the gate, and the speed of a track, from the readings kept.
+    """
     count = past.accepted[channel]
     kept = min(count, KEPT)
     if kept < MIDDLE:
