@@ -157,7 +157,7 @@ def _agrees_with_accepted(
 ) -> bool:
     """Say whether a reading is near the last accepted one, or the median of the last few."""
     count = past.accepted[channel]
-    if count < MIDDLE:
+    if count == 0:
         return True
     last = (count - 1) % KEPT
     last_a, last_b = past.value[channel, last, 0], past.value[channel, last, 1]
@@ -167,6 +167,8 @@ def _agrees_with_accepted(
     width = _width(past, channel, gap, variance_a, variance_b)
     if apart(channel, a, b, last_a, last_b) <= width:
         return True
+    if count < MIDDLE:
+        return False
     if channel >= FIRST_TRACK:
         middle = (count - 1 - MIDDLE // 2) % KEPT
         gap = stamp - past.stamp_ns[channel, middle]

@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from shipdrag_ros.compiled import INLINED, UNCOUNTED
-from shipdrag_ros.samples import Channel, Float64, Int64
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, Channel, Float64, Int64
 
 MOTION = int(Channel.POSITION_GEODETIC) + 1  # the channels before it are judged
 FIRST_TRACK = int(Channel.POSITION)  # this channel and those after it are positions
@@ -40,6 +40,7 @@ _OF_PLANE = 1.1774  # median of the length of a normal vector of the plane
 _FLOOR_M_S = 0.06
 _FLOOR_PART = 0.02
 _FLOOR_M = 0.5
+_FIRST_M = 500.0  # that the first fixes may be apart, besides what any ship can go
 
 
 class Past(NamedTuple):
@@ -252,6 +253,8 @@ def learn_gate(past: Past, channel: int) -> None:
     count = past.accepted[channel]
     kept = min(count, KEPT)
     if kept < MIDDLE:
+        if channel >= FIRST_TRACK:
+            past.gate[channel], past.rate[channel] = _FIRST_M, ABSURD_SPEED_M_S
         return
     if channel < FIRST_TRACK:
         _learn_speed(past, channel, count, kept)

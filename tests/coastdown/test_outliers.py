@@ -78,6 +78,15 @@ def test_one_bad_reading_is_rejected_and_the_next_good_one_is_not(
         assert rejected(LOG, time, value) == [at]
 
 
+@pytest.mark.parametrize('at', range(6))
+def test_a_track_that_starts_with_a_jump_recovers(at) -> None:
+    value = np.column_stack([8.0 * np.arange(60.0), np.zeros(60)])
+    value += 2.0 * np.random.default_rng(11).standard_normal((60, 2))
+    value[at] += 2e4
+    # which of the first two is the bad one shows when the rest has come
+    assert rejected(METRES, np.arange(60.0), value) == ([at] if at else [1, 2, 3, 4, 5])
+
+
 @pytest.mark.parametrize('rate', [0.2, 1.0, 10.0, 100.0])
 @pytest.mark.parametrize('channel', [METRES, DEGREES])
 def test_a_jump_of_the_position_is_rejected(channel, rate) -> None:
