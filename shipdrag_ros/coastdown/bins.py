@@ -197,8 +197,8 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
 
     Notes
     -----
-    Where a gap before bin `last` leaves too few, the window reaches back as far
-    again: a record that goes on after a gap has a slope at once.
+    Where a gap leaves too few, but any, the window reaches back as far again: a
+    record that goes on after a gap has a slope at once.
     """
     speeds = bins.speeds[source]
     mask = len(speeds) - 1
@@ -206,7 +206,7 @@ def line(bins: Bins, source: int, last: int, width: int) -> tuple[float, float, 
         before, newest = _span(bins, source, last, reach)
         low, high = speeds[before & mask], speeds[newest & mask]
         count = high[COUNT] - low[COUNT]
-        if reach > width and (newest < last or speeds[(last - 1) & mask, COUNT] == high[COUNT]):
+        if count == 0:
             return np.nan, np.nan, count
         if count < 4:
             continue

@@ -88,6 +88,8 @@ def _direction(window: Window, parameters: Parameters) -> tuple[Float64, Float64
         return np.empty(0), np.empty(0), 0.0
     t, speed, angle, noise_m = course
     moves = speed > _MOVING * float(speed.max())
+    if not moves.any():  # at rest
+        return np.empty(0), np.empty(0), 0.0
     # a fix that errs turns the course by more where the way is short
     step_s = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
     doubt = 6.0 * noise_m / max(step_s * float(speed[moves].min()), 1e-9)

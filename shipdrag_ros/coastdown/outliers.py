@@ -34,6 +34,7 @@ from shipdrag_ros.coastdown.past import (
     keep,
     keep_and_learn,
     learn_anew,
+    learn_gate,
     median,
     repeats_kept,
     same_as_last,
@@ -43,6 +44,7 @@ from shipdrag_ros.compiled import compiled
 _NEVER = -(2**62)
 _ACCELERATION_M_S2 = 0.15  # that needs no proof: three times what a merchant ship coasts with
 _FASTER = 1.5  # than by the last readings a ship may get, without proof
+_BRAKE_M_S2 = 4.0  # between two readings that are refused
 _AGREED_NS = 5_000_000_000
 _SILENT_NS = 300_000_000_000  # after it nothing is compared with what was before
 _DOUBTS = 64  # readings refused more than accepted, after which all is learnt anew
@@ -127,12 +129,25 @@ def _width(past: Past, channel: int, gap_ns: int, variance_a: float, variance_b:
     if variance_a > 0.0 and variance_a < np.inf:
         stated += variance_a
     if channel < FIRST_TRACK:
-        way = _ACCELERATION_M_S2 * gap
+        way = max(_ACCELERATION_M_S2, _FASTER * _latest_rate(past, channel)) * gap
     else:
         if variance_b > 0.0 and variance_b < np.inf:
             stated += variance_b
-        way = (_FASTER * past.rate[channel] + _ACCELERATION_M_S2 * gap) * gap
+        rate = max(past.rate[channel], _latest_rate(past, channel))
+        way = (_FASTER * rate + _ACCELERATION_M_S2 * gap) * gap
     return float(max(past.gate[channel], SD * math.sqrt(stated)) + way)
+
+
+@compiled(uncounted=True)
+def _latest_rate(past: Past, channel: int) -> float:
+    """Return the change a second over the last `MIDDLE` readings: a ship may get under way."""
+    count = past.accepted[channel]
+    if count < MIDDLE:
+        return 0.0
+    last, first = (count - 1) % KEPT, (count - MIDDLE) % KEPT
+    new, old = past.value[channel, last], past.value[channel, first]
+    time = (past.stamp_ns[channel, last] - past.stamp_ns[channel, first]) * 1e-9
+    return float(apart(channel, new[0], new[1], old[0], old[1]) / time) if time > 0.0 else 0.0
 
 
 @compiled(uncounted=True)
@@ -141,7 +156,7 @@ def _agrees_with_accepted(
 ) -> bool:
     """Say whether a reading is near the last accepted one, or the median of the last few."""
     count = past.accepted[channel]
-    if count < MIDDLE:
+    if count == 0:
         return True
     last = (count - 1) % KEPT
     last_a, last_b = past.value[channel, last, 0], past.value[channel, last, 1]
@@ -151,6 +166,8 @@ def _agrees_with_accepted(
     width = _width(past, channel, gap, variance_a, variance_b)
     if apart(channel, a, b, last_a, last_b) <= width:
         return True
+    if count < MIDDLE:
+        return False
     if channel >= FIRST_TRACK:
         middle = (count - 1 - MIDDLE // 2) % KEPT
         gap = stamp - past.stamp_ns[channel, middle]
@@ -180,11 +197,16 @@ def _agrees_with_refused(
     last = (count - 1) % AGREED
     gap = stamp - past.refused_ns[channel, 1]
     width = _width(past, channel, gap, variance_a, variance_b)
-    # of what is refused little is known: a car that brakes is its own witness
-    if channel < FIRST_TRACK and count > 1:
-        before = (count - 2) % AGREED
-        width += abs(past.refused[channel, last, 0] - past.refused[channel, before, 0])
     last_a, last_b = past.refused[channel, last, 0], past.refused[channel, last, 1]
+    if channel < FIRST_TRACK:
+        if count == 1:
+            width += _BRAKE_M_S2 * gap * 1e-9
+        else:  # a car that brakes goes on as it did
+            lasted = past.refused_ns[channel, 1] - past.refused_ns[channel, 0]
+            steps = gap * (count - 1) / max(1, lasted)  # stamps may be equal
+            going_on = (last_a - past.refused[channel, (count - 2) % AGREED, 0]) * steps
+            if abs(a - last_a - going_on) <= width:
+                return True
     return bool(apart(channel, a, b, last_a, last_b) <= width)
 
 
@@ -271,6 +293,7 @@ def refuse(
     """
     past.heard_ns[channel] = stamp
     past.due_ns[channel] = _NEVER
+    learn_gate(past, channel)  # the last time may be long ago
     if past.accepted[channel] > 0 and same_as_last(past, channel, a, b):
         return  # a sensor that sticks where it was
     refused = past.refused_count[channel]

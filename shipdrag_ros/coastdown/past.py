@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Channel, Float64, Int64
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, Channel, Float64, Int64
 
 MOTION = int(Channel.POSITION_GEODETIC) + 1  # the channels before it are judged
 FIRST_TRACK = int(Channel.POSITION)  # this channel and those after it are positions
@@ -30,7 +30,7 @@ STUCK = 6  # repeats in a row that a sensor that does not repeat makes when it s
 REPEATS = 2  # among the readings kept: a sensor that repeats more often does so by its nature
 
 _NEVER = -(2**62)
-_LEARN_NS = 64_000_000_000
+_LEARN_NS = 128_000_000_000
 _WITNESSES = 16  # readings before a run of repeats that tell whether it is natural
 _OF_MEDIAN = 0.6745  # median of the size of a normal variable, in standard deviations
 _OF_QUARTILE = 1.1503  # its upper quartile
@@ -39,6 +39,7 @@ _OF_PLANE = 1.1774  # median of the length of a normal vector of the plane
 _FLOOR_M_S = 0.06
 _FLOOR_PART = 0.02
 _FLOOR_M = 0.5
+_FIRST_M = 500.0  # that the first fixes may be apart, besides what any ship can go
 
 
 class Past(NamedTuple):
@@ -169,7 +170,7 @@ def keep_and_learn(past: Past, channel: int, stamp: int, a: float, b: float) -> 
     if past.repeats[channel] == STUCK:
         past.stuck[channel] = _is_stuck(past, channel)
     if count < KEPT or stamp >= past.learn_ns[channel]:
-        _learn(past, channel)
+        learn_gate(past, channel)
         past.learn_ns[channel] = (stamp // _LEARN_NS + 1) * _LEARN_NS
     quiet = count >= KEPT and past.repeats[channel] == 0 and past.doubts[channel] == 0
     past.due_ns[channel] = past.learn_ns[channel] if quiet else _NEVER
@@ -244,11 +245,15 @@ def _is_stuck(past: Past, channel: int) -> int:
 
 
 @compiled(uncounted=True)
-def _learn(past: Past, channel: int) -> None:
-    """Learn the gate, and the speed of a track, from the readings kept."""
+def learn_gate(past: Past, channel: int) -> None:
+    """
+    Learn the gate, and the speed of a track, from the readings kept.
+    """
     count = past.accepted[channel]
     kept = min(count, KEPT)
     if kept < MIDDLE:
+        if channel >= FIRST_TRACK:
+            past.gate[channel], past.rate[channel] = _FIRST_M, ABSURD_SPEED_M_S
         return
     if channel < FIRST_TRACK:
         _learn_speed(past, channel, count, kept)

@@ -100,7 +100,7 @@ def test_the_longest_line_does_not_overflow() -> None:
 
 def test_a_line_needs_points_over_the_window() -> None:
     bins = binned(LOG, np.arange(100.0), 0.1 * np.arange(100.0))
-    assert np.isnan(line(bins, LOG, FIRST + 140, WIDTH)[0])
+    assert np.isnan(line(bins, LOG, FIRST + 98 + WIDTH, WIDTH)[0])
     assert np.isnan(line(bins, LOG, FIRST + 2, WIDTH)[0])
     assert not np.isnan(line(bins, LOG, FIRST + 98, WIDTH)[0])
 
@@ -111,7 +111,7 @@ def test_a_line_reaches_back_over_a_gap() -> None:
     slope, level, count = line(bins, LOG, FIRST + 160, 60)
     assert count == 70
     np.testing.assert_allclose([slope, level], [0.1, 16.0], rtol=1e-6)
-    assert np.isnan(line(bins, LOG, FIRST + 129, 60)[0])
+    np.testing.assert_allclose(line(bins, LOG, FIRST + 129, 60)[0], 0.1, rtol=1e-6)
 
 
 def test_old_bins_are_overwritten_and_not_mistaken_for_new_ones() -> None:

@@ -115,7 +115,7 @@ def test_late_s_says_what_is_late() -> None:
 @pytest.mark.parametrize('channel', [LOG, GROUND, METRES, DEGREES])
 def test_motion_that_does_not_change_is_frozen(channel: Channel) -> None:
     # frozen at t = 1..: accepted for frozen_s, then not, until it changes
-    samples = [sample(channel, 0.0, [1.0, 2.0])]
+    samples = [sample(channel, 0.0, [3.0001, 4.0])]
     samples += [sample(channel, t, [3.0, 4.0]) for t in range(1, 20)]
     samples += [sample(channel, t, [3.000001, 4.0]) for t in (20.0, 21.0)]
     found = reasons(*samples, frozen_s=10.0)

@@ -163,6 +163,11 @@ def _result(
             'froude_min'
         )
     curve = _curve(found, np.linspace(low, high, _CURVE_POINTS), ship)
+    if len(curve) < 2:
+        raise EstimationError(
+            f'the fitted force nowhere slows the ship from {high:.4g} to {low:.4g} m/s: give a '
+            'window in which she coasts'
+        )
     valid = ValidRange.of_branch(curve)
     tracks = {}
     for name, stamps in record.stamps.items():
