@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import SOURCES, newest_bin, warm
+from shipdrag_ros.coastdown.bins import SOURCES, warm
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.ending import End, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
@@ -38,7 +38,7 @@ from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
-from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits
+from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits, alive_ns
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, estimate_final, motion_fit
 from shipdrag_ros.estimation.result import Estimate
@@ -99,6 +99,7 @@ class Monitor:
         )
         self._memory = self._fresh(Tally.fresh())
         warm(self._memory.bins)
+        alive_ns(self._memory.guard, self._tuning.limits, 0)  # compiled now, too
         motion_fit.warm()
         self._steady_ns = round(parameters.steady_s * SECOND_NS)
         self._window_ns = round(parameters.window_s * SECOND_NS)
@@ -178,7 +179,7 @@ class Monitor:
             elif stop == Stop.BIN:
                 events += self._judge()
             elif stop == Stop.SILENCE:
-                if not self._fall_back():
+                if not self._fall_back(int(stamp_ns[at])):
                     events += self._stop_at_last_sample(EndedBy.DATA_STOP)
             elif stop == Stop.SLOPE:
                 self._propose(int(self._memory.watch.seen[0]), noticed=True)
@@ -288,16 +289,16 @@ class Monitor:
             return []
         return self._dismissals.take(NotCoastdown(start_ns, end_ns, doubt.reason, doubt.text))
 
-    def _fall_back(self) -> bool:
-        """Go on with another speed source where the one watched has failed, if there is one."""
+    def _fall_back(self, now_ns: int) -> bool:
+        """Go on with another speed source where the one watched is silent, if there is one."""
         assert self._candidate is not None
-        steadiness, bins = self._memory.steadiness, self._memory.bins
+        steadiness, guard, tuning = self._memory.steadiness, self._memory.guard, self._tuning
         failed = self._candidate.source
-        newest = max(newest_bin(bins, source) for source in range(SOURCES))
         for source in range(SOURCES):
             limits = steadiness.limit[source]
-            recent = newest_bin(bins, source) > newest - self._tuning.slopes.width
-            if source == failed or not recent or np.isnan(limits[0]):
+            # by the rule that found the other silent: or both would be tried in turn for ever
+            silent = now_ns > alive_ns(guard, tuning.limits, source) + tuning.data_stop_ns
+            if source == failed or silent or np.isnan(limits[0]):
                 continue
             self._memory.watch.source[0] = source
             self._candidate = replace(

@@ -283,3 +283,15 @@ def test_nothing_is_compiled_once_it_runs(ship, record, sensors) -> None:
     events = watched.update(block[: len(block) // 2]) + watched.update(block[len(block) // 2 :])
     assert of(Onset, events)
     assert [len(kernel.signatures) for kernel in kernels] == compiled
+
+
+def test_silence_of_all_speeds_ends_a_coastdown_though_the_heading_goes_on(
+    ship, record, sensors
+) -> None:
+    everything = record(sensors=(sensors['log'], sensors['radar'], sensors['compass']))
+    silent_ns = START_NS + 1500 * S
+    heard = everything[(everything.stamp_ns < silent_ns) | (everything.channel == Channel.HEADING)]
+    watched = monitor(ship)
+    (ended,) = of(Coastdown, watched.update(heard))
+    assert ended.ended_by is EndedBy.DATA_STOP
+    assert silent_ns - S <= ended.end_ns < silent_ns
