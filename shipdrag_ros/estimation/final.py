@@ -12,8 +12,9 @@ from shipdrag_ros.estimation.choice import estimate
 from shipdrag_ros.estimation.coverage import coverage_notes
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 
 _RUN_DOWNS = 4.0  # of the shaft, after which no thrust is left
@@ -33,8 +34,8 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
     parameters
         `estimator`: `auto` stands for the fit of the equation of motion here;
         any other is used as during the coastdown. Where the fit fails, the
-        estimate during the coastdown is kept, and a note says why. Where both
-        disagree, the band is widened.
+        estimate during the coastdown is kept, or that of one input alone, and a
+        note says why. Where both disagree, the band is widened.
 
     Raises
     ------
@@ -51,15 +52,52 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     try:
         found = motion_fit.estimate(window, ship, parameters)
     except EstimationError as error:
-        found = estimate(window, ship, parameters)
-        note = f'not fitted as a motion, so as during the coastdown: {error}'
-        return replace(found, notes=(*found.notes, note))
+        return _instead(window, ship, parameters, error)
     try:
         other = estimate(window, ship, parameters)
     except EstimationError as error:
         note = f'not compared with the estimate during the coastdown, which failed: {error}'
         return replace(found, notes=(*found.notes, note))
     return widened(found, other, _without_thrust_m_s(found, window, ship))
+
+
+def _instead(
+    window: Window, ship: Ship, parameters: Parameters, unfitted: EstimationError
+) -> Estimate:
+    """Estimate as during the coastdown; by one input alone where all together give nothing."""
+    try:
+        found = estimate(window, ship, parameters)
+    except EstimationError as error:
+        heard = [name for name in MOTION_INPUTS if len(getattr(window, name))]
+        for name in heard if len(heard) > 1 else []:
+            try:
+                found = motion_fit.estimate(_alone(window, name), ship, parameters)
+            except EstimationError:
+                continue
+            others = ' and '.join(other for other in heard if other != name)
+            note = f'by {name} alone, without {others}: together they give nothing: {error}'
+            return replace(found, notes=(*found.notes, note))
+        raise
+    note = f'not fitted as a motion, so as during the coastdown: {unfitted}'
+    return replace(found, notes=(*found.notes, note))
+
+
+def _alone(window: Window, kept: str) -> Window:
+    """Leave out all inputs of motion but one, in the record before too."""
+
+    def of(name: str) -> Series:
+        series: Series = getattr(window, name)
+        if name == kept:
+            return series
+        return Series(series.time_ns[:0], series.value[:0], series.variance[:0])
+
+    return replace(
+        window,
+        speed_through_water=of('speed_through_water'),
+        speed_over_ground=of('speed_over_ground'),
+        position=of('position'),
+        before=None if window.before is None else _alone(window.before, kept),
+    )
 
 
 def _without_thrust_m_s(found: Estimate, window: Window, ship: Ship) -> float:
