@@ -95,9 +95,11 @@ class ReplayResult:
             and not self.coastdowns
             and self.run.span_ns is not None
         ):
+            slowest = float(self.ship.speed(self.parameters.froude_min))
             text = (
-                f'the ship was never steady for longer than {self.steady_lead_s:.0f} s; an onset '
-                f'can be found after {needed_s:.0f} s of it'
+                f'the ship was never seen to sail ahead steadily, faster than {slowest:.2g} m/s, '
+                f'for longer than {self.steady_lead_s:.0f} s; an onset can be found after '
+                f'{needed_s:.0f} s of it'
             )
             found.append(NotCoastdown(*self.run.span_ns, Dismissal.LEAD_IN, text))
         return tuple(sorted(found, key=lambda one: one.start_ns))

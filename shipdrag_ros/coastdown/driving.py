@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.instruments import cut_of, length_s, runs, until
 from shipdrag_ros.coastdown.readings import binned, readings, seconds
+from shipdrag_ros.estimation.motion_fit.shaft_fall import STANDS_RAD_S
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -70,9 +71,11 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
             run = turning[first : last + 1]
             fastest = float(run[np.argmax(np.abs(run))])
             is_astern = fastest < 0.0 < ahead
+            usual = float(np.median(run))
             text = (
-                f'{name} turns at up to {fastest:.3g} rad/s ({fastest * 30.0 / math.pi:.0f} rpm)'
-                f'{", astern" if is_astern else ", which is thrust"}'
+                f'{name} turns at {usual:.3g} rad/s, up to {fastest:.3g} '
+                f'({fastest * 30.0 / math.pi:.0f} rpm), '
+                f'{"astern" if is_astern else "not as the water alone turns it: that is thrust"}'
             )
             reason = Dismissal.ASTERN if is_astern else Dismissal.THRUST
             found.append(cut_of(window, start_s, end_s, reason, text))
@@ -89,7 +92,8 @@ def turns_on(window: Window) -> bool:
     heard = False
     for number, shaft in enumerate(window.shafts):
         past = window.before.shafts[number] if window.before is not None else shaft
-        if not len(shaft) or not len(past):
+        # a shaft that stood before as well has driven nothing: its sensor is dead
+        if not len(shaft) or not len(past) or np.median(np.abs(past.value)) < STANDS_RAD_S:
             continue
         if len(window.pitches[number]):
             return False

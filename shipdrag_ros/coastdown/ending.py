@@ -37,6 +37,7 @@ _THRUST_MIN = 0.2
 _BRAKE_MIN = 1.2
 _THROUGHOUT_MIN = 0.07  # likewise, where it ended in a steady speed, ...
 _CORNER = 9.0  # ... and chi^2 would gain no more than this from a later begin of that force
+_TURN_MOST = 3.0  # times the deceleration before: more than drifting in a turn makes it
 _EARLIER_WINDOWS = 3  # slope windows before the newest one that say how it decelerated
 
 
@@ -113,8 +114,10 @@ def _departed(
     if excess > coasting.limits[0]:
         return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
     if -excess > coasting.limits[0]:
-        # where nothing tells the heading, this is how a turn shows
-        cause = EndedBy.BRAKE if told else EndedBy.TURN
+        # where nothing tells the heading, this is how a turn shows, unless it is too much for one
+        before = line(bins, source, first + width, span)[0] if span >= width else 0.0
+        braked = told or slope < _TURN_MOST * min(before, 0.0)
+        cause = EndedBy.BRAKE if braked else EndedBy.TURN
         return End(cause, _bend(bins, coasting, tuning, first, number, sign=1))
     return None
 

@@ -37,6 +37,7 @@ _IDLING = (
 )
 _MANY = 20  # readings that must be left by them, since fewer tell less than the turn spoils
 _SHOWN = 300  # means of the speed
+_WORDLESS = 1e-3  # of a stretch
 _SLIVER = 0.01  # of a stretch
 _SPAN = tuple[int, int]
 
@@ -179,6 +180,8 @@ def examine(
     kept = None if best is None else best.kept
     failure = _refusal(window, kept, cuts) if cuts else None
     start_ns, end_ns = whole if failure or kept is None else kept
+    if failure is None:  # what lies between two samples is worth no word
+        cuts = [cut for cut in cuts if cut.end_ns - cut.start_ns > _WORDLESS * _length(whole)]
     notes = () if best is None else tuple(best.notes)
     if idling:
         notes = (*notes, _IDLING)

@@ -118,8 +118,8 @@ class Monitor:
         An onset needs `slope_window_s` of it.
         """
         lead = int(self._memory.watch.lead[1])
-        # the first slope is that of the window before
-        return float(lead + self._tuning.slopes.width) if lead else 0.0
+        # the first slope is that of what came before, two thirds of a window at least
+        return float(lead + 2 * self._tuning.slopes.width // 3) if lead else 0.0
 
     @property
     def state(self) -> State:

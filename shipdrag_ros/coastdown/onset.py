@@ -47,6 +47,7 @@ EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed s
 _BRAKED = 1.5
 _BRAKE_EXPONENT = 1.0  # ... and by a force that falls less than in proportion to the speed
 _LAW_BINS_MIN = 6
+_BEND_BINS_MIN = 6
 _GUARD = 0.1  # of confirm_s: the thrust runs down first
 _TRIALS = 3  # after confirm_s, twice and three times as long
 _PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by then
@@ -415,6 +416,8 @@ def bend(
     each second of a gap between them.
     """
     time, speed = speeds(bins, source, first, last)
+    if len(time) < _BEND_BINS_MIN:  # too few to bend: what is there is all of it
+        return first
     inverse = 1.0 / np.maximum(speed, 0.5 * speed_min)
     hinges = np.concatenate([np.arange(one, other - 0.5) for one, other in pairwise(time[2:-1])])
     ramp = np.maximum(0.0, time - hinges[:, np.newaxis])

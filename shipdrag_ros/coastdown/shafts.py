@@ -212,7 +212,7 @@ def propulsion(
     rows = rows[~np.isnan(rows[:, -1])]
     # one that repeats to the last bit is stuck, unless it stands
     moves = np.array([np.ptp(row[-width:]) > 0.0 for row in rows], bool)
-    now = rows[:, -SHAFT_S:].mean(axis=1)
+    now = np.nanmean(rows[:, -SHAFT_S:], axis=1)  # the last one is known
     if np.any(now < _ASTERN):
         return Propulsion(Thrust.ASTERN, None, float(now.min()))
     fell = now < FELL

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.estimation.motion_fit.coast import ONSET, THRUST, THRUST_FAST
-from shipdrag_ros.estimation.motion_fit.shaft_fall import Fall, find_fall, say
+from shipdrag_ros.estimation.motion_fit.shaft_fall import Fall, Slowing, find_fall, say
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import SHAFTS
 from shipdrag_ros.ship import Ship
@@ -137,11 +137,14 @@ class RunDown:
 def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:
     """Yield number, name and fall of each propeller that shows one."""
     before = window.before
+    slowing = Slowing.of(window)
     for number in range(len(SHAFTS)):
         of_propeller = []
         for what, all_of in (('shaft', 'shafts'), ('pitch', 'pitches')):
             earlier = None if before is None else getattr(before, all_of)[number]
-            fall = find_fall(earlier, getattr(window, all_of)[number], window.start_ns)
+            series = getattr(window, all_of)[number]
+            by = slowing if what == 'shaft' else None
+            fall = find_fall(earlier, series, window.start_ns, by)
             if fall is not None:
                 of_propeller.append((number, _name(window, what, number), fall))
         if of_propeller:
@@ -162,7 +165,8 @@ def _others(window: Window, fallen: set[int]) -> Iterator[str]:
     """Yield what the shafts show that do not fall."""
     for number, shaft in enumerate(window.shafts):
         if len(shaft) and number not in fallen:
-            yield say(_name(window, 'shaft', number), shaft, window, window.start_ns)
+            earlier = None if window.before is None else window.before.shafts[number]
+            yield say(_name(window, 'shaft', number), shaft, window, window.start_ns, earlier)
 
 
 def _name(window: Window, what: str, number: int) -> str:

@@ -11,14 +11,16 @@ from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.samples import Float64
 
 _BAND = (0.08, 0.92)  # of the fall of the shaft speed from which its decay is found
-_FALLEN = 0.8  # of the steady shaft speed: at more the engine was not stopped
+_FALLEN = 0.9  # of the steady turns a metre: at more the engine was not stopped
 _EARLIEST_S = 300.0  # before the onset as found
 _SOON = (8.0, 16.0)  # after the fall, in half-lives
 _ROUNDS = 3
 _LEAST_SD = 0.01  # of the run-down, relative: no shaft falls exactly so
 _FEW = 3  # samples that tell a level
+_BLOCKS = 40  # of a window, whose median speeds are taken
+_SLOWEST = 0.05  # of her first speed: below it the readings are noise
 _LONGEST = 0.15  # of the window: what falls more slowly falls with the ship
-_STANDS_RAD_S = 0.5  # no propeller of a ship drives at less
+STANDS_RAD_S = 0.5  # no propeller of a ship drives at less
 _SLOWED, _ALIKE = 0.85, 0.2  # a ship has slowed down; a shaft has, as much
 _MAD_TO_SD = 1.4826
 
@@ -45,7 +47,48 @@ class Fall:
     kept: float
 
 
-def find_fall(before: Series | None, series: Series, start_ns: int) -> Fall | None:
+@dataclass(frozen=True)
+class Slowing:
+    """
+    The speed of a ship over that at the start of a window.
+
+    Attributes
+    ----------
+    time_s, ratio : (n,)
+        From the start of the window [s]; 1 before it.
+    """
+
+    time_s: Float64
+    ratio: Float64
+
+    @classmethod
+    def of(cls, window: Window) -> Slowing | None:
+        """
+        Take it from a speed that was read, in medians; None where there is none.
+        """
+        for series in (window.speed_through_water, window.speed_over_ground):
+            if len(series) >= _BLOCKS:
+                time_s = (series.time_ns - window.start_ns) * 1e-9
+                parts = np.array_split(np.arange(len(series)), _BLOCKS)
+                speed = np.array([np.median(np.abs(series.value[part])) for part in parts])
+                middle = np.array([np.median(time_s[part]) for part in parts])
+                first = speed[0] + 0.5 * max(speed[0] - speed[1], 0.0)
+                if not first > 0.0:
+                    return None
+                ratio = np.clip(speed / first, _SLOWEST, 1.0)
+                return cls(np.concatenate([[0.0], middle]), np.concatenate([[1.0], ratio]))
+        return None
+
+    def at(self, time_s: Float64) -> Float64:
+        """
+        Return the ratio at (m,) times.
+        """
+        return np.interp(time_s, self.time_s, self.ratio)
+
+
+def find_fall(
+    before: Series | None, series: Series, start_ns: int, speed: Slowing | None = None
+) -> Fall | None:
     """
     Fit an exponential fall to a shaft speed or pitch; None if it shows none.
 
@@ -56,6 +99,9 @@ def find_fall(before: Series | None, series: Series, start_ns: int) -> Fall | No
         the window itself must show the steady value.
     start_ns
         Of the window.
+    speed
+        How the ship slows down, for a shaft: what the water turns falls with her, and is
+        not the run-down of an engine.
     """
     if len(series) < _FEW:
         return None
@@ -63,9 +109,11 @@ def find_fall(before: Series | None, series: Series, start_ns: int) -> Fall | No
     parts = [before, series] if before is not None and has_before else [series]
     time_s = np.concatenate([(part.time_ns - start_ns) * 1e-9 for part in parts])
     shaft: Float64 = np.abs(np.concatenate([part.value for part in parts]))
+    if speed is not None:
+        shaft = shaft / speed.at(time_s)
     steady = shaft[: len(parts[0])] if has_before else shaft[:_FEW]
     high = float(np.median(steady) if has_before else steady.max())
-    low = float(np.median(np.abs(series.value)))
+    low = float(np.median(shaft[-len(series) :]))
     if not low < _FALLEN * high:
         return None
     scatter = np.abs(steady - high) if has_before else np.abs(np.diff(shaft)) / np.sqrt(2.0)
@@ -158,7 +206,9 @@ def _fit_fall(
     )
 
 
-def say(name: str, shaft: Series, window: Window, since_ns: int) -> str:
+def say(
+    name: str, shaft: Series, window: Window, since_ns: int, earlier: Series | None = None
+) -> str:
     """
     Say what a shaft shows that turns on, or does not turn.
 
@@ -170,10 +220,15 @@ def say(name: str, shaft: Series, window: Window, since_ns: int) -> str:
         In the window.
     since_ns
         From when on it is looked at.
+    earlier
+        The shaft in the record before the window.
     """
     rate = np.abs(shaft.value[shaft.time_ns >= since_ns])
     low, high = (float(value) for value in np.quantile(rate, (0.05, 0.95)))
-    if high < _STANDS_RAD_S:
+    if high < STANDS_RAD_S:
+        past = np.empty(0) if earlier is None else np.abs(earlier.value)
+        if len(past) >= _FEW and np.median(past) < STANDS_RAD_S:
+            return f'{name} stood before the stop too: it tells nothing, or its sensor is dead'
         return f'{name} stands in the window: the thrust had ended before it'
     turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s'
     for speed in (window.speed_through_water, window.speed_over_ground):
