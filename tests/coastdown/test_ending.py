@@ -116,8 +116,8 @@ def test_fixes_on_another_mark_are_kept_and_live_is_as_replay(ship, record, sens
     kept = (fixes[:, np.newaxis] == window.position.value).all(axis=2).any(axis=1)
     missing = np.flatnonzero(~kept)
     assert len(window.position.value) == np.count_nonzero(kept)
-    assert len(missing) == 5
-    assert np.ptp(missing) == 4
+    assert 1 <= len(missing) <= 5
+    assert np.ptp(missing) == len(missing) - 1
     assert bits(watched([block[i : i + 1] for i in range(len(block))])) == bits(events)
 
 

@@ -14,6 +14,7 @@ from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import SHAFTS
 from shipdrag_ros.ship import Ship
 
+_SUDDEN_S = 30.0  # slower than this, a shaft that follows the ship seems to run down
 ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the fit finds it
 # Of a and b in `coast`, before the fit: mean and sd. Their impulse, a + b / 3 run-downs of the
 # shaft, is 0.42 +- 0.81: below 0 (the propeller brakes before it stands), 0 (gone at once), 1/2
@@ -145,6 +146,10 @@ def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:
             series = getattr(window, all_of)[number]
             by = slowing if what == 'shaft' else None
             fall = find_fall(earlier, series, window.start_ns, by)
+            if fall is None and by is not None:  # an engine may hold it while the ship slows down
+                fall = find_fall(earlier, series, window.start_ns)
+                if fall is not None and fall.run_down_s > _SUDDEN_S:
+                    fall = None
             if fall is not None:
                 of_propeller.append((number, _name(window, what, number), fall))
         if of_propeller:
