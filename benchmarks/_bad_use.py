@@ -223,7 +223,7 @@ COMMANDS = (
         'a window that ends outside of the bag',
         lambda f: ['replay', _coast(f), '--window', '600', '90000'],
         0,
-        'Warning: --window ends at 90000 s; the bag ends at 1800.0 s',
+        'Warning: the window ends at 90000 s; the bag ends at 1800.0 s',
     ),
     _use(
         'a window that ends before it begins',
@@ -242,7 +242,7 @@ COMMANDS = (
         'a window of steady sailing',
         _replay('--window', '10', '290'),
         1,
-        'no estimate from 10 to 290 s: no deceleration above the noise',
+        'no estimate from 10 to 290 s: nothing of it is a coastdown',
         'give another --window',
     ),
     _use(

@@ -73,8 +73,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         course = ('--heading', '3.1416', '--first-heading', '0') if name == 'back' else ()
         assert main([*line, '--lead-in', '600', '--seed', str(seed), *course]) == 0
     (folder / 'damaged.mcap').write_bytes((folder / 'run.mcap').read_bytes()[:-20_000])
-    rows = ((f'{1000 * i}', '10', f'{0.005 * i}', '0', '60', '5') for i in range(60))
-    table = ['t,u,x,y,lat,lon', *(','.join(row) for row in rows)]
+    rows = ((f'{1000 * i}', '10', f'{0.005 * i}', '0', '60', '5', '90', '91') for i in range(60))
+    table = ['t,u,x,y,lat,lon,port,starboard', *(','.join(row) for row in rows)]
     (folder / 'log.csv').write_text('\n'.join(table))
     with gzip.open(folder / 'LOG.nmea.gz', 'wt') as log:
         log.writelines(nmea(second) for second in range(60))

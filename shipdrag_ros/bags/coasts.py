@@ -10,7 +10,8 @@ import numpy as np
 from shipdrag_ros.bags.playback import InputCounts, ReplayResult
 from shipdrag_ros.bags.run import ResetMark
 from shipdrag_ros.coastdown import Monitor, validate
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event
+from shipdrag_ros.coastdown.driving import gone_s
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, Event
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
@@ -108,14 +109,32 @@ def _window(result: ReplayResult, coastdown: Coastdown, apart: bool) -> Window:
     # the validation looks back; stamps may differ from times of arrival
     margin_s = parameters.frozen_s + parameters.late_s + _SET_CLOCK_S
     margin_ns = round(margin_s * _SECOND_NS)
-    first_ns = max(coastdown.start_ns - before_ns - margin_ns, 0)
+    start_ns, after_steady = _start(coastdown, result.ship)
+    first_ns = max(start_ns - before_ns - margin_ns, 0)
     inputs = result.run.inputs(start_ns=first_ns, end_ns=coastdown.end_ns + margin_ns)
     block = concatenate([item for item in inputs if isinstance(item, Block)])
     reasons = validate(_arrived_later(block) if apart else block, parameters)
     accepted = block[np.flatnonzero(reasons == Reason.ACCEPTED)]
     return Window.from_block(
         accepted,
-        coastdown.start_ns,
+        start_ns,
         coastdown.end_ns,
-        before_ns=None if coastdown.cut_at_start else coastdown.start_ns - before_ns,
+        before_ns=start_ns - before_ns if after_steady else None,
     )
+
+
+def _start(coastdown: Coastdown, ship: Ship) -> tuple[int, bool]:
+    """
+    Return the start of a coastdown, and whether what comes before it may be steady sailing.
+
+    The run-down of the thrust is cut from a window that was given, but it follows the stop:
+    with it, the record before is as good as before any other.
+    """
+    if not coastdown.cut_at_start:
+        return coastdown.start_ns, True
+    cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
+    first_ns = min(cut.start_ns for cut in cuts)
+    short = coastdown.start_ns - first_ns < round(gone_s(ship) * _SECOND_NS)
+    if short and all(cut.reason is Dismissal.THRUST for cut in cuts):
+        return first_ns, True
+    return coastdown.start_ns, False
