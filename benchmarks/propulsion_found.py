@@ -16,7 +16,6 @@ import argparse
 import csv
 import math
 import os
-import sys
 import time
 from dataclasses import fields
 from multiprocessing import get_context
@@ -123,20 +122,22 @@ def main() -> None:
     tables = {'stops': stops_tables, 'others': others_tables, 'steady': steady_table}
     began = time.perf_counter()
     score(Case('declutched', 'ferry', 'calm', 1), {'both': ('log', 'track')})  # compiles
-    lines = [f'{n} seeds from {first}{", quick" if quick else ""}; update_s 60']
+    lines = [
+        f'{n} seeds from {first}{", quick" if quick else ""}; {given.jobs} processes; update_s 60'
+    ]
     rows: list[Row] = []
+    OUT.mkdir(exist_ok=True)
+    print(*lines, sep='\n', flush=True)
     for part in given.part:
         cases = [case for case in parts[part] if not given.kind or given.kind in case.kind]
         found = run(cases, given.jobs)
         rows += found
-        lines += tables[part](found)
-        print(f'{part}: {len(cases)} cases', file=sys.stderr, flush=True)
-    lines += ['', f'{time.perf_counter() - began:.0f} s, {given.jobs} processes']
-    OUT.mkdir(exist_ok=True)
-    text = '\n'.join(lines)
-    (OUT / f'{given.name}.md').write_text(text + '\n', encoding='utf-8')
-    write_rows(OUT / f'{given.name}.csv', rows)
-    print(text)
+        new = [*tables[part](found), '', f'{time.perf_counter() - began:.0f} s so far']
+        print(*new, sep='\n', flush=True)
+        lines += new
+        # each part is there as soon as it is done
+        (OUT / f'{given.name}.md').write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        write_rows(OUT / f'{given.name}.csv', rows)
 
 
 if __name__ == '__main__':
