@@ -106,7 +106,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('--quick', action='store_true', help='a small part, under a minute')
     parser.add_argument('--seed', type=int, default=1, help='first seed')
-    parser.add_argument('--seeds', type=int, default=12, help='each is 72 coastdowns')
+    parser.add_argument('--seeds', type=int, default=6, help='each is 72 coastdowns')
     parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1)
     parser.add_argument('--part', nargs='+', default=['stops', 'others', 'steady'])
     parser.add_argument('--kind', help='only kinds that hold this text')
@@ -117,7 +117,7 @@ def main() -> None:
     parts = {
         'stops': stops(range(first, first + n), quick),
         'others': others(range(first, first + (n + 1) // 2), quick),
-        'steady': sailing(range(first, first + (1 if quick else math.ceil(5 * n / 3)))),
+        'steady': sailing(range(first, first + (1 if quick else math.ceil(10 * n / 3)))),
     }
     tables = {'stops': stops_tables, 'others': others_tables, 'steady': steady_table}
     began = time.perf_counter()

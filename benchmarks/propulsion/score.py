@@ -60,9 +60,12 @@ class Row:
     dated_s, delay_s
         Reported start, and first report, less the true end of drive; NaN without.
     wrong
-        Reported coastdowns that hold more than 10 s of drive, or no glide to speak of.
+        Reported coastdowns that hold more than 10 s of drive.
+    idle
+        Reported coastdowns that hold less, but of which half is no glide: an engine that
+        is on the shaft and does not push, a ship at rest.
     wrong_live
-        Onsets announced of which the same is true at the time when they were.
+        Onsets announced of which either is true at the time when they were.
     rms, cover
         Of r against the truth over the valid range: relative to r's maximum; share within
         2 sigma. NaN without.
@@ -83,6 +86,7 @@ class Row:
     dated_s: float
     delay_s: float
     wrong: int
+    idle: int
     wrong_live: int
     rms: float
     cover: float
@@ -135,8 +139,9 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         why,
         dated,
         delay,
-        sum(_is_wrong(truth, span) for span in spans),
-        sum(_is_wrong(truth, span) for span in onsets),
+        sum(_driven_s(truth, span) > DRIVEN_S for span in spans),
+        sum(_is_idle(truth, span) for span in spans),
+        sum(_driven_s(truth, span) > DRIVEN_S or _is_idle(truth, span) for span in onsets),
         rms,
         cover,
         len(standing) - len(kept),
@@ -169,10 +174,9 @@ def _rows(span: tuple[float, float]) -> slice:
     return slice(max(round(span[0] / ROW_S), 0), max(round(span[1] / ROW_S), 0))
 
 
-def _is_wrong(truth: Truth, span: tuple[float, float]) -> bool:
-    """More than 10 s of drive, or less than half of it a glide."""
+def _is_idle(truth: Truth, span: tuple[float, float]) -> bool:
     gliding = truth.gliding[_rows(span)].sum() * ROW_S
-    return _driven_s(truth, span) > DRIVEN_S or gliding < 0.5 * (span[1] - span[0])
+    return _driven_s(truth, span) <= DRIVEN_S and gliding < 0.5 * (span[1] - span[0])
 
 
 def _lacks(truth: Truth, spans: list[tuple[float, float]]) -> tuple[str, int | None]:

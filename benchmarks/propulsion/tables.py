@@ -45,10 +45,15 @@ def others_tables(rows: list[Row]) -> list[str]:
     """
     suites = {**SUITES, **WITH_HEADING}
     lines = ['', f'## No coastdowns: {len(rows) // len(suites)}', '']
-    lines += ['Cases left with a coastdown that holds more than 10 s of drive:', '']
+    lines += ['Cases left with a coastdown that holds more than 10 s of drive, + others left with']
+    lines += [
+        'one that holds no push but no glide either (an engine that idles on the shaft):',
+        '',
+    ]
 
     def left(some: list[Row]) -> str:
-        return _of(sum(row.wrong > 0 for row in some), len(some))
+        idle = sum(row.idle > 0 and not row.wrong for row in some)
+        return f'{sum(row.wrong > 0 for row in some)} + {idle} / {len(some)}'
 
     def live(some: list[Row]) -> str:
         return _of(sum(row.wrong_live > 0 for row in some), len(some))
@@ -82,7 +87,7 @@ def steady_table(rows: list[Row]) -> list[str]:
             *(a_day([row for row in rows if row.suite == suite], what) for suite in suites),
         ]
         for name, what in (
-            ('coastdowns left', lambda row: row.wrong),
+            ('coastdowns left', lambda row: row.wrong + row.idle),
             ('announced live', lambda row: row.wrong_live),
             ('without estimate', lambda row: row.refused),
             ('withdrawn', lambda row: row.withdrawn),
