@@ -94,7 +94,7 @@ def _departed(
     """Say whether the speed has ceased to fall as it did; None where it falls on."""
     width, start, source = tuning.slopes.width, coasting.start, coasting.source
     told = heading_is_told(bins, start)
-    excess, first = math.nan, start
+    excess, first, before = math.nan, start, math.nan
     earlier = number - width
     span = min(_EARLIER_WINDOWS * width, earlier - start)
     if span >= width:
@@ -102,7 +102,7 @@ def _departed(
         # while the thrust runs down the fall steepens
         if span < _EARLIER_WINDOWS * width:
             excess = max(excess, 0.0)
-        first = earlier - width
+        first, before = earlier - width, line(bins, source, earlier, span)[0]
     long = 2 * round(parameters.confirm_s)
     if not abs(excess) > coasting.limits[0] and number - long >= start + long:
         overall, newest, _ = line(bins, source, number, long)
@@ -110,12 +110,12 @@ def _departed(
         excess = (long / width) * _excess(
             bins, source, start + long, long // 2, overall, newest - 0.5 * overall * long
         )
-        first = start
+        first, before = start, line(bins, source, start + long, long // 2)[0]
+        slope = overall
     if excess > coasting.limits[0]:
         return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
     if -excess > coasting.limits[0]:
         # where nothing tells the heading, this is how a turn shows, unless it is too much for one
-        before = line(bins, source, first + width, span)[0] if span >= width else 0.0
         braked = told or slope < _TURN_MOST * min(before, 0.0)
         cause = EndedBy.BRAKE if braked else EndedBy.TURN
         return End(cause, _bend(bins, coasting, tuning, first, number, sign=1))

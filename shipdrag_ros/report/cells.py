@@ -80,7 +80,9 @@ def facts(coastdown: Coastdown) -> Table:
         ('ended because', words.ENDED_BY[coastdown.ended_by]),
     ]
     if coastdown.onset_detected_ns is not None:
-        delay = (coastdown.onset_detected_ns - coastdown.start_ns) * 1e-9
+        # from where it seemed to begin, which may have been cut since
+        first_ns = min([coastdown.start_ns, *(cut.start_ns for cut in coastdown.cuts)])
+        delay = (coastdown.onset_detected_ns - first_ns) * 1e-9
         rows.append(('confirmed after', words.duration(delay)))
     if coastdown.estimate is not None:
         rows.extend(_estimate_facts(coastdown.estimate))

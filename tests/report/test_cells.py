@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, NotCoastdown
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.report import cells
 from shipdrag_ros.report.hulls import rank
@@ -82,3 +82,12 @@ def test_a_ranking_starts_with_the_best(run: RunResult) -> None:
         '1. Vitus Bering sea trial.mcap',
         '2. Vitus Bering b.mcap',
     ]
+
+
+def test_a_coastdown_is_confirmed_after_it_seemed_to_begin_though_that_was_cut() -> None:
+    second = 1_000_000_000
+    cut = NotCoastdown(0, 77 * second, Dismissal.THRUST, 'the shaft drives')
+    coastdown = Coastdown(
+        77 * second, 900 * second, 12 * second, EndedBy.SPEED, None, 'no figure', cuts=(cut,)
+    )
+    assert ('confirmed after', '12 s') in cells.facts(coastdown).rows
