@@ -17,7 +17,6 @@ import argparse
 import difflib
 import json
 import os
-import random
 import shutil
 import subprocess
 import sys
@@ -47,23 +46,37 @@ OPERATORS = (
     'ZeroIterationForLoop',
 )
 
-# run by the interpreter that has cosmic-ray: {module: {kind: [[operator, occurrence], ...]}}, or a mutant
-_LIST = """
-import json, sys
+# both are run by the interpreter that has cosmic-ray
+_DRAW = """
+import json, random, sys
+from functools import cache
 import cosmic_ray.plugins as plugins
 from cosmic_ray.ast import ast_nodes, get_ast
-kinds, files = json.loads(sys.stdin.read())
-names = [n for n in plugins.operator_names() if n.split('/')[1].startswith(tuple(kinds))]
-found = {}
-for file in files:
-    nodes = list(ast_nodes(get_ast(open(file, encoding='utf-8').read())))
-    of = found[file] = {}
+kinds, rooms, count, seed = json.loads(sys.stdin.read())
+loud = ('BitOr', 'BitAnd', 'BitXor', 'LShift', 'RShift', 'Invert', 'Mod')  # not defined for floats
+names = [
+    n for n in plugins.operator_names()
+    if n.split('/')[1].startswith(tuple(kinds)) and not n.endswith(loud)
+]
+@cache
+def nodes(file):
+    return list(ast_nodes(get_ast(open(file, encoding='utf-8').read())))
+@cache
+def sites(file, kind):
+    found = []
     for name in names:
-        operator = plugins.get_operator(name)()
-        kind = next(k for k in kinds if name.split('/')[1].startswith(k))
-        count = sum(sum(1 for _ in operator.mutation_positions(node)) for node in nodes)
-        of.setdefault(kind, []).extend([name, i] for i in range(count))
-print(json.dumps(found))
+        if name.split('/')[1].startswith(kind):
+            operator = plugins.get_operator(name)()
+            places = sum(sum(1 for _ in operator.mutation_positions(n)) for n in nodes(file))
+            found += [(file, name, i) for i in range(places)]
+    return found
+draw, drawn = random.Random(seed), []
+while len(drawn) < count:
+    room = sorted(rooms)[len(drawn) % len(rooms)]
+    there = sites(draw.choice(rooms[room]), draw.choice(kinds))
+    if there:
+        drawn.append(draw.choice(there))
+print(json.dumps(drawn))
 """
 _MUTATE = """
 import sys
@@ -113,27 +126,19 @@ def _drawn(copy: Path, options: argparse.Namespace) -> list[tuple[str, str, int]
         for path in sorted((copy / 'shipdrag_ros').rglob('*.py'))
         if path.name not in ('__init__.py', '__main__.py')
     ]
+    rooms: dict[str, list[str]] = {}
+    for file in files:
+        parts = Path(file).parts
+        rooms.setdefault(parts[1] if len(parts) > 2 else '', []).append(file)
     ran = subprocess.run(
-        [options.cosmic_ray, '-c', _LIST],
-        input=json.dumps([OPERATORS, files]),
+        [options.cosmic_ray, '-c', _DRAW],
+        input=json.dumps([OPERATORS, rooms, options.count, options.seed]),
         cwd=copy,
         capture_output=True,
         text=True,
         check=True,
     )
-    sites = json.loads(ran.stdout)
-    rooms: dict[str, list[str]] = {}
-    for file in files:
-        rooms.setdefault(Path(file).parts[1], []).append(file)
-    draw = random.Random(options.seed)
-    names, drawn = sorted(rooms), []
-    while len(drawn) < options.count:
-        room = names[len(drawn) % len(names)]
-        kind = draw.choice(OPERATORS)
-        all_of_kind = [(file, *site) for file in rooms[room] for site in sites[file].get(kind, [])]
-        if all_of_kind:
-            drawn.append(draw.choice(all_of_kind))
-    return drawn
+    return [(file, name, occurrence) for file, name, occurrence in json.loads(ran.stdout)]
 
 
 def _tried(
