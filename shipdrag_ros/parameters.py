@@ -178,6 +178,12 @@ class Parameters:
         ------
         ParameterError
             Naming every unknown key and every bad value at once.
+
+        Examples
+        --------
+        >>> from shipdrag_ros.parameters import Parameters
+        >>> Parameters.from_mapping({'update_s': 10.0}, subject='mine').update_s
+        10.0
         """
         known = {item.name: item for item in fields(cls)}
         problems = [

@@ -191,6 +191,13 @@ class Block:
             Time of arrival [ns]; the stamps where it is not given.
         variance : scalar, (n,) or (n, 2)
             Variance of the value; NaN where unknown.
+
+        Examples
+        --------
+        >>> from shipdrag_ros.samples import Block, Channel
+        >>> block = Block.of(Channel.SPEED_THROUGH_WATER, [0, 1_000_000_000], [6.0, 5.9])
+        >>> len(block)
+        2
         """
         stamps = np.atleast_1d(np.asarray(stamp_ns, np.int64))
         received = stamps if receive_ns is None else np.asarray(receive_ns, np.int64)

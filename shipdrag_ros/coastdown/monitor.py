@@ -73,6 +73,21 @@ class Monitor:
     Notes
     -----
     Memory is bounded: `history_ns` of samples, at most `ring.CAPACITY` of them.
+
+    Examples
+    --------
+    >>> from importlib import resources
+    >>> from shipdrag_ros.ship import Ship
+    >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+    >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+    >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
+    >>> block = sense(simulate(ship, scenario), standard_sensors(), seed=1)
+    >>> from shipdrag_ros.coastdown import Monitor
+    >>> from shipdrag_ros.parameters import Parameters
+    >>> monitor = Monitor(ship, Parameters())
+    >>> events = [*monitor.update(block), *monitor.finish()]
+    >>> type(events[0]).__name__, type(events[-1]).__name__
+    ('Onset', 'Coastdown')
     """
 
     def __init__(

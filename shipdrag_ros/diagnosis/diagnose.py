@@ -77,6 +77,27 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     Notes
     -----
     A run that has too little of either is left out, and a note says so.
+
+    Examples
+    --------
+    >>> from importlib import resources
+    >>> from shipdrag_ros.ship import Ship
+    >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+    >>> from shipdrag_ros.diagnosis import CoastRun, diagnose
+    >>> from shipdrag_ros.estimation import Window
+    >>> from shipdrag_ros.parameters import Parameters
+    >>> from shipdrag_ros.ship import StatedEffect, Uncertain
+    >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+    >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
+    >>> scale = StatedEffect('log_scale', {'factor': Uncertain(0.1, 0.0)})
+    >>> truth = simulate(ship, scenario, effects=[scale])
+    >>> block = sense(truth, standard_sensors(), seed=1)
+    >>> stop_ns = START_NS + round(scenario.lead_in_s * 1e9)
+    >>> end_ns = START_NS + round(scenario.length_s * 1e9)
+    >>> window = Window.from_block(block, stop_ns, end_ns, before_ns=START_NS)
+    >>> diagnosis = diagnose([CoastRun('first', window)], ship, Parameters())
+    >>> [effect.name for effect in diagnosis.effects]
+    ['log_scale']
     """
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):

@@ -27,6 +27,23 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     ------
     EstimationError
         If the window does not hold a coastdown that can be estimated.
+
+    Examples
+    --------
+    >>> from importlib import resources
+    >>> from shipdrag_ros.ship import Ship
+    >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+    >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+    >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
+    >>> block = sense(simulate(ship, scenario), standard_sensors(), seed=1)
+    >>> from shipdrag_ros.estimation import Window
+    >>> stop_ns = START_NS + round(scenario.lead_in_s * 1e9)
+    >>> end_ns = START_NS + round(scenario.length_s * 1e9)
+    >>> from shipdrag_ros.estimation import estimate
+    >>> from shipdrag_ros.parameters import Parameters
+    >>> found = estimate(Window.from_block(block, stop_ns, end_ns), ship, Parameters())
+    >>> found.estimator, len(found.curve) > 50
+    ('warped', True)
     """
     if parameters.estimator in ('auto', warped.NAME):
         return warped.estimate(window, ship, parameters)

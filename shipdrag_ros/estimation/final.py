@@ -41,6 +41,25 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
     ------
     EstimationError
         If the window does not hold a coastdown that can be estimated.
+
+    Examples
+    --------
+    >>> from importlib import resources
+    >>> from shipdrag_ros.ship import Ship
+    >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+    >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+    >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
+    >>> block = sense(simulate(ship, scenario), standard_sensors(), seed=1)
+    >>> from shipdrag_ros.estimation import Window
+    >>> stop_ns = START_NS + round(scenario.lead_in_s * 1e9)
+    >>> end_ns = START_NS + round(scenario.length_s * 1e9)
+    >>> import numpy as np
+    >>> from shipdrag_ros.estimation import estimate_final
+    >>> from shipdrag_ros.parameters import Parameters
+    >>> window = Window.from_block(block, stop_ns, end_ns, before_ns=START_NS)
+    >>> curve = estimate_final(window, ship, Parameters()).curve
+    >>> f'r(5 m/s) = {np.interp(5.0, curve.speed_m_s, curve.resistance_m_s2):.4f}'
+    'r(5 m/s) = 0.0068'
     """
     found = _estimate(window, ship, parameters)
     return replace(found, notes=(*found.notes, *coverage_notes(window)))

@@ -162,6 +162,21 @@ class Window:
         Latitude and longitude become metres by the WGS84 radii of curvature at
         the first position, the east by the cosine of the mean latitude: the
         error is of third order, some centimetres over 10 km.
+
+        Examples
+        --------
+        >>> from importlib import resources
+        >>> from shipdrag_ros.ship import Ship
+        >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+        >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+        >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
+        >>> block = sense(simulate(ship, scenario), standard_sensors(), seed=1)
+        >>> from shipdrag_ros.estimation import Window
+        >>> stop_ns = START_NS + round(scenario.lead_in_s * 1e9)
+        >>> end_ns = START_NS + round(scenario.length_s * 1e9)
+        >>> window = Window.from_block(block, stop_ns, end_ns)
+        >>> len(window.speed_through_water)
+        901
         """
         inside = (block.stamp_ns >= start_ns) & (block.stamp_ns <= end_ns)
 

@@ -77,6 +77,15 @@ def decode(source: Source, payloads: Sequence[bytes], receive_ns: ArrayLike) -> 
     Variances follow the columns of the value; those of `POSITION_GEODETIC`
     are in m^2, to the north and to the east. A variance that is not positive
     and finite is unknown, NaN.
+
+    Examples
+    --------
+    >>> from shipdrag_ros.messages import Source, decode, encode
+    >>> from shipdrag_ros.samples import Block, Channel
+    >>> sent = next(encode(Block.of(Channel.SPEED_THROUGH_WATER, [0], [6.0])))
+    >>> decoded = decode(Source('speed_through_water', sent.type), [sent.payload], [sent.log_ns])
+    >>> float(decoded.block.value[0, 0])
+    6.0
     """
     ends = np.fromiter(accumulate(map(len, payloads), initial=0), np.int64)
     data = np.frombuffer(b''.join(payloads), np.uint8)

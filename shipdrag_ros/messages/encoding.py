@@ -54,6 +54,15 @@ def encode(block: Block, *, namespace: str = '') -> Iterator[EncodedMessage]:
         Samples; their receive time becomes the log time.
     namespace
         Put before the name of the input, `/ship` for instance.
+
+    Examples
+    --------
+    >>> from shipdrag_ros.messages import encode
+    >>> from shipdrag_ros.samples import Block, Channel
+    >>> block = Block.of(Channel.SPEED_THROUGH_WATER, [0], [6.0])
+    >>> message = next(encode(block))
+    >>> message.topic, message.type
+    ('/speed_through_water', 'geometry_msgs/msg/TwistWithCovarianceStamped')
     """
     for code, stamp, received, value, variance in zip(
         block.channel.tolist(),

@@ -138,6 +138,15 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
     -----
     QR of the columns scaled to length 1, then singular values of the small
     triangle; the normal equations, which square the condition, are not formed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from shipdrag_ros.regression import least_squares
+    >>> x = np.arange(4.0)
+    >>> fit = least_squares(np.column_stack([np.ones(4), x]), 1.0 + 2.0 * x)
+    >>> [f'{value:.3f}' for value in fit.coefficients]
+    ['1.000', '2.000']
     """
     if columns.ndim != 2 or columns.shape[:1] != values.shape or not columns.size:
         raise ValueError(f'columns {columns.shape} and values {values.shape}, expected n x p, n')

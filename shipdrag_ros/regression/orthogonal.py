@@ -125,6 +125,16 @@ class OrthogonalBasis:
         ------
         ValueError
             If there is no time, or `order` < 1.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from shipdrag_ros.regression import OrthogonalBasis
+        >>> time = np.linspace(-1.0, 1.0, 50)
+        >>> basis = OrthogonalBasis.on(time, 3)
+        >>> coefficients, _ = basis.fit(time**2)
+        >>> basis.order, f'{coefficients[2]:.3f}'
+        (3, '1.000')
         """
         if order < 1 or len(time) == 0:
             raise ValueError(f'{order} polynomials on {len(time)} times, expected 1 or more each')

@@ -143,6 +143,15 @@ def fit_surface(
     -----
     S5; RMSE = sqrt(SSE / (n - p)), the s of S1 (11). A variable measured at k
     values carries powers up to k - 1; terms beyond are left out.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from shipdrag_ros.regression import fit_surface
+    >>> points = np.random.default_rng(1).uniform(size=(30, 2))
+    >>> surface = fit_surface(points, 1.0 + points.prod(axis=1), inputs=['a', 'b'])
+    >>> f'{surface.predict(np.array([[0.5, 0.5]]))[0].value:.3f}'
+    '1.250'
     """
     levels = [len(np.unique(column)) for column in points.T]
     most = [count - 1 for count in levels]

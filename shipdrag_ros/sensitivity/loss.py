@@ -174,6 +174,20 @@ def vary(simulate: Simulator, names: Sequence[str], values: Float64, steps: Floa
     SensitivityError
         If the numbers do not fit each other, or the unchanged parameters
         cannot be simulated.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from shipdrag_ros.sensitivity import vary
+    >>> time = np.linspace(0.0, 1.0, 5)
+    >>> responses = vary(
+    ...     lambda sets: sets[:, :1] * np.exp(-sets[:, 1:] * time),
+    ...     ['size', 'rate'],
+    ...     np.array([1.0, 2.0]),
+    ...     np.array([[0.1], [0.2]]),
+    ... )
+    >>> responses.differences.shape
+    (2, 1, 5)
     """
     count, changes = len(names), steps.shape[-1]
     if values.shape != (count,) or steps.shape != (count, changes):

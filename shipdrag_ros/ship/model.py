@@ -71,6 +71,16 @@ class Ship:
         ------
         ShipFileError
             Naming every problem of the file at once.
+
+        Examples
+        --------
+        >>> from importlib import resources
+        >>> from shipdrag_ros.ship import Ship
+        >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+        >>> ship.name, ship.length_m
+        ('Vitus Bering', 150.0)
+        >>> f'{ship.n_r(5.0):.3f}'
+        '0.077'
         """
         try:
             content = Path(path).read_text(encoding='utf-8-sig')
@@ -92,6 +102,13 @@ class Ship:
         ------
         ShipFileError
             Naming every problem of the text at once.
+
+        Examples
+        --------
+        >>> from shipdrag_ros.ship import Ship
+        >>> ship = Ship.from_yaml('{length_m: 80.0, displaced_volume_m3: 4000.0}', subject='coaster')
+        >>> f'{ship.mass_kg / 1000.0:.0f} t'
+        '4100 t'
         """
         try:
             data, problems = strict_yaml.load(content)

@@ -143,6 +143,13 @@ class Cable:
     SimulationError
         Naming every value that is impossible; for a surface also if l/d is
         not above 20.
+
+    Examples
+    --------
+    >>> from shipdrag_ros.simulation.cable import Cable
+    >>> drag = Cable(length_m=100.0, diameter_m=0.05, drag=0.02).in_water(1025.0)
+    >>> f'{drag.force_n(2.0):.0f} N'
+    '205 N'
     """
 
     length_m: float
@@ -280,6 +287,12 @@ def tangent_range(tolerance: float) -> tuple[float, float]:
     low, high
         1/(1 + s) and 1/(1 - s), s = sqrt(tolerance). The error tends to -1 as
         u grows, so from a tolerance of 1 on there is no upper end: inf.
+
+    Examples
+    --------
+    >>> from shipdrag_ros.simulation.cable import tangent_range
+    >>> [f'{u:.2f}' for u in tangent_range(0.1)]
+    ['0.76', '1.46']
     """
     root = math.sqrt(_possible(tolerance))
     return 1.0 / (1.0 + root), 1.0 / (1.0 - root) if root < 1.0 else math.inf

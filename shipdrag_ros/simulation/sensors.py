@@ -132,6 +132,17 @@ def sense(
     ------
     SimulationError
         If a sensor is impossible.
+
+    Examples
+    --------
+    >>> from importlib import resources
+    >>> from shipdrag_ros.ship import Ship
+    >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+    >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+    >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
+    >>> block = sense(simulate(ship, scenario), standard_sensors(), seed=1)
+    >>> len(block)
+    6004
     """
     problems = [problem for sensor in sensors for problem in _problems(sensor)]
     if len({sensor.channel for sensor in sensors}) < len(sensors):

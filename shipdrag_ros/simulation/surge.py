@@ -154,6 +154,16 @@ def simulate(
     + gusts - m dc/dt, u the speed through water, c the velocity of the water
     as far as it changes. In the lead-in the thrust equals the resistance at
     the steady speed, effects included.
+
+    Examples
+    --------
+    >>> from importlib import resources
+    >>> from shipdrag_ros.ship import Ship
+    >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
+    >>> from shipdrag_ros.simulation import Scenario, simulate
+    >>> truth = simulate(ship, Scenario(speed_m_s=6.0, duration_s=900.0))
+    >>> f'{truth.speed_through_water_m_s[-1]:.2f} m/s, r(5 m/s) = {truth.specific_resistance(5.0):.5f}'
+    '2.51 m/s, r(5 m/s) = 0.00678'
     """
     action = own_action(ship, scenario, reference_rad=reference_rad, effects=effects)
     law = law_of(ship, scenario)

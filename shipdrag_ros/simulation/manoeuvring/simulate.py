@@ -63,6 +63,15 @@ def steer(
     S3; equations and rudder machine after Fossen (1994): forces are polynomials
     in the dimensionless change of speed, sway, yaw rate and rudder angle, times
     powers of the momentary speed and the length.
+
+    Examples
+    --------
+    >>> import math
+    >>> from shipdrag_ros.simulation.manoeuvring import mariner, steer, tactical_diameter_m, turn
+    >>> ship = mariner()
+    >>> motions = steer(ship, turn(math.radians(20.0)))
+    >>> motions.position_m.shape
+    (1, 1200, 2)
     """
     limit_rad = ship.rudder.limit_rad
     if not 0.0 < manoeuvre.rudder_rad <= limit_rad * (1.0 + 1e-9):
