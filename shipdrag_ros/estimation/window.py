@@ -168,7 +168,8 @@ class Window:
         >>> from importlib import resources
         >>> from shipdrag_ros.ship import Ship
         >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
-        >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+        >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate
+        >>> from shipdrag_ros.simulation import standard_sensors
         >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
         >>> block = sense(simulate(ship, scenario), standard_sensors(), seed=1)
         >>> from shipdrag_ros.estimation import Window

@@ -106,7 +106,8 @@ class Ship:
         Examples
         --------
         >>> from shipdrag_ros.ship import Ship
-        >>> ship = Ship.from_yaml('{length_m: 80.0, displaced_volume_m3: 4000.0}', subject='coaster')
+        >>> text = '{length_m: 80.0, displaced_volume_m3: 4000.0}'
+        >>> ship = Ship.from_yaml(text, subject='coaster')
         >>> f'{ship.mass_kg / 1000.0:.0f} t'
         '4100 t'
         """

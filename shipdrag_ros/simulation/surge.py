@@ -162,8 +162,10 @@ def simulate(
     >>> ship = Ship.load(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml')
     >>> from shipdrag_ros.simulation import Scenario, simulate
     >>> truth = simulate(ship, Scenario(speed_m_s=6.0, duration_s=900.0))
-    >>> f'{truth.speed_through_water_m_s[-1]:.2f} m/s, r(5 m/s) = {truth.specific_resistance(5.0):.5f}'
-    '2.51 m/s, r(5 m/s) = 0.00678'
+    >>> f'{truth.speed_through_water_m_s[-1]:.2f} m/s'
+    '2.51 m/s'
+    >>> f'r(5 m/s) = {truth.specific_resistance(5.0):.5f} m/s^2'
+    'r(5 m/s) = 0.00678 m/s^2'
     """
     action = own_action(ship, scenario, reference_rad=reference_rad, effects=effects)
     law = law_of(ship, scenario)
