@@ -24,6 +24,7 @@ FLOORS = {
     'strict_yaml': 0,
     'parameters': 1,
     'ship': 1,
+    'inference': 2,
     'regression': 2,
     'simulation': 2,
     'residual': 3,

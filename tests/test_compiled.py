@@ -236,7 +236,7 @@ def test_a_closure_is_refused() -> None:
 def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) -> None:
     snippet = tmp_path / 'snippet.py'
     whiten = 'from shipdrag_ros.estimation.motion_fit.whitening import whiten\n'
-    spread = 'from shipdrag_ros.regression.averaging import root\n'
+    spread = 'from shipdrag_ros.inference.gaussian import root\n'
     snippet.write_text(f"{whiten}{spread}whiten(1, 2, 3, 'wrong')\nroot('wrong')\nroot()\n")
     told, _, status = api.run(
         ['--config-file', str(ROOT / 'pyproject.toml'), '--follow-imports=silent', str(snippet)]
@@ -288,7 +288,7 @@ CALLEES = (
     'estimation.motion_fit.law',
     'estimation.motion_fit.whitening',
     'estimation.warped_model',
-    'regression.averaging',
+    'inference.gaussian',
     'regression.refit',
 )
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.warped_model import combine
-from shipdrag_ros.regression.averaging import condense, posterior
+from shipdrag_ros.inference.gaussian import condense, posterior
 from shipdrag_ros.samples import Float64, Int64
 
 HUBER = 2.0  # standard deviations: 99 % efficient in Gaussian noise

@@ -36,8 +36,8 @@ from shipdrag_ros.estimation.warped_model import (
 )
 from shipdrag_ros.estimation.warped_prior import FREE, coast_priors
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.inference.gaussian import average, condense, deviations, root
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.regression.averaging import average, condense, deviations, root
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from shipdrag_ros.estimation.motion_fit.families import PLAIN
 from shipdrag_ros.estimation.motion_fit.law import Law, shape_table, spread
-from shipdrag_ros.estimation.motion_fit.solve import cholesky_solve
+from shipdrag_ros.inference.gaussian import cholesky_solve
 from shipdrag_ros.samples import Float64
 
 _TYPICAL_POWER = 2.5

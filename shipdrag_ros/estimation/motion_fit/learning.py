@@ -15,8 +15,8 @@ import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.estimation.motion_fit.solve import cholesky
 from shipdrag_ros.estimation.motion_fit.whitening import CALM, Disturbance, Noise, whiten
+from shipdrag_ros.inference.gaussian import cholesky, products_of
 from shipdrag_ros.samples import Float64, Int64
 
 _TYPICAL_S = 240.0  # correlation time; known from experience within a factor of e
@@ -117,14 +117,10 @@ def _criterion(x: Float64, which: Int64, steady: _Steady) -> float:
     total = whiten(rows, table, Noise(noise.variance, about, noise.damping_1_s, noise.inertia))
     # of the columns first, then the values: what is left of these is the last pivot
     p = len(table) - 1
-    products = np.empty((p + 1, p + 1))
+    rolled = np.empty_like(table)
     for a in range(p + 1):
-        for b in range(a + 1):
-            of = 0.0
-            for i in range(table.shape[1]):
-                of += table[(a + 1) % (p + 1), i] * table[(b + 1) % (p + 1), i]
-            products[a, b] = products[b, a] = of
-    solved, lower, scale = cholesky(products, 0.0)
+        rolled[a] = table[(a + 1) % (p + 1)]
+    solved, lower, scale = cholesky(products_of(rolled), 0.0)
     if not solved:
         return np.inf
     for a in range(p):

@@ -9,25 +9,12 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.motion_fit.coast import Rows, predict
 from shipdrag_ros.estimation.motion_fit.law import Law
 from shipdrag_ros.estimation.motion_fit.whitening import Noise, whiten
+from shipdrag_ros.inference.gaussian import cholesky_solve, products_of
 from shipdrag_ros.samples import Float64, Int64
 
 _RISES = 8  # of the damping, in one iteration
 _CONVERGED = 1e-3  # fall of chi^2: far below what tells laws apart
 _LAST_FALL = 0.03  # of chi^2, by a step so small that what it leads to need not be computed
-
-
-@compiled(fastmath={'reassoc', 'contract'})
-def _products(table: Float64) -> Float64:
-    """Return all products of two lines of a table; no library, whose threads may differ."""
-    size, n = table.shape
-    products = np.empty((size, size))
-    for a in range(size):
-        for b in range(a + 1):
-            total = 0.0
-            for i in range(n):
-                total += table[a, i] * table[b, i]
-            products[a, b] = products[b, a] = total
-    return products
 
 
 @compiled
@@ -61,7 +48,7 @@ def normal_equations(
     p = len(active)
     whiten(rows, table, noise)
     # of residual and columns
-    products = _products(table)
+    products = products_of(table)
     matrix = products[1:, 1:].copy()
     gradient = products[1:, 0].copy()
     chi2 = products[0, 0]
@@ -72,73 +59,6 @@ def normal_equations(
         matrix[a, a] += prior[1, u]
         gradient[a] += prior[1, u] * off
     return chi2, matrix, gradient, table[0].copy()
-
-
-@compiled
-def cholesky(matrix: Float64, damping: float) -> tuple[bool, Float64, Float64]:
-    """
-    Return the lower factor of M + damping diag M, M scaled to unit diagonal.
-
-    Returns
-    -------
-    solved, lower, scale
-        The scale of each unknown.
-    """
-    p = len(matrix)
-    scale = np.empty(p)
-    lower = np.zeros((p, p))
-    for a in range(p):
-        if not matrix[a, a] > 0.0:
-            return False, lower, scale
-        scale[a] = 1.0 / np.sqrt(matrix[a, a])
-    for a in range(p):
-        for b in range(a + 1):
-            total = matrix[a, b] * scale[a] * scale[b]
-            if a == b:
-                total = 1.0 + damping
-            for c in range(b):
-                total -= lower[a, c] * lower[b, c]
-            if a == b:
-                if not total > 1e-14:
-                    return False, lower, scale
-                lower[a, a] = np.sqrt(total)
-            else:
-                lower[a, b] = total / lower[b, b]
-    return True, lower, scale
-
-
-@compiled
-def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[bool, Float64]:
-    """
-    Solve (M + damping diag M) x = b for columns of b, M scaled to unit diagonal.
-    """
-    solved, lower, scale = cholesky(matrix, damping)
-    if not solved:
-        return False, right
-    return True, substitute(lower, scale, right)
-
-
-@compiled
-def substitute(lower: Float64, scale: Float64, right: Float64) -> Float64:
-    """
-    Solve for columns of b with a factor of `cholesky`.
-    """
-    p = len(lower)
-    x = right.copy()
-    for j in range(right.shape[1]):
-        for a in range(p):
-            total = x[a, j] * scale[a]
-            for c in range(a):
-                total -= lower[a, c] * x[c, j]
-            x[a, j] = total / lower[a, a]
-        for a in range(p - 1, -1, -1):
-            total = x[a, j]
-            for c in range(a + 1, p):
-                total -= lower[c, a] * x[c, j]
-            x[a, j] = total / lower[a, a]
-        for a in range(p):
-            x[a, j] *= scale[a]
-    return x
 
 
 @compiled

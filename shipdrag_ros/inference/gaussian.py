@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Linear models under Gaussian priors, averaged by their marginal likelihood.
+Gaussian algebra: normal equations, one Cholesky factor, evidence, model averages.
 
-The rows are condensed once; then every model, a choice of columns under a
-prior, is a matter of one small triangular factor.
+Linear models under Gaussian priors are averaged by their marginal likelihood. The rows are
+condensed once; then every model, a choice of columns under a prior, is a matter of one small
+triangular factor.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 _BLOCK = 128
+_FOLLOWS = 1e-14  # of a scaled diagonal
 _NEGLIGIBLE = 1e-3  # weight of a model against the best; the rest is left out of the spread
 # Sums may be taken in any order, so that they are vectorised; the order is
 # fixed when compiled, not by the data or where they lie.
@@ -62,6 +64,31 @@ def condense(rows: Float64, residual: Float64, weight: Float64) -> Float64:
     return products
 
 
+@compiled('f8[:, ::1](f8[:, ::1])', fastmath=_SUMS)
+def products_of(table: Float64) -> Float64:
+    """
+    Return all products of two lines of a table; no library, whose threads may differ.
+
+    Parameters
+    ----------
+    table : (c, n)
+        Whitened residual and columns, for instance.
+
+    Returns
+    -------
+    (c, c)
+    """
+    size, n = table.shape
+    products = np.empty((size, size))
+    for a in range(size):
+        for b in range(a + 1):
+            total = 0.0
+            for i in range(n):
+                total += table[a, i] * table[b, i]
+            products[a, b] = products[b, a] = total
+    return products
+
+
 @compiled('b1(f8[:, ::1])')
 def _factor(matrix: Float64) -> bool:
     """Cholesky in place, lower, row by row; False where it is not positive."""
@@ -79,6 +106,41 @@ def _factor(matrix: Float64) -> bool:
             return False
         matrix[i, i] = math.sqrt(pivot)
     return True
+
+
+@compiled
+def cholesky(matrix: Float64, damping: float) -> tuple[bool, Float64, Float64]:
+    """
+    Return the lower factor of M + damping diag M, M scaled to unit diagonal.
+
+    Parameters
+    ----------
+    matrix : (p, p)
+        Symmetric.
+    damping
+        Of Levenberg and Marquardt; 0: none.
+
+    Returns
+    -------
+    solved, lower, scale
+        Whether M is positive, the factor (p, p), and the scale of each unknown (p,).
+    """
+    p = len(matrix)
+    scale = np.empty(p)
+    lower = np.zeros((p, p))
+    for a in range(p):
+        if not matrix[a, a] > 0.0:
+            return False, lower, scale
+        scale[a] = 1.0 / np.sqrt(matrix[a, a])
+    for a in range(p):
+        for b in range(a):
+            lower[a, b] = matrix[a, b] * scale[a] * scale[b]
+        lower[a, a] = 1.0 + damping
+    solved = _factor(lower)
+    for a in range(p):
+        # what is left of a column that follows from others is rounding
+        solved = solved and lower[a, a] * lower[a, a] > _FOLLOWS
+    return solved, lower, scale
 
 
 @compiled('void(f8[:, ::1], f8[::1])')
@@ -367,3 +429,37 @@ def root(covariance: Float64) -> Float64:
                 total -= lower[i, k] * lower[j, k]
             lower[i, j] = total / pivot
     return lower
+
+
+@compiled
+def cholesky_solve(matrix: Float64, right: Float64, damping: float) -> tuple[bool, Float64]:
+    """
+    Solve (M + damping diag M) x = b for columns of b, M scaled to unit diagonal.
+    """
+    solved, lower, scale = cholesky(matrix, damping)
+    if not solved:
+        return False, right
+    return True, substitute(lower, scale, right)
+
+
+@compiled
+def substitute(lower: Float64, scale: Float64, right: Float64) -> Float64:
+    """
+    Solve for columns of b with a factor of `cholesky`.
+    """
+    p = len(lower)
+    x = right.copy()
+    for j in range(right.shape[1]):
+        for a in range(p):
+            total = x[a, j] * scale[a]
+            for c in range(a):
+                total -= lower[a, c] * x[c, j]
+            x[a, j] = total / lower[a, a]
+        for a in range(p - 1, -1, -1):
+            total = x[a, j]
+            for c in range(a + 1, p):
+                total -= lower[c, a] * x[c, j]
+            x[a, j] = total / lower[a, a]
+        for a in range(p):
+            x[a, j] *= scale[a]
+    return x

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from shipdrag_ros.regression.averaging import (
+from shipdrag_ros.inference.gaussian import (
     average,
     condense,
     deviations,
