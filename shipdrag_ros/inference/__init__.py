@@ -1,2 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gaussian inference: rows, noise and algebra that estimate and diagnosis share."""
+"""Gaussian inference: algebra, noise and rows that estimate and diagnosis share."""
+
+from shipdrag_ros.inference.gaussian import average, cholesky, condense, posterior
+
+__all__ = ['average', 'cholesky', 'condense', 'posterior']
