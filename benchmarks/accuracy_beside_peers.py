@@ -46,12 +46,12 @@ from _coasts import (
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import estimate, estimate_final
-from shipdrag_ros.estimation.motion_fit.families import POWERS
-from shipdrag_ros.estimation.motion_fit.first_fits import fit_robustly
-from shipdrag_ros.estimation.motion_fit.guess import Guess
-from shipdrag_ros.estimation.motion_fit.problem import Problem
-from shipdrag_ros.estimation.motion_fit.record import Record
-from shipdrag_ros.estimation.motion_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.families import POWERS
+from shipdrag_ros.estimation.ode_fit.first_fits import fit_robustly
+from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.problem import Problem
+from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 

@@ -39,7 +39,7 @@ from shipdrag_ros.simulation import (
 )
 
 CONFIG = Path(__file__).parents[1] / 'config'
-ESTIMATORS = ('warped', 's1_joint', 's1_speed', 's1_position')
+ESTIMATORS = ('log_time', 's1_joint', 's1_speed', 's1_position')
 
 
 @dataclass(frozen=True)

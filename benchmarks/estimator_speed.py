@@ -92,8 +92,8 @@ def whole(n: int) -> dict[str, Callable[[], object]]:
         return partial(method, window, plain.truth.ship, Parameters(estimator=estimator))
 
     return {
-        'live (warped)': of('warped', estimate, plain.window),
-        'live, steady record of 30 min': of('warped', estimate, steady.window),
+        'live (log_time)': of('log_time', estimate, plain.window),
+        'live, steady record of 30 min': of('log_time', estimate, steady.window),
         'final (motion)': of('auto', estimate_final, plain.window),
         'final, steady record of 30 min': of('auto', estimate_final, steady.window),
         'S1 joint': of('s1_joint', estimate, plain.window),

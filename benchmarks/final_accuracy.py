@@ -22,12 +22,12 @@ from rich.progress import track
 from rich.table import Table
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate, motion_fit
-from shipdrag_ros.estimation.motion_fit.guess import Guess
-from shipdrag_ros.estimation.motion_fit.problem import Problem
-from shipdrag_ros.estimation.motion_fit.record import Record
-from shipdrag_ros.estimation.motion_fit.run_down import RunDown
-from shipdrag_ros.estimation.motion_fit.whitening import Disturbance
+from shipdrag_ros.estimation import Window, estimate, ode_fit
+from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.problem import Problem
+from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
@@ -255,7 +255,7 @@ def main() -> None:
         'failed',
     ):
         table.add_column(heading, justify='right')
-    method = estimate if options.live else motion_fit.estimate
+    method = estimate if options.live else ode_fit.estimate
     for case in CASES:
         table.add_row(*row(case, runs, method))
     Console(width=140).print(table)

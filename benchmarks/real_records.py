@@ -273,7 +273,7 @@ def default_line(record: Record, published: Estimate, out: Path) -> str:
         replayed(record, out, estimator=estimator, order_max=Parameters().order_max)
         .coastdowns[0]
         .estimate
-        for estimator in ('auto', 'warped')
+        for estimator in ('auto', 'log_time')
     ]
     for each in (published, *found):
         assert each is not None

@@ -29,7 +29,7 @@ from rich.console import Console
 from rich.table import Table
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate_final, motion_fit
+from shipdrag_ros.estimation import Window, estimate_final, ode_fit
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -230,7 +230,7 @@ def score(hull: Hull, law: Law, case: Case, n: int, runs: int) -> Score:
             estimate = estimate_final(window, ship, Parameters())
         except EstimationError:
             continue
-        fitted += estimate.estimator == motion_fit.NAME
+        fitted += estimate.estimator == ode_fit.NAME
         curve = estimate.valid_curve
         took.append(time.perf_counter() - begin)
         speeds = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], 200)

@@ -12,12 +12,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ParameterError
 
 _SECTION = 'ros__parameters'
+FORMER_ESTIMATORS = {'warped': 'log_time', 'motion': 'ode_fit'}
+"""Names that an estimator had before, still accepted, and what they are now."""
+# every module of that folder is one; listed without importing it
+ESTIMATORS = (
+    'auto',
+    *(
+        module.name
+        for module in iter_modules([str(Path(__file__).parent / 'estimation' / 'estimators')])
+    ),
+    *FORMER_ESTIMATORS,
+)
+"""Values of the parameter `estimator`."""
 
 
 def _parameter(
@@ -135,10 +148,10 @@ class Parameters:
     )
     estimator: str = _parameter(
         'auto',
-        'auto is warped during a coastdown and motion after it; warped: all inputs that are '
-        'there, in warped time, averaged over models; motion: fit of the equation of motion; '
-        's1_...: the published problems',
-        choices=('auto', 'warped', 'motion', 's1_joint', 's1_position', 's1_speed'),
+        'auto is log_time during a coastdown and ode_fit after it; log_time: all inputs that are '
+        'there, polynomials in the logarithm of time averaged over models; ode_fit: fit of the '
+        'equation of motion; s1_...: the published problems',
+        choices=ESTIMATORS,
     )
     order_max: int = _parameter(
         20, 'largest number of coefficients that the order search tries', low=3, high=40

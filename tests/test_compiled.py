@@ -235,7 +235,7 @@ def test_a_closure_is_refused() -> None:
 
 def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) -> None:
     snippet = tmp_path / 'snippet.py'
-    whiten = 'from shipdrag_ros.estimation.motion_fit.whitening import whiten\n'
+    whiten = 'from shipdrag_ros.estimation.ode_fit.whitening import whiten\n'
     spread = 'from shipdrag_ros.inference.gaussian import root\n'
     snippet.write_text(f"{whiten}{spread}whiten(1, 2, 3, 'wrong')\nroot('wrong')\nroot()\n")
     told, _, status = api.run(
@@ -252,7 +252,7 @@ ESTIMATES = """
 import numpy as np
 from shipdrag_ros.diagnosis.noise import Colour, Damping, whiten
 from shipdrag_ros.estimation import Window, estimate, estimate_final
-from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
+from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -282,12 +282,16 @@ whiten(Rows(time_s, kind, speed), np.full(n, 0.01), colour,
 print(table.tobytes().hex())
 """
 # functions that call those of other files, and what they call
-CALLERS = ('estimation.motion_fit.solve', 'estimation.projection', 'estimation.robust')
+CALLERS = (
+    'estimation.ode_fit.solve',
+    'estimation.log_time.projection',
+    'estimation.log_time.robust',
+)
 CALLEES = (
-    'estimation.motion_fit.coast',
-    'estimation.motion_fit.law',
-    'estimation.motion_fit.whitening',
-    'estimation.warped_model',
+    'estimation.ode_fit.coast',
+    'estimation.ode_fit.law',
+    'estimation.ode_fit.whitening',
+    'estimation.log_time.model',
     'inference.gaussian',
     'regression.refit',
 )
@@ -329,8 +333,8 @@ def test_the_bits_of_an_estimate_do_not_depend_on_what_was_kept(
 @pytest.mark.parametrize(
     ('module', 'old', 'new'),
     [
-        ('estimation/robust.py', 'HUBER = 2.0', 'HUBER = 1.0'),
-        ('estimation/motion_fit/law.py', 's * s * b\n', 's * s * b * 1.01\n'),
+        ('estimation/log_time/robust.py', 'HUBER = 2.0', 'HUBER = 1.0'),
+        ('estimation/ode_fit/law.py', 's * s * b\n', 's * s * b * 1.01\n'),
     ],
 )
 def test_an_edit_of_this_package_acts_at_once(

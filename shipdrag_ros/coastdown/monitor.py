@@ -40,7 +40,7 @@ from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
 from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits, alive_ns
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate, estimate_final, motion_fit
+from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
@@ -115,7 +115,7 @@ class Monitor:
         self._memory = self._fresh(Tally.fresh())
         warm(self._memory.bins)
         alive_ns(self._memory.guard, self._tuning.limits, 0)  # compiled now, too
-        motion_fit.warm()
+        ode_fit.warm()
         self._steady_ns = round(parameters.steady_s * SECOND_NS)
         self._window_ns = round(parameters.window_s * SECOND_NS)
         self._update_ns = round(parameters.update_s * SECOND_NS)

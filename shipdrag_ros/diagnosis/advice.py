@@ -31,8 +31,8 @@ from shipdrag_ros.diagnosis.prospect import (
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Weighed
-from shipdrag_ros.estimation.motion_fit.coast import LOG
-from shipdrag_ros.estimation.motion_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.coast import LOG
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship import Ship

@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.diagnosis.result import Gap
 from shipdrag_ros.diagnosis.terms import hats
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.motion_fit.steady import white_sd
+from shipdrag_ros.estimation.ode_fit.steady import white_sd
 from shipdrag_ros.samples import Float64
 
 SHAPES = 5

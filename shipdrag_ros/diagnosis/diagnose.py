@@ -27,7 +27,7 @@ from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
 from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, odd
 from shipdrag_ros.errors import DiagnosisError, EstimationError
-from shipdrag_ros.estimation.motion_fit.coast import LOG
+from shipdrag_ros.estimation.ode_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect, Uncertain

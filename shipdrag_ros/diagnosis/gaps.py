@@ -13,7 +13,7 @@ from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Problem
 from shipdrag_ros.diagnosis.result import Gap, Where
 from shipdrag_ros.diagnosis.terms import EffectTerm, PlaceTerm
-from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION
+from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION
 from shipdrag_ros.samples import Float64
 
 _PARTS = 12  # of a coastdown, in telling where a gap is

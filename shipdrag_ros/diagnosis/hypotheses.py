@@ -31,7 +31,7 @@ from shipdrag_ros.diagnosis.terms import (
     scope_runs,
 )
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.motion_fit.coast import LOG
+from shipdrag_ros.estimation.ode_fit.coast import LOG
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape

@@ -28,7 +28,7 @@ from shipdrag_ros.diagnosis.terms import (
     Term,
 )
 from shipdrag_ros.diagnosis.unknowns import Unknown
-from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND
+from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns, Frame, Scenario, simulate_columns

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.samples import Float64, Int64
 
 _STATES = 6

@@ -21,10 +21,10 @@ from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.diagnosis.kink import kink_s
 from shipdrag_ros.diagnosis.noise import Damping, bin_means, learn, whiten
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.estimation.motion_fit.record import KINDS, Record
-from shipdrag_ros.estimation.motion_fit.run_down import RunDown
-from shipdrag_ros.estimation.motion_fit.steady import LEAST_S
+from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.estimation.ode_fit.record import KINDS, Record
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64

@@ -19,7 +19,7 @@ from scipy.interpolate import BSpline
 
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, of_prior, scaled
-from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION
+from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import CoefficientBaseline

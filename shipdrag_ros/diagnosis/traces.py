@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.linear import Linear, Problem
 from shipdrag_ros.diagnosis.observation import Measured
-from shipdrag_ros.estimation.motion_fit.record import KINDS
+from shipdrag_ros.estimation.ode_fit.record import KINDS
 from shipdrag_ros.samples import Float64
 
 ACROSS = 'position_across'

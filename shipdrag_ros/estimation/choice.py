@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from shipdrag_ros.estimation import motion_fit, s1, warped
+from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
@@ -21,7 +21,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     ship
         For n_r and the Froude number.
     parameters
-        `estimator` among them; `auto` is `warped`.
+        `estimator` among them; `auto` is `log_time`.
 
     Raises
     ------
@@ -43,10 +43,6 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     >>> from shipdrag_ros.parameters import Parameters
     >>> found = estimate(Window.from_block(block, stop_ns, end_ns), ship, Parameters())
     >>> found.estimator, len(found.curve) > 50
-    ('warped', True)
+    ('log_time', True)
     """
-    if parameters.estimator in ('auto', warped.NAME):
-        return warped.estimate(window, ship, parameters)
-    if parameters.estimator == motion_fit.NAME:
-        return motion_fit.estimate(window, ship, parameters)
-    return s1.estimate(window, ship, parameters)
+    return named(parameters.estimator).estimate(window, ship, parameters)

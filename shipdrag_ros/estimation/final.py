@@ -6,11 +6,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import motion_fit
 from shipdrag_ros.estimation.agreement import widened
 from shipdrag_ros.estimation.choice import estimate
 from shipdrag_ros.estimation.coverage import coverage_notes
-from shipdrag_ros.estimation.motion_fit.run_down import RunDown
+from shipdrag_ros.estimation.estimators import AFTER, named
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
@@ -69,7 +69,7 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     if parameters.estimator != 'auto':
         return estimate(window, ship, parameters)
     try:
-        found = motion_fit.estimate(window, ship, parameters)
+        found = named(AFTER).estimate(window, ship, parameters)
     except EstimationError as error:
         return _instead(window, ship, parameters, error)
     try:
@@ -90,7 +90,7 @@ def _instead(
         heard = [name for name in MOTION_INPUTS if len(getattr(window, name))]
         for name in heard if len(heard) > 1 else []:
             try:
-                found = motion_fit.estimate(_alone(window, name), ship, parameters)
+                found = named(AFTER).estimate(_alone(window, name), ship, parameters)
             except EstimationError:
                 continue
             others = ' and '.join(other for other in heard if other != name)

@@ -15,7 +15,7 @@ import numpy as np
 
 from shipdrag_ros.bags import Recorded
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
-from shipdrag_ros.estimation import motion_fit
+from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.ship import Ship
@@ -40,14 +40,6 @@ ENDED_BY = {
 FROUDE_MAX_BY = {
     FroudeMax.INFLECTION: 'the steepest rise of r, beyond which it falls significantly',
     FroudeMax.BRANCH_TOP: 'the highest speed of the fit; no steepest rise was found',
-}
-_STRAIGHT = {'s1_speed': 2, 's1_position': 3, 's1_joint': 3}  # coefficients of a constant r
-_ESTIMATORS = {
-    'warped': 'all inputs in warped time, averaged over models',
-    'motion': 'fit of the equation of motion',
-    's1_joint': 'orthogonal polynomial, speed and position jointly',
-    's1_position': 'orthogonal polynomial, position alone',
-    's1_speed': 'orthogonal polynomial, speed alone',
 }
 
 
@@ -120,7 +112,7 @@ def estimator(name: str) -> str:
     """
     Name an estimator, with what it is.
     """
-    return f'{name}: {_ESTIMATORS[name]}' if name in _ESTIMATORS else name
+    return f'{name}: {named(name).meaning}'
 
 
 def ship_line(ship: Ship) -> str:
@@ -286,7 +278,7 @@ def _fastest_reading(estimate: Estimate, fastest_m_s: float) -> str:
 
 def _residual_notes(estimate: Estimate) -> list[str]:
     """Tell of residuals that are not the independent scatter that the band counts on."""
-    if estimate.estimator == motion_fit.NAME:
+    if named(estimate.estimator).learns_noise:
         return []  # slow disturbances are learnt, or a note says that they are not
     found = []
     for name, track in estimate.tracks.items():
@@ -341,15 +333,12 @@ def _method_notes(estimate: Estimate) -> list[str]:
             'The joint fit takes log and position to show the same speed: a current, or a log '
             'that reads wrong by a factor, bends r(v).'
         )
-    if estimate.order is not None and estimate.order == _STRAIGHT.get(estimate.estimator):
+    method = named(estimate.estimator)
+    if estimate.order is not None and estimate.order == method.constant_order:
         found.append(
             f'{estimate.order} coefficients make r the same at every speed: these samples show '
             'its mean, not its shape, and the band holds for the mean alone.'
         )
-    if estimate.estimator.startswith('s1_'):
-        found.append(
-            'The band holds the noise of the sensors and the uncertainty of the added mass, not '
-            'the error of the polynomial itself: towards the highest speeds, where the run-down '
-            'of the engine lies, the true error can be several times larger.'
-        )
+    if method.caveat:
+        found.append(method.caveat)
     return found

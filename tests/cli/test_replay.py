@@ -68,7 +68,7 @@ def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
         'current_m_s',
     } <= set(coastdown)
     assert coastdown['bag'] == str(coastdown_bag)
-    assert coastdown['estimator'] == 'motion'
+    assert coastdown['estimator'] == 'ode_fit'
     assert coastdown['start_ns'] < coastdown['onset_detected_ns'] < coastdown['end_ns']
     low, high = coastdown['froude_valid']
     froude = np.array(coastdown['froude'])
@@ -95,7 +95,7 @@ def test_the_words_give_every_figure(
         'start',
         'duration',
         'ended because',
-        'motion',
+        'ode_fit',
         'coefficients',
         'samples used',
         'valid range',

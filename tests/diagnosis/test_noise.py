@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipdrag_ros.diagnosis.noise import Colour, Damping, apply, bin_means, learn, whiten
-from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION, Rows
+from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION, Rows
 
 TIMES_S = np.array([90.0, 600.0, 50.0, 40.0])
 

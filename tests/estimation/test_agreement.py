@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.estimation import Window, estimate, estimate_final, motion_fit
+from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
 from shipdrag_ros.estimation.agreement import widened
-from shipdrag_ros.estimation.motion_fit.colour import colour_of
+from shipdrag_ros.estimation.ode_fit.colour import colour_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation.noise import GaussMarkov
@@ -22,7 +22,7 @@ def cut(block: Block) -> Window:
 
 def test_a_second_estimate_that_is_far_off_is_in_the_band(coast, ship) -> None:
     window = cut(coast.block(500))
-    found = motion_fit.estimate(window, ship, Parameters())
+    found = ode_fit.estimate(window, ship, Parameters())
     other = estimate(window, ship, Parameters())
     assert widened(found, other, np.inf) is found
     twice = replace(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, motion_fit
+from shipdrag_ros.estimation import Window, ode_fit
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
@@ -26,7 +26,7 @@ def run(coast, ship, *, current_m_s: float, seed: int, log: bool) -> Estimate:
     if not log:
         block = block[rows]
     cut = Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
-    return motion_fit.estimate(cut, ship, Parameters())
+    return ode_fit.estimate(cut, ship, Parameters())
 
 
 @pytest.mark.parametrize('log', [True, False])

@@ -16,11 +16,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from shipdrag_ros.estimation import Window, estimate, estimate_final
-from shipdrag_ros.estimation.motion_fit.first_fits import fit_robustly
-from shipdrag_ros.estimation.motion_fit.guess import Guess
-from shipdrag_ros.estimation.motion_fit.problem import Problem
-from shipdrag_ros.estimation.motion_fit.record import Record
-from shipdrag_ros.estimation.motion_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.first_fits import fit_robustly
+from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.problem import Problem
+from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship

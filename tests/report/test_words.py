@@ -159,7 +159,7 @@ def test_a_ship_that_drifts_astern_is_told(coastdown: Coastdown) -> None:
         ('s1_position', 3, True),
         ('s1_joint', 3, True),
         ('s1_joint', 4, False),
-        ('another', 3, False),
+        ('log_time', 3, False),
         ('another', None, False),
     ],
 )

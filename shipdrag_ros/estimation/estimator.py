@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What an estimator declares of itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
+
+
+class Estimating(Protocol):
+    """A pure function: no memory, no random numbers, no clock."""
+
+    def __call__(self, window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+        """
+        Estimate r(v) from one window.
+
+        Raises
+        ------
+        EstimationError
+            If the window does not hold a coastdown that can be estimated.
+        """
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """
+    A way from a window to r(v).
+
+    Attributes
+    ----------
+    name
+        Value of the parameter `estimator`, and of `Estimate.estimator`.
+    meaning
+        What it is, for a report.
+    estimate
+    learns_noise
+        Whether slow disturbances are learnt, or a note says that they are not.
+    constant_order
+        Number of coefficients that make r the same at every speed; None where
+        orders are averaged.
+    caveat
+        What its band does not hold; '' for nothing.
+    """
+
+    name: str
+    meaning: str
+    estimate: Estimating
+    learns_noise: bool = False
+    constant_order: int | None = None
+    caveat: str = ''

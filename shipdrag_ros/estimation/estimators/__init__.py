@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The estimators: every module in this folder is one.
+
+A new estimator is a new module with an `ESTIMATOR` of its own name. The parameter `estimator`,
+the report and the documentation find it here; a module is imported when it is asked for.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+
+from shipdrag_ros.estimation.estimator import Estimator
+from shipdrag_ros.parameters import FORMER_ESTIMATORS
+
+DURING, AFTER = 'log_time', 'ode_fit'
+"""What `auto` stands for: during a coastdown, and when it has ended."""
+
+
+@cache
+def named(name: str) -> Estimator:
+    """
+    Return an estimator by its name, or by one that it had before.
+
+    Parameters
+    ----------
+    name
+        One of `parameters.ESTIMATORS`; `auto` is that during a coastdown.
+    """
+    known = DURING if name == 'auto' else FORMER_ESTIMATORS.get(name, name)
+    found = import_module(f'{__name__}.{known}').ESTIMATOR
+    assert isinstance(found, Estimator)
+    return found

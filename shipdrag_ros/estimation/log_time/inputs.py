@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a window offers to the live estimator, as rows of one linear model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.log_time.model import OVER_GROUND, POSITION, THROUGH_WATER
+from shipdrag_ros.estimation.log_time.projection import project
+from shipdrag_ros.estimation.log_time.robust import despike
+from shipdrag_ros.estimation.ode_fit.stated import stated_weight
+from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.regression.orthogonal import TimeScale
+from shipdrag_ros.samples import Float64, Int64
+
+KINDS = ('position', 'speed_through_water', 'speed_over_ground')
+ENOUGH = 5  # distinct stamps of an input, without which it is left out
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """
+    The inputs used, kind after kind.
+
+    Attributes
+    ----------
+    scale
+        Of time, over all of them.
+    stamps : 3 of (count,) int64
+        [ns].
+    time_s : (n,)
+        From the first stamp.
+    value, clean : (n,)
+        Speed [m/s] or distance along the track [m], and without spikes.
+    stated : (n,)
+        Weight by the variances that samples state, 1 for the typical one.
+    count : (3,) int64
+        Samples of each kind.
+    known_sd : (3,)
+        A-priori standard deviation of each, 0 where unknown.
+    notes
+        What was left out, a sentence each.
+    """
+
+    scale: TimeScale
+    stamps: tuple[Int64, ...]
+    time_s: Float64
+    value: Float64
+    clean: Float64
+    stated: Float64
+    count: Int64
+    known_sd: Float64
+    notes: tuple[str, ...]
+
+    @property
+    def span_s(self) -> float:
+        """Length of the window."""
+        return self.scale.span_ns * 1e-9
+
+    @property
+    def used(self) -> list[int]:
+        """Kinds with samples."""
+        return [kind for kind in range(len(KINDS)) if self.count[kind]]
+
+    @property
+    def tells_water_from_ground(self) -> bool:
+        """Whether there is a log, and something over ground."""
+        over_ground = self.count[POSITION] + self.count[OVER_GROUND]
+        return bool(self.count[THROUGH_WATER] and over_ground)
+
+    def part(self, kind: int) -> slice:
+        """
+        Return where a kind is.
+        """
+        first = int(self.count[:kind].sum())
+        return slice(first, first + int(self.count[kind]))
+
+
+def gather(window: Window, parameters: Parameters) -> Inputs:
+    """
+    Bring the inputs of a window into rows.
+
+    Raises
+    ------
+    EstimationError
+        If there is too little, or what there is cannot be used.
+    """
+    series = (window.position, window.speed_through_water, window.speed_over_ground)
+    notes = []
+    used: dict[int, Series] = {}
+    for kind, one in enumerate(series):
+        stamps = 1 + np.count_nonzero(np.diff(one.time_ns)) if len(one) else 0
+        if stamps < ENOUGH:
+            if stamps:
+                notes.append(
+                    f'{KINDS[kind]}: {len(one)} sample(s) left out, {ENOUGH} distinct stamps are '
+                    'needed'
+                )
+            continue
+        bad = int((~np.isfinite(one.value)).sum())
+        if bad:
+            raise EstimationError(
+                f'{KINDS[kind]}: {bad} value(s) are not finite: give accepted samples only'
+            )
+        used[kind] = one
+    if not used:
+        counts = ', '.join(f'{name} {len(one)}' for name, one in zip(KINDS, series))
+        raise EstimationError(
+            f'samples in the window: {counts}; {ENOUGH} distinct stamps or more of one input are '
+            'needed: give a longer window'
+        )
+    if THROUGH_WATER not in used:
+        notes.append('no speed through water: a current is part of the speed')
+    values = [_along(one) if kind == POSITION else one.value for kind, one in used.items()]
+    scale = TimeScale.of(*(one.time_ns for one in used.values()))
+    speed_sd = parameters.speed_sigma_m_s
+    time_s: list[Float64] = [
+        np.asarray((one.time_ns - scale.first_ns) * 1e-9, np.float64) for one in used.values()
+    ]
+    stated = [
+        stated_weight(when, value, one.variance)
+        for when, value, one in zip(time_s, values, used.values())
+    ]
+    return Inputs(
+        scale,
+        tuple(used[k].time_ns if k in used else np.empty(0, np.int64) for k in range(len(KINDS))),
+        np.concatenate(time_s),
+        np.concatenate(values),
+        np.concatenate([despike(value) for value in values]),
+        np.concatenate(stated),
+        np.array([len(used[k]) if k in used else 0 for k in range(len(KINDS))]),
+        np.array([parameters.position_sigma_m, speed_sd, speed_sd]),
+        tuple(notes),
+    )
+
+
+def _along(position: Series) -> Float64:
+    time = TimeScale.of(position.time_ns).normalise(position.time_ns)
+    distance: Float64 = project(time, np.ascontiguousarray(position.value))
+    if np.isnan(distance[0]):
+        raise EstimationError(
+            f'position: {len(position)} samples without a direction of travel, all near '
+            f'{position.value[0].tolist()} m; check the input or leave it out'
+        )
+    return distance

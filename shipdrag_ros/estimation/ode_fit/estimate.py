@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The final figure of a coastdown: the equation of motion fitted to its window.
+
+A pure function of the window, the ship and the parameters, without threads and
+random numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.curve import ValidRange
+from shipdrag_ros.estimation.ode_fit.coast import (
+    CURRENT,
+    LOG,
+    LOG_SCALE,
+    V0,
+    Rows,
+    predict,
+)
+from shipdrag_ros.estimation.ode_fit.colour import Colour
+from shipdrag_ros.estimation.ode_fit.first_fits import (
+    fit_robustly,
+    weigh_disturbed,
+    with_log_scale,
+)
+from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
+from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.learning import ENGINE_HOLD, learn
+from shipdrag_ros.estimation.ode_fit.problem import Problem
+from shipdrag_ros.estimation.ode_fit.record import KINDS, Record
+from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
+from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
+from shipdrag_ros.estimation.ode_fit.whitening import Disturbance
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+NAME = 'ode_fit'
+_CURVE_POINTS = 257
+_QUIET_S = 5.0  # before the stop the last seconds teach nothing; more where it is known worse
+
+
+def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    """
+    Estimate r(v) from one window by fitting the equation of motion.
+
+    Parameters
+    ----------
+    window
+        Accepted samples; with the steady record `before` it, disturbances are
+        learnt and the speed at the stop is pinned.
+    ship
+        For n_r, the Froude number and the run-down of the thrust.
+    parameters
+        `froude_min` and the known standard deviations are used.
+
+    Raises
+    ------
+    EstimationError
+        If the window does not hold a coastdown that can be estimated.
+    """
+    run_down = RunDown.of(window, ship)
+    record = Record.of(window, run_down, parameters)
+    guess = Guess.of(record.coast, float(ship.n_r(1.0)))
+    notes = [*window.notes, *ship.warnings, *run_down.notes]
+    # first the coastdown alone, as if nothing but sensor noise disturbed
+    alone = record.without_steady()
+    first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess))
+    if record.steady_s >= LEAST_S:
+        plain = first.plainly(guess.lowest)
+        about = _learn(record, plain, run_down)
+        problem = Problem.of(record, run_down, ship, guess).disturbed(about, plain)
+        problem = weigh_disturbed(problem, first)
+        notes.append(_disturbance_note(about, record.steady_s))
+    else:
+        record = alone
+        notes.append(
+            'there is no steady record before the onset to learn slow disturbances from: the '
+            'band holds what scatters in the window alone'
+        )
+    full = problem
+    first, problem = with_log_scale(problem.condensed(first), first)
+    if LOG_SCALE in problem.extras:
+        scale, sd = first.unknown(LOG_SCALE)
+        notes.append(
+            f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
+            'deviations), taken out'
+        )
+    found = problem.average(first)
+    colours = full.colours(found)
+    most = max(colour.inflation for colour in colours.values())
+    if most > 1.0:
+        # the figure stays: whether the sensor errs slowly or the ship is pushed is not known
+        found = replace(found, covariance=most * found.covariance)
+        notes += _colour_notes(colours)
+    return _result(found, full, record, window, ship, parameters, tuple(notes))
+
+
+def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> Disturbance:
+    """Learn the disturbances of the steady record, damped as a plain fit has it."""
+    damping, inertia = plain.damping(plain.unknowns[plain.law.size + V0 :][:1])
+    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else -_QUIET_S
+    keep = record.steady.time_s < quiet
+    steady = record.steady
+    rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
+    variance = record.variance(rows, record.steady_weight[keep])
+    return learn(rows, variance, damping_1_s=float(damping[0]), inertia=float(inertia[0]))
+
+
+def _disturbance_note(about: Disturbance, steady_s: float) -> str:
+    found = []
+    if about.gust_m_s2:
+        found.append(
+            f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s (the engine is '
+            f'taken to damp the speed {ENGINE_HOLD:g} times as the hull does; 1 to 2 is usual)'
+        )
+    if about.water_m_s:
+        found.append(f'the log by {about.water_m_s:.2g} m/s over {about.water_s:.0f} s')
+    return (
+        f'disturbances learnt from {steady_s:.0f} s of steady record: '
+        f'{" and ".join(found) or "none but the noise of the sensors"}'
+    )
+
+
+def _colour_notes(colours: dict[int, Colour]) -> list[str]:
+    names = {kind: name for name, kind in KINDS.items()}
+    return [
+        f'what the fit leaves of {names[kind]} is not independent from sample to sample: its '
+        f'means over {colour.block} scatter {math.sqrt(colour.inflation):.2g} times as much as '
+        'independent ones; the band is widened for that'
+        for kind, colour in colours.items()
+        if colour.inflation > 1.0
+    ]
+
+
+def _result(
+    found: FittedMotion,
+    problem: Problem,
+    record: Record,
+    window: Window,
+    ship: Ship,
+    parameters: Parameters,
+    notes: tuple[str, ...],
+) -> Estimate:
+    coast = record.coast
+    last_speed, last_sigma = _speed_at(found, problem, float(coast.time_s[-1]))
+    none = np.zeros(0, np.int64)
+    residual, speed = predict(found.law, found.unknowns, problem.grid_s, coast, none)
+    low = max(last_speed, float(ship.speed(parameters.froude_min)))
+    high = min(found.unknown(V0)[0], float(speed.max()))
+    if not high > low * 1.02:
+        raise EstimationError(
+            f'the fitted speed falls from {high:.4g} to {low:.4g} m/s only, above froude_min '
+            f'{parameters.froude_min:g}: give a window that lies in a coastdown, or a smaller '
+            'froude_min'
+        )
+    curve = _curve(found, np.linspace(low, high, _CURVE_POINTS), ship)
+    if len(curve) < 2:
+        raise EstimationError(
+            f'the fitted force nowhere slows the ship from {high:.4g} to {low:.4g} m/s: give a '
+            'window in which she coasts'
+        )
+    valid = ValidRange.of_branch(curve)
+    tracks = {}
+    for name, stamps in record.stamps.items():
+        chosen = coast.kind == KINDS[name]
+        measured = coast.value[chosen]
+        tracks[name] = Track(stamps, measured, measured - residual[0, chosen])
+    last_r, last_repeatable = (
+        float(value[0]) for value in found.resistance(np.array([last_speed]))
+    )
+    last_of_n_r = last_r / (1.0 + float(ship.n_r(last_speed))) * ship.added_mass.sd
+    noise = {}
+    for name in record.white_sd:
+        chosen = problem.rows.kind == KINDS[name]
+        chosen[: len(record.steady.time_s)] = False
+        worth = np.concatenate([record.steady_weight, record.coast_weight])[chosen]
+        noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen] * worth)))
+    current = found.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
+    stamps = np.concatenate(list(record.stamps.values()))
+    return Estimate(
+        estimator=NAME,
+        start_ns=int(stamps.min()),
+        end_ns=int(stamps.max()),
+        order=None,
+        orders=(),
+        samples={name: len(times) for name, times in record.stamps.items()},
+        noise_sd=noise,
+        curve=curve,
+        froude_valid=valid.froude,
+        froude_max_by=valid.by,
+        froude_max_argmax=valid.argmax,
+        w=valid.w,
+        last_speed_m_s=last_speed,
+        last_speed_sigma_m_s=last_sigma,
+        last_resistance_m_s2=last_r,
+        last_sigma_m_s2=float(np.hypot(last_repeatable, last_of_n_r)),
+        tracks=tracks,
+        current_m_s=current[0],
+        current_sigma_m_s=current[1],
+        notes=notes,
+    )
+
+
+def _speed_at(found: FittedMotion, problem: Problem, time_s: float) -> tuple[float, float]:
+    """Return the speed through water at a time, and its standard deviation."""
+    row = Rows(np.array([time_s]), np.array([LOG]), np.zeros(1))
+    k = found.law.size
+    every = np.arange(k + LOG_SCALE, dtype=np.int64)
+    unknowns = found.unknowns.copy()
+    unknowns[k + LOG_SCALE] = 0.0
+    table, speed = predict(found.law, unknowns, problem.grid_s, row, every)
+    by_unknown = table[1:, 0]
+    covariance = found.covariance[: len(every), : len(every)]
+    variance = np.einsum('i,ij,j->', by_unknown, covariance, by_unknown)
+    return float(speed[0]), float(np.sqrt(variance))
+
+
+def _curve(found: FittedMotion, speed: Float64, ship: Ship) -> ResistanceCurve:
+    """Return r(v) where it retards."""
+    r, repeatable = found.resistance(speed)
+    slope, slope_sigma = found.slope(speed)
+    of_n_r = np.abs(r) / (1.0 + ship.n_r(speed)) * ship.added_mass.sd
+    per_froude = float(ship.speed(1.0))
+    driving = np.flatnonzero(r <= 0.0)
+    part = slice(int(driving[-1]) + 1 if len(driving) else 0, None)
+    return ResistanceCurve(
+        np.ascontiguousarray(speed[part]),
+        r[part],
+        np.sqrt(repeatable**2 + of_n_r**2)[part],
+        repeatable[part],
+        ship.froude(speed[part]),
+        (per_froude * slope)[part],
+        (per_froude * slope_sigma)[part],
+    )

@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One coastdown to be fitted: what is measured, known and unknown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shipdrag_ros.estimation.ode_fit.averaging import average
+from shipdrag_ros.estimation.ode_fit.coast import (
+    CURRENT,
+    EXTRAS,
+    LOG,
+    LOG_SCALE,
+    ONSET,
+    POSITION,
+    THRUST,
+    THRUST_FAST,
+    V0,
+    X0,
+    Rows,
+    predict,
+)
+from shipdrag_ros.estimation.ode_fit.colour import Colour, colour_of
+from shipdrag_ros.estimation.ode_fit.condensing import means
+from shipdrag_ros.estimation.ode_fit.families import FIRST, POWERS, Humps
+from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
+from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.law import Law
+from shipdrag_ros.estimation.ode_fit.learning import ENGINE_HOLD
+from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.solve import fit
+from shipdrag_ros.estimation.ode_fit.whitening import (
+    CALM,
+    Disturbance,
+    Noise,
+    whiten,
+)
+from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.ship import Ship
+
+_STEPS = 72  # of the integration, longer as the ship slows down
+_ITERATIONS = 30
+_SCALE_SD = 0.02  # of a log's scale, before the fit
+
+
+@dataclass(frozen=True)
+class Problem:
+    """
+    What all fits of one coastdown share.
+
+    Attributes
+    ----------
+    rows
+        Of the steady record, then of the coastdown.
+    steady
+        How many of them are of the steady record.
+    grid_s
+        Times of the integration.
+    noise
+        White noise, larger for an outlier, and slow disturbances.
+    run_down
+        What is known of the stop.
+    guess
+        Where the first fit starts.
+    first
+        Law of the first fit.
+    humps
+        Where humps may be.
+    extras
+        Unknowns behind the coefficients that are fitted.
+    """
+
+    rows: Rows
+    steady: int
+    grid_s: Float64
+    noise: Noise
+    run_down: RunDown
+    guess: Guess
+    first: Law
+    humps: Humps
+    extras: tuple[int, ...]
+
+    @classmethod
+    def of(cls, record: Record, run_down: RunDown, ship: Ship, guess: Guess) -> Problem:
+        """
+        Set up the fit of a record that nothing but sensor noise disturbs.
+        """
+        steady, coast = record.steady, record.coast
+        rows = Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast)))
+        variance = np.concatenate(
+            [
+                record.variance(steady, record.steady_weight),
+                record.variance(coast, record.coast_weight),
+            ]
+        )
+        extras = [V0]
+        if run_down.shaft_s > 0.0:
+            extras += [THRUST, THRUST_FAST]
+        # without a steady record a later stop is but a higher speed, or more thrust
+        if run_down.stop_sd_s > 0.0 and len(steady.time_s):
+            extras.append(ONSET)
+        kinds = set(coast.kind.tolist())
+        if POSITION in kinds:
+            extras.append(X0)
+        if LOG in kinds and len(kinds) > 1:
+            extras.append(CURRENT)
+        end = float(coast.time_s[-1]) + 3.0 * run_down.stop_sd_s
+        typical = max(float(coast.time_s[-1]), 1e-3) / 25.0
+        grid = typical * np.expm1(np.linspace(0.0, math.log1p(end / typical), _STEPS + 1))
+        ones = np.ones(len(variance))
+        v_ref = guess.speed_m_s
+        return cls(
+            rows,
+            len(steady.time_s),
+            grid,
+            Noise(variance, CALM, ones, ones),
+            run_down,
+            guess,
+            Law(np.array(FIRST, np.int64), v_ref, run_down.shaft_s, ship.n_r_polynomial()),
+            Humps.between(guess.lowest, float(ship.froude(v_ref))),
+            tuple(extras),
+        )
+
+    def disturbed(self, about: Disturbance, plain: FittedMotion) -> Problem:
+        """
+        Return the problem with slow disturbances, damped as a fit has it.
+        """
+        _, speed = predict(
+            plain.law, plain.unknowns, self.grid_s, self.rows, np.zeros(0, np.int64)
+        )
+        damping, inertia = plain.damping(speed)
+        damping[: self.steady] *= ENGINE_HOLD
+        return replace(self, noise=Noise(self.noise.variance, about, damping, inertia))
+
+    def weighted(self, variance: Float64) -> Problem:
+        """
+        Return the problem with another variance of the white noise.
+        """
+        return replace(self, noise=self.noise._replace(variance=variance))
+
+    def residual(self, found: FittedMotion) -> Float64:
+        """
+        Return measured less predicted of all rows, (n,).
+        """
+        none = np.zeros(0, np.int64)
+        table, _ = predict(found.law, found.unknowns, self.grid_s, self.rows, none)
+        result: Float64 = table[0]
+        return result
+
+    def colours(self, found: FittedMotion) -> dict[int, Colour]:
+        """
+        Return by how much what a fit leaves of the coastdown is correlated, for each input.
+        """
+        white = self.residual(found).reshape(1, -1)
+        whiten(self.rows, white, self.noise)
+        kind, left = self.rows.kind[self.steady :], white[0, self.steady :]
+        return {int(of): colour_of(left[kind == of]) for of in np.unique(kind)}
+
+    def condensed(self, near: FittedMotion) -> Problem:
+        """
+        Return the problem with the coastdown condensed to a row a step and input.
+
+        What a fit that is near leaves is as good as a constant over a step, so
+        that its mean stands for all of it; slow disturbances do not change
+        within a step either.
+        """
+        left = self.residual(near)
+        noise = self.noise
+        coast, variance = means(self.rows, self.steady, left, noise.variance, self.grid_s)
+        before = slice(self.steady)
+        nothing = np.zeros(len(coast.time_s))
+        rows = Rows(
+            *(
+                np.concatenate([old[before], new])
+                for old, new in zip(self.rows, (coast.time_s, coast.kind, nothing))
+            )
+        )
+        value = np.concatenate([left[before], coast.value])
+        value -= replace(self, rows=rows).residual(near) - rows.value
+        damping, inertia = (
+            np.interp(rows.time_s, self.rows.time_s, of_row)
+            for of_row in (noise.damping_1_s, noise.inertia)
+        )
+        variance = np.concatenate([noise.variance[before], variance])
+        return replace(
+            self,
+            rows=rows._replace(value=value),
+            noise=Noise(variance, noise.about, damping, inertia),
+        )
+
+    def start(self) -> Float64:
+        """
+        Return unknowns for the first fit to start from: purely quadratic drag.
+        """
+        size = self.first.size
+        unknowns = np.zeros(size + EXTRAS)
+        unknowns[FIRST.index(2)] = self._unit_m_s2
+        unknowns[size + V0] = self.guess.speed_m_s
+        for extra, mean, _ in self.run_down.priors:
+            unknowns[size + extra] = mean
+        unknowns[size + X0] = self.guess.first_m
+        return unknowns
+
+    def fit_first(self, start: Float64) -> tuple[FittedMotion | None, Float64]:
+        """
+        Fit the first family, None where that fails; return whitened residuals too.
+
+        How the thrust ended is held as it is most likely: without the priors of the whole law
+        it cannot be told from the highest powers.
+        """
+        converged, _, unknowns, covariance, white = fit(
+            self.first,
+            start,
+            self.grid_s,
+            self.rows,
+            self.noise,
+            self._active(self.first, held=(THRUST, THRUST_FAST)),
+            self._prior(self.first),
+            _ITERATIONS,
+        )
+        return FittedMotion(self.first, unknowns, covariance) if converged else None, white
+
+    def average(self, first: FittedMotion) -> FittedMotion:
+        """
+        Fit the whole law from the first on; where it cannot be, the first stands alone.
+        """
+        law = self.first._replace(
+            powers=np.array(POWERS, np.int64),
+            humps=len(self.humps.sd),
+            first_hump=self.humps.first,
+            spacing=self.humps.spacing,
+        )
+        start = np.zeros(law.size + EXTRAS)
+        start[law.size :] = first.unknowns[first.law.size :]
+        for power, coefficient in zip(FIRST, first.unknowns):
+            start[POWERS.index(power)] = coefficient
+        converged, unknowns, covariance = average(
+            law,
+            start,
+            self.grid_s,
+            self.rows,
+            self.noise,
+            self._active(law),
+            self._prior(law),
+            self.humps.priors(self._unit_m_s2),
+        )
+        return FittedMotion(law, unknowns, covariance) if converged else first
+
+    @property
+    def _unit_m_s2(self) -> float:
+        return self.guess.quadratic_1_m * self.guess.speed_m_s**2
+
+    def _active(self, law: Law, held: tuple[int, ...] = ()) -> Int64:
+        k = law.size
+        extras = [k + extra for extra in self.extras if extra not in held]
+        return np.array([*range(k), *extras], np.int64)
+
+    def _prior(self, law: Law) -> Float64:
+        """Return mean and precision of what is known before, (2, k + 7)."""
+        k = law.size
+        prior = np.zeros((2, k + EXTRAS))
+        for extra, mean, sd in (*self.run_down.priors, (LOG_SCALE, 0.0, _SCALE_SD)):
+            prior[:, k + extra] = mean, 1.0 / sd**2 if sd > 0.0 else 0.0
+        return prior

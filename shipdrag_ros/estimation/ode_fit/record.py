@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: Apache-2.0
+"""From a window to rows of measurements, the steady record before it condensed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.stated import stated_weight
+from shipdrag_ros.estimation.ode_fit.steady import (
+    condense,
+    steady_since,
+    weighted_white_sd,
+)
+from shipdrag_ros.estimation.s1.track import along_track
+from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis
+from shipdrag_ros.samples import Float64, Int64
+
+KINDS = {'speed_through_water': LOG, 'speed_over_ground': OVER_GROUND, 'position': POSITION}
+LEAST_STAMPS = 12  # of an input: fewer do not tell its noise
+_TRACK_ORDER = 8  # of the polynomials of a track that bends
+_FINE_S = 60.0  # of the steady record, its end, in which the stop may be
+
+
+@dataclass(frozen=True)
+class Record:
+    """
+    Rows of the coastdown and of the steady record before it.
+
+    Attributes
+    ----------
+    steady, coast
+        Times count from the stop as far as known.
+    steady_weight, coast_weight : (m,), (n,)
+        How many samples of typical stated variance each row is worth.
+    white_sd
+        Standard deviation of the white noise of each input used, of such a sample.
+    stamps
+        Stamps of each input used, in the window.
+    """
+
+    steady: Rows
+    steady_weight: Float64
+    coast: Rows
+    coast_weight: Float64
+    white_sd: dict[str, float]
+    stamps: dict[str, Int64]
+
+    @classmethod
+    def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> Record:
+        """
+        Take what a window offers.
+
+        Raises
+        ------
+        EstimationError
+            If no input has enough samples.
+        """
+        inputs = {
+            name: series for name in KINDS if len(series := getattr(window, name)) >= LEAST_STAMPS
+        }
+        if not inputs:
+            found = ', '.join(f'{name} {len(getattr(window, name))}' for name in KINDS)
+            raise EstimationError(
+                f'samples in the window: {found}; a fit of the motion needs {LEAST_STAMPS} of '
+                'one of them: give a longer window, or another `estimator`'
+            )
+        for name, series in inputs.items():
+            bad = int((~np.isfinite(series.value)).sum())
+            if bad:
+                raise EstimationError(
+                    f'{name}: {bad} value(s) are not finite: give accepted samples only'
+                )
+        zero_ns = run_down.stop_ns
+        known = {
+            'speed_through_water': parameters.speed_sigma_m_s,
+            'speed_over_ground': parameters.speed_sigma_m_s,
+            'position': parameters.position_sigma_m,
+        }
+        since = -np.inf if window.before is None else _steady_since(window, inputs, zero_ns)
+        steady: list[tuple[Float64, int, Float64, Float64]] = []
+        coast: list[tuple[Float64, int, Float64, Float64]] = []
+        white: dict[str, float] = {}
+        for name, series in inputs.items():
+            time_s = _seconds(series.time_ns, zero_ns)
+            before_s: Float64 = np.empty(0)
+            before, variance = series.value[:0], series.variance[:0]
+            if window.before is not None:
+                earlier: Series = getattr(window.before, name)
+                before_s = _seconds(earlier.time_ns, zero_ns)
+                keep = before_s >= since
+                before_s, before = before_s[keep], earlier.value[keep]
+                variance = earlier.variance[keep]
+            value = series.value
+            if name == 'position':
+                both = _distance(
+                    np.concatenate([before_s, time_s]), np.concatenate([before, value])
+                )
+                before, value = both[: len(before_s)], both[len(before_s) :]
+            weight = stated_weight(
+                np.concatenate([before_s, time_s]),
+                np.concatenate([before, value]),
+                np.concatenate([variance, series.variance]),
+            )
+            white[name] = known[name] or max(
+                weighted_white_sd(np.concatenate([before, value]), weight),
+                1e-6 * float(np.ptp(value)),
+                1e-9,
+            )
+            coast.append((time_s, KINDS[name], value, weight[len(before_s) :]))
+            if len(before_s):
+                means = condense(before_s, before, weight[: len(before_s)], _FINE_S)
+                steady.append((means[0], KINDS[name], *means[1:]))
+        steady_rows, steady_weight = _merge(steady)
+        coast_rows, coast_weight = _merge(coast)
+        return cls(
+            steady_rows,
+            steady_weight,
+            coast_rows,
+            coast_weight,
+            white,
+            {name: series.time_ns for name, series in inputs.items()},
+        )
+
+    @property
+    def steady_s(self) -> float:
+        """Length of the steady record [s]."""
+        return float(np.ptp(self.steady.time_s)) if len(self.steady.time_s) else 0.0
+
+    def without_steady(self) -> Record:
+        """
+        Return the coastdown alone.
+        """
+        rows, weight = _merge([])
+        return replace(self, steady=rows, steady_weight=weight)
+
+    def variance(self, rows: Rows, weight: Float64) -> Float64:
+        """
+        Return the variance of the white noise of rows that are worth so many samples.
+        """
+        of_kind = np.zeros(len(KINDS))
+        for name, sd in self.white_sd.items():
+            of_kind[KINDS[name]] = sd**2
+        result: Float64 = of_kind[rows.kind] / weight
+        return result
+
+
+def _seconds(time_ns: Int64, zero_ns: int) -> Float64:
+    return np.asarray((time_ns - zero_ns) * 1e-9, np.float64)
+
+
+def _merge(parts: list[tuple[Float64, int, Float64, Float64]]) -> tuple[Rows, Float64]:
+    """Sort rows of several inputs by time; ties keep the order of the inputs."""
+    if not parts:
+        return Rows(np.empty(0), np.empty(0, np.int64), np.empty(0)), np.empty(0)
+    time_s = np.concatenate([part[0] for part in parts])
+    kind = np.concatenate([np.full(len(part[0]), part[1], np.int64) for part in parts])
+    value = np.concatenate([part[2] for part in parts])
+    weight = np.concatenate([part[3] for part in parts])
+    order = np.argsort(time_s, kind='stable')
+    return Rows(time_s[order], kind[order], value[order]), weight[order]
+
+
+def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> float:
+    """Return the time [s after the stop] from which the record before is steady."""
+    assert window.before is not None
+    heading = window.before.heading
+    heading_s = _seconds(heading.time_ns, zero_ns)
+    for name in ('speed_through_water', 'speed_over_ground'):
+        if name in inputs:
+            series: Series = getattr(window.before, name)
+            time_s = _seconds(series.time_ns, zero_ns)
+            return float(steady_since(time_s, series.value, heading_s, heading.value))
+    # positions alone do not tell from sample to sample: by their means
+    series = window.before.position
+    if len(series) < LEAST_STAMPS:
+        return np.inf
+    time_s = _seconds(series.time_ns, zero_ns)
+    edges = np.arange(time_s[-1], time_s[0] - 60.0, -60.0)[::-1]
+    blocks = np.searchsorted(time_s, edges)
+    rows = [
+        (time_s[a:b].mean(), series.value[a:b].mean(axis=0)) for a, b in pairwise(blocks) if b > a
+    ]
+    if len(rows) < 3:
+        return np.inf
+    when = np.array([row[0] for row in rows])
+    where = np.array([row[1] for row in rows])
+    speed = np.hypot(*(np.diff(where, axis=0) / np.diff(when)[:, None]).T)
+    return float(steady_since(0.5 * (when[1:] + when[:-1]), speed, heading_s, heading.value))
+
+
+def _distance(time_s: Float64, position: Float64) -> Float64:
+    scale = 0.5 * float(np.ptp(time_s))
+    time = (time_s - time_s[0]) / scale - 1.0
+    basis = OrthogonalBasis.on(time, min(_TRACK_ORDER, len(time) - 1))
+    return along_track(time, position, basis)

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+S1's estimator as published: a window in, r(v) with its range out.
+
+A pure function of the window, the ship and the parameters: no memory, no
+random numbers, no clock, and sums that do not depend on the number of threads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.curve import ValidRange, resistance_curve, specific_resistance
+from shipdrag_ros.estimation.motion import sigma
+from shipdrag_ros.estimation.result import Estimate, Track
+from shipdrag_ros.estimation.s1.problems import (
+    Measured,
+    Solution,
+    solve_joint,
+    solve_position,
+    solve_speed,
+)
+from shipdrag_ros.estimation.s1.track import along_track
+from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
+from shipdrag_ros.ship import Ship
+
+_GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is evaluated
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """What a problem needs."""
+
+    speed: bool
+    position: bool
+    stamps: int  # of each input, at least
+    order: int  # coefficients without which there is no deceleration
+
+
+# joint: fewer stamps of an input do not tell its noise, hence not its weight
+PROBLEMS = {
+    's1_speed': _Problem(speed=True, position=False, stamps=4, order=2),
+    's1_position': _Problem(speed=False, position=True, stamps=4, order=3),
+    's1_joint': _Problem(speed=True, position=True, stamps=12, order=3),
+}
+
+
+@dataclass(frozen=True)
+class _Inputs:
+    """What the window offers, and which problem it is for."""
+
+    estimator: str
+    speed: Measured | None
+    position: Measured | None
+    notes: tuple[str, ...]
+
+    @property
+    def used(self) -> tuple[Measured, ...]:
+        return tuple(data for data in (self.speed, self.position) if data is not None)
+
+
+def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    """
+    Estimate r(v) from one window.
+
+    Parameters
+    ----------
+    window
+        Accepted samples.
+    ship
+        For n_r and the Froude number.
+    parameters
+        `estimator`, `order_max`, `froude_min` and the known standard
+        deviations are used.
+
+    Raises
+    ------
+    EstimationError
+        If the window does not hold a coastdown that can be estimated.
+
+    Notes
+    -----
+    S1 (1)-(13). Samples of one input are weighted equally. `w` is of the
+    repeatable sigma, which is S1's.
+    """
+    inputs = _inputs(window, parameters)
+    solution = _solve(inputs)
+    _check_deceleration(inputs, solution)
+    motion = solution.fit.motion(_GRID)
+    curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
+    valid = ValidRange.of_polynomial(curve)
+    end = motion[-1:]
+    r, r_sigma, _ = specific_resistance(end, ship)
+    scale = solution.fit.scale
+    return Estimate(
+        estimator=inputs.estimator,
+        start_ns=scale.first_ns,
+        end_ns=scale.first_ns + scale.span_ns,
+        order=solution.order,
+        orders=solution.trials,
+        samples={data.name: len(data.value) for data in inputs.used},
+        noise_sd=solution.noise_sd,
+        curve=curve,
+        froude_valid=valid.froude,
+        froude_max_by=valid.by,
+        froude_max_argmax=valid.argmax,
+        w=valid.w,
+        last_speed_m_s=float(end.speed[0]),
+        last_speed_sigma_m_s=float(sigma(end.speed_error)[0]),
+        last_resistance_m_s2=float(r[0]),
+        last_sigma_m_s2=float(r_sigma[0]),
+        tracks=_tracks(inputs, solution),
+        reorthogonalised=solution.reorthogonalised,
+        notes=(*window.notes, *inputs.notes, *solution.notes, *ship.warnings),
+    )
+
+
+def _inputs(window: Window, parameters: Parameters) -> _Inputs:
+    """Decide which inputs are used, and for which problem."""
+    name, speed = 'speed_through_water', window.speed_through_water
+    notes: list[str] = []
+    if len(speed) < PROBLEMS['s1_speed'].stamps <= len(window.speed_over_ground):
+        name, speed = 'speed_over_ground', window.speed_over_ground
+    position = window.position
+    estimator = parameters.estimator
+    if estimator == 'auto':
+        estimator = _offered(len(speed), len(position))
+    problem = PROBLEMS[estimator]
+    for series_name, series, used in (
+        (name, speed, problem.speed),
+        ('position', position, problem.position),
+    ):
+        if used:
+            _check(series_name, series, problem.stamps, estimator)
+        elif len(series) and parameters.estimator == 'auto':
+            notes.append(
+                f'{series_name}: {len(series)} sample(s) left out, a joint fit needs '
+                f'{PROBLEMS["s1_joint"].stamps} of each input'
+            )
+    if problem.speed and name == 'speed_over_ground':
+        notes.append(
+            'speed over ground was used as the speed, there is none through water: '
+            'a current is part of it'
+        )
+    return _Inputs(
+        estimator,
+        _speed(name, speed, parameters) if problem.speed else None,
+        _distance(position, parameters) if problem.position else None,
+        tuple(notes),
+    )
+
+
+def _offered(speeds: int, positions: int) -> str:
+    """Name the problem that `auto` stands for."""
+    enough = PROBLEMS['s1_joint'].stamps
+    if min(speeds, positions) >= enough:
+        return 's1_joint'
+    return 's1_speed' if speeds >= min(positions, enough) else 's1_position'
+
+
+def _check(name: str, series: Series, enough: int, estimator: str) -> None:
+    stamps = len(np.unique(series.time_ns))
+    if stamps < enough:
+        raise EstimationError(
+            f'{name}: {stamps} distinct stamp(s) in the window, {estimator} needs {enough} or '
+            'more: give a longer window, or another `estimator`'
+        )
+    bad = int((~np.isfinite(series.value)).sum())
+    if bad:
+        raise EstimationError(f'{name}: {bad} value(s) are not finite: give accepted samples only')
+
+
+def _speed(name: str, series: Series, parameters: Parameters) -> Measured:
+    scale, basis = _polynomials(series, parameters)
+    sigma_m_s = parameters.speed_sigma_m_s
+    return Measured(name, series.time_ns, series.value, sigma_m_s, scale, basis)
+
+
+def _distance(series: Series, parameters: Parameters) -> Measured:
+    scale, basis = _polynomials(series, parameters)
+    distance = along_track(scale.normalise(series.time_ns), series.value, basis)
+    sigma_m = parameters.position_sigma_m
+    return Measured('position', series.time_ns, distance, sigma_m, scale, basis)
+
+
+def _polynomials(series: Series, parameters: Parameters) -> tuple[TimeScale, OrthogonalBasis]:
+    scale = TimeScale.of(series.time_ns)
+    return scale, OrthogonalBasis.on(scale.normalise(series.time_ns), parameters.order_max)
+
+
+def _solve(inputs: _Inputs) -> Solution:
+    if inputs.speed is None:
+        assert inputs.position is not None
+        return solve_position(inputs.position)
+    if inputs.position is None:
+        return solve_speed(inputs.speed)
+    return solve_joint(inputs.speed, inputs.position)
+
+
+def _check_deceleration(inputs: _Inputs, solution: Solution) -> None:
+    needed = PROBLEMS[inputs.estimator].order
+    if solution.order < needed:
+        noise = ', '.join(f'{name} {value:.3g}' for name, value in solution.noise_sd.items())
+        raise EstimationError(
+            f'no deceleration above the noise (sd {noise}) in '
+            f'{solution.fit.scale.span_ns * 1e-9:.4g} s: {solution.order} coefficient(s) explain '
+            f'the samples, {inputs.estimator} needs {needed}; give a longer window, or one after '
+            'the engine stop'
+        )
+
+
+def _tracks(inputs: _Inputs, solution: Solution) -> dict[str, Track]:
+    fit = solution.fit
+    result = {}
+    if inputs.speed is not None:
+        data = inputs.speed
+        fitted = fit.fitted(data.time_ns, derivative=fit.speed_at)
+        result[data.name] = Track(data.time_ns, data.value, fitted)
+    if inputs.position is not None:
+        data = inputs.position
+        result[data.name] = Track(data.time_ns, data.value, fit.fitted(data.time_ns, derivative=0))
+    return result

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Distance along the track against plain polynomials of numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from shipdrag_ros.estimation.log_time.projection import project
+from shipdrag_ros.samples import Float64
+
+LINE, MOST = 2, 7  # coefficients of a bend
+
+
+def fitted(time: Float64, value: Float64) -> Polynomial:
+    """The polynomial of least AICc (Hurvich and Tsai 1989), a line at least."""
+    n = len(time)
+    best, least = None, np.inf
+    for order in range(LINE, min(MOST, n - 2) + 1):
+        k = order + 1  # the variance is fitted too
+        if n <= k + 1:
+            break
+        trial = Polynomial.fit(time, value, order - 1, domain=[-1.0, 1.0])
+        sse = ((value - trial(time)) ** 2).sum()
+        criterion = n * np.log(sse / n) + 2.0 * k + 2.0 * k * (k + 1.0) / (n - k - 1.0)
+        if criterion < least:
+            best, least = trial, criterion
+    assert best is not None
+    return best
+
+
+def plainly(time: Float64, position: Float64) -> tuple[Float64, bool]:
+    """Distance along, and whether the track is taken to bend."""
+    away = position - position[0]
+    way = np.array([Polynomial.fit(time, column, 1).convert().coef[1] for column in away.T])
+    way /= np.hypot(*way)
+    ahead, across = away @ way, away @ [-way[1], way[0]]
+    bend = fitted(time, across)
+    if bend.degree() < LINE:
+        return ahead, False
+    x, y = fitted(time, ahead).deriv(), bend.deriv()
+    fine = np.linspace(-1.0, 1.0, 4001)
+    rate = np.hypot(x(fine), y(fine)) - np.abs(x(fine))
+    excess = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(fine))])
+    return ahead + np.interp(time, fine, excess), True
+
+
+@pytest.mark.parametrize('n', [9, 12, 40])
+@pytest.mark.parametrize('bend_m', [0.0, 40.0, 300.0])
+def test_as_plain_polynomials_have_it(n: int, bend_m: float) -> None:
+    # 40 seeds each; in a short record AIC alone would see bends that are noise
+    bent = 0
+    for seed in range(40):
+        rng = np.random.default_rng([seed, n])
+        time = np.sort(np.concatenate([[-1.0, 1.0], rng.uniform(-1.0, 1.0, n - 2)]))
+        position = np.column_stack([2000.0 * time - 200.0 * time**2, bend_m * time**2])
+        position += 10.0 * rng.normal(size=(n, 2))
+        expected, bends = plainly(time, position)
+        bent += bends
+        np.testing.assert_allclose(project(time, position), expected, rtol=0.0, atol=0.05)
+    if bend_m == 0.0:
+        assert bent <= 12
+    elif bend_m == 300.0:
+        assert bent == 40

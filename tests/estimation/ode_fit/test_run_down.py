@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The engine stop as the shaft shows it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+from shipdrag_ros.ship import Ship
+
+SHIP = Ship.from_yaml(
+    'length_m: 150.0\ndisplaced_volume_m3: 20200.0\npropulsion: {run_down_s: 10.0, sd: 5.0}\n',
+    subject='ship',
+)
+STOP_S = 600.0
+
+
+@pytest.mark.parametrize('turned', [0.0, 0.4, 0.7])
+def test_a_propeller_that_the_water_turns_does_not_hide_the_run_down(turned: float) -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 2100.0)
+    after = np.maximum(time - STOP_S, 0.0)
+    # the ship slows down to a third, and the water turns the propeller with it
+    by_water = turned / (1.0 + after / 700.0)
+    shaft = by_water + (1.0 - by_water) * np.exp(-after / 10.0)
+    shaft[time < STOP_S] = 1.0
+    values = 12.0 * shaft + rng.normal(0.0, 0.02, len(time))
+    block = Block.of(Channel.SHAFT, (time * 1e9).astype(np.int64), values)
+    onset_s = STOP_S + 15.0
+    window = Window.from_block(block, round(onset_s * 1e9), round(2100 * 1e9), before_ns=0)
+    found = RunDown.of(window, SHIP)
+    assert found.shaft_s == found.run_down_s
+    assert found.run_down_s == pytest.approx(10.0, rel=0.1)
+    assert found.stop_ns * 1e-9 == pytest.approx(STOP_S, abs=1.0)
+
+
+def cut(
+    *blocks: Block, start_s: float = STOP_S, end_s: float = 2100.0, before: bool = True
+) -> Window:
+    """Cut a window that starts where it is told."""
+    return Window.from_block(
+        in_arrival_order(list(blocks)),
+        round(start_s * 1e9),
+        round(end_s * 1e9),
+        before_ns=0 if before else None,
+    )
+
+
+def series(channel: Channel, time: Float64, value: Float64) -> Block:
+    rng = np.random.default_rng(2)
+    noisy = value + rng.normal(0.0, 0.02, len(time))
+    return Block.of(channel, (time * 1e9).astype(np.int64), noisy)
+
+
+def falling(time: Float64, stop_s: float) -> Float64:
+    return np.where(time < stop_s, 12.0, 12.0 * np.exp(-(time - stop_s) / 8.0))
+
+
+TIME = np.arange(0.0, 2100.0)
+SPEED = 8.0 / (1.0 + np.maximum(TIME - STOP_S, 0.0) / 700.0)
+
+
+def test_of_several_shafts_the_last_stop_counts() -> None:
+    window = cut(
+        series(Channel.SHAFT, TIME, falling(TIME, STOP_S)),
+        series(Channel.SHAFT_2, TIME, falling(TIME, STOP_S + 90.0)),
+    )
+    found = RunDown.of(window, SHIP)
+    assert found.stop_ns * 1e-9 == pytest.approx(STOP_S + 90.0, abs=1.0)
+    assert 'propeller 2 shows the stop' in found.notes[0]
+
+
+def test_the_pitch_of_a_propeller_dates_the_stop_where_the_shaft_goes_on() -> None:
+    pitch = np.clip(1.0 - (TIME - STOP_S) / 12.0, 0.0, 1.0)
+    window = cut(
+        series(Channel.SHAFT, TIME, np.full(len(TIME), 12.0)), series(Channel.PITCH, TIME, pitch)
+    )
+    found = RunDown.of(window, SHIP)
+    assert found.stop_ns * 1e-9 == pytest.approx(STOP_S, abs=6.0)
+    assert found.stop_sd_s < 5.0
+    assert 'the pitch shows the stop' in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ('shaft', 'says'),
+    [
+        (np.zeros(len(TIME)), 'the shaft stands in the window'),
+        (np.where(TIME < 900.0, 30.0, 29.0), 'if it drives the ship, r is off by its thrust'),
+        (0.6 * SPEED / 8.0 * 12.0, 'as the water turns it'),
+    ],
+)
+def test_without_a_record_before_it_the_window_tells_what_the_shaft_shows(
+    shaft: Float64, says: str
+) -> None:
+    window = cut(
+        series(Channel.SHAFT, TIME, shaft),
+        series(Channel.SPEED_THROUGH_WATER, TIME, SPEED),
+        before=False,
+    )
+    found = RunDown.of(window, SHIP)
+    assert found.shaft_s == 0.0
+    assert len(found.notes) == 1
+    assert says in found.notes[0]
+
+
+def test_a_shaft_that_goes_on_at_part_of_its_speed_is_said() -> None:
+    speed = series(Channel.SPEED_THROUGH_WATER, TIME, SPEED)
+    slower = np.where(TIME < 900.0, 46.0, 29.0)
+    by_water = np.where(TIME < STOP_S, 12.0, 0.6 * SPEED / 8.0 * 12.0)
+    for shaft, says in ((slower, 'off by its thrust'), (by_water, 'as the water turns it')):
+        found = RunDown.of(cut(series(Channel.SHAFT, TIME, shaft), speed), SHIP)
+        assert 'the shaft shows' in found.notes[0]
+        assert says in found.notes[-1]
+
+
+def test_a_shaft_that_runs_down_in_the_window_is_seen_without_a_record_before_it() -> None:
+    window = cut(series(Channel.SHAFT, TIME, falling(TIME, STOP_S)), before=False)
+    found = RunDown.of(window, SHIP)
+    assert found.shaft_s == pytest.approx(8.0, rel=0.1)
+    assert found.stop_ns * 1e-9 == pytest.approx(STOP_S, abs=1.0)
+
+
+def test_a_stop_inside_a_window_without_a_record_before_it_is_said() -> None:
+    window = cut(series(Channel.SHAFT, TIME, falling(TIME, STOP_S + 300.0)), before=False)
+    found = RunDown.of(window, SHIP)
+    assert found.shaft_s == 0.0
+    assert 'an engine stop 300 s after the start of the window' in found.notes[0]
+
+
+def test_without_any_shaft_the_thrust_is_taken_to_have_ended() -> None:
+    window = cut(series(Channel.SPEED_THROUGH_WATER, TIME, SPEED), before=False)
+    found = RunDown.of(window, SHIP)
+    assert found.notes == ('the thrust is taken to have ended before the window',)
