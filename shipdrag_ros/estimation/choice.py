@@ -3,11 +3,36 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.ship import Ship
+
+_LARGEST = 1e9  # m, m/s: far above any ship's, and far below where squares and powers overflow
+
+
+def check_size(window: Window) -> None:
+    """
+    Refuse readings of a size that no ship has.
+
+    Raises
+    ------
+    EstimationError
+        If an input of motion holds one.
+    """
+    for part in (window, window.before):
+        for name in MOTION_INPUTS if part is not None else ():
+            size = np.abs(getattr(part, name).value)
+            if np.any(size > _LARGEST):
+                raise EstimationError(
+                    f'{name} holds {size.max():.3g}, which no ship has: give metres and metres '
+                    'a second, and leave such readings out'
+                )
 
 
 def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
@@ -45,4 +70,5 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     >>> found.estimator, len(found.curve) > 50
     ('log_time', True)
     """
+    check_size(window)
     return named(parameters.estimator).estimate(window, ship, parameters)

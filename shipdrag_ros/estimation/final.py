@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.agreement import widened
-from shipdrag_ros.estimation.choice import estimate
+from shipdrag_ros.estimation.choice import check_size, estimate
 from shipdrag_ros.estimation.coverage import coverage_notes
 from shipdrag_ros.estimation.estimators import AFTER, named
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
@@ -69,7 +69,7 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     if parameters.estimator != 'auto':
         return estimate(window, ship, parameters)
     try:
-        found = named(AFTER).estimate(window, ship, parameters)
+        found = _fitted(window, ship, parameters)
     except EstimationError as error:
         return _instead(window, ship, parameters, error)
     try:
@@ -78,6 +78,11 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         note = f'not compared with the estimate during the coastdown, which failed: {error}'
         return replace(found, notes=(*found.notes, note))
     return widened(found, other, _without_thrust_m_s(found, window, ship))
+
+
+def _fitted(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    check_size(window)
+    return named(AFTER).estimate(window, ship, parameters)
 
 
 def _instead(
@@ -90,7 +95,7 @@ def _instead(
         heard = [name for name in MOTION_INPUTS if len(getattr(window, name))]
         for name in heard if len(heard) > 1 else []:
             try:
-                found = named(AFTER).estimate(_alone(window, name), ship, parameters)
+                found = _fitted(_alone(window, name), ship, parameters)
             except EstimationError:
                 continue
             others = ' and '.join(other for other in heard if other != name)

@@ -79,15 +79,19 @@ class Slow:
         keep = record.steady.time_s < -ONSET_SD_S
         steady = record.steady
         rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
-        about = learn(
+        about, filtered = learn(
             rows,
             record.variance(rows, record.steady_weight[keep]),
             damping_1_s=2.0 / coast_s,
             inertia=1.0 + float(ship.n_r(speed_m_s)),
+            r_m_s2=(1.0 + float(ship.n_r(speed_m_s))) * speed_m_s / coast_s,
         )
         if about == CALM:
             return None
-        return cls(about, record.white_sd, coast_s, speed_m_s, record.steady_s)
+        sizes = dict(record.white_sd)
+        if 'speed_through_water' in sizes:
+            sizes['speed_through_water'] *= math.sqrt(filtered)
+        return cls(about, sizes, coast_s, speed_m_s, record.steady_s)
 
     @property
     def note(self) -> str:

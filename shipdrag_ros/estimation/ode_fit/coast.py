@@ -23,8 +23,8 @@ from shipdrag_ros.estimation.ode_fit.law import Law, shapes
 from shipdrag_ros.samples import Float64, Int64
 
 # Columns of the unknowns behind the k coefficients.
-V0, THRUST, THRUST_FAST, ONSET, X0, CURRENT, LOG_SCALE = range(7)
-EXTRAS = 7
+V0, THRUST, THRUST_FAST, ONSET, X0, CURRENT, LOG_SCALE, LOG_LAG = range(8)
+EXTRAS = 8
 _FAST = 3.0  # of the second part of the thrust: the power of the shaft that falls fastest
 _OF_MOTION = 3  # of these, the ones that change the motion by themselves
 
@@ -175,10 +175,12 @@ def predict(
     speed = np.empty(n)
     v0, x0, onset = unknowns[k + V0], unknowns[k + X0], unknowns[k + ONSET]
     current, scale = unknowns[k + CURRENT], 1.0 + unknowns[k + LOG_SCALE]
+    lag = unknowns[k + LOG_LAG]
     here = np.empty(2 * (q + 1))
     cell = 0
     for i in range(n):
-        t = rows.time_s[i] - onset
+        # a log tells the speed of some seconds ago
+        t = rows.time_s[i] - onset - (lag if rows.kind[i] == LOG else 0.0)
         acceleration = 0.0
         if t < 0.0:
             here[:] = 0.0
@@ -187,6 +189,8 @@ def predict(
             here[q + 1] = v0 * t
             here[q + 2 + k + V0] = t
         else:
+            while cell > 0 and grid_s[cell] > t:
+                cell -= 1
             while cell < len(grid_s) - 2 and grid_s[cell + 1] < t:
                 cell += 1
             h = grid_s[cell + 1] - grid_s[cell]
@@ -241,5 +245,5 @@ def predict(
                 elif kind == OVER_GROUND:
                     table[1 + p, i] = 1.0
             elif kind == LOG:
-                table[1 + p, i] = here[0]
+                table[1 + p, i] = here[0] if u == k + LOG_SCALE else -scale * acceleration
     return table, speed

@@ -46,7 +46,8 @@ def colour_of(white: Float64) -> Colour:
     """
     found = Colour(1.0, 1)
     n = len(white)
-    mean_square = float((white * white).mean()) if n else 0.0
+    # less than 1 where the correlation is in the standard deviation already
+    mean_square = max(float((white * white).mean()), 1.0) if n else 0.0
     block = 2
     while block * _LEAST_BLOCKS <= n and mean_square > 0.0:
         count = n // block

@@ -18,6 +18,7 @@ from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.ode_fit.coast import (
     CURRENT,
     LOG,
+    LOG_LAG,
     LOG_SCALE,
     V0,
     Rows,
@@ -76,9 +77,10 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess))
     if record.steady_s >= LEAST_S:
         plain = first.plainly(guess.lowest)
-        about = _learn(record, plain, run_down)
+        about, filtered = _learn(record, plain, run_down)
         problem = Problem.of(record, run_down, ship, guess).disturbed(about, plain)
         problem = weigh_disturbed(problem, first)
+        problem = problem.filtered(filtered * record.white_sd.get('speed_through_water', 0.0) ** 2)
         notes.append(_disturbance_note(about, record.steady_s))
     else:
         record = alone
@@ -104,15 +106,23 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     return _result(found, full, record, window, ship, parameters, tuple(notes))
 
 
-def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> Disturbance:
+def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> tuple[Disturbance, float]:
     """Learn the disturbances of the steady record, damped as a plain fit has it."""
-    damping, inertia = plain.damping(plain.unknowns[plain.law.size + V0 :][:1])
+    top = plain.unknowns[plain.law.size + V0 :][:1]
+    damping, inertia = plain.damping(top)
+    r, _ = plain.resistance(top)
     quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else -_QUIET_S
     keep = record.steady.time_s < quiet
     steady = record.steady
     rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
     variance = record.variance(rows, record.steady_weight[keep])
-    return learn(rows, variance, damping_1_s=float(damping[0]), inertia=float(inertia[0]))
+    return learn(
+        rows,
+        variance,
+        damping_1_s=float(damping[0]),
+        inertia=float(inertia[0]),
+        r_m_s2=float(r[0]),
+    )
 
 
 def _disturbance_note(about: Disturbance, steady_s: float) -> str:
@@ -124,6 +134,8 @@ def _disturbance_note(about: Disturbance, steady_s: float) -> str:
         )
     if about.water_m_s:
         found.append(f'the log by {about.water_m_s:.2g} m/s over {about.water_s:.0f} s')
+    if about.wander_m:
+        found.append(f'positions by {about.wander_m:.2g} m over {about.wander_s:.0f} s')
     return (
         f'disturbances learnt from {steady_s:.0f} s of steady record: '
         f'{" and ".join(found) or "none but the noise of the sensors"}'
@@ -216,7 +228,7 @@ def _speed_at(found: FittedMotion, problem: Problem, time_s: float) -> tuple[flo
     k = found.law.size
     every = np.arange(k + LOG_SCALE, dtype=np.int64)
     unknowns = found.unknowns.copy()
-    unknowns[k + LOG_SCALE] = 0.0
+    unknowns[k + LOG_SCALE] = unknowns[k + LOG_LAG] = 0.0
     table, speed = predict(found.law, unknowns, problem.grid_s, row, every)
     by_unknown = table[1:, 0]
     covariance = found.covariance[: len(every), : len(every)]

@@ -27,7 +27,7 @@ class FittedMotion:
         Powers and humps.
     unknowns
         See `coast`.
-    covariance : (k + 7, k + 7)
+    covariance : (k + 8, k + 8)
         Of all unknowns, between priors too; rows of what was not fitted are 0.
     """
 

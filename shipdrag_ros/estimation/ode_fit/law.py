@@ -107,7 +107,7 @@ def spread(shape: Float64, unknowns: Float64, covariance: Float64) -> tuple[Floa
     ----------
     shape : (m, k)
         What the coefficients are multiplied by.
-    unknowns, covariance : (k + 7,), (k + 7, k + 7)
+    unknowns, covariance : (k + 8,), (k + 8, k + 8)
     """
     m, k = shape.shape
     value, sd = np.empty(m), np.empty(m)

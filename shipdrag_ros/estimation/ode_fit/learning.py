@@ -19,7 +19,10 @@ from shipdrag_ros.estimation.ode_fit.whitening import CALM, Disturbance, Noise, 
 from shipdrag_ros.inference.gaussian import cholesky, products_of
 from shipdrag_ros.samples import Float64, Int64
 
-_TYPICAL_S = 240.0  # correlation time; known from experience within a factor of e
+# Correlation times of gusts, of what the log errs by and of positions (receivers and radar: 20
+# to 600 s); known from experience within a factor of e.
+_TYPICAL_S = np.array([240.0, 240.0, 110.0])
+_GUST_OF_R = 0.1  # a force that swings is seldom more of the resistance
 _SHORTEST_S, _LONGEST_S = 15.0, 3000.0
 # At steady speed an engine that holds torque, power or revs gives more thrust to a ship that is
 # slowed: the speed is damped 1 to 2 times as much as the hull's resistance says.
@@ -29,9 +32,14 @@ _LARGEST = 12.0  # logarithm
 _CLOSE = 0.05  # of the logarithms and of the criterion, in searching
 _EVALUATIONS = 160  # in one search
 _GUESSES = (-2.0, -1.0, 0.0, 1.0)  # of the logarithm of a second disturbance's size
+_LESS = (0.0, 2.0)  # of the logarithms of the others' sizes
+# of the prior's sd; a step is the same part everywhere, so that the weight of each is its size
+_OF_PRIOR = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.28, 2.56)
 _WORTH = 0.5  # fall of the criterion
-_GUST, _WATER = np.array([0, 1]), np.array([2, 3])  # of the logarithms searched for
-_BOTH = np.array([0, 1, 2, 3])
+# Gust, water, wander: logarithms of size and time. Last that of the factor by which the filter of
+# a log makes its means scatter more than samples tell; its second one means nothing.
+_KINDS, _FILTER = 4, 3
+_LARGEST_FILTER = 4.0  # logarithm, of the sd
 
 
 class _Steady(NamedTuple):
@@ -46,17 +54,22 @@ class _Steady(NamedTuple):
         Measured values and columns of what is profiled out.
     noise
         White noise, and how the ship damps.
-    units : (2,)
-        Sizes that the logarithms are relative to [m/s^2], [m/s].
+    units : (3,)
+        Sizes that the logarithms are relative to [m/s^2], [m/s], [m].
+    gust_m_s2
+        Standard deviation of the half-normal prior of the force.
     """
 
     rows: Rows
     table: Float64
     noise: Noise
     units: Float64
+    gust_m_s2: float
 
 
-def learn(rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float) -> Disturbance:
+def learn(
+    rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float, r_m_s2: float
+) -> tuple[Disturbance, float]:
     """
     Learn the slow disturbances of a steady record.
 
@@ -68,14 +81,24 @@ def learn(rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float) 
         Of their white noise.
     damping_1_s, inertia
         dr/dv over 1 + n_r [1/s] and 1 + n_r at the steady speed, of the hull alone.
+    r_m_s2
+        Resistance there, of which a force that swings is a part.
+
+    Returns
+    -------
+    about
+    filtered
+        By how much the variance of the log's noise is larger in means than its samples tell:
+        a log that is filtered over some seconds errs alike in neighbours.
 
     Notes
     -----
     The hull's damping is taken `ENGINE_HOLD` times, the middle of what engines do.
     The mean speed, the first position and the current are profiled out
-    (restricted likelihood). None, a gust force, the water's speed, or both: by
-    Akaike's criterion. The correlation times have a broad log-normal prior,
-    without which a short record lets them run away.
+    (restricted likelihood). A gust force, the water's speed, a wandering of the
+    positions, or several: one after the other, by Akaike's criterion. The correlation
+    times have a broad log-normal prior, without which a short record lets them run away;
+    the force a half-normal one, without which errors of the instruments are taken for it.
     """
     n = len(rows.time_s)
     damping_1_s = ENGINE_HOLD * damping_1_s
@@ -88,24 +111,35 @@ def learn(rows: Rows, variance: Float64, *, damping_1_s: float, inertia: float) 
         columns.append(np.where(position, rows.time_s, (rows.kind == OVER_GROUND) * 1.0))
     speed_sd = 0.1 if position.all() else float(np.sqrt(np.median(variance[~position])))
     # a force that moves the ship by about as much as its log scatters
-    force = 0.3 * speed_sd * inertia * np.sqrt(damping_1_s * (damping_1_s + 1.0 / _TYPICAL_S))
+    force = 0.3 * speed_sd * inertia * np.sqrt(damping_1_s * (damping_1_s + 1.0 / _TYPICAL_S[0]))
     noise = Noise(variance, CALM, np.full(n, damping_1_s), np.full(n, inertia))
-    units = np.array([force, 0.3 * speed_sd])
-    steady = _Steady(rows, np.array(columns), noise, units)
-    return Disturbance(*_learn(steady, bool(log.any())))
+    place = 3.0 * float(np.sqrt(np.median(variance[position]))) if position.any() else 1.0
+    units = np.array([force, 0.3 * speed_sd, place])
+    steady = _Steady(rows, np.array(columns), noise, units, _GUST_OF_R * max(r_m_s2, 1e-9))
+    logged, placed = int(log.any()), int(position.any())
+    found = _learn(steady, np.array([1, logged, placed, logged]))
+    return Disturbance(*found[0]), float(found[1])
 
 
 @compiled
 def _about(x: Float64, which: Int64, units: Float64) -> Disturbance:
-    """Return the disturbances of four logarithms; those not searched for are none."""
-    found = np.array([0.0, CALM.gust_s, 0.0, CALM.water_s])
+    """Return the disturbances of logarithms; those not searched for are none."""
+    found = np.array([0.0, CALM.gust_s, 0.0, CALM.water_s, 0.0, CALM.wander_s])
     for i in which:
+        if i // 2 == _FILTER:
+            continue
         value = np.exp(min(max(x[i], -_LARGEST), _LARGEST))
         if i % 2:
-            found[i] = min(max(_TYPICAL_S * value, _SHORTEST_S), _LONGEST_S)
+            found[i] = min(max(_TYPICAL_S[i // 2] * value, _SHORTEST_S), _LONGEST_S)
         else:
             found[i] = units[i // 2] * value
-    return Disturbance(found[0], found[1], found[2], found[3])
+    return Disturbance(found[0], found[1], found[2], found[3], found[4], found[5])
+
+
+@compiled
+def _filtered(x: Float64) -> float:
+    """Return the factor of the variance of the log's noise."""
+    return float(np.exp(2.0 * min(max(x[2 * _FILTER], 0.0), _LARGEST_FILTER)))
 
 
 @compiled
@@ -114,7 +148,9 @@ def _criterion(x: Float64, which: Int64, steady: _Steady) -> float:
     about = _about(x, which, steady.units)
     rows, noise = steady.rows, steady.noise
     table = steady.table.copy()
-    total = whiten(rows, table, Noise(noise.variance, about, noise.damping_1_s, noise.inertia))
+    variance = noise.variance.copy()
+    variance[rows.kind == LOG] *= _filtered(x)
+    total = whiten(rows, table, Noise(variance, about, noise.damping_1_s, noise.inertia))
     # of the columns first, then the values: what is left of these is the last pivot
     p = len(table) - 1
     rolled = np.empty_like(table)
@@ -129,6 +165,7 @@ def _criterion(x: Float64, which: Int64, steady: _Steady) -> float:
     for i in which:
         if i % 2:
             total += x[i] * x[i]
+    total += (about.gust_m_s2 / steady.gust_m_s2) ** 2
     return float(total)
 
 
@@ -207,30 +244,72 @@ def _mean(top: Float64, least: float, which: Int64, steady: _Steady) -> Float64:
 
 
 @compiled
-def _learn(steady: _Steady, logged: bool) -> Disturbance:
-    """Choose between no disturbance, one and two by Akaike's criterion."""
-    best, chosen, which = _criterion(np.zeros(4), _GUST[:0], steady), np.zeros(4), _GUST[:0]
-    calm, least = best, best
-    for one in (_GUST, _WATER):
-        if one[0] == 2 and not logged:
-            continue
-        found, cost = _search(np.zeros(4), one, steady)
-        if cost + 2.0 * len(one) < best:
-            best, least, chosen, which = cost + 2.0 * len(one), cost, found, one
-    if logged and best < calm:
-        # a second one is worth a search only where a guess of it helps
-        start, guessed = chosen, np.inf
+def _with_one_more(chosen: Float64, new: int, which: Int64, steady: _Steady) -> Float64:
+    """
+    Return where to search with one disturbance more, the last of `which`.
+
+    What was taken for the others may be the new one: they are tried small too.
+    """
+    start, least = chosen, np.inf
+    for less in _LESS:
         for size in _GUESSES:
             trial = chosen.copy()
-            trial[2 if which[0] == 0 else 0] = size
-            cost = _criterion(trial, _BOTH, steady)
-            if cost < guessed:
-                start, guessed = trial, cost
-        if guessed < least - _WORTH:
-            found, cost = _search(start, _BOTH, steady)
-            if cost + 2.0 * len(_BOTH) < best:
-                best, least, chosen, which = cost + 2.0 * len(_BOTH), cost, found, _BOTH
+            if less > 0.0:
+                trial[which[:-2:2]] -= less
+                trial[which[1:-2:2]] = 0.0
+            trial[2 * new] = size
+            cost = _criterion(trial, which, steady)
+            if cost < least:
+                start, least = trial, cost
+    return start
+
+
+@compiled
+def _hidden_gust(chosen: Float64, which: Int64, steady: _Steady) -> float:
+    """Return the logarithm of the root of the mean variance of a force of typical time."""
+    more = np.append(which, np.array([0, 1]))
+    trial = chosen.copy()
+    least, total, variances = np.inf, 0.0, 0.0
+    for part in _OF_PRIOR:
+        trial[0] = np.log(part * steady.gust_m_s2 / steady.units[0])
+        cost = _criterion(trial, more, steady)
+        if cost < least:
+            # relative to the best so far
+            fall = np.exp(0.5 * (cost - least))
+            total, variances, least = fall * total, fall * variances, cost
+        weight = np.exp(0.5 * (least - cost)) * part
+        total += weight
+        variances += weight * (part * steady.gust_m_s2) ** 2
+    return float(np.log(np.sqrt(variances / total) / steady.units[0]))
+
+
+@compiled
+def _learn(steady: _Steady, seen: Int64) -> tuple[Disturbance, float]:
+    """Add one disturbance after the other while Akaike's criterion falls."""
+    which = np.zeros(0, np.int64)
+    chosen = np.zeros(2 * _KINDS)
+    least = _criterion(chosen, which, steady)
+    left = seen.copy()
+    for _ in range(_KINDS):
+        best, best_which, best_chosen, added = least - 4.0, which, chosen, -1
+        for kind in range(_KINDS):
+            if left[kind]:
+                more = np.append(which, np.array([2 * kind, 2 * kind + 1]))
+                start = _with_one_more(chosen, kind, more, steady)
+                # a second one is worth a search only where a guess of it helps
+                if len(which) and not _criterion(start, more, steady) < least - _WORTH:
+                    continue
+                found, cost = _search(start, more, steady)
+                if cost < best:
+                    best, best_which, best_chosen, added = cost, more, found, kind
+        if added < 0:
+            break
+        least, which, chosen = best, best_which, best_chosen
+        left[added] = 0
     if len(which):
         chosen = _mean(chosen, least, which, steady)
-    disturbance: Disturbance = _about(chosen, which, steady.units)
-    return disturbance
+    if left[0] and len(which):
+        # positions that wander hide a force: not shown is not none
+        chosen[0] = _hidden_gust(chosen, which, steady)
+        which = np.append(which, np.array([0, 1]))
+    return _about(chosen, which, steady.units), _filtered(chosen)

@@ -13,6 +13,7 @@ from shipdrag_ros.estimation.ode_fit.coast import (
     CURRENT,
     EXTRAS,
     LOG,
+    LOG_LAG,
     LOG_SCALE,
     ONSET,
     POSITION,
@@ -45,6 +46,7 @@ from shipdrag_ros.ship import Ship
 _STEPS = 72  # of the integration, longer as the ship slows down
 _ITERATIONS = 30
 _SCALE_SD = 0.02  # of a log's scale, before the fit
+_LAG_S, _LAG_SD_S = 0.0, 6.0  # of a log behind other inputs, by its filter
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,8 @@ class Problem:
             extras.append(X0)
         if LOG in kinds and len(kinds) > 1:
             extras.append(CURRENT)
+            if len(steady.time_s):
+                extras.append(LOG_LAG)
         end = float(coast.time_s[-1]) + 3.0 * run_down.stop_sd_s
         typical = max(float(coast.time_s[-1]), 1e-3) / 25.0
         grid = typical * np.expm1(np.linspace(0.0, math.log1p(end / typical), _STEPS + 1))
@@ -141,6 +145,18 @@ class Problem:
         Return the problem with another variance of the white noise.
         """
         return replace(self, noise=self.noise._replace(variance=variance))
+
+    def filtered(self, least: float) -> Problem:
+        """
+        Return the problem with at least so large a variance of the log's noise.
+        """
+        variance = self.noise.variance.copy()
+        log = self.rows.kind == LOG
+        if not log[self.steady :].any():
+            return self
+        typical = float(np.median(variance[self.steady :][log[self.steady :]]))
+        variance[log] *= max(1.0, least / typical)
+        return self.weighted(variance)
 
     def residual(self, found: FittedMotion) -> Float64:
         """
@@ -260,9 +276,10 @@ class Problem:
         return np.array([*range(k), *extras], np.int64)
 
     def _prior(self, law: Law) -> Float64:
-        """Return mean and precision of what is known before, (2, k + 7)."""
+        """Return mean and precision of what is known before, (2, k + 8)."""
         k = law.size
         prior = np.zeros((2, k + EXTRAS))
-        for extra, mean, sd in (*self.run_down.priors, (LOG_SCALE, 0.0, _SCALE_SD)):
+        of_log = (LOG_SCALE, 0.0, _SCALE_SD), (LOG_LAG, _LAG_S, _LAG_SD_S)
+        for extra, mean, sd in (*self.run_down.priors, *of_log):
             prior[:, k + extra] = mean, 1.0 / sd**2 if sd > 0.0 else 0.0
         return prior

@@ -6,7 +6,8 @@ The rows are whitened by a Kalman filter of what disturbs the motion: linear in
 the data, so residual and columns of the design pass the same gains, and exact
 for uneven stamps, gaps and a disturbance that is not stationary. A gust FORCE
 moves the ship through the equation of motion, whose damping falls with the
-speed; a disturbance of the water's speed is read by the log alone.
+speed; a disturbance of the water's speed is read by the log alone, a wandering of the
+positions by them alone.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION, Rows
+from shipdrag_ros.estimation.ode_fit.coast import OVER_GROUND, POSITION, Rows
 from shipdrag_ros.samples import Float64
 
-_STATES = 4  # speed, distance, gust, water
+_STATES = 5  # speed, distance, gust, water, wander
 _LONGEST_STEP_S = 30.0  # of the prediction through a gap
 
 
@@ -33,12 +34,16 @@ class Disturbance(NamedTuple):
         Standard deviation of the force per mass, and its correlation time.
     water_m_s, water_s
         The same of what the log reads of the water's own motion.
+    wander_m, wander_s
+        The same of the error of positions.
     """
 
     gust_m_s2: float
     gust_s: float
     water_m_s: float
     water_s: float
+    wander_m: float = 0.0
+    wander_s: float = 60.0
 
 
 CALM = Disturbance(0.0, 60.0, 0.0, 60.0)
@@ -56,12 +61,14 @@ def _carry(about: Disturbance, damping: float, inertia: float, dt: float, carry:
     carry[5] = about.gust_m_s2**2 * (1.0 - gust_decay**2)
     carry[6] = np.exp(-dt / about.water_s)
     carry[7] = about.water_m_s**2 * (1.0 - carry[6] ** 2)
+    carry[8] = np.exp(-dt / about.wander_s)
+    carry[9] = about.wander_m**2 * (1.0 - carry[8] ** 2)
 
 
 @compiled
 def _step(cov: Float64, mean: Float64, carry: Float64, low: int, high: int) -> None:
     """Carry covariance and means, of the states low .. high - 1, over a step."""
-    decay, by_gust, way, way_by_gust, gust_decay, gust, water_decay, water = carry
+    decay, by_gust, way, way_by_gust, gust_decay, gust = carry[:6]
     if low == 0:
         for c in range(mean.shape[1]):
             u, g = mean[0, c], mean[2, c]
@@ -80,13 +87,15 @@ def _step(cov: Float64, mean: Float64, carry: Float64, low: int, high: int) -> N
             cov[r, 0] = decay * u + by_gust * g
             cov[r, 2] = gust_decay * g
         cov[2, 2] += gust
-    if high == _STATES:
+    # errors of the log and of the positions
+    for e in range(3, high):
+        decay, grown = carry[2 * e], carry[2 * e + 1]
         for c in range(mean.shape[1]):
-            mean[3, c] *= water_decay
+            mean[e, c] *= decay
         for s in range(low, high):
-            cov[3, s] *= water_decay
-            cov[s, 3] *= water_decay
-        cov[3, 3] += water
+            cov[e, s] *= decay
+            cov[s, e] *= decay
+        cov[e, e] += grown
 
 
 class Noise(NamedTuple):
@@ -130,7 +139,7 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
     variance, about, damping, inertia = noise
     columns, n = table.shape
     log_det = 0.0
-    if about.gust_m_s2 == 0.0 and about.water_m_s == 0.0:
+    if about.gust_m_s2 == 0.0 and about.water_m_s == 0.0 and about.wander_m == 0.0:
         weights = 1.0 / np.sqrt(variance)
         for c in range(columns):
             for i in range(n):
@@ -140,7 +149,7 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
         return log_det
     # only the states that are disturbed
     low = 0 if about.gust_m_s2 > 0.0 else 3
-    high = _STATES if about.water_m_s > 0.0 else 3
+    high = _STATES if about.wander_m > 0.0 else (4 if about.water_m_s > 0.0 else 3)
     cov = np.zeros((_STATES, _STATES))
     mean = np.zeros((_STATES, columns))
     gain = np.zeros(_STATES)
@@ -150,7 +159,8 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
     cov[0, 2] = cov[2, 0] = cov[2, 2] / inertia[0] / rate
     cov[0, 0] = cov[0, 2] / inertia[0] / damping[0]
     cov[3, 3] = about.water_m_s**2
-    carry = np.empty(8)
+    cov[4, 4] = about.wander_m**2
+    carry = np.empty(10)
     last_dt, last_mid, last_inertia = -1.0, -1.0, -1.0
     for i in range(n):
         if i:
@@ -163,17 +173,19 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
                     last_dt, last_mid, last_inertia = dt, mid, inertia[i]
                 for _ in range(parts):
                     _step(cov, mean, carry, low, high)
+        # what is measured, and the error of its input; over ground has none
         first = 1 if rows.kind[i] == POSITION else 0
-        of_water = 1.0 if rows.kind[i] == LOG else 0.0
+        error = 4 if rows.kind[i] == POSITION else 3
+        erring = 0.0 if rows.kind[i] == OVER_GROUND else 1.0
         for s in range(low, high):
-            seen[s] = cov[s, first] + of_water * cov[s, 3]
-        total = seen[first] + of_water * seen[3] + variance[i]
+            seen[s] = cov[s, first] + erring * cov[s, error]
+        total = seen[first] + erring * seen[error] + variance[i]
         weight = 1.0 / np.sqrt(total)
         log_det += np.log(total)
         for s in range(low, high):
             gain[s] = seen[s] / total
         for c in range(columns):
-            innovation = table[c, i] - mean[first, c] - of_water * mean[3, c]
+            innovation = table[c, i] - mean[first, c] - erring * mean[error, c]
             for s in range(low, high):
                 mean[s, c] += gain[s] * innovation
             table[c, i] = innovation * weight

@@ -10,7 +10,14 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final, ode_fit
-from shipdrag_ros.estimation.ode_fit.coast import EXTRAS, LOG, Rows, integrate, predict
+from shipdrag_ros.estimation.ode_fit.coast import (
+    EXTRAS,
+    LOG,
+    POSITION,
+    Rows,
+    integrate,
+    predict,
+)
 from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.learning import learn
 from shipdrag_ros.estimation.ode_fit.solve import cholesky_solve
@@ -194,10 +201,11 @@ def test_the_final_figure_is_the_fit_unless_another_is_asked_for(coast, ship) ->
 
 def test_sensitivities_are_the_derivatives() -> None:
     law = Law(np.array([1, 2, 4]), 8.0, 9.0, np.array([0.05, 0.01]))
-    unknowns = np.array([0.002, 0.012, 0.006, 8.1, 0.3, 0.5, 0.4, 20.0, 0.2, 0.0])
-    grid = np.linspace(0.0, 600.0, 200)
-    time_s = np.array([-5.0, 3.0, 100.0, 100.0, 400.0])
+    unknowns = np.array([0.002, 0.012, 0.006, 8.1, 0.3, 0.5, 0.4, 20.0, 0.2, 0.0, 1.5])
+    grid = np.linspace(0.0, 600.0, 800)
+    time_s = np.array([-5.0, 12.0, 100.0, 100.0, 400.0])
     rows = Rows(time_s, np.array([LOG, LOG, 1, 2, 2]), np.zeros(5))
+    assert len(unknowns) == law.size + EXTRAS
     every = np.arange(len(unknowns))
     table, _ = predict(law, unknowns, grid, rows, every)
     for i in every:
@@ -238,6 +246,74 @@ def test_whitening_is_generalised_least_squares() -> None:
     np.testing.assert_allclose(log_det, np.linalg.slogdet(covariance)[1], rtol=1e-12)
 
 
+def test_positions_that_wander_are_whitened_beside_a_log() -> None:
+    time_s = np.array([0.0, 0.0, 9.0, 11.0, 30.0, 30.0])
+    kind = np.array([LOG, POSITION, POSITION, LOG, LOG, POSITION])
+    rows = Rows(time_s, kind, np.arange(6.0))
+    variance = np.array([0.1, 2.0, 1.0, 0.3, 0.1, 3.0])
+    apart = np.abs(time_s[:, None] - time_s)
+    both_log = np.outer(kind == LOG, kind == LOG)
+    both_position = np.outer(kind == POSITION, kind == POSITION)
+    covariance = np.diag(variance) + both_position * 2.25 * np.exp(-apart / 50.0)
+    covariance += both_log * 0.09 * np.exp(-apart / 20.0)
+    about = Disturbance(0.0, 60.0, 0.3, 20.0, 1.5, 50.0)
+    table = np.vstack([rows.value, np.ones(6)])
+    log_det = whiten(rows, table, Noise(variance, about, np.full(6, 0.01), np.ones(6)))
+    full = np.vstack([rows.value, np.ones(6)])
+    np.testing.assert_allclose(
+        table @ table.T, full @ np.linalg.inv(covariance) @ full.T, rtol=1e-12
+    )
+    np.testing.assert_allclose(log_det, np.linalg.slogdet(covariance)[1], rtol=1e-12)
+
+
+LAG_S, LEAD_S, PACE_S = 6.0, 1000.0, 1.0
+
+
+def filtered_and_wandering(coast, seed: int) -> Block:
+    """Steady, then a coastdown: a log with a filter, whose noise it colours; positions wander."""
+    time_s = np.arange(-LEAD_S, 700.0, PACE_S)
+    rng = np.random.default_rng(seed)
+    coasting = np.maximum(time_s, 0.0)
+    noise = 0.02 * np.sqrt(2.0 * LAG_S / PACE_S) * rng.standard_normal(len(time_s))
+    log = np.full(len(time_s), coast.speed_m_s)
+    given = coast.speed(coasting) + noise
+    for i in range(1, len(time_s)):
+        log[i] = log[i - 1] + PACE_S / LAG_S * (given[i] - log[i - 1])
+    along = np.where(time_s < 0.0, coast.speed_m_s * time_s, coast.distance(coasting))
+    along = along + GaussMarkov(1.2, 120.0).sample(time_s, rng)
+    along += 0.4 * rng.standard_normal(len(time_s))
+    stamps = np.round((time_s + LEAD_S) * 1e9).astype(np.int64)
+    return in_arrival_order(
+        [
+            Block.of(Channel.SPEED_THROUGH_WATER, stamps, log),
+            Block.of(Channel.POSITION, stamps, np.column_stack([along, 0.0 * along])),
+        ]
+    )
+
+
+def test_log_and_positions_are_no_worse_than_either(coast, ship) -> None:
+    # N = 12, seeds 0..11: of log, of positions, of both
+    start_ns = round(LEAD_S * 1e9)
+    rms = []
+    for seed in range(12):
+        block = filtered_and_wandering(coast, seed)
+        parts = [
+            block[block.channel == Channel.SPEED_THROUGH_WATER],
+            block[block.channel == Channel.POSITION],
+            block,
+        ]
+        one = []
+        for part in parts:
+            cut = Window.from_block(part, start_ns, int(part.stamp_ns[-1]), before_ns=0)
+            found = ode_fit.estimate(cut, ship, Parameters())
+            largest = float(found.curve.resistance_m_s2.max())
+            one.append(np.sqrt(np.mean(error(found, coast, ship) ** 2)) / largest)
+        rms.append(one)
+    print(np.array(rms))
+    log, positions, both = np.sqrt(np.mean(np.square(rms), axis=0))
+    assert both < 1.1 * min(log, positions)
+
+
 def test_a_wandering_log_is_learnt_and_a_quiet_one_left_alone() -> None:
     # N = 20, seeds 0..19; medians within a factor of 2, not more than 4 false finds
     time_s = np.arange(5.0, 1800.0, 10.0)
@@ -249,9 +325,17 @@ def test_a_wandering_log_is_learnt_and_a_quiet_one_left_alone() -> None:
         wander = GaussMarkov(0.05, 200.0).sample(time_s, rng)
         kind = np.full(len(time_s), LOG)
         found.append(
-            learn(Rows(time_s, kind, white + wander), variance, damping_1_s=0.007, inertia=1.1)
+            learn(
+                Rows(time_s, kind, white + wander),
+                variance,
+                damping_1_s=0.007,
+                inertia=1.1,
+                r_m_s2=0.025,
+            )[0]
         )
-        quiet = learn(Rows(time_s, kind, white), variance, damping_1_s=0.007, inertia=1.1)
+        quiet, _ = learn(
+            Rows(time_s, kind, white), variance, damping_1_s=0.007, inertia=1.1, r_m_s2=0.025
+        )
         false += quiet != CALM
     # log alone: the same wander may be told as a force
     told = [item.water_m_s or item.gust_m_s2 / 1.1 / 0.0092 for item in found]
