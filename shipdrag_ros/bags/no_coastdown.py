@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -10,11 +11,13 @@ import numpy as np
 from shipdrag_ros.bags.playback import ReplayResult
 from shipdrag_ros.bags.sailing import accepted_samples
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.samples import MOTION_INPUTS, Block, Float64
+from shipdrag_ros.samples import MOTION_INPUTS, Block, Channel, Float64
 
 _BIN_S = 10.0
 _GLIDE_S = 600.0  # within which a ship that glides has slowed
 _SLOWED = 0.1  # of the speed; what falls less is the sea
+_STILL_S = 300.0  # a reading that does not change for so long, to the last bit, ...
+_STILL_READINGS = 60  # ... so often, is none
 _TOLD = 3  # of the stretches that were dismissed
 _LEAD_WINDOWS = 2.0  # lengths of the slope test that a steady lead has at least
 
@@ -46,6 +49,13 @@ def why_no_coastdown(result: ReplayResult) -> str:
     str
         Part of a sentence.
     """
+    still = _stood_still(result)
+    why = _why(result)
+    return f'{still}; {why}' if still else why
+
+
+def _why(result: ReplayResult) -> str:
+    """Say why by what was dismissed, or else by what the speed did."""
     if result.not_coastdowns:
         return _dismissed(result)
     block, _ = accepted_samples(result.run)
@@ -76,6 +86,29 @@ def why_no_coastdown(result: ReplayResult) -> str:
         f'{fell}, but not as after an engine stop from steady sailing (less power, a turn, '
         'unsteady speed before); if it was one, say so with --window START END'
     )
+
+
+def _stood_still(result: ReplayResult) -> str:
+    """Say that a speed sent one value for long, as no ship at sea does; '' where none did."""
+    said = []
+    blocks = [item for item in result.run.inputs() if isinstance(item, Block)]
+    for channel in (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND):
+        read = [block[block.channel == channel] for block in blocks]
+        stamp_ns = np.concatenate([block.stamp_ns for block in read]) if read else np.empty(0)
+        if not len(stamp_ns):
+            continue
+        value = np.concatenate([block.value[:, 0] for block in read])
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(value)) + 1, [len(value)]])
+        for first, after in pairwise(edges.tolist()):
+            lasts_s = float(stamp_ns[after - 1] - stamp_ns[first]) * 1e-9
+            # a ship may well lie still
+            if value[first] and after - first >= _STILL_READINGS and lasts_s >= _STILL_S:
+                since_s = float(stamp_ns[first] - stamp_ns[0]) * 1e-9
+                said.append(
+                    f'{channel.input} stood still at {value[first]:.3g} m/s for '
+                    f'{lasts_s / 60.0:.0f} min, from {since_s:.0f} s of it on'
+                )
+    return '; '.join(said[:_TOLD])
 
 
 def _dismissed(result: ReplayResult) -> str:

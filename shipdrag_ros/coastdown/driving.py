@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.instruments import cut_of, length_s, runs, until
-from shipdrag_ros.coastdown.readings import binned, readings, seconds
+from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings, seconds
 from shipdrag_ros.estimation.ode_fit.shaft_fall import STANDS_RAD_S
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Float64
@@ -26,12 +26,17 @@ _DRIVING = 0.9  # of the turns a metre that drive the ship: the water alone turn
 _STEADY = 0.97  # of its speed a ship keeps that is driven evenly
 _TOLD = 1.1  # the speed falls by so much: then a shaft can be seen to follow it
 _FOLLOWS = 0.5  # power of the ship's speed by which a shaft falls at least, if not driven
+_OFTENER = 1.15  # what turns with the water does not turn more often a metre by this
+_PARTS = 24  # of a run
 _RUNS_DOWN = 4.0  # by which one falls that an engine lets run down
 _RISES = 1.3  # a shaft that the water turns does not go faster again
 _JOIN = 0.05  # of the window: pauses of the thrust no longer than this are part of it
 _DIAMETER = 0.05  # of a propeller, of the length, where it is not stated
 _SLIP = 0.1  # of the ship's speed: a screw that goes forward by less can drive nothing
-_FEW = 0.05  # of the readings may be bad
+_IDLES = 1.4  # of the turns a metre that drive the ship: no propeller that drives has as many ...
+_IDLES_ON_TRACK = 1.7  # the same where a current may be part of the speed
+_OFTEN = 0.1  # ... for this part of the time
+_PUSHES = 0.7  # of those: with fewer a propeller hardly pushes
 _RUN_DOWNS, _ONSET_S = 5.0, 30.0
 
 
@@ -52,6 +57,8 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
     record = [_joined(window, number) for number in range(len(window.shafts))]
     top = max((float(np.abs(n).max(initial=0.0)) for _, n, _ in record), default=0.0)
     speed_s, speed = _speed_of_record(window)
+    # a current makes turns a metre over ground grow or fall by themselves
+    by_log = len(window.speed_through_water) >= LEAST_READINGS
     several = sum(len(time_s) > 0 for time_s, _, _ in record) > 1
     found: list[NotCoastdown] = []
     for number, (time_s, turning, idle) in enumerate(record):
@@ -59,7 +66,7 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
             continue
         v = np.interp(time_s, speed_s, speed) if len(speed_s) else np.full(len(time_s), np.nan)
         fast = (np.abs(turning) > _IDLE * top) & _can_drive(turning, v, ship) & ~idle
-        drives = _driven(time_s, turning, v, fast, steady=steady)
+        drives = _driven(time_s, turning, v, fast, steady=steady, by_log=by_log)
         driven = turning[fast]
         ahead = 1.0 if not len(driven) or np.median(driven) >= 0.0 else -1.0
         name = f'shaft {number + 1}' if several else 'the shaft'
@@ -82,25 +89,41 @@ def thrust(window: Window, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
     return found
 
 
-def turns_on(window: Window) -> bool:
+def idles(window: Window) -> bool:
     """
-    Say whether all shafts turn on throughout as in the steady record before.
+    Say whether all shafts turn on, but more often a metre than ever drove the ship.
 
-    Where no pitch is known that says nothing: a controllable propeller may be at
-    zero pitch, and only the speed can tell.
+    Notes
+    -----
+    A propeller that drives with less power turns less often a metre than in steady
+    sailing, until the ship has slowed to where it drives her as before. If she slows on
+    beyond that it is at zero pitch, which nothing tells where no pitch is known. What
+    it does after it has stopped says nothing.
     """
-    heard = False
+    speed_s, speed = _speed_of_record(window)
+    most = _IDLES if len(window.speed_through_water) >= LEAST_READINGS else _IDLES_ON_TRACK
+    found = False
     for number, shaft in enumerate(window.shafts):
-        past = window.before.shafts[number] if window.before is not None else shaft
+        past = None if window.before is None else window.before.shafts[number]
         # a shaft that stood before as well has driven nothing: its sensor is dead
-        if not len(shaft) or not len(past) or np.median(np.abs(past.value)) < STANDS_RAD_S:
+        if not len(shaft) or past is None or not len(past):
             continue
-        if len(window.pitches[number]):
+        if np.median(np.abs(past.value)) < STANDS_RAD_S:
+            continue
+        if len(window.pitches[number]) or not len(speed_s):
             return False
-        heard = True
-        if np.quantile(np.abs(shaft.value), _FEW) < _DRIVING * np.median(np.abs(past.value)):
+        time_s, turning, _ = _joined(window, number)
+        v = np.interp(time_s, speed_s, speed)
+        turns = np.abs(turning) / np.maximum(np.abs(v), max(0.02 * float(np.abs(v).max()), 1e-9))
+        usual = float(np.median(turns[time_s < 0.0]))
+        size = np.abs(turning[time_s >= 0.0])
+        if np.any(size > _RISES * np.minimum.accumulate(size) + STANDS_RAD_S):
             return False
-    return heard
+        on = turns[time_s >= 0.0][size > STANDS_RAD_S]
+        if not len(on) or np.quantile(on, 1.0 - _OFTEN) < most * usual:
+            return False
+        found = True
+    return found
 
 
 def gone_s(ship: Ship) -> float:
@@ -153,6 +176,7 @@ def _driven(
     fast: NDArray[np.bool_],
     *,
     steady: bool,
+    by_log: bool,
 ) -> NDArray[np.bool_]:
     """Say where an engine turns a shaft, and not the water."""
     size = np.abs(turning)
@@ -168,7 +192,12 @@ def _driven(
     for first, last in runs(fast & ~drives & inside, time_s, 0.0):
         run = slice(first, last + 1)
         drives[run] |= _is_driven(
-            size[run], turning[run], np.abs(speed[run]), known=usual is not None, steady=steady
+            size[run],
+            turning[run],
+            np.abs(speed[run]),
+            usual=None if usual is None else usual[0],
+            steady=steady,
+            by_log=by_log,
         )
     return drives
 
@@ -196,10 +225,18 @@ def _usual_turns(
 
 
 def _is_driven(
-    size: Float64, turning: Float64, speed: Float64, *, known: bool, steady: bool
+    size: Float64,
+    turning: Float64,
+    speed: Float64,
+    *,
+    usual: float | None,
+    steady: bool,
+    by_log: bool,
 ) -> NDArray[np.bool_]:
     """Judge one run of a turning shaft by whether it follows the ship's speed."""
-    rises = size > _RISES * np.minimum.accumulate(size)
+    # one that is let go may go faster, up to what the water makes it
+    least = 0.0 if usual is None else _PUSHES * usual
+    rises = (size > _RISES * np.minimum.accumulate(size)) & (size > least * speed)
     turned = turning * np.sign(turning[0]) < 0.0
     some = max(1, len(size) // 5)
     fell = _fall(speed, some)
@@ -207,10 +244,27 @@ def _is_driven(
     if fell > _TOLD:
         power = math.log(max(slowed, 1e-9)) / math.log(fell)
         follows = power >= _FOLLOWS and (steady or power < _RUNS_DOWN)
+        follows = follows and not (by_log and least and _pushes_again(size, speed, least))
     else:
         # what turns with the water does not make the ship faster
-        follows = known and slowed < _RISES and fell > _STEADY
+        follows = usual is not None and slowed < _RISES and fell > _STEADY
     return rises | turned if follows else np.ones(len(size), bool)
+
+
+def _pushes_again(size: Float64, speed: Float64, least: float) -> bool:
+    """
+    Say whether the turns a metre rise, to more than `least`.
+
+    One that runs down, or is taken back in steps, falls with the ship over all, and yet
+    keeps its speed in between.
+    """
+    count = min(len(size), _PARTS)
+    n, v = (
+        np.array([part.mean() for part in np.array_split(value, count)]) for value in (size, speed)
+    )
+    turns = n / np.maximum(v, 1e-9)
+    rises = turns > _OFTENER * np.minimum.accumulate(turns)
+    return bool(np.any(rises & (turns > least)))
 
 
 def _fall(value: Float64, some: int) -> float:

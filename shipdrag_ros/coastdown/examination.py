@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.driving import gone_s, thrust, turns_on
+from shipdrag_ros.coastdown.driving import gone_s, idles, thrust
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.force_law import departures
@@ -30,10 +30,11 @@ SECOND_NS = 1_000_000_000
 LEAST_READINGS = 8  # of the speed, or positions, in what is kept
 LEAST_FALL = 0.05  # of the speed, from the first to the last tenth of what is kept
 _ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are told
+_SHORTEST = 0.5  # of confirm_s: less at the end of what was found is no coastdown by itself
 _AT_REST = 0.1  # of the highest speed of the stretch: what is slower from its start is no coast
 _IDLING = (
-    'the shaft turns on as before and no pitch is known: by the speed the propeller is taken to '
-    'idle at zero pitch'
+    'the shaft turns on, more often a metre than when it drove the ship, and no pitch is known: '
+    'the propeller is taken to idle at zero pitch'
 )
 _MANY = 20  # readings that must be left by them, since fewer tell less than the turn spoils
 _SHOWN = 300  # means of the speed
@@ -162,7 +163,7 @@ def examine(
     """
     steady = steady and window.before is not None
     whole = (window.start_ns, window.end_ns)
-    idling = steady and turns_on(window)
+    idling = steady and idles(window)
     cuts = [
         *gaps(window, parameters),
         *([] if idling else thrust(window, ship, steady=steady)),
@@ -178,7 +179,8 @@ def examine(
         cuts += part.cuts if part is best else [part.set_aside]
     cuts.sort(key=lambda cut: cut.start_ns)
     kept = None if best is None else best.kept
-    failure = _refusal(window, kept, cuts) if cuts else None
+    least_s = _SHORTEST * parameters.confirm_s if steady else 0.0
+    failure = _refusal(window, kept, cuts, least_s) if cuts else None
     start_ns, end_ns = whole if failure or kept is None else kept
     if failure is None:  # what lies between two samples is worth no word
         cuts = [cut for cut in cuts if cut.end_ns - cut.start_ns > _WORDLESS * _length(whole)]
@@ -311,17 +313,21 @@ def _length(span: _SPAN) -> int:
     return span[1] - span[0]
 
 
-def _refusal(window: Window, kept: _SPAN | None, cuts: Sequence[NotCoastdown]) -> str | None:
+def _refusal(
+    window: Window, kept: _SPAN | None, cuts: Sequence[NotCoastdown], least_s: float
+) -> str | None:
     """Say why what is left is no coastdown; None where it may be one."""
     why = '; '.join(dict.fromkeys(f'{cut.reason.value}: {cut.text}' for cut in cuts))
     if kept is None or not _length(kept):
         return f'nothing of it is a coastdown: {why}'
     first, last, count = _ends(window.part(*kept))
     fall = 1.0 - last / first if first > 0.0 else 0.0
-    if count >= LEAST_READINGS and fall >= LEAST_FALL:
+    long_enough = kept[0] == window.start_ns or _length(kept) >= least_s * SECOND_NS
+    if count >= LEAST_READINGS and fall >= LEAST_FALL and long_enough:
         return None
+    least = f'{least_s:.0f} s, ' if least_s else ''
     return (
         f'what is left is no coastdown: {_length(kept) * 1e-9:.1f} s with {count} readings, '
-        f'in which the speed falls by {fall:.0%}; it takes {LEAST_READINGS} readings and a fall '
-        f'of {LEAST_FALL:.0%}; cut was {why}'
+        f'in which the speed falls by {fall:.0%}; it takes {least}{LEAST_READINGS} readings and '
+        f'a fall of {LEAST_FALL:.0%}; cut was {why}'
     )

@@ -9,7 +9,7 @@ from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.samples import Float64
 
 _BINS = 48  # of a stretch; a change in it is found to within one of them
-_LEAST = 8  # readings of an input that tells the speed
+LEAST_READINGS = 8  # readings of an input that tells the speed
 _HAMPEL = 5.0  # robust standard deviations from the median of 7 neighbours
 _NEIGHBOURS = 3
 
@@ -63,10 +63,10 @@ def readings(window: Window) -> tuple[Float64, Float64]:
     that are long enough for them.
     """
     for series in (window.speed_through_water, window.speed_over_ground):
-        if len(series) >= _LEAST:
+        if len(series) >= LEAST_READINGS:
             return clean_readings(seconds(series, window), series.value)
     track = window.position
-    if len(track) < _LEAST:
+    if len(track) < LEAST_READINGS:
         return np.empty(0), np.empty(0)
     time_s = seconds(track, window)
     count = min(_BINS, len(time_s) // 2) + 1

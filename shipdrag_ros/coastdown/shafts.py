@@ -44,9 +44,9 @@ _DRIVE_SD = 0.01  # of the logarithm of a drive averaged over some seconds
 _KNEE = 0.8  # of the drive before the last fall: where it stopped, ...
 _GONE = 0.3  # ... and of the largest: where it is over
 _BEFORE_S = 90  # the drive before the last fall is the upper fifth of this long
-_RUN_DOWN_S = 20  # a fall that takes longer may have been ordered so
+_RUN_DOWN_S = 12  # a fall that takes longer may have been ordered so
 _EVEN = 0.52  # of the plateau, half-way down: an even fall has 0.55, one by itself 0.49
-_RATE_S = 6  # the rate of a fall is taken over this long
+_PUSHES = 0.65  # of its steady speed, about where a propeller gives no thrust any more
 
 
 class Thrust(Enum):
@@ -290,13 +290,12 @@ def _knee(row: Float64) -> int:
     plateau = float(np.quantile(above[max(0, gone - _BEFORE_S) : gone + 1], 0.8))
     knee = int(np.flatnonzero(above[: gone + 1] >= _KNEE * plateau)[-1])
     # a shaft that runs down by itself does so ever more slowly, from the stop on; one that is
-    # taken back evenly drives until that ends
+    # taken back evenly drives until the water alone turns it as fast
     middle = (knee + gone) // 2
     if gone - knee < _RUN_DOWN_S or above[middle - 1 : middle + 2].mean() < _EVEN * plateau:
         return knee + 1
-    rate = (row[knee] - row[gone]) / (gone - knee)
-    slowing = row[gone:-_RATE_S] - row[gone + _RATE_S :] < 0.3 * rate * _RATE_S
-    return gone + 1 + (int(np.argmax(slowing)) if slowing.any() else 0)
+    drives = np.flatnonzero(row[knee : gone + 1] >= _PUSHES * (plateau + low))
+    return knee + 1 + int(drives[-1] if len(drives) else 0)
 
 
 def engaged_at(bins: Bins, steady: Drive, start: int, number: int) -> tuple[Thrust, int] | None:

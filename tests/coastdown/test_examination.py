@@ -131,6 +131,57 @@ def test_a_shaft_that_turns_on_after_an_onset_leaves_it_to_the_speed() -> None:
     assert any('no pitch is known' in note for note in found.notes)
 
 
+def after_an_onset(turning: np.ndarray, time_s: np.ndarray, speed: np.ndarray) -> Examination:
+    inputs = [block(LOG, noisy(speed), time_s), block(SHAFT, turning, time_s)]
+    return examine(window(*inputs, before_s=600.0), BOAT, Parameters())
+
+
+@pytest.mark.parametrize('level', [0.5, 1.0])
+def test_a_shaft_that_idles_and_stops_later_leaves_it_to_the_speed(level: float) -> None:
+    # zero pitch that nothing tells; the engine is stopped late in the glide
+    time_s = np.arange(-600.0, LENGTH_S)
+    turning = np.where(time_s < 10.0, 12.0, level * 12.0)
+    turning[time_s > 200.0] = 0.0
+    found = after_an_onset(turning, time_s, glide(time_s))
+    assert is_whole(found)
+    assert any('no pitch is known' in note for note in found.notes)
+
+
+def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives() -> None:
+    time_s = np.arange(-600.0, LENGTH_S)
+    speed = np.where(time_s < 0.0, 4.0, 2.4 + 1.6 * np.exp(-np.maximum(time_s, 0.0) / 90.0))
+    turning = 12.0 * np.where(time_s < 0.0, 1.0, 0.6)
+    found = after_an_onset(turning, time_s, speed)
+    assert found.failure is not None
+    assert 'the shaft turns' in found.failure
+
+
+def test_power_taken_back_in_steps_is_no_windmilling() -> None:
+    time_s = np.arange(-600.0, LENGTH_S)
+    speed = 4.0 / (1.0 + 0.0045 * np.maximum(time_s, 0.0))
+    turning = 12.0 * np.select([time_s < 0.0, time_s < 150.0], [1.0, 0.7], 0.45)
+    assert after_an_onset(turning, time_s, speed).failure is not None
+
+
+def test_a_shaft_that_is_let_go_may_speed_up_to_windmill() -> None:
+    time_s = np.arange(-600.0, LENGTH_S)
+    speed = glide(time_s)
+    turning = np.where(time_s < 0.0, 12.0, np.where(time_s < 40.0, 3.0, 0.5 * 3.0 * speed))
+    assert is_whole(after_an_onset(turning, time_s, speed))
+
+
+def test_a_short_rest_of_what_was_found_is_refused() -> None:
+    time_s = np.arange(-600.0, LENGTH_S)
+    turning = np.where(time_s < 260.0, 8.0, 0.0)
+    turning[time_s < 0.0] = 12.0
+    speed = np.where(time_s < 260.0, 2.8 + 1.2 * np.exp(-np.maximum(time_s, 0.0) / 90.0), 0.0)
+    speed[time_s < 0.0] = 4.0
+    speed[time_s >= 260.0] = glide(time_s[time_s >= 260.0], start_s=260.0, speed=2.85)
+    found = after_an_onset(turning, time_s, speed)
+    assert found.failure is not None
+    assert 'it takes 60 s, ' in found.failure
+
+
 # what heading, track, rudder and log say
 
 

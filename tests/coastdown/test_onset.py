@@ -163,6 +163,17 @@ def test_a_windmilling_shaft_dates_the_stop(watch, record, sensors, fraction: fl
     assert 80.0 <= after_s(onset.detected_ns, 900.0) <= 130.0
 
 
+def test_an_even_run_down_is_dated_where_the_thrust_is_gone(watch, record, sensors) -> None:
+    # over a minute down to a third; two thirds of the turns give no thrust any more
+    block = record(sensors=(sensors['log'],))
+    stamps, turning = following(block, 0.5)
+    second = (stamps - START_NS) / S - 900.0
+    ramp = 11.0 * np.clip(1.0 - 0.7 * (second + 30.0) / 60.0, 0.3, 1.0)
+    turning = np.where(second < 10.0, ramp, np.minimum(turning, ramp.clip(0.5 * 11.0)))
+    (onset,) = onsets(watch(with_shaft(block, stamps, turning)))
+    assert -5.0 <= after_s(onset.start_ns, 900.0) <= 5.0
+
+
 def test_a_shaft_that_holds_its_speed_asks_for_more(watch, record, sensors) -> None:
     # the propeller is driven at half of its speed
     driven = record(

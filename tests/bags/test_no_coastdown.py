@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Why no coastdown was found is said of what is in the bag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import open_runs, replay, why_no_coastdown
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.ship import ConstantAddedMass, Ship
+
+BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass(value=0.1))
+STAMPS = 10**18 + np.arange(1800) * 10**9
+
+
+@pytest.mark.parametrize('from_s', [0, 600])
+def test_a_log_that_stands_still_is_told(write_bag: Callable[..., Path], from_s: int) -> None:
+    speed = 4.0 + 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
+    speed[from_s:] = 4.017
+    path = write_bag('a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
+    (run,) = open_runs([path])
+    why = why_no_coastdown(replay(run, ship=BOAT))
+    minutes = (1799 - from_s) / 60.0
+    assert f'speed_through_water stood still at 4.02 m/s for {minutes:.0f} min' in why
+
+
+@pytest.mark.parametrize('steady', [0.0, 4.0])
+def test_a_log_at_work_and_a_ship_at_rest_do_not_stand_still(
+    write_bag: Callable[..., Path], steady: float
+) -> None:
+    noise = 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
+    speed = steady + noise if steady else np.zeros(len(STAMPS))
+    path = write_bag('a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
+    (run,) = open_runs([path])
+    assert 'stood still' not in why_no_coastdown(replay(run, ship=BOAT))
