@@ -39,7 +39,8 @@ setup(
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
     package_data={
         PACKAGE: ['py.typed', 'data/*'],
-        f'{PACKAGE}.report': ['*.html', '*.json'],
+        f'{PACKAGE}.diagnosis': ['*.json'],
+        f'{PACKAGE}.report': ['*.html'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),

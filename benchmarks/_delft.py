@@ -11,9 +11,11 @@ from _regressions import CUBE, CUBIC, WRONG, gauss, rms, shown
 from _tables import table
 from matplotlib.figure import Figure
 
-from shipdrag_ros.report.pictures import BLUE, ORANGE, STYLE
-from shipdrag_ros.residual import FORMS, Hulls, fit_form
+from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.residual.fit import fit_form
+from shipdrag_ros.studies.residual.forms import FORMS
+from shipdrag_ros.studies.residual.hulls import Hulls
 
 
 def yachts(path: Path, froude_max: float) -> tuple[Hulls, Float64]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.simulation.manoeuvring import SteeredShip
+from shipdrag_ros.studies.manoeuvring.ship import SteeredShip
 
 Rates = Callable[[float, list[float]], tuple[float, ...]]
 

@@ -19,8 +19,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.bags import NmeaResult, import_nmea, open_runs, replay
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.importing.formats.nmea.importer import NmeaResult, import_nmea
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 

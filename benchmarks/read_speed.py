@@ -30,8 +30,9 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from numpy.typing import NDArray
 
-from shipdrag_ros.bags import BagWriter, open_runs, replay
+from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.messages import encode, types
+from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
 
 SEED = 1

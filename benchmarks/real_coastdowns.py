@@ -30,9 +30,9 @@ import numpy as np
 from _known_coasts import COASTS, Known, KnownCoast
 from real_records import DATA, ROOT, run_command
 
+from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main as shipdrag
-from shipdrag_ros.report import words
 
 PAGE = ROOT / 'docs' / 'real_records.md'
 SECTION = re.compile('(?<=<!-- coastdowns -->\n).*?(?=<!-- end coastdowns -->)', re.DOTALL)
@@ -215,7 +215,7 @@ def told(coast: KnownCoast, said: Said) -> str:
             continue
         for known in wanted:
             at = resistance(each, known)
-            shown = 'outside' if at is None else words.plus_minus(at[0], 2.0 * at[1])
+            shown = 'outside' if at is None else display.plus_minus(at[0], 2.0 * at[1])
             lines.append(f'{_speed(known)}: {shown}')
     cuts = [
         f'{each["reason"]} {start:.0f} to {end:.0f} s'
@@ -238,7 +238,7 @@ def row(coast: KnownCoast, out: Path) -> str:
         replayed(coast, out, run.span_ns[0], window=given) for given in (False, True)
     )
     known = [
-        f'{_speed(each)}: {words.plus_minus(each.r_m_s2, each.two_sd_m_s2)}'
+        f'{_speed(each)}: {display.plus_minus(each.r_m_s2, each.two_sd_m_s2)}'
         for each in coast.known
     ]
     cells = (

@@ -25,12 +25,14 @@ import numpy as np
 from _second_opinion import second_opinion
 from _tables import put, table
 
-from shipdrag_ros.bags import ReplayResult, open_runs, replay
+from shipdrag_ros import display
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main as shipdrag
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report import pictures, words
-from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.replay import ReplayResult, replay, words
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.report import drawing, pictures
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / 'docs' / 'real_records.md'
@@ -252,9 +254,9 @@ def show(record: Record, out: Path) -> Outcome:
         if at is None:
             print(f'  r({speed:g} m/s) is outside; second opinion {other:.4g}')
             continue
-        shown = words.plus_minus(at[0], 2 * at[1])
+        shown = display.plus_minus(at[0], 2 * at[1])
         print(f'  r({speed:g} m/s) = {shown} m/s^2 (2 sigma); second opinion {other:.4g}')
-        cells.append(f'{speed:g}: {shown} ({other:.{words.decimals_of(2 * at[1])}f})')
+        cells.append(f'{speed:g}: {shown} ({other:.{display.decimals_of(2 * at[1])}f})')
     print(f"  second opinion: v' = -({c0:.2g} {c1:+.2g} v {c2:+.2g} v|v|)")
     fit = f'{found.estimator.removeprefix("s1_")}, {found.order}'
     limits = f'{curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f}'
@@ -280,7 +282,7 @@ def default_line(record: Record, published: Estimate, out: Path) -> str:
         curve = each.valid_curve
         at = [resistance_at(each, speed) for speed in record.speeds_m_s]
         shown = [
-            f'{speed:g}: {words.plus_minus(r[0], 2 * r[1])}'
+            f'{speed:g}: {display.plus_minus(r[0], 2 * r[1])}'
             for speed, r in zip(record.speeds_m_s, at)
             if r is not None
         ]
@@ -300,7 +302,7 @@ def show_model_ship_at_rest(out: Path) -> None:
         assert found is not None
         low = float(found.valid_curve.speed_m_s[0])
         shown = [
-            f'r({speed:.3g} m/s) = {words.plus_minus(at[0], 2 * at[1])}'
+            f'r({speed:.3g} m/s) = {display.plus_minus(at[0], 2 * at[1])}'
             for speed in (low, 0.1, 0.15)
             if (at := resistance_at(found, speed)) is not None
         ]
@@ -360,7 +362,7 @@ def draw(out: Path, data: Path) -> None:
             coastdown.estimate, mass_kg=result.ship.mass_kg, truth=result.truth
         )
         figure.set_size_inches(6.0, 4.2)
-        pictures.save(figure, out / f'{name}.png')
+        drawing.save(figure, out / f'{name}.png')
         print(f'picture: {out / name}.png, {words.result_sentence(coastdown)}')
 
 

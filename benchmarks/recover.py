@@ -36,9 +36,10 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from shipdrag_ros.bags import BagWriter, check, open_runs, recover
+from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.bags.records import MAGIC, Place, unpack_chunk, walk
+from shipdrag_ros.bags.salvage import check, recover
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode, types
 from shipdrag_ros.samples import Block, Channel, in_arrival_order

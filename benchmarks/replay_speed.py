@@ -18,7 +18,8 @@ import time
 from importlib.resources import files
 from pathlib import Path
 
-from shipdrag_ros.bags import BagWriter, Compression, open_runs, replay
+from shipdrag_ros.bags import BagWriter, Compression, open_runs
+from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors

@@ -17,13 +17,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shipdrag_ros.report.cable_pictures import LINES, RANGE_COLOR, SURFACES
-from shipdrag_ros.report.pictures import BLUE, GREEN, STYLE, VERMILION, save
-from shipdrag_ros.simulation.cable import (
+from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
+from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
+from shipdrag_ros.studies.cable.drag import (
     LONGEST,
     PUBLISHED_RANGE,
     SHORTEST,
-    QuadraticDrag,
     Surface,
     Tangent,
     base_coefficient,
@@ -33,6 +32,7 @@ from shipdrag_ros.simulation.cable import (
     tangent_error,
     tangent_range,
 )
+from shipdrag_ros.studies.cable.face.pictures import LINES, RANGE_COLOR, SURFACES
 
 DOCS = Path(__file__).resolve().parents[1] / 'docs'
 ROUNDED = {Surface.SMOOTH: (0.777, 0.008), Surface.ROUGH: (0.769, 0.031)}  # the paper's (12)

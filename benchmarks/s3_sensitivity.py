@@ -26,14 +26,26 @@ import numpy as np
 from _tables import table as markdown
 from _wrong_values import COAST_S, LEAD_IN_S, SPEED_M_S, verdicts
 
-from shipdrag_ros.report import coasting_page, sensitivity_pictures, steering_page
-from shipdrag_ros.report.cells import Table
-from shipdrag_ros.report.pictures import save
+from shipdrag_ros.display import Table
+from shipdrag_ros.report.drawing import save
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.sensitivity import CHANGES, Losses, Norm, own_share
-from shipdrag_ros.sensitivity.coast import coast_from
-from shipdrag_ros.sensitivity.coasting import CoastStudy, study_coast
-from shipdrag_ros.sensitivity.steering import (
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+    Side,
+    advance_m,
+    overshoots_rad,
+    tactical_diameter_m,
+    turn,
+    zigzag,
+)
+from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
+from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.sensitivity.coast import coast_from
+from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
+from shipdrag_ros.studies.sensitivity.face import coasting_page, steering_page
+from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, own_share
+from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     DESIGN,
     TINY,
@@ -44,18 +56,6 @@ from shipdrag_ros.sensitivity.steering import (
     respond,
     respond_by_groups,
     study,
-)
-from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.manoeuvring import (
-    FORM,
-    Side,
-    advance_m,
-    mariner,
-    overshoots_rad,
-    steer,
-    tactical_diameter_m,
-    turn,
-    zigzag,
 )
 
 DOCS = Path(__file__).resolve().parents[1] / 'docs'
@@ -289,7 +289,7 @@ def page(
         'Fang Xianghong, Xu Feng: *sensitivity of ship manoeuvring derivatives by a loss '
         'function*. Written by',
         '`benchmarks/s3_sensitivity.py --write`. The verb is `shipdrag sensitivity`, the analysis '
-        '`shipdrag_ros/sensitivity/loss.py`: it takes any',
+        '`shipdrag_ros/studies/sensitivity/loss.py`: it takes any',
         'simulator and knows no ship.',
         '',
         '    shipdrag sensitivity --manoeuvre zigzag:15 --keep 24 --report mariner.html',
@@ -359,7 +359,7 @@ def page(
         'a little, and of the 15/15 the largest to starboard is taken, the third.',
         'Ordered at once the looks of the helmsman fall otherwise: one is worth up to '
         '0.1 degrees.',
-        '`tests/simulation/manoeuvring` holds the runs against a solve_ivp of their own: u and v '
+        '`tests/studies/manoeuvring` holds the runs against a solve_ivp of their own: u and v '
         'to 2e-6 m/s, r to 1e-7 rad/s.',
         '',
         f'**Speed.** {timed.runs} runs of 600 s in one call: {1e3 * timed.batched:.0f} ms; a '

@@ -36,9 +36,11 @@ from _river_ships import (
 from _tables import table, write_csv
 from matplotlib.figure import Figure
 
-from shipdrag_ros.report.pictures import BLUE, GREEN, STYLE, VERMILION, save
-from shipdrag_ros.residual import FORMS, Hulls, ResidualFit, fit_form
+from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.residual.fit import ResidualFit, fit_form
+from shipdrag_ros.studies.residual.forms import FORMS
+from shipdrag_ros.studies.residual.hulls import Hulls
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'docs' / 's4_residual.md'

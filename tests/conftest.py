@@ -8,6 +8,10 @@ Property tests try the same examples each time, new ones with
 
 from __future__ import annotations
 
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
 import pytest
 from hypothesis import settings
 
@@ -29,3 +33,39 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             f'{len(skipped)} tests skipped: {NO_BROWSER}; with Chromium (apt-get install '
             'chromium) they open every kind of page'
         )
+
+
+class Page(HTMLParser):
+    """Text, pictures and links of a page; every tag that is opened is closed."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.words: list[str] = []
+        self.images: list[str] = []
+        self.links: list[str] = []
+        self.open: list[str] = []
+        self.feed(path.read_text(encoding='utf-8'))
+        assert self.open == []
+        self.text = re.sub(r'\s+', ' ', ' '.join(self.words))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        if tag == 'img':
+            self.images.append(values['src'] or '')
+            assert values['alt']
+        if 'href' in values or (tag != 'img' and 'src' in values):
+            self.links.append(tag)
+        if tag not in ('img', 'meta', 'br'):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] != 'style':
+            self.words.append(data)
+
+
+@pytest.fixture
+def read_page() -> type[Page]:
+    return Page

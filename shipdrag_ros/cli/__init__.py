@@ -19,10 +19,11 @@ from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import Help
 from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.studies import found
 
 
 class Verb(NamedTuple):
-    """A verb, its module in this package, and what it does in one line."""
+    """A verb, its module (a leading dot: of this package), and what it does in one line."""
 
     name: str
     module: str
@@ -30,20 +31,29 @@ class Verb(NamedTuple):
 
 
 VERBS = (
-    Verb('demo', 'demo', 'simulated ship -> ROS topics -> node -> bag -> replay -> report'),
-    Verb('node', 'node', 'the onboard node: estimates live and records'),
-    Verb('replay', 'replay', 'the same estimator over bags, without ROS'),
-    Verb('simulate', 'simulate', 'simulated coastdown with sensors, as a bag'),
-    Verb('baseline', 'baseline', 'learn the baseline, and how far runs scatter, from clean runs'),
-    Verb('diagnose', 'diagnose', 'where model and data disagree, and which effect is missing'),
-    Verb('residual', 'residual', 'residual resistance from ratios of the hull, guarded'),
-    Verb('surface', 'surface', 'polynomial surface of coefficients, with the degree they show'),
-    Verb('sensitivity', 'sensitivity', 'which derivatives or values of a ship file matter'),
-    Verb('import', 'import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
-    Verb('info', 'info', 'what is in a bag'),
-    Verb('check', 'check', 'is a bag sound'),
-    Verb('recover', 'recover', 'save what is whole in a damaged bag'),
-    Verb('cable', 'cable', 'drag of a towed cable, and the line that may replace it'),
+    Verb(
+        'demo',
+        '.demo',
+        'simulated ship -> ROS topics -> node -> bag -> replay -> report',
+    ),
+    Verb('node', '.node', 'the onboard node: estimates live and records'),
+    Verb('replay', '.replay', 'the same estimator over bags, without ROS'),
+    Verb('simulate', '.simulate', 'simulated coastdown with sensors, as a bag'),
+    Verb(
+        'baseline',
+        '.baseline',
+        'learn the baseline, and how far runs scatter, from clean runs',
+    ),
+    Verb(
+        'diagnose',
+        '.diagnose',
+        'where model and data disagree, and which effect is missing',
+    ),
+    Verb('import', '.import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
+    Verb('info', '.info', 'what is in a bag'),
+    Verb('check', '.check', 'is a bag sound'),
+    Verb('recover', '.recover', 'save what is whole in a damaged bag'),
+    *(Verb(study.verb, f'{package}.face.verb', study.summary) for package, study in found()),
 )
 
 USER_ERROR = 1
@@ -125,7 +135,7 @@ def parser(verb: str) -> argparse.ArgumentParser:
         )
         if known.name == verb:
             added.epilog = epilog(verb)
-            module = import_module(f'{__name__}.{known.module}')
+            module = import_module(known.module, __name__)
             module.add_arguments(added)
             added.set_defaults(run=module.run)
     return top

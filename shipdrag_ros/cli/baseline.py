@@ -14,8 +14,8 @@ from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, Learnt, learn_baseline
+from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.report.cells import Table
 from shipdrag_ros.ship import Ship
 
 

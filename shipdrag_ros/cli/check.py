@@ -6,7 +6,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from shipdrag_ros.bags import FileCheck, check
+from shipdrag_ros.bags.salvage import FileCheck, check
 from shipdrag_ros.cli.arguments import add_json, bag
 from shipdrag_ros.cli.damage import damage_table
 from shipdrag_ros.cli.output import Output

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shipdrag_ros.bags import Damage
+from shipdrag_ros.bags.salvage import Damage
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.report.cells import Table
+from shipdrag_ros.display import Table
 
 _SHOWN = 40
 

@@ -22,6 +22,7 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, NoReturn
 
+from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import simulate
 from shipdrag_ros.cli.arguments import number
@@ -30,9 +31,9 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, replay_run, write_results
 from shipdrag_ros.cli.replay_text import show_run
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.report import words
-from shipdrag_ros.report.run import RunResult
-from shipdrag_ros.report.truth import TrueCurve
+from shipdrag_ros.replay import words
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
@@ -173,7 +174,7 @@ class _Live:
         self._output.say(
             f'{(estimate.stamp_ns - self._stop_ns) * 1e-9:7.0f} s after the stop: '
             f'{estimate.speed_m_s:6.3f} m/s, r = '
-            f'{words.plus_minus(estimate.resistance_m_s2, 2.0 * estimate.sigma_m_s2)} m/s², '
+            f'{display.plus_minus(estimate.resistance_m_s2, 2.0 * estimate.sigma_m_s2)} m/s², '
             f'true {self._truth.at(estimate.speed_m_s):.5f}'
         )
 

@@ -8,15 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from shipdrag_ros.bags import (
-    ReplayResult,
-    accepted_samples,
-    clocks_apart,
-    coast_windows,
-    replay,
-    why_no_coastdown,
-)
-from shipdrag_ros.bags.playback import SHIP_FILE
 from shipdrag_ros.cli import diagnose_json
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
@@ -31,12 +22,22 @@ from shipdrag_ros.diagnosis import (
     diagnose_sailing,
     with_effects,
 )
+from shipdrag_ros.diagnosis import tables as diagnosis_cells
+from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report import diagnosis_cells, diagnosis_words
-from shipdrag_ros.report.cuts import cut_lines
+from shipdrag_ros.replay import (
+    ReplayResult,
+    accepted_samples,
+    clocks_apart,
+    coast_windows,
+    replay,
+    why_no_coastdown,
+)
+from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.report.diagnosis_page import write_diagnosis
-from shipdrag_ros.report.diagnosis_score import Score
 from shipdrag_ros.ship import Ship
 
 

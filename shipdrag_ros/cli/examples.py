@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.studies import found
+
 EXAMPLES = {
     'demo': ('shipdrag demo --out demo',),
     'node': (
@@ -24,17 +26,6 @@ EXAMPLES = {
         'shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml',
         'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
     ),
-    'residual': (
-        'shipdrag residual hulls.csv --form auto --target c_R --predict new_hulls.csv '
-        '--report residual.html',
-    ),
-    'surface': (
-        'shipdrag surface table.csv --inputs alpha,beta --target c_x --report surface.html',
-    ),
-    'sensitivity': (
-        'shipdrag sensitivity --manoeuvre zigzag:15 --keep 24 --report mariner.html',
-        'shipdrag sensitivity --ship ship.yaml --manoeuvre coastdown:8.2',
-    ),
     'import': (
         'shipdrag import LOG.nmea.gz -o log.mcap --ship ship.yaml',
         'shipdrag import log.csv -o plane.mcap --time t:ms --map speed_through_water=u:kn '
@@ -44,7 +35,7 @@ EXAMPLES = {
     'info': ('shipdrag info run.mcap',),
     'check': ('shipdrag check run.mcap --json check.json',),
     'recover': ('shipdrag recover damaged.mcap -o saved.mcap',),
-    'cable': ('shipdrag cable --length 50 --diameter 0.1 --speed 3 --report cable.html',),
+    **{study.verb: study.examples for _, study in found()},
 }
 
 

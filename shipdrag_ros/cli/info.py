@@ -6,11 +6,11 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from shipdrag_ros import display
 from shipdrag_ros.bags import BagInfo, info, open_runs
 from shipdrag_ros.cli.arguments import add_json, add_remap, bag
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.report import words
-from shipdrag_ros.report.cells import Table
+from shipdrag_ros.display import Table
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,13 +44,13 @@ def _show(output: Output, about: BagInfo) -> None:
     output.heading(about.name)
     for warning in about.warnings:
         output.say(f'Warning: {warning}')
-    begin = '-' if about.start_ns is None else words.utc(about.start_ns)
+    begin = '-' if about.start_ns is None else display.utc(about.start_ns)
     attached = ', '.join(f'{name} ({size} bytes)' for name, size in about.attachments.items())
     rows = [
         ('files', ', '.join(str(path) for path in about.paths)),
         ('size', f'{about.size_bytes * 1e-6:.3f} MB, compression {about.compression}'),
         ('begin', begin),
-        ('length', words.duration(about.duration_s)),
+        ('length', display.duration(about.duration_s)),
         ('messages', f'{about.messages}'),
         ('recorded by', f'shipdrag_ros {about.software}' if about.software else 'another tool'),
         ('outputs of', about.node or '-'),

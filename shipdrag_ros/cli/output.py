@@ -18,7 +18,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table as RichTable
 
 from shipdrag_ros.cli.arguments import STDOUT
-from shipdrag_ros.report.cells import Table
+from shipdrag_ros.display import Table
 
 _PIPE_WIDTH = 160  # a file or a pipe has no width of its own; tables must not be cut there
 

@@ -9,18 +9,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.bags import Run, replay
+from shipdrag_ros.bags import Run
 from shipdrag_ros.cli import replay_json, replay_text
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number
 from shipdrag_ros.cli.output import Output, json_text
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report.hulls import Ranking, rank
+from shipdrag_ros.replay import replay
+from shipdrag_ros.replay.hulls import Ranking, rank
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import together
 from shipdrag_ros.report.page import write_report
-from shipdrag_ros.report.run import RunResult
 from shipdrag_ros.report.spreadsheet import write_curves
-from shipdrag_ros.report.together import together
 from shipdrag_ros.ship import Ship
 
 _LATE_S = 10.0

@@ -6,12 +6,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from shipdrag_ros.bags import InputCounts, Recorded
 from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
 from shipdrag_ros.estimation.reciprocal import Combined
-from shipdrag_ros.report.hulls import Ranking
-from shipdrag_ros.report.run import RunResult
-from shipdrag_ros.report.together import together
+from shipdrag_ros.replay import InputCounts, Recorded
+from shipdrag_ros.replay.hulls import Ranking
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import together
 
 
 def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> dict[str, Any]:

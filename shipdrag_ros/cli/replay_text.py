@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.report import cells, words
-from shipdrag_ros.report.cuts import cut_lines
-from shipdrag_ros.report.hulls import Ranking
-from shipdrag_ros.report.run import RunResult
-from shipdrag_ros.report.together import Together
+from shipdrag_ros.replay import tables as cells
+from shipdrag_ros.replay import words
+from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.hulls import Ranking
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import Together
 
 
 def show_run(output: Output, run: RunResult) -> None:

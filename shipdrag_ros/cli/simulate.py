@@ -16,7 +16,7 @@ from shipdrag_ros.cli.arguments import add_json, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report.truth import ATTACHMENT, TrueCurve
+from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import (

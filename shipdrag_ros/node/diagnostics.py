@@ -14,11 +14,11 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from shipdrag_ros.coastdown import InputHealth
 from shipdrag_ros.diagnosis import Diagnosis, Verdict
+from shipdrag_ros.diagnosis.words import advice, sentence
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
-from shipdrag_ros.report.diagnosis_words import advice, sentence
 from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.simulation.effects import LIBRARY
 

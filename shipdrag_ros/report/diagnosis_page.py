@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shipdrag_ros.diagnosis import Diagnosis, Trace, Verdict
-from shipdrag_ros.report import diagnosis_cells, diagnosis_pictures, words
-from shipdrag_ros.report import diagnosis_words as told
-from shipdrag_ros.report.diagnosis_score import Score
+from shipdrag_ros.diagnosis import tables as diagnosis_cells
+from shipdrag_ros.diagnosis import words as told
+from shipdrag_ros.diagnosis.score import Score
+from shipdrag_ros.replay import words
+from shipdrag_ros.report import diagnosis_pictures
 from shipdrag_ros.report.document import Picture, write_page
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import LIBRARY

@@ -12,8 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shipdrag_ros.diagnosis import Compared, Trace
-from shipdrag_ros.report.diagnosis_words import Answer, probability
-from shipdrag_ros.report.pictures import BLUE, STYLE, TRACK_LABELS, VERMILION
+from shipdrag_ros.diagnosis.words import Answer, probability
+from shipdrag_ros.display import TRACK_LABELS
+from shipdrag_ros.report.drawing import BLUE, STYLE, VERMILION
 
 _ALONG = ('speed_through_water', 'speed_over_ground', 'position')
 _MEASURED: dict[str, Any] = {

@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from shipdrag_ros import __version__
-from shipdrag_ros.report.pictures import data_uri
+from shipdrag_ros.report.drawing import data_uri
 
 
 @dataclass(frozen=True)

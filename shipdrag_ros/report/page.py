@@ -7,14 +7,18 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from shipdrag_ros import display
 from shipdrag_ros.coastdown.events import Coastdown
-from shipdrag_ros.report import cells, pictures, words
-from shipdrag_ros.report.cells import Table
-from shipdrag_ros.report.cuts import cut_lines, cut_picture
+from shipdrag_ros.display import Table
+from shipdrag_ros.replay import tables as cells
+from shipdrag_ros.replay import words
+from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.hulls import Ranking
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import together
+from shipdrag_ros.report import pictures
+from shipdrag_ros.report.cut_picture import cut_picture
 from shipdrag_ros.report.document import Picture, write_page
-from shipdrag_ros.report.hulls import Ranking
-from shipdrag_ros.report.run import RunResult
-from shipdrag_ros.report.together import together
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,7 @@ def _coastdown(number: int, coastdown: Coastdown, run: RunResult) -> _Coastdown:
     if estimate is not None:
         curve = cells.curve_table(estimate.valid_curve, truth=run.truth)
     return _Coastdown(
-        heading=f'Coastdown {number}: {words.utc(coastdown.start_ns)}',
+        heading=f'Coastdown {number}: {display.utc(coastdown.start_ns)}',
         cuts=cut_lines(coastdown, run.span_ns),
         sentence=words.result_sentence(coastdown, mass_kg=run.ship.mass_kg),
         facts=cells.facts(coastdown),

@@ -8,10 +8,7 @@ none of them touches pyplot, so nothing is kept and no display is needed.
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -19,22 +16,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from shipdrag_ros.display import M_S_PER_KNOT, TRACK_LABELS, force_unit
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
-from shipdrag_ros.report.hulls import Hull
-from shipdrag_ros.report.truth import TrueCurve
-from shipdrag_ros.report.words import M_S_PER_KNOT, force_unit, speed_name
-
-# Okabe and Ito's colours, told apart by colour-blind readers; line styles and
-# shades of grey differ as well, for print
-BLUE, VERMILION, GREEN, ORANGE, SKY, PURPLE = (
-    '#0072B2',
-    '#D55E00',
-    '#009E73',
-    '#E69F00',
-    '#56B4E9',
-    '#CC79A7',
+from shipdrag_ros.replay.hulls import Hull
+from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.replay.words import speed_name
+from shipdrag_ros.report.drawing import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    STYLE,
+    VERMILION,
 )
+
 _HULLS = (
     (BLUE, '-'),
     (VERMILION, '--'),
@@ -44,28 +41,7 @@ _HULLS = (
     (SKY, (0, (1, 1))),
 )
 
-STYLE: dict[Any, Any] = {
-    'font.family': 'DejaVu Sans',  # comes with matplotlib: the same picture everywhere
-    'font.size': 9,
-    'axes.grid': True,
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'grid.color': '#dddddd',
-    'grid.linewidth': 0.6,
-    'legend.frameon': False,
-    'legend.fontsize': 8,
-    'lines.linewidth': 1.4,
-    'svg.hashsalt': 'shipdrag',  # the same page from the same data
-}
 _MANY_POINTS = 500  # above this dots are drawn as pixels, or the page grows by megabytes
-_PIXELS_PER_INCH = 200
-
-TRACK_LABELS = {
-    'speed_through_water': ('Speed through water', 'm/s'),
-    'speed_over_ground': ('Speed over ground', 'm/s'),
-    'position': ('Distance along the track', 'm'),
-    'position_across': ('Distance to port of the track', 'm'),
-}
 
 
 def track_picture(estimate: Estimate) -> Figure:
@@ -251,25 +227,6 @@ def combined_picture(combined: Combined, runs: Sequence[ResistanceCurve]) -> Fig
         axis.set_ylim(0.0, 1.25 * float(np.max(_band(combined)[1])))
         axis.legend(loc='upper left')
     return figure
-
-
-def data_uri(figure: Figure) -> str:
-    """
-    Return a figure as an SVG that a page can carry in itself.
-    """
-    buffer = io.BytesIO()
-    with matplotlib.rc_context(STYLE):
-        # without a date the same data give the same bytes
-        figure.savefig(buffer, format='svg', dpi=_PIXELS_PER_INCH, metadata={'Date': None})
-    return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')
-
-
-def save(figure: Figure, path: Path, *, pixels_per_inch: int = _PIXELS_PER_INCH) -> None:
-    """
-    Write a figure to a file; its ending gives the format.
-    """
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(path, dpi=pixels_per_inch)
 
 
 def _draw_band(

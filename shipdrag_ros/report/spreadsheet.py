@@ -7,7 +7,7 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.replay.run_result import RunResult
 
 COLUMNS = (
     'speed_m_s',

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import pi
 
 from shipdrag_ros.samples import Float64
@@ -10,6 +11,7 @@ from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.ship.baseline import ittc57
 from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
 
+ROPES = (0.01, 0.04)  # C0 of towed ropes in practice
 _USUAL_FORM_FACTOR = 0.2  # where the baseline is a table
 
 
@@ -53,6 +55,29 @@ def quadratic_n(density_kg_m3: float, drag_area_m2: float, speed_m_s: Float64) -
     Return 0.5 rho A v^2 [N].
     """
     return 0.5 * density_kg_m3 * drag_area_m2 * speed_m_s**2
+
+
+@dataclass(frozen=True)
+class QuadraticDrag:
+    """
+    A drag that grows with the square of the speed.
+
+    Attributes
+    ----------
+    drag_area_m2
+        C0 l d.
+    density_kg_m3
+        Of the water.
+    """
+
+    drag_area_m2: float
+    density_kg_m3: float
+
+    def force_n(self, speed_m_s: Float64) -> Float64:
+        """
+        Return the drag at speeds of 0 or more; S2 (11).
+        """
+        return quadratic_n(self.density_kg_m3, self.drag_area_m2, speed_m_s)
 
 
 def disc_area_m2(ship: Ship) -> float:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,23 +11,13 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Event
 from shipdrag_ros.messages import (
-    EncodedMessage,
-    OutputMessage,
-    Source,
-    decode,
     encode,
-    outputs,
-    reset_request,
 )
-from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
 
 START_NS = 1_700_000_000_000_000_000
-PARAMETERS = Parameters(update_s=30.0)
 
 
 def record(seed: int = 1, seconds: int = 60) -> Block:
@@ -127,131 +117,3 @@ def assert_same() -> Callable[[Block, Block], None]:
         np.testing.assert_allclose(one.value, other.value, rtol=0, atol=1e-15)
 
     return check
-
-
-def sail(seed: int = 1, *, steady_s: float = 400.0, coast_s: float = 700.0) -> Block:
-    """A steady ship whose engine stops; r = v^2 / 3000, at 1 Hz."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(0.0, steady_s + coast_s)
-    coasting = np.maximum(t - steady_s, 0.0)
-    speed = 8.0 / (1.0 + 8.0 * coasting / 3000.0)
-    track = np.where(
-        t < steady_s, 8.0 * (t - steady_s), 3000.0 * np.log1p(8.0 * coasting / 3000.0)
-    )
-    shaft = 10.0 * np.exp(-coasting / 8.0)
-    stamps = START_NS + np.round(t * 1e9).astype(np.int64)
-    log = speed + rng.normal(0.0, 0.03, len(t))
-    fixes = np.column_stack([track, 0.0 * track]) + rng.normal(0.0, 1.0, (len(t), 2))
-    yaw = rng.normal(0.7, 0.005, len(t))
-    received = stamps + 20_000_000
-
-    def block(channel: Channel, value: np.ndarray, delay_ns: int) -> Block:
-        return Block.of(channel, stamps, value, receive_ns=received + delay_ns)
-
-    return in_arrival_order(
-        [
-            block(Channel.SPEED_THROUGH_WATER, log, 0),
-            block(Channel.POSITION, fixes, 1),
-            block(Channel.SHAFT, shaft, 2),
-            block(Channel.HEADING, yaw, 3),
-        ]
-    )
-
-
-class Live:
-    """What the node does with messages, without ROS: one at a time, and recording."""
-
-    def __init__(self, ship: Ship, parameters: Parameters = PARAMETERS) -> None:
-        self.monitor = Monitor(ship, parameters)
-        self.ship, self.parameters = ship, parameters
-        self.bag: BagWriter | None = None
-        self.events: list[Event] = []
-
-    def start(self, path: Path, ring: Iterable[EncodedMessage] = ()) -> None:
-        self.bag = BagWriter(path)
-        self.bag.attach('ship.yaml', self.ship.to_yaml())
-        self.bag.attach('parameters.yaml', self.parameters.to_yaml())
-        for message in ring:
-            self.write(message)
-
-    def receive(self, message: EncodedMessage) -> None:
-        self.write(message)
-        source = Source(message.topic.removeprefix('/'), message.type)
-        block = decode(source, [message.payload], [message.log_ns]).block
-        self.report(self.monitor.update(block), message.log_ns)
-
-    def reset(self, now_ns: int) -> None:
-        self.write_output(reset_request(now_ns, 'service'), now_ns)
-        self.report(self.monitor.reset(now_ns, 'service'), now_ns)
-
-    def stop(self, now_ns: int, *, finish: bool = True) -> None:
-        if finish:
-            self.report(self.monitor.finish(), now_ns)
-        assert self.bag is not None
-        self.bag.close()
-        self.bag = None
-
-    def report(self, events: list[Event], now_ns: int) -> None:
-        self.events += events
-        for event in events:
-            for message in outputs(event):
-                self.write_output(message, now_ns)
-
-    def write(self, message: EncodedMessage) -> None:
-        if self.bag is not None:
-            self.bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
-
-    def write_output(self, message: OutputMessage, now_ns: int) -> None:
-        if self.bag is not None:
-            self.bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=now_ns,
-                publish_ns=message.stamp_ns,
-            )
-
-
-@pytest.fixture(scope='session')
-def ship() -> Ship:
-    return Ship(name='test ship', length_m=150.0, displaced_volume_m3=20200.0)
-
-
-@pytest.fixture(scope='session')
-def parameters() -> Parameters:
-    """Those of the recording."""
-    return PARAMETERS
-
-
-@pytest.fixture(scope='session')
-def voyage() -> Callable[..., Block]:
-    return sail
-
-
-@pytest.fixture(scope='session')
-def live() -> type[Live]:
-    return Live
-
-
-@pytest.fixture(scope='session')
-def recording(ship: Ship, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Event]]:
-    path = tmp_path_factory.mktemp('recording') / 'live.mcap'
-    live = Live(ship)
-    live.start(path)
-    block = sail()
-    for message in encode(block):
-        live.receive(message)
-    live.stop(int(block.receive_ns[-1]))
-    return path, live.events
-
-
-@pytest.fixture
-def write_run() -> Callable[..., Path]:
-    """Write a block, and maybe a ship and parameters, to a file."""
-    return write

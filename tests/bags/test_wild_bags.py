@@ -22,11 +22,12 @@ from hypothesis import strategies as st
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
-from shipdrag_ros.bags import BagWriter, Compression, info, mcap_file, open_runs, replay
+from shipdrag_ros.bags import BagWriter, Compression, info, mcap_file, open_runs
 from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode, types
+from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import Ship
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.report.cells import Table
+from shipdrag_ros.display import Table
 
 
 def test_results_go_to_stdout_and_logs_to_stderr(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from shipdrag_ros.bags import open_runs, replay
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.messages import EventKind, read_event
+from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, Truth, sense, simulate, standard_sensors

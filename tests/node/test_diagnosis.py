@@ -11,14 +11,15 @@ from typing import Any
 
 import pytest
 
-from shipdrag_ros.bags import coast_windows, open_runs, replay
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Coastdown
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
+from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisState, DiagnosisStatus
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report.diagnosis_words import sentence
+from shipdrag_ros.replay import coast_windows, replay
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors

@@ -15,13 +15,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.bags import ReplayResult, open_runs, replay
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.messages import EncodedMessage, OutputMessage, Source, encode
 from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import ReplayResult, replay
 from shipdrag_ros.samples import Block, concatenate
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors

@@ -3,15 +3,11 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
-from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shipdrag_ros.bags import InputCounts, Recorded
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.estimation.result import (
     Estimate,
@@ -20,46 +16,10 @@ from shipdrag_ros.estimation.result import (
     ResistanceCurve,
     Track,
 )
-from shipdrag_ros.report.run import RunResult
-from shipdrag_ros.report.truth import TrueCurve
+from shipdrag_ros.replay import InputCounts, Recorded
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.ship import Ship
-
-
-class Page(HTMLParser):
-    """Text, pictures and links of a page; every tag that is opened is closed."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        self.words: list[str] = []
-        self.images: list[str] = []
-        self.links: list[str] = []
-        self.open: list[str] = []
-        self.feed(path.read_text(encoding='utf-8'))
-        assert self.open == []
-        self.text = re.sub(r'\s+', ' ', ' '.join(self.words))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        values = dict(attrs)
-        if tag == 'img':
-            self.images.append(values['src'] or '')
-            assert values['alt']
-        if 'href' in values or (tag != 'img' and 'src' in values):
-            self.links.append(tag)
-        if tag not in ('img', 'meta', 'br'):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] != 'style':
-            self.words.append(data)
-
-
-@pytest.fixture
-def read_page() -> type[Page]:
-    return Page
-
 
 START_NS = 1_700_000_000_000_000_000
 SECOND_NS = 1_000_000_000

@@ -9,10 +9,10 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, NotCoastdown
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.report import cells
-from shipdrag_ros.report.hulls import rank
-from shipdrag_ros.report.run import RunResult
-from shipdrag_ros.report.truth import TrueCurve
+from shipdrag_ros.replay import tables as cells
+from shipdrag_ros.replay.hulls import rank
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.truth import TrueCurve
 
 
 def test_a_curve_is_shown_at_its_own_points_from_end_to_end(estimate: Estimate) -> None:

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import Advice, Candidate, CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report import diagnosis_pictures, diagnosis_words
+from shipdrag_ros.report import diagnosis_pictures
 from shipdrag_ros.report.diagnosis_page import write_diagnosis
-from shipdrag_ros.report.diagnosis_score import Score
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse

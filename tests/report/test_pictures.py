@@ -12,9 +12,9 @@ import pytest
 from matplotlib.axes import Axes
 
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
-from shipdrag_ros.report import pictures
-from shipdrag_ros.report.hulls import Hull
-from shipdrag_ros.report.truth import TrueCurve
+from shipdrag_ros.replay.hulls import Hull
+from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.report import drawing, pictures
 
 
 def line(axis: Axes, label: str) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +86,7 @@ def test_the_curve_has_its_band_range_scales_and_truth(
 
 def test_an_empty_valid_range_is_drawn_without_one(estimate: Estimate) -> None:
     empty = replace(estimate, froude_valid=(0.9, 0.9))
-    pictures.data_uri(pictures.resistance_picture(empty))
+    drawing.data_uri(pictures.resistance_picture(empty))
 
 
 def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
@@ -105,13 +105,13 @@ def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
 def test_a_picture_is_saved_as_its_name_says(
     estimate: Estimate, tmp_path: Path, name: str
 ) -> None:
-    pictures.save(pictures.order_picture(estimate), tmp_path / name)
+    drawing.save(pictures.order_picture(estimate), tmp_path / name)
     head = (tmp_path / name).read_bytes()[:100]
     assert head.startswith(b'\x89PNG') if name.endswith('png') else b'<?xml' in head
 
 
 def test_the_same_data_give_the_same_bytes(estimate: Estimate) -> None:
-    first, second = (pictures.data_uri(pictures.order_picture(estimate)) for _ in range(2))
+    first, second = (drawing.data_uri(pictures.order_picture(estimate)) for _ in range(2))
     assert first == second
     kind, data = first.split(',', 1)
     assert kind == 'data:image/svg+xml;base64'

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shipdrag_ros.report.run import RunResult
+from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.report.spreadsheet import write_curves
 
 

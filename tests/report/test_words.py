@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.bags import Recorded
+from shipdrag_ros import display
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.estimation.result import FroudeMax
-from shipdrag_ros.report import words
+from shipdrag_ros.replay import Recorded, words
 from shipdrag_ros.ship import Ship
 
 
@@ -32,18 +32,18 @@ def test_every_end_and_every_rule_has_words() -> None:
     ],
 )
 def test_a_spread_sets_the_digits(value: float, spread: float, text: str) -> None:
-    assert words.plus_minus(value, spread) == text
+    assert display.plus_minus(value, spread) == text
 
 
 def test_times_of_a_real_clock_are_dates_and_others_are_seconds() -> None:
-    assert words.utc(1_700_000_000_000_000_000) == '2023-11-14 22:13:20 UTC'
-    assert words.utc(153_200_000_000) == '153 s'
-    assert words.utc(2**62) == '2116-02-20 23:53:38 UTC'
+    assert display.utc(1_700_000_000_000_000_000) == '2023-11-14 22:13:20 UTC'
+    assert display.utc(153_200_000_000) == '153 s'
+    assert display.utc(2**62) == '2116-02-20 23:53:38 UTC'
 
 
 def test_a_long_time_is_also_given_in_minutes() -> None:
-    assert words.duration(40.0) == '40 s'
-    assert words.duration(1500.0) == '1500 s (25 min)'
+    assert display.duration(40.0) == '40 s'
+    assert display.duration(1500.0) == '1500 s (25 min)'
 
 
 def test_the_sentence_gives_range_figure_and_force(coastdown: Coastdown, ship: Ship) -> None:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.cable import ROPES, QuadraticDrag
 from shipdrag_ros.simulation.effect import (
     AREAS,
     Effect,
@@ -14,6 +13,7 @@ from shipdrag_ros.simulation.effect import (
     Scope,
     log_normal,
 )
+from shipdrag_ros.simulation.hydrodynamics import ROPES, QuadraticDrag
 
 
 def _act(frame: Frame, drag_area_m2: float) -> Action:

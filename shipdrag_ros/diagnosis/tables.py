@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of a diagnosis as text, the same in the terminal and on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from shipdrag_ros.diagnosis import Compared, Diagnosis, Named, Trace
+from shipdrag_ros.diagnosis import words as words
+from shipdrag_ros.display import TRACK_LABELS, Table, plus_minus
+from shipdrag_ros.ship import Uncertain
+from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.simulation.effects import LIBRARY
+
+
+def probabilities(found: Diagnosis) -> Table:
+    """
+    Show how probable each answer is.
+    """
+    rows = tuple(
+        (each.words, words.probability(each.probability)) for each in words.answers(found)
+    )
+    return Table(('what is missing', 'probability'), rows)
+
+
+def parameters(effects: Sequence[Named]) -> Table:
+    """
+    Show how large effects are; the names are those of `simulate --effect`.
+    """
+    rows = [
+        (
+            effect.name,
+            quantity.name,
+            *_figures(quantity, effect.parameters[quantity.name]),
+            quantity.meaning,
+        )
+        for effect in effects
+        for quantity in LIBRARY[effect.name].parameters
+    ]
+    return Table(('effect', 'parameter', 'value', 'sd', 'meaning'), tuple(rows))
+
+
+def gaps(found: Diagnosis) -> Table:
+    """
+    Show how far model and data are apart.
+    """
+    named = 'a constant part'  # where no effect has a size
+    if found.best:
+        named = words.names_text([effect.name for effect in found.best])
+    known = {
+        words.model(found): found.before,
+        f'with {named}': found.after,
+        f'each run predicted, {words.model(found)}': found.held_out_before,
+        f'each run predicted, with {named} learnt from the others': found.held_out_after,
+    }
+    rows = [
+        (
+            name,
+            _number(gap.rms_speed_m_s, '.3f'),
+            _number(gap.rms_position_m, '.1f'),
+            f'{gap.chi2_per_sample:.2f}',
+        )
+        for name, gap in known.items()
+        if gap is not None
+    ]
+    return Table(
+        ('', 'speed rms [m/s]', 'position rms [m]', 'chi² a sample; noise: 1'), tuple(rows)
+    )
+
+
+def noise(traces: Sequence[Trace]) -> Table:
+    """
+    Show what the noise of each measurement is, and what is left of it.
+    """
+    rows = [
+        (f'{trace.name}: {label.lower()} [{unit}]', *_noise(compared))
+        for trace in traces
+        for compared in trace.compared
+        for label, unit in (TRACK_LABELS[compared.quantity],)
+    ]
+    heads = ('', 'sd in steady sailing', 'at the end', 'left over before', 'left over after')
+    return Table(heads, tuple(rows))
+
+
+def _figures(quantity: Quantity, found: Uncertain) -> tuple[str, str]:
+    """Return value and sd, as the sd deserves; what was a choice has none."""
+    if found.sd == 0.0:
+        return words.size(quantity, found), '-'
+    value, _, sd = plus_minus(found.value, found.sd).partition(' ± ')
+    return value, sd
+
+
+def _noise(compared: Compared) -> tuple[str, ...]:
+    steady = compared.time_s < 0.0
+    figures = (
+        float(np.median(compared.sd[steady if steady.any() else ...])),
+        float(compared.sd[-1]),
+        *(
+            float(np.sqrt(np.mean((compared.measured - simulated) ** 2)))
+            for simulated in (compared.before, compared.after)
+        ),
+    )
+    return tuple(f'{figure:.0f}' if figure >= 100.0 else f'{figure:.2g}' for figure in figures)
+
+
+def _number(value: float | None, form: str) -> str:
+    return '-' if value is None else format(value, form)

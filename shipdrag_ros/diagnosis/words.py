@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A diagnosis in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, Named, Verdict
+from shipdrag_ros.display import plus_minus
+from shipdrag_ros.ship import CoefficientBaseline, Ship, Uncertain
+from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.simulation.effects import LIBRARY
+
+_CHANNELS = {
+    'log': 'in the speed log',
+    'radar': 'in radar or GNSS',
+    'log_radar': 'between log and radar, which of them cannot be told',
+    'force': 'in the force on the ship',
+}
+NOTHING_BETWEEN = 'nothing between log and track'
+NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
+_LEAST = 0.001  # probability that is told
+_WORTH_A_WORD = 0.01
+
+
+def sentence(found: Diagnosis) -> str:
+    """
+    Return the verdict in a sentence.
+    """
+    match found.verdict:
+        case Verdict.NONE if found.nothing >= 0.5 and found.baseline == 'none':
+            return (
+                'Log and track agree: nothing is wrong between them that this record could show '
+                f'(probability {probability(found.nothing)}).'
+            )
+        case Verdict.NONE if found.nothing >= 0.5:
+            return (
+                'Model and data agree: nothing is missing that these runs could show '
+                f'(probability {probability(found.nothing)}).'
+            )
+        case Verdict.NONE:
+            other, share = max(
+                (
+                    (each.words, each.probability)
+                    for each in answers(found)
+                    if each.words not in (NOTHING, NOTHING_BETWEEN)
+                ),
+                key=lambda answer: answer[1],
+            )
+            return (
+                f'No effect can be named: {other} is the likeliest ({probability(share)}), but a '
+                'baseline that is further off than stated would explain these runs as well '
+                f'({probability(found.nothing)}).'
+            )
+        case Verdict.NAMED:
+            sizes = ' and '.join(_sized(effect) for effect in found.effects)
+            return (
+                f'Missing in the model: {sizes}; probability '
+                f'{probability(found.effects[0].probability)}.'
+            )
+        case Verdict.ONE_OF:
+            unnamed = f', or {UNNAMED} ({probability(found.unnamed)})'
+            return (
+                f'Missing is one of these: {_listed(found.candidates)}'
+                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot tell '
+                'them apart.'
+            )
+        case Verdict.UNKNOWN:
+            first = found.candidates[0]
+            why = ''
+            if first.names and found.unnamed < first.probability:
+                why = f' The likeliest of them, {names_text(first.names)}, leaves more than noise.'
+            return f'Something is missing that is none of the known effects, {place(found)}.{why}'
+
+
+def examined(found: Diagnosis) -> str:
+    """
+    Say what was examined, and what was not.
+    """
+    parts = {FORCE: 'the force on the ship', LOG_TRACK: 'the log against the way over ground'}
+    seen = [words for part, words in parts.items() if part in found.examined]
+    unseen = [words for part, words in parts.items() if part not in found.examined]
+    said = f'Examined: {" and ".join(seen)}'
+    return f'{said}; not examined: {" and ".join(unseen)}.' if unseen else f'{said}.'
+
+
+def advice(found: Diagnosis) -> list[str]:
+    """
+    Return what would decide, a line each.
+    """
+    return [
+        each.measure
+        if each.probability is None
+        else f'{each.measure}; decides with probability {probability(each.probability)}'
+        for each in found.would_decide
+    ]
+
+
+def place(found: Diagnosis) -> str:
+    """
+    Say where model and data disagree.
+    """
+    if found.where is None:
+        return 'nowhere'
+    where = found.where
+    first, last = where.time_s
+    since = 'of the record' if found.baseline == 'none' else 'after the stop'
+    if last <= 0.0:
+        first, last, since = -first, -last, 'before the stop'
+    return (
+        f'{_CHANNELS[where.channel]}, {first:.0f} to {last:.0f} s {since}, '
+        f'at {where.speed_m_s[0]:.1f} to {where.speed_m_s[1]:.1f} m/s'
+    )
+
+
+def model(found: Diagnosis) -> str:
+    """
+    Say what the runs were held against.
+    """
+    match found.baseline:
+        case 'none':
+            return 'log as it is'
+        case 'fitted_here':
+            return 'a form fitted to these runs'
+        case _:
+            return 'model as stated'
+
+
+def added(found: Diagnosis) -> str:
+    """
+    Say what the model after has that the one before has not.
+    """
+    match found.verdict:
+        case Verdict.NONE:
+            return 'with the baseline moved to fit'
+        case Verdict.UNKNOWN:
+            return 'with an unknown, smooth disturbance'
+        case _ if not found.best:
+            return 'with a constant part besides'
+        case _:
+            return f'with {names_text([effect.name for effect in found.best])}'
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A possible answer, and how probable it is."""
+
+    words: str
+    probability: float
+
+
+def answers(found: Diagnosis) -> tuple[Answer, ...]:
+    """
+    Return the candidates, then nothing and something unnamed, and what is left.
+    """
+    nothing = NOTHING if found.baseline != 'none' else NOTHING_BETWEEN
+    told = [
+        Answer(names_text(each.names) if each.names else nothing, each.probability)
+        for each in found.candidates
+    ]
+    if all(each.names for each in found.candidates):
+        told.append(Answer(nothing, found.nothing))
+    told.append(Answer(UNNAMED, found.unnamed))
+    others = 1.0 - sum(each.probability for each in told)
+    return (*told, Answer(OTHERS, others)) if others >= _LEAST else tuple(told)
+
+
+def names_text(names: Sequence[str]) -> str:
+    """
+    Name effects; none: nothing is missing.
+    """
+    return ' + '.join(name.replace('_', ' ') for name in names) or NOTHING
+
+
+def probability(value: float) -> str:
+    """
+    Return a probability; what is all but certain is not said to be certain.
+    """
+    if value > 1.0 - _LEAST:
+        return f'> {100.0 - 100.0 * _LEAST:g} %'
+    return f'{100.0 * value:.1f} %' if value >= _LEAST else f'< {100.0 * _LEAST:g} %'
+
+
+def baseline(found: Diagnosis, ship: Ship | None) -> str:
+    """
+    Say where the baseline comes from, and how well it is stated to be known.
+    """
+    if found.baseline == 'none':
+        return 'no baseline was needed: log and way over ground are held against each other'
+    given = None if ship is None else ship.baseline
+    if found.baseline == 'fitted_here' or given is None:
+        return 'none is stated: a form of the resistance was fitted to these runs'
+    if isinstance(given, CoefficientBaseline):
+        sd = given.relative_sd
+        known = f'friction ± {200.0 * sd.friction:g} %, wave ± {200.0 * sd.wave:g} %'
+    else:
+        known = f'± {200.0 * given.relative_sd:g} %'
+    return f'{given.source or "of unstated source"}; {known} (two standard deviations, as stated)'
+
+
+def size(quantity: Quantity, found: Uncertain) -> str:
+    """
+    Return a value with two standard deviations; what was a choice has none.
+    """
+    for word, value in quantity.words.items():
+        if value == found.value:
+            return word
+    if found.sd == 0.0:
+        return f'{found.value:g} {quantity.unit}'.rstrip()
+    text = plus_minus(found.value, 2.0 * found.sd)
+    return f'({text}) {quantity.unit}' if quantity.unit else text
+
+
+def quantity_text(quantity: Quantity) -> str:
+    """
+    Name a parameter without its unit.
+    """
+    suffix = quantity.unit.lower().replace('/', '_').replace('^', '')
+    name = quantity.name.removesuffix(f'_{suffix}') if suffix else quantity.name
+    return name.replace('_', ' ')
+
+
+def _sized(effect: Named) -> str:
+    """Return an effect with its sizes."""
+    sizes = ', '.join(
+        f'{quantity_text(quantity)} {size(quantity, effect.parameters[quantity.name])}'
+        for quantity in LIBRARY[effect.name].parameters
+    )
+    return f'{names_text([effect.name])} ({sizes})'
+
+
+def _listed(candidates: Sequence[Candidate]) -> str:
+    return ', '.join(
+        f'{names_text(each.names)} ({probability(each.probability)})' for each in candidates
+    )

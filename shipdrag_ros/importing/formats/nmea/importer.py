@@ -1,0 +1,236 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A log of NMEA 0183 as a bag.
+
+What a sentence does not hold is counted by reason with its first lines; what
+it holds is written, plausible or not, for the monitor to judge. The log itself
+is attached, if it is not too long, so that nothing is lost.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from datetime import date
+from pathlib import Path
+
+import yaml
+from pynmeagps.nmeatypes_core import NMEA_TALKERS
+
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing.bag import ATTACHMENT, BATCH_SAMPLES, Rejected, new_bag
+from shipdrag_ros.importing.formats.nmea.clock import Clock
+from shipdrag_ros.importing.formats.nmea.log import Checksum, NmeaLog
+from shipdrag_ros.importing.formats.nmea.record import Record
+from shipdrag_ros.importing.formats.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
+from shipdrag_ros.importing.formats.nmea.survey import Survey
+from shipdrag_ros.samples import INPUTS, Channel
+
+LOG_ATTACHMENT = 'log.nmea'
+LOG_LIMIT_BYTES = 16 << 20
+"""A longer log is not attached."""
+
+
+@dataclass(frozen=True)
+class NmeaResult:
+    """
+    What became of a log.
+
+    Attributes
+    ----------
+    lines, sentences
+        Lines in the log, and sentences in them whose checksum is right.
+    written
+        Samples by input.
+    sources
+        Talker and sentence that each input is taken from; several of several shafts.
+    not_taken
+        By input, values of the sentences that it is not taken from.
+    not_used
+        Sentences that tell no input and no time, by address.
+    unknown_talkers
+        Sentences by talker, where NMEA 0183 knows none of the name.
+    rejected
+        By input, 'time' or 'line', and reason.
+    start_ns, end_ns
+        First and last time written [ns].
+    backward, repeated
+        Samples whose time is before that, or is that, of an earlier one of
+        the same input; a replay rejects them and says so.
+    dates_put_right
+        Times whose date was a day off at midnight.
+    magnetic_heading
+        Whether the heading is magnetic, for want of a variation.
+    shift_days
+        Added to every date of the log, whole cycles of the GPS week.
+    log_attached
+        Whether the log is attached to the bag.
+    damage
+        Why the log could not be read to its end; empty if it could.
+    """
+
+    lines: int
+    sentences: int
+    written: dict[str, int]
+    sources: dict[str, str]
+    not_taken: dict[str, dict[str, int]]
+    not_used: dict[str, int]
+    unknown_talkers: dict[str, int]
+    rejected: dict[str, dict[str, Rejected]]
+    start_ns: int
+    end_ns: int
+    backward: int
+    repeated: int
+    dates_put_right: int
+    magnetic_heading: bool
+    shift_days: int
+    log_attached: bool
+    damage: str
+
+
+def import_nmea(
+    source: Path,
+    out: Path,
+    *,
+    day: date | None = None,
+    transducer_m: float | None = None,
+    checksum: Checksum = Checksum.REQUIRED,
+    attachments: Mapping[str, str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> NmeaResult:
+    """
+    Write the measurements of a log as a bag.
+
+    Parameters
+    ----------
+    source
+        Log, see `NmeaLog`.
+    out
+        MCAP file to make.
+    day
+        Date (UTC) of the first time in the log; needed if the log has none. Of a
+        log whose dates are a whole number of GPS week cycles (1024 weeks)
+        away from it, the dates are shifted.
+    transducer_m
+        Depth of the echo sounder below the surface [m], for sentences that
+        do not tell it.
+    checksum
+        Whether sentences without one are taken.
+    attachments
+        Text by name, a ship file for instance.
+    progress
+        Told how much is read, and of how much.
+
+    Raises
+    ------
+    ImportDataError
+        If the log cannot be read, or nothing in it has a value and a time.
+    BagError
+        If the bag cannot be made.
+
+    Notes
+    -----
+    The log is read twice: first to see who tells what. Each input is taken
+    from one talker and sentence, the first in `READERS` of those that have at
+    least half as many values as the most frequent; two instruments of
+    different place or scale are never mixed.
+    """
+    log = NmeaLog(source, checksum=checksum)
+    mounting = Mounting(transducer_m)
+    survey = Survey(mounting)
+    for sentence in log.sentences(_part(progress, 0)):
+        survey.take(sentence)
+    clock = survey.clock(log, day)
+    record = Record(survey.chosen(), clock, mounting)
+    with new_bag(out, attachments) as bag:
+        text_of_log = log.text(LOG_LIMIT_BYTES)
+        if text_of_log is not None:
+            bag.attach(LOG_ATTACHMENT, text_of_log)
+        for sentence in log.sentences(_part(progress, 1)):
+            record.take(sentence)
+            if len(record) >= BATCH_SAMPLES:
+                bag.write_samples(record.pop())
+        record.finish()
+        bag.write_samples(record.pop())
+        result = _result(log, survey, record, clock, attached=text_of_log is not None)
+        about = {'source': source.name, 'date': day, 'transducer_m': transducer_m}
+        about |= {'checksum': checksum.value, **asdict(result)}
+        bag.attach(ATTACHMENT, yaml.safe_dump(about, sort_keys=False, allow_unicode=True))
+    return result
+
+
+def _part(
+    progress: Callable[[int, int], None] | None, part: int
+) -> Callable[[int, int], None] | None:
+    """Return the progress of one of two readings."""
+    if progress is None:
+        return None
+    return lambda done, total: progress(part * total + done, 2 * total)
+
+
+def _result(
+    log: NmeaLog, survey: Survey, record: Record, clock: Clock, *, attached: bool
+) -> NmeaResult:
+    """Sum up; ImportDataError if there is nothing."""
+    rejected = {
+        name: record.rejected[name] for name in (*INPUTS, 'time') if name in record.rejected
+    }
+    if log.rejected:
+        rejected['line'] = log.rejected
+    if record.start_ns is None:
+        reasons = [
+            f'{name}: {reason} {each.count} times, {each.first[0]}'
+            for name, by_reason in rejected.items()
+            for reason, each in by_reason.items()
+        ]
+        raise ImportDataError(
+            f'{str(log.path)!r} gave no sample from {record.sentences} sentence(s); '
+            f'{"; ".join(reasons) or "give a log with any of " + ", ".join(READERS)}'
+        )
+    not_used: Counter[str] = Counter()
+    unknown: Counter[str] = Counter()
+    for (talker, kind), count in survey.addresses.items():
+        if kind not in READERS and kind not in TIMED:
+            not_used[talker + kind] += count
+        if kind and talker not in NMEA_TALKERS:
+            unknown[talker] += count
+    heading = record.chosen.get(Channel.HEADING)
+    return NmeaResult(
+        lines=log.lines,
+        sentences=record.sentences,
+        written={name: record.written[name] for name in INPUTS if record.written[name]},
+        sources=_sources(record),
+        not_taken=_not_taken(survey, record),
+        not_used=dict(not_used.most_common()),
+        unknown_talkers=dict(unknown),
+        rejected=rejected,
+        start_ns=record.start_ns,
+        end_ns=record.newest_ns,
+        backward=record.backward,
+        repeated=record.repeated,
+        dates_put_right=clock.dates_put_right,
+        magnetic_heading=heading is not None and heading.detail == MAGNETIC,
+        shift_days=clock.shift_days,
+        log_attached=attached,
+        damage=log.damage,
+    )
+
+
+def _sources(record: Record) -> dict[str, str]:
+    """Say what each input is taken from; of several shafts and pitches, each once."""
+    told: dict[str, dict[str, None]] = {}
+    for channel, source in sorted(record.chosen.items()):
+        told.setdefault(channel.input, {})[str(source)] = None
+    return {name: ', '.join(sources) for name, sources in told.items()}
+
+
+def _not_taken(survey: Survey, record: Record) -> dict[str, dict[str, int]]:
+    """Count by input the values of the sources that nothing is taken from."""
+    counts: dict[str, dict[str, int]] = {}
+    for channel, of_channel in sorted(survey.values.items()):
+        for source, count in of_channel.items():
+            if source != record.chosen[channel]:
+                others = counts.setdefault(channel.input, {})
+                others[str(source)] = others.get(str(source), 0) + count
+    return counts

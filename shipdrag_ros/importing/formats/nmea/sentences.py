@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the sentences of NMEA 0183 measure, in the units of `Channel`.
+
+One row a value that a sentence may hold. Several sentences may tell the same
+input; the one that comes first here is the better.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import cos, hypot, pi, radians, remainder, sin
+from typing import NamedTuple
+
+from pynmeagps.nmeatypes_get import NMEA_PAYLOADS_GET
+
+from shipdrag_ros.importing.table import NUMBER
+from shipdrag_ros.samples import PITCHES, SHAFTS, Channel
+
+KNOT_M_S = 1852.0 / 3600.0
+_FOOT_M = 0.3048
+_FATHOM_M = 6.0 * _FOOT_M
+_WIND_UNITS = {'N': KNOT_M_S, 'K': 1.0 / 3.6, 'M': 1.0, 'S': 0.44704}
+_LATITUDE = re.compile(r'(\d{2})(\d{2}(?:\.\d+)?)')
+_LONGITUDE = re.compile(r'(\d{3})(\d{2}(?:\.\d+)?)')
+_NO_MEASUREMENT = {'N': 'no fix', 'E': 'dead reckoning', 'M': 'manual', 'S': 'simulated'}
+_NO_FIX = {'0': 'no fix', '6': 'dead reckoning', '7': 'manual', '8': 'simulated'}
+MAGNETIC = 'magnetic'
+
+
+class NoValue(Exception):
+    """A value that a sentence does not hold; the reason, and the text found instead."""
+
+    def __init__(self, reason: str, text: str = '') -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.text = text
+
+
+class Measured(NamedTuple):
+    """
+    A value of a sentence.
+
+    Attributes
+    ----------
+    a, b
+        Columns of the value, see `Channel`.
+    detail
+        What tells it from others of the same sentence: the shaft, the rudder, a
+        heading that is magnetic.
+    channel
+        What it is, where the sentence tells: which shaft.
+    """
+
+    a: float
+    b: float = 0.0
+    detail: str = ''
+    channel: Channel | None = None
+
+
+@dataclass(frozen=True)
+class Fields:
+    """The fields of a sentence by pynmeagps' names; one that is not there is empty."""
+
+    kind: str
+    texts: Sequence[str]
+
+    def __getitem__(self, name: str) -> str:
+        place = _PLACES[self.kind][name]
+        return self.texts[place].strip() if place < len(self.texts) else ''
+
+    def number(self, name: str) -> float:
+        """
+        Return a number; NoValue if there is none.
+        """
+        text = self[name]
+        if not text:
+            raise NoValue('empty')
+        if not NUMBER.fullmatch(text):
+            raise NoValue('not a number', text)
+        return float(text)
+
+    def first(self, *choices: tuple[str, float]) -> float:
+        """
+        Return the first of several fields that is not empty, times its factor.
+        """
+        for name, factor in choices:
+            if self[name]:
+                return self.number(name) * factor
+        raise NoValue('empty')
+
+    def check(self, name: str, *, allowed: str) -> None:
+        """
+        Refuse a status that is not allowed; NMEA 0183 before 2.3 has some empty.
+        """
+        if self[name] and self[name] not in allowed:
+            status = self[name] if len(self[name]) == 1 else 'not known'
+            raise NoValue(f'status {status}', self[name])
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """
+    What a log does not say about the ship.
+
+    Attributes
+    ----------
+    transducer_m
+        Depth of the echo sounder below the surface [m]; None if unknown.
+    """
+
+    transducer_m: float | None = None
+
+
+# None: the sentence need not hold it, and does not
+Reader = Callable[[Fields, Mounting], Measured | None]
+
+
+def _water_vhw(fields: Fields, mounting: Mounting) -> Measured:
+    return Measured(fields.first(('spdN', KNOT_M_S), ('spdK', 1.0 / 3.6)))
+
+
+def _water_vbw(fields: Fields, mounting: Mounting) -> Measured:
+    fields.check('waterspdstatus', allowed='A')
+    return Measured(fields.number('longwaterspd') * KNOT_M_S)
+
+
+def _ground_vbw(fields: Fields, mounting: Mounting) -> Measured:
+    fields.check('groundspdstatus', allowed='A')
+    return Measured(
+        hypot(fields.number('longgroundspd'), fields.number('transgroundspd')) * KNOT_M_S
+    )
+
+
+def _ground_vtg(fields: Fields, mounting: Mounting) -> Measured:
+    _check_mode(fields)
+    return Measured(fields.first(('sogn', KNOT_M_S), ('sogk', 1.0 / 3.6)))
+
+
+def _ground_rmc(fields: Fields, mounting: Mounting) -> Measured:
+    _check_fix(fields)
+    return Measured(fields.number('spd') * KNOT_M_S)
+
+
+def _position(fields: Fields, mounting: Mounting) -> Measured:
+    _check_fix(fields)
+    return Measured(
+        _angle(fields, 'lat', _LATITUDE, 'NS', ('N', 'S'), 90.0),
+        _angle(fields, 'lon', _LONGITUDE, 'EW', ('E', 'W'), 180.0),
+    )
+
+
+def _angle(
+    fields: Fields,
+    name: str,
+    form: re.Pattern[str],
+    side: str,
+    sides: tuple[str, str],
+    largest_deg: float,
+) -> float:
+    """Return degrees from degrees and minutes and a side, the first positive."""
+    text = fields[name]
+    if not text or not fields[side]:
+        raise NoValue('empty')
+    found = form.fullmatch(text)
+    if found is None or fields[side] not in sides:
+        raise NoValue('no latitude and longitude', f'{text},{fields[side]}')
+    minutes = float(found[2])
+    angle_deg = int(found[1]) + minutes / 60.0
+    if minutes >= 60.0 or angle_deg > largest_deg:
+        raise NoValue('no latitude and longitude', text)
+    return angle_deg if fields[side] == sides[0] else -angle_deg
+
+
+def _yaw_hdt(fields: Fields, mounting: Mounting) -> Measured:
+    return Measured(_yaw(fields.number('headingT')))
+
+
+def _yaw_hdg(fields: Fields, mounting: Mounting) -> Measured:
+    """Apply what deviation and variation the sensor states; none is no zero variation."""
+    heading_deg = fields.number('headingM')
+    if fields['deviation']:
+        heading_deg += _easterly(fields, 'deviation', 'deviationEW')
+    if not fields['variation']:
+        return Measured(_yaw(heading_deg), detail=MAGNETIC)
+    return Measured(_yaw(heading_deg + _easterly(fields, 'variation', 'variationEW')))
+
+
+def _easterly(fields: Fields, name: str, side: str) -> float:
+    if fields[side] not in ('E', 'W'):
+        raise NoValue(f'{name} neither E nor W', fields[side])
+    return fields.number(name) if fields[side] == 'E' else -fields.number(name)
+
+
+def _yaw(compass_deg: float) -> float:
+    """Return REP-103 yaw [rad] in (-pi, pi] of a compass angle."""
+    return remainder(radians(90.0 - compass_deg), 2.0 * pi)
+
+
+def _shaft(fields: Fields, mounting: Mounting) -> Measured:
+    place, detail = _shaft_place(fields)
+    return Measured(fields.number('rpm') * pi / 30.0, detail=detail, channel=SHAFTS[place])
+
+
+def _pitch(fields: Fields, mounting: Mounting) -> Measured | None:
+    """Return the ratio to the greatest pitch; a fixed propeller has none to tell."""
+    if not fields['pitch'] or fields['source'] != 'S':
+        return None
+    place, detail = _shaft_place(fields)
+    return Measured(fields.number('pitch') * 0.01, detail=detail, channel=PITCHES[place])
+
+
+def _shaft_place(fields: Fields) -> tuple[int, str]:
+    """
+    Return place of a shaft, from 0, and its name.
+
+    NMEA 0183 numbers from the centre line, odd to starboard and even to port, 0 on
+    the line; the place of 1 to 4 is the number and that of 0 the fourth, as in the
+    names of joints, so that no two of four shafts meet.
+    """
+    fields.check('status', allowed='A')
+    if fields['source'] != 'S':
+        raise NoValue('not of a shaft', fields['source'])
+    number = fields['engineshaftnum'] or '0'
+    if not number.isdecimal() or int(number) > len(SHAFTS):
+        raise NoValue('no number of a shaft from 0 to 4', number)
+    return (int(number) - 1) % len(SHAFTS), f'shaft {number}'
+
+
+def _wind(fields: Fields, mounting: Mounting) -> Measured:
+    fields.check('status', allowed='A')
+    if fields['reference'] == 'T':
+        raise NoValue('true wind, computed and not measured', 'T')
+    if fields['reference'] != 'R':
+        raise NoValue('neither R nor T', fields['reference'])
+    unit = _WIND_UNITS.get(fields['speedu'])
+    if unit is None:
+        raise NoValue('no unit', fields['speedu'])
+    # where it comes from, clockwise from ahead; its velocity points the other way
+    angle, speed = radians(fields.number('angle')), fields.number('speed') * unit
+    return Measured(-speed * cos(angle), speed * sin(angle))
+
+
+def _depth_dpt(fields: Fields, mounting: Mounting) -> Measured:
+    depth_m = fields.number('depth')
+    # negative: to the keel, whose depth is not told
+    if fields['offset'] and (offset_m := fields.number('offset')) >= 0.0:
+        return Measured(depth_m + offset_m)
+    return Measured(depth_m + _transducer(mounting))
+
+
+def _depth_dbt(fields: Fields, mounting: Mounting) -> Measured:
+    depth_m = fields.first(('depthm', 1.0), ('depthf', _FOOT_M), ('depthfath', _FATHOM_M))
+    return Measured(depth_m + _transducer(mounting))
+
+
+def _transducer(mounting: Mounting) -> float:
+    if mounting.transducer_m is None:
+        raise NoValue('depth of the transducer not told')
+    return mounting.transducer_m
+
+
+def _rudder(fields: Fields, mounting: Mounting) -> Measured:
+    """Return the starboard or single rudder, or the port one; as sent, + turns to starboard."""
+    for side, detail in (('stbd', ''), ('port', 'port')):
+        if fields[f'{side}angle']:
+            fields.check(f'{side}status', allowed='A')
+            return Measured(radians(fields.number(f'{side}angle')), detail=detail)
+    raise NoValue('empty')
+
+
+def has_fix(fields: Fields) -> bool:
+    """
+    Say whether the source itself calls its fix valid.
+    """
+    try:
+        _check_fix(fields)
+    except NoValue:
+        return False
+    return True
+
+
+def _check_fix(fields: Fields) -> None:
+    if fields.kind == 'GGA':
+        quality = fields['quality']
+        if not quality:
+            raise NoValue('quality empty')
+        if quality in _NO_FIX:
+            raise NoValue(f'quality {quality}: {_NO_FIX[quality]}', quality)
+        return
+    if not fields['status']:
+        raise NoValue('status empty')
+    fields.check('status', allowed='AD')
+    _check_mode(fields)
+
+
+def _check_mode(fields: Fields) -> None:
+    mode = fields['posMode']
+    if mode in _NO_MEASUREMENT:
+        raise NoValue(f'mode {mode}: {_NO_MEASUREMENT[mode]}', mode)
+
+
+READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
+    'RMC': (
+        (Channel.POSITION_GEODETIC, _position),
+        (Channel.SPEED_OVER_GROUND, _ground_rmc),
+    ),
+    'GGA': ((Channel.POSITION_GEODETIC, _position),),
+    'GLL': ((Channel.POSITION_GEODETIC, _position),),
+    'VTG': ((Channel.SPEED_OVER_GROUND, _ground_vtg),),
+    'VBW': (
+        (Channel.SPEED_THROUGH_WATER, _water_vbw),
+        (Channel.SPEED_OVER_GROUND, _ground_vbw),
+    ),
+    'VHW': ((Channel.SPEED_THROUGH_WATER, _water_vhw),),
+    'HDT': ((Channel.HEADING, _yaw_hdt),),
+    'HDG': ((Channel.HEADING, _yaw_hdg),),
+    'RPM': ((Channel.SHAFT, _shaft), (Channel.PITCH, _pitch)),
+    'RSA': ((Channel.RUDDER, _rudder),),
+    'MWV': ((Channel.WIND_APPARENT, _wind),),
+    'DPT': ((Channel.DEPTH, _depth_dpt),),
+    'DBT': ((Channel.DEPTH, _depth_dbt),),
+}
+"""What each sentence measures; the better source of an input first."""
+
+TIMED = ('RMC', 'GGA', 'GLL', 'ZDA')
+"""Sentences that tell the time."""
+
+_PLACES = {
+    kind: {name: place for place, name in enumerate(NMEA_PAYLOADS_GET[kind])}
+    for kind in (*READERS, 'ZDA')
+}

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Who tells what in a log of NMEA 0183, before anything is taken from it.
+
+Several instruments, and several sentences of one, may tell the same input.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from datetime import date
+from typing import NamedTuple
+
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing.formats.nmea.clock import DAY_NS, Clock, Moment, days_of, rollover_days
+from shipdrag_ros.importing.formats.nmea.log import NmeaLog, Sentence
+from shipdrag_ros.importing.formats.nmea.sentences import (
+    READERS,
+    TIMED,
+    Fields,
+    Measured,
+    Mounting,
+    NoValue,
+)
+from shipdrag_ros.samples import Channel
+
+_RANK = {kind: place for place, kind in enumerate(READERS)}
+
+
+class Source(NamedTuple):
+    """Who tells an input; the better source is the smaller."""
+
+    rank: int
+    detail: str
+    talker: str
+    kind: str
+
+    def __str__(self) -> str:
+        return f'{self.talker}{self.kind} {self.detail}'.strip()
+
+
+def read_values(
+    sentence: Sentence, mounting: Mounting
+) -> list[tuple[Channel, Source | None, Measured | NoValue]]:
+    """
+    Return what a sentence measures, or why it does not.
+    """
+    found: list[tuple[Channel, Source | None, Measured | NoValue]] = []
+    fields = Fields(sentence.kind, sentence.fields)
+    for told, read in READERS.get(sentence.kind, ()):
+        channel = told
+        try:
+            value = read(fields, mounting)
+        except NoValue as reason:
+            found.append((channel, None, reason))
+        else:
+            if value is None:
+                continue
+            if value.channel is not None:
+                channel = value.channel
+            rank = _RANK[sentence.kind]
+            source = Source(rank, value.detail, sentence.talker, sentence.kind)
+            found.append((channel, source, value))
+    return found
+
+
+class Survey:
+    """
+    Sees who tells what, and on which day.
+
+    Attributes
+    ----------
+    addresses
+        Number of sentences by talker and kind.
+    values
+        Number of values by source, of each channel.
+    """
+
+    def __init__(self, mounting: Mounting) -> None:
+        self._mounting = mounting
+        self._received = False
+        self._timed = False
+        self._first: Moment | None = None
+        self.addresses: Counter[tuple[str, str]] = Counter()
+        self.values: dict[Channel, Counter[Source]] = {}
+
+    def take(self, sentence: Sentence) -> None:
+        """
+        Count one sentence.
+        """
+        self.addresses[sentence.talker, sentence.kind] += 1
+        self._received |= sentence.receive_ns is not None
+        if sentence.kind in TIMED:
+            self._time(Fields(sentence.kind, sentence.fields))
+        for channel, source, _ in read_values(sentence, self._mounting):
+            if source is not None:
+                self.values.setdefault(channel, Counter())[source] += 1
+
+    def _time(self, fields: Fields) -> None:
+        if self._first is not None:
+            return
+        try:
+            moment = Moment(fields)
+        except NoValue:
+            return
+        self._timed = True
+        if moment.trusted and moment.day is not None:
+            self._first = moment
+
+    def chosen(self) -> dict[Channel, Source]:
+        """
+        Return the one source of each input.
+
+        The first in the order of `Source` of those with at least half as many
+        values as the most frequent: two instruments of different place or
+        scale are never mixed.
+        """
+        return {
+            channel: min(source for source, n in counts.items() if 2 * n >= max(counts.values()))
+            for channel, counts in self.values.items()
+        }
+
+    def clock(self, log: NmeaLog, day: date | None) -> Clock:
+        """
+        Return the clock at the start of the log.
+
+        Parameters
+        ----------
+        log
+            Read to its end.
+        day
+            Date (UTC) of its first time, from outside.
+
+        Raises
+        ------
+        ImportDataError
+            If there is no sentence, or nothing tells time and date.
+        """
+        name = repr(str(log.path))
+        if not self.addresses:
+            reasons = ', '.join(
+                f'{reason} {rejected.count} times, {rejected.first[0]}'
+                for reason, rejected in log.rejected.items()
+            )
+            hint = '; for sentences without give --no-checksum' if _bare(log) else ''
+            raise ImportDataError(
+                f'{name} holds no sentence of NMEA 0183 in {log.lines} line(s): '
+                f'{reasons or "all are blank"}{hint}; for a table give --map and --time'
+            )
+        if self._first is not None and self._first.day is not None:
+            shift_days = 0
+            if day is not None:
+                shifted = rollover_days(self._first.day, day)
+                if shifted is None:
+                    own = date.fromordinal(date(1970, 1, 1).toordinal() + self._first.day)
+                    raise ImportDataError(
+                        f'--date {day}: {name} begins on {own}, which is no whole number of '
+                        '1024 weeks away; leave --date out'
+                    )
+                shift_days = shifted
+            near_ns = (self._first.day + shift_days) * DAY_NS + self._first.of_day_ns
+            return Clock(near_ns, shift_days=shift_days)
+        if day is not None:
+            return Clock(days_of(day) * DAY_NS + DAY_NS // 2 - 1)  # noon: of the whole day
+        if self._received:
+            return Clock(None)
+        if self._timed:
+            raise ImportDataError(
+                f'{name} tells times of day, but no date (no RMC or ZDA with a fix and a date); '
+                'give --date YYYY-MM-DD of its first time, in UTC'
+            )
+        raise ImportDataError(
+            f'{name} tells no time: it has none of {", ".join(TIMED)} with a time, and no time '
+            'of receipt before its lines'
+        )
+
+
+def _bare(log: NmeaLog) -> bool:
+    return 'without checksum' in log.rejected

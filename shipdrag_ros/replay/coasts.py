@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The samples of coastdowns that a replay has found, with the steady record before each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shipdrag_ros.bags.run import ResetMark
+from shipdrag_ros.coastdown import Monitor, validate
+from shipdrag_ros.coastdown.driving import gone_s
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, Event
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay.playback import InputCounts, ReplayResult
+from shipdrag_ros.samples import MOTION_INPUTS, Block, Reason, concatenate
+from shipdrag_ros.ship import Ship
+
+_SECOND_NS = 1_000_000_000
+_SET_CLOCK_S = 10.0
+_CLOCKS_APART_S = 600.0  # what comes late, since the clocks differ, is to be diagnosed
+_MOST = 0.5  # of the messages of an input
+
+
+def clocks_apart(result: ReplayResult) -> tuple[str, ...]:
+    """
+    Return the inputs of motion whose clock is too slow or too fast.
+
+    Most of their messages are rejected as late, or as from the future.
+    """
+    return tuple(
+        name
+        for name in MOTION_INPUTS
+        if name in result.inputs and _most_are_off(result.inputs[name])
+    )
+
+
+def _most_are_off(counts: InputCounts) -> bool:
+    return counts.rejected.get('late', 0) + counts.rejected.get('future', 0) > (
+        _MOST * counts.messages
+    )
+
+
+def coast_windows(result: ReplayResult) -> list[tuple[Coastdown, Window]]:
+    """
+    Read the samples of each coastdown again.
+
+    Parameters
+    ----------
+    result
+        From `replay`.
+
+    Returns
+    -------
+    list of (coastdown, window)
+        In their order, without those withdrawn; the window holds what was
+        accepted, and the record before it.
+
+    Notes
+    -----
+    A sensor whose clock is slow is heard too. Where there are `clocks_apart`,
+    fast ones as well, coastdowns are looked for anew; those have no estimate.
+    """
+    coastdowns = result.coastdowns
+    apart = bool(clocks_apart(result))
+    if apart and not any(each.ended_by is EndedBy.GIVEN for each in coastdowns):
+        coastdowns = _look_anew(result) or coastdowns
+    return [
+        (coastdown, _window(result, coastdown, apart))
+        for coastdown in coastdowns
+        if not coastdown.withdrawn
+    ]
+
+
+def _look_anew(result: ReplayResult) -> tuple[Coastdown, ...]:
+    """Look for coastdowns in what all inputs say, whatever their clocks."""
+    parameters = replace(
+        result.parameters,
+        late_s=_CLOCKS_APART_S,
+        # by the clocks of the others, an input that is behind is silent
+        data_stop_s=max(result.parameters.data_stop_s, _CLOCKS_APART_S),
+    )
+    monitor = Monitor(result.ship, parameters, estimate=_refuse, final=_refuse)
+    events: list[Event] = []
+    for item in result.run.inputs():
+        if isinstance(item, ResetMark):
+            events += monitor.reset(item.receive_ns, item.reason)
+        else:
+            events += monitor.update(_arrived_later(item))
+    events += monitor.finish()
+    return tuple(event for event in events if isinstance(event, Coastdown) and not event.withdrawn)
+
+
+def _refuse(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    raise EstimationError('the clocks of the inputs are apart')
+
+
+def _arrived_later(block: Block) -> Block:
+    """Return samples for which a stamp of a fast clock is not from the future."""
+    return replace(block, receive_ns=block.receive_ns + round(_CLOCKS_APART_S * _SECOND_NS))
+
+
+def _window(result: ReplayResult, coastdown: Coastdown, apart: bool) -> Window:
+    parameters = replace(result.parameters, late_s=_CLOCKS_APART_S)
+    before_ns = round(parameters.steady_s * _SECOND_NS)
+    # the validation looks back; stamps may differ from times of arrival
+    margin_s = parameters.frozen_s + parameters.late_s + _SET_CLOCK_S
+    margin_ns = round(margin_s * _SECOND_NS)
+    start_ns, after_steady = _start(coastdown, result.ship)
+    first_ns = max(start_ns - before_ns - margin_ns, 0)
+    inputs = result.run.inputs(start_ns=first_ns, end_ns=coastdown.end_ns + margin_ns)
+    block = concatenate([item for item in inputs if isinstance(item, Block)])
+    reasons = validate(_arrived_later(block) if apart else block, parameters)
+    accepted = block[np.flatnonzero(reasons == Reason.ACCEPTED)]
+    return Window.from_block(
+        accepted,
+        start_ns,
+        coastdown.end_ns,
+        before_ns=start_ns - before_ns if after_steady else None,
+    )
+
+
+def _start(coastdown: Coastdown, ship: Ship) -> tuple[int, bool]:
+    """
+    Return the start of a coastdown, and whether what comes before it may be steady sailing.
+
+    The run-down of the thrust is cut from a window that was given, but it follows the stop:
+    with it, the record before is as good as before any other.
+    """
+    if not coastdown.cut_at_start:
+        return coastdown.start_ns, True
+    cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
+    first_ns = min(cut.start_ns for cut in cuts)
+    short = coastdown.start_ns - first_ns < round(gone_s(ship) * _SECOND_NS)
+    if short and all(cut.reason is Dismissal.THRUST for cut in cuts):
+        return first_ns, True
+    return coastdown.start_ns, False

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Why no coastdown was found in a run, as far as a replay and the speed itself tell."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.replay.playback import ReplayResult
+from shipdrag_ros.replay.sailing import accepted_samples
+from shipdrag_ros.samples import MOTION_INPUTS, Block, Channel, Float64
+
+_BIN_S = 10.0
+_GLIDE_S = 600.0  # within which a ship that glides has slowed
+_SLOWED = 0.1  # of the speed; what falls less is the sea
+_STILL_S = 300.0  # a reading that does not change for so long, to the last bit, ...
+_STILL_READINGS = 60  # ... so often, is none
+_TOLD = 3  # of the stretches that were dismissed
+_LEAD_WINDOWS = 2.0  # lengths of the slope test that a steady lead has at least
+
+
+class _Fall(NamedTuple):
+    """The largest loss of speed within `_GLIDE_S`."""
+
+    start_s: float
+    end_s: float
+    from_m_s: float
+    to_m_s: float
+
+    @property
+    def lost(self) -> float:
+        return 1.0 - self.to_m_s / self.from_m_s
+
+
+def why_no_coastdown(result: ReplayResult) -> str:
+    """
+    Say why a replay has found no coastdown, and what to do.
+
+    Parameters
+    ----------
+    result
+        From `replay`, without a coastdown.
+
+    Returns
+    -------
+    str
+        Part of a sentence.
+    """
+    still = _stood_still(result)
+    why = _why(result)
+    return f'{still}; {why}' if still else why
+
+
+def _why(result: ReplayResult) -> str:
+    """Say why by what was dismissed, or else by what the speed did."""
+    if result.not_coastdowns:
+        return _dismissed(result)
+    block, _ = accepted_samples(result.run)
+    if not len(block):
+        return f'no message of {", ".join(MOTION_INPUTS)} could be used'
+    name, fall = _largest_fall(block)
+    if not name:
+        return f'no message of {", ".join(MOTION_INPUTS)} could be used'
+    if fall is None:
+        return f'there is too little of {name} to know what steady sailing is'
+    if fall.lost < _SLOWED:
+        return (
+            f'by {name} nothing slowed: the speed never fell by more than {fall.lost:.0%} within '
+            f'{_GLIDE_S / 60.0:.0f} min'
+        )
+    fell = (
+        f'the speed by {name} fell most from {fall.from_m_s:.2f} to {fall.to_m_s:.2f} m/s, at '
+        f'{fall.start_s:.0f} to {fall.end_s:.0f} s of the record'
+    )
+    least_s = _LEAD_WINDOWS * result.parameters.slope_window_s
+    if fall.start_s < least_s:
+        return (
+            f'{fell}, with only {fall.start_s:.0f} s before it where at least {least_s:.0f} s of '
+            'steady sailing are needed; if the engine was stopped there, say so with --window '
+            'START END'
+        )
+    return (
+        f'{fell}, but not as after an engine stop from steady sailing (less power, a turn, '
+        'unsteady speed before); if it was one, say so with --window START END'
+    )
+
+
+def _stood_still(result: ReplayResult) -> str:
+    """Say that a speed sent one value for long, as no ship at sea does; '' where none did."""
+    said = []
+    blocks = [item for item in result.run.inputs() if isinstance(item, Block)]
+    for channel in (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND):
+        read = [block[block.channel == channel] for block in blocks]
+        stamp_ns = np.concatenate([block.stamp_ns for block in read]) if read else np.empty(0)
+        if not len(stamp_ns):
+            continue
+        value = np.concatenate([block.value[:, 0] for block in read])
+        edges = np.concatenate([[0], np.flatnonzero(np.diff(value)) + 1, [len(value)]])
+        for first, after in pairwise(edges.tolist()):
+            lasts_s = float(stamp_ns[after - 1] - stamp_ns[first]) * 1e-9
+            # a ship may well lie still
+            if value[first] and after - first >= _STILL_READINGS and lasts_s >= _STILL_S:
+                since_s = float(stamp_ns[first] - stamp_ns[0]) * 1e-9
+                said.append(
+                    f'{channel.input} stood still at {value[first]:.3g} m/s for '
+                    f'{lasts_s / 60.0:.0f} min, from {since_s:.0f} s of it on'
+                )
+    return '; '.join(said[:_TOLD])
+
+
+def _dismissed(result: ReplayResult) -> str:
+    """Say what was nearly a coastdown, and why it is none."""
+    first_ns = result.run.span_ns[0] if result.run.span_ns else 0
+    told = [
+        f'from {(one.start_ns - first_ns) * 1e-9:.0f} to {(one.end_ns - first_ns) * 1e-9:.0f} s '
+        f'it was none ({one.reason.value}): {one.text}'
+        for one in result.not_coastdowns[:_TOLD]
+    ]
+    more = len(result.not_coastdowns) - _TOLD
+    if more > 0:
+        told.append(f'and {more} more, which `shipdrag replay` lists')
+    return '; '.join(told)
+
+
+def _largest_fall(block: Block) -> tuple[str, _Fall | None]:
+    """Return by which input, and the largest fall of its speed; '' where there is no input."""
+    try:
+        window = Window.from_block(block, int(block.stamp_ns.min()), int(block.stamp_ns.max()))
+    except ValueError:  # a clock was set within the record
+        return 'a clock that was set', None
+    for name in MOTION_INPUTS:
+        series = getattr(window, name)
+        if not len(series):
+            continue
+        time_s = (series.time_ns - window.start_ns) * 1e-9
+        return name, _fall(*_binned(time_s, np.asarray(series.value, np.float64)))
+    return '', None
+
+
+def _binned(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
+    """Return times and speeds in bins, of speeds or of places; medians bear bad readings."""
+    number = (time_s // _BIN_S).astype(np.int64)
+    edges = np.flatnonzero(np.diff(number)) + 1
+    times = np.array([part.mean() for part in np.split(time_s, edges)])
+    medians = np.array([np.median(part, axis=0) for part in np.split(value, edges)])
+    if value.ndim == 1:
+        return times, np.abs(medians)
+    gone = np.hypot(*np.diff(medians, axis=0).T)
+    return 0.5 * (times[1:] + times[:-1]), gone / np.diff(times)
+
+
+def _fall(time_s: Float64, speed_m_s: Float64) -> _Fall | None:
+    """Return the largest fall, of medians over three bins; None where the bins are few."""
+    if len(speed_m_s) < 4:
+        return None
+    smooth = np.median(np.lib.stride_tricks.sliding_window_view(speed_m_s, 3), axis=1)
+    time_s = time_s[1:-1]
+    best: _Fall | None = None
+    for first, fast in enumerate(smooth):
+        last = first + int(np.searchsorted(time_s[first:], time_s[first] + _GLIDE_S, side='right'))
+        slow = first + int(np.argmin(smooth[first:last]))
+        if fast <= 0.0:
+            continue
+        found = _Fall(float(time_s[first]), float(time_s[slow]), float(fast), float(smooth[slow]))
+        if best is None or found.lost > best.lost:
+            best = found
+    return best

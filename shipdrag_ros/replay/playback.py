@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A run through the same monitor, estimator and encoder as on board.
+
+Also one window of it, given by hand, through the same estimator.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from shipdrag_ros.bags.run import Inputs, ResetMark, Run
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, Event, NotCoastdown, Update
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import DEFAULT_NODE, TOPICS, outputs
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay.comparison import Comparison, Recorded
+from shipdrag_ros.replay.given_window import estimate_window, read_window
+from shipdrag_ros.samples import Channel, Reason
+from shipdrag_ros.ship import Ship
+
+SHIP_FILE = 'ship.yaml'
+PARAMETERS_FILE = 'parameters.yaml'
+WRONG_TYPE = 'type'
+
+# done, of how many messages
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class InputCounts:
+    """
+    What became of one input.
+
+    Attributes
+    ----------
+    messages
+        Messages that came.
+    used, rejected
+        Readings that were used, and those that were not by reason. A message holds one
+        reading, but of shafts and pitches one a joint; one that cannot be read counts
+        as a reading rejected.
+    """
+
+    messages: int
+    used: int
+    rejected: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """
+    What a run gave.
+
+    Attributes
+    ----------
+    run
+        What was replayed.
+    ship, parameters
+        What was used.
+    coastdowns
+        In their order, without those that were withdrawn.
+    events
+        All events but the updates, which recorded outputs stand for.
+    inputs
+        Messages and readings counted, of inputs that have any.
+    recorded
+        Comparison with the outputs in the bag.
+    steady_lead_s
+        The longest that the ship was steady; None where no coastdown was looked for.
+    """
+
+    run: Run
+    ship: Ship
+    parameters: Parameters
+    coastdowns: tuple[Coastdown, ...]
+    events: tuple[Event, ...]
+    inputs: Mapping[str, InputCounts]
+    recorded: Recorded
+    steady_lead_s: float | None = None
+
+    @property
+    def not_coastdowns(self) -> tuple[NotCoastdown, ...]:
+        """
+        What was nearly a coastdown, and what was cut, in the order of their start.
+        """
+        found = [event for event in self.events if isinstance(event, NotCoastdown)]
+        needed_s = self.parameters.slope_window_s
+        if (
+            self.steady_lead_s is not None
+            and self.steady_lead_s < needed_s
+            and not self.coastdowns
+            and self.run.span_ns is not None
+        ):
+            slowest = float(self.ship.speed(self.parameters.froude_min))
+            text = (
+                f'the ship was never seen to sail ahead steadily, faster than {slowest:.2g} m/s, '
+                f'for longer than {self.steady_lead_s:.0f} s; an onset can be found after '
+                f'{needed_s:.0f} s of it'
+            )
+            found.append(NotCoastdown(*self.run.span_ns, Dismissal.LEAD_IN, text))
+        return tuple(sorted(found, key=lambda one: one.start_ns))
+
+
+def replay(
+    run: Run,
+    *,
+    ship: Ship | None = None,
+    parameters: Parameters | None = None,
+    window: tuple[float, float] | None = None,
+    progress: Progress | None = None,
+) -> ReplayResult:
+    """
+    Estimate from a run as the node would have.
+
+    Parameters
+    ----------
+    run
+        From `open_runs`.
+    ship, parameters
+        Instead of those attached to the bag; recorded outputs are compared
+        only if they are the same.
+    window
+        Begin and end [s from the start of the bag], instead of finding
+        coastdowns; outputs are then not compared.
+    progress
+        Told now and then how many messages are done, and of how many.
+
+    Raises
+    ------
+    BagError
+        If the bag has no input, no ship file where none is given, or the
+        window lies outside of it.
+    ShipFileError, ParameterError
+        If those attached to the bag cannot be used.
+    """
+    if not any(topic.input for topic in run.topics):
+        raise BagError(_no_input(run))
+    used_ship, used_parameters = _ship(run, ship), _parameters(run, parameters)
+    if window is not None:
+        return _in_window(run, used_ship, used_parameters, window)
+    return _as_on_board(run, used_ship, used_parameters, progress)
+
+
+def _no_input(run: Run) -> str:
+    if not run.topics:
+        why = '; '.join(run.warnings) or 'nothing was recorded'
+        return f'{run.name!r} holds no message: {why}; give another bag'
+    refused = [topic for topic in run.topics if topic.refused]
+    if refused:
+        found = ', '.join(f'{topic.topic} is {topic.type}' for topic in refused)
+        accepted = '; '.join(
+            f'{name}: {", ".join(types)}'
+            for name, types in TOPICS.items()
+            if any(topic.topic.rpartition('/')[2] == name for topic in refused)
+        )
+        return f'{run.name!r} holds no input in a type that is read: {found}; read are {accepted}'
+    found = ', '.join(f'{topic.topic} ({topic.type})' for topic in run.topics)
+    return (
+        f'{run.name!r} holds none of the inputs {", ".join(TOPICS)}; it has {found}: '
+        'name one with --remap FROM:=TO'
+    )
+
+
+def _as_on_board(
+    run: Run, ship: Ship, parameters: Parameters, progress: Progress | None
+) -> ReplayResult:
+    monitor = Monitor(ship, parameters)
+    own = _is_own(run, ship, parameters)
+    comparison = Comparison(run.outputs() if own else iter(()))
+    coastdowns: list[Coastdown] = []
+    kept: list[Event] = []
+
+    def take(events: list[Event]) -> None:
+        for event in events:
+            if not isinstance(event, Update):
+                kept.append(event)
+            if isinstance(event, Coastdown) and not event.withdrawn:
+                coastdowns.append(event)
+            if own:
+                for message in outputs(event, node=run.node or DEFAULT_NODE):
+                    comparison.add(message)
+
+    inputs = run.inputs()
+    total = sum(topic.messages for topic in run.topics if topic.input)
+    for item in inputs:
+        if isinstance(item, ResetMark):
+            take(monitor.reset(item.receive_ns, item.reason))
+        else:
+            take(monitor.update(item))
+        if progress is not None:
+            progress(inputs.messages.total(), total)
+    take(monitor.finish())
+    used = {name: health.used for name, health in monitor.health().items()}
+    rejected = {name: health.rejected for name, health in monitor.health().items()}
+    return ReplayResult(
+        run,
+        ship,
+        parameters,
+        tuple(coastdowns),
+        tuple(kept),
+        _counts(run, inputs, used, rejected),
+        comparison.finish(),
+        monitor.steady_lead_s,
+    )
+
+
+def _in_window(
+    run: Run, ship: Ship, parameters: Parameters, window: tuple[float, float]
+) -> ReplayResult:
+    samples = read_window(run, parameters, window)
+    coastdown = estimate_window(samples, ship, parameters)
+    used: Counter[str] = Counter()
+    rejected: dict[str, Counter[str]] = {}
+    for channel, code in zip(samples.block.channel, samples.reasons, strict=True):
+        name, reason = Channel(channel).input, Reason(code)
+        if reason is Reason.ACCEPTED:
+            used[name] += 1
+        else:
+            rejected.setdefault(name, Counter())[reason.name.lower()] += 1
+    return ReplayResult(
+        run,
+        ship,
+        parameters,
+        (coastdown,),
+        (coastdown, *coastdown.cuts),
+        _counts(run, samples.inputs, used, rejected),
+        Recorded(0, 0, None),
+    )
+
+
+def _counts(
+    run: Run,
+    inputs: Inputs,
+    used: Mapping[str, int],
+    rejected: Mapping[str, Mapping[str, int]],
+) -> dict[str, InputCounts]:
+    """Join what the decoder, the matching of types and the validation have counted."""
+    counts: dict[str, InputCounts] = {}
+    for name in TOPICS:
+        refused = run.refused[name]
+        reasons = dict(inputs.unreadable.get(name, {})) | dict(rejected.get(name, {}))
+        if refused:
+            reasons[WRONG_TYPE] = refused
+        messages = inputs.messages[name] + refused
+        if messages:
+            counts[name] = InputCounts(messages, used.get(name, 0), reasons)
+    return counts
+
+
+def _ship(run: Run, given: Ship | None) -> Ship:
+    if given is not None:
+        return given
+    if SHIP_FILE not in run.attachments:
+        raise BagError(f'{run.name!r} has no {SHIP_FILE} attached; give one with --ship FILE')
+    return Ship.from_yaml(run.attachments[SHIP_FILE], subject=f'{run.name}: {SHIP_FILE}')
+
+
+def _parameters(run: Run, given: Parameters | None) -> Parameters:
+    if given is not None:
+        return given
+    text = run.attachments.get(PARAMETERS_FILE, '')
+    return Parameters.from_yaml(text, subject=f'{run.name}: {PARAMETERS_FILE}')
+
+
+def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:
+    """Say whether these are what the bag was recorded with, as far as it says so."""
+    if run.node is None:
+        return False
+    own_ship = SHIP_FILE not in run.attachments or _ship(run, None).to_yaml() == ship.to_yaml()
+    return own_ship and (
+        PARAMETERS_FILE not in run.attachments or _parameters(run, None) == parameters
+    )

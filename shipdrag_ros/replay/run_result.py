@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one bag gave, as the page, the terminal and the JSON tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
+from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
+from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
+from shipdrag_ros.replay.warnings import run_warnings
+from shipdrag_ros.ship import Ship
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """
+    Everything one run gave.
+
+    Attributes
+    ----------
+    bag
+        Name of the bag, as the user gave it.
+    ship
+        The ship that was used.
+    coastdowns
+        In the order of their start.
+    inputs
+        Messages counted, by input.
+    recorded
+        Comparison with the outputs in the bag.
+    warnings
+        What is wrong with the run, a sentence each.
+    truth
+        The true curve, where the record is simulated.
+    span_ns
+        First and last time of arrival in the bag [ns]; None where it is empty.
+    not_coastdowns
+        What was nearly a coastdown, and what was cut, with why.
+    steady_lead_s
+        The longest that the ship was steady; None where no coastdown was looked for.
+    """
+
+    bag: str
+    ship: Ship
+    coastdowns: tuple[Coastdown, ...]
+    inputs: Mapping[str, InputCounts]
+    recorded: Recorded
+    warnings: tuple[str, ...] = ()
+    truth: TrueCurve | None = None
+    span_ns: tuple[int, int] | None = None
+    not_coastdowns: tuple[NotCoastdown, ...] = ()
+    steady_lead_s: float | None = None
+
+    @property
+    def dismissed(self) -> tuple[NotCoastdown, ...]:
+        """What is no coastdown, without what is told as cut off one."""
+        told = [cut for coastdown in self.coastdowns for cut in coastdown.cuts]
+        return tuple(one for one in self.not_coastdowns if one not in told)
+
+    @classmethod
+    def of(cls, result: ReplayResult) -> RunResult:
+        """
+        Take what a replay gave, and the truth if the bag holds it.
+
+        Raises
+        ------
+        BagError
+            If the truth in the bag cannot be read.
+        """
+        run = result.run
+        text = run.attachments.get(ATTACHMENT)
+        return cls(
+            bag=run.name,
+            ship=result.ship,
+            coastdowns=result.coastdowns,
+            inputs=result.inputs,
+            recorded=result.recorded,
+            warnings=run_warnings(result),
+            truth=None if text is None else TrueCurve.from_yaml(text, subject=run.name),
+            span_ns=run.span_ns,
+            not_coastdowns=result.not_coastdowns,
+            steady_lead_s=result.steady_lead_s,
+        )

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What all pictures share: colours, style, and how one becomes part of a page."""
+
+from __future__ import annotations
+
+import base64
+import io
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, told apart by colour-blind readers; line styles and
+# shades of grey differ as well, for print
+BLUE, VERMILION, GREEN, ORANGE, SKY, PURPLE = (
+    '#0072B2',
+    '#D55E00',
+    '#009E73',
+    '#E69F00',
+    '#56B4E9',
+    '#CC79A7',
+)
+STYLE: dict[Any, Any] = {
+    'font.family': 'DejaVu Sans',  # comes with matplotlib: the same picture everywhere
+    'font.size': 9,
+    'axes.grid': True,
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'grid.color': '#dddddd',
+    'grid.linewidth': 0.6,
+    'legend.frameon': False,
+    'legend.fontsize': 8,
+    'lines.linewidth': 1.4,
+    'svg.hashsalt': 'shipdrag',  # the same page from the same data
+}
+_PIXELS_PER_INCH = 200  # of what is drawn as pixels
+
+
+def data_uri(figure: Figure) -> str:
+    """
+    Return a figure as an SVG that a page can carry in itself.
+    """
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        # without a date the same data give the same bytes
+        figure.savefig(buffer, format='svg', dpi=_PIXELS_PER_INCH, metadata={'Date': None})
+    return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')
+
+
+def save(figure: Figure, path: Path, *, pixels_per_inch: int = _PIXELS_PER_INCH) -> None:
+    """
+    Write a figure to a file; its ending gives the format.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(path, dpi=pixels_per_inch)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Standard manoeuvres, and the figures by which they are judged.
+
+A turning circle is a zigzag whose order never changes sides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from math import inf, isinf, pi, radians
+
+import numpy as np
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.manoeuvring.motion import Motion
+
+_ANGLES_DEG = (1.0, 90.0)
+KINDS = ('zigzag', 'turn')
+
+
+class Side(StrEnum):
+    """Sides of a ship."""
+
+    STARBOARD = 'starboard'
+    PORT = 'port'
+
+    @property
+    def sign(self) -> float:
+        """Of headings and yaw rates to this side."""
+        return 1.0 if self is Side.STARBOARD else -1.0
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """
+    Rudder orders of a helmsman.
+
+    Attributes
+    ----------
+    rudder_rad
+        Size of each order.
+    reverse_rad
+        Heading at which the order changes sides; infinite: never.
+    first
+        Side of the first turn.
+    """
+
+    rudder_rad: float
+    reverse_rad: float = inf
+    first: Side = Side.STARBOARD
+
+    @property
+    def name(self) -> str:
+        """As `parse` reads it."""
+        kind = 'turn' if isinf(self.reverse_rad) else 'zigzag'
+        return f'{kind}:{np.degrees(self.rudder_rad):g}'
+
+
+def zigzag(angle_deg: float, *, first: Side = Side.STARBOARD) -> Manoeuvre:
+    """
+    Return a zigzag of equal rudder and heading angles.
+    """
+    return Manoeuvre(radians(angle_deg), radians(angle_deg), first)
+
+
+def turn(angle_deg: float, *, first: Side = Side.STARBOARD) -> Manoeuvre:
+    """
+    Return a turning circle.
+    """
+    return Manoeuvre(radians(angle_deg), first=first)
+
+
+def parse(text: str) -> Manoeuvre:
+    """
+    Read `zigzag:15` or `turn:35`, the angle in degrees; first to starboard.
+
+    Raises
+    ------
+    SimulationError
+        If it is neither, or the angle is impossible.
+    """
+    kind, separator, size = text.partition(':')
+    try:
+        angle = float(size)
+    except ValueError:
+        angle = np.nan
+    low, high = _ANGLES_DEG
+    # written so that NaN fails
+    if kind not in KINDS or not separator or not low <= angle <= high:
+        raise SimulationError(
+            f'manoeuvre {text!r}, expected zigzag:ANGLE or turn:ANGLE with {low:g}..{high:g} '
+            'degrees of rudder; write zigzag:15, for instance'
+        )
+    return zigzag(angle) if kind == 'zigzag' else turn(angle)
+
+
+def overshoots_rad(motion: Motion, manoeuvre: Manoeuvre) -> Float64:
+    """
+    Return by how much the heading exceeds that of the reversal, each time.
+
+    Returns
+    -------
+    (m,)
+        First to the side of the first turn, then by turns.
+    """
+    heading, rate = motion.heading_rad, motion.yaw_rate_rad_s
+    ends = np.flatnonzero((rate[1:-1] * rate[2:] < 0.0) | (rate[1:-1] == 0.0)) + 1
+    between = rate[ends] - rate[ends + 1]
+    step = np.diff(motion.time_s)[ends]
+    # the heading is a parabola between two samples
+    peak = heading[ends] + 0.5 * step * rate[ends] ** 2 / np.where(between == 0.0, 1.0, between)
+    over = np.abs(peak) - manoeuvre.reverse_rad
+    side = manoeuvre.first.sign
+    found = []
+    for sign, beyond in zip(np.sign(peak), over):
+        # wiggles on the way count neither as a turn nor twice
+        if sign == side and beyond >= 0.0:
+            found.append(beyond)
+            side = -side
+    return np.array(found)
+
+
+def advance_m(motion: Motion, manoeuvre: Manoeuvre) -> float:
+    """
+    Return the way ahead from the order to a change of heading by 90 degrees.
+
+    NaN where the ship does not turn as far.
+    """
+    return _at(motion, manoeuvre, 0.5 * pi, motion.position_m[:, 0])
+
+
+def tactical_diameter_m(motion: Motion, manoeuvre: Manoeuvre) -> float:
+    """
+    Return the way abeam from the order to a change of heading by 180 degrees.
+
+    NaN where the ship does not turn as far.
+    """
+    return _at(motion, manoeuvre, pi, manoeuvre.first.sign * motion.position_m[:, 1])
+
+
+def _at(motion: Motion, manoeuvre: Manoeuvre, heading_rad: float, value: Float64) -> float:
+    turned = manoeuvre.first.sign * motion.heading_rad
+    beyond = np.flatnonzero(turned >= heading_rad)
+    if not len(beyond):
+        return np.nan
+    i = int(beyond[0])
+    return float(np.interp(heading_rad, turned[i - 1 : i + 1], value[i - 1 : i + 1]))

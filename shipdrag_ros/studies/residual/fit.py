@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A regression of residual resistance on shape, and the guard over it.
+
+S4 shows that such regressions meet the hulls they were made from and mislead
+for all others. So what leaves here says where it may be used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros.errors import DataError
+from shipdrag_ros.regression import Domain, LinearFit, Prediction, least_squares
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.residual.expectations import EXPECTATIONS
+from shipdrag_ros.studies.residual.forms import FORMS, Form
+from shipdrag_ros.studies.residual.hulls import Hulls
+
+AUTO = 'auto'
+OPEN = 1e-6  # which part of a row the data may leave open: the digits of printed ratios
+FIRM = 2.0  # standard deviations by which a trend must be wrong
+_STEP = 1e-4  # of a ratio, for derivatives
+_ENOUGH = 3  # hulls left out that tell how far a new hull scatters
+
+
+@dataclass(frozen=True)
+class ResidualFit:
+    """
+    A form fitted to measured hulls.
+
+    Attributes
+    ----------
+    form
+        Which.
+    hulls
+        The data.
+    count
+        How many different hulls they are.
+    fit
+        Of the form's columns.
+    domain
+        Hull of the data in the form's ratios.
+    spread
+        By what factor hulls that were left out miss their standard deviation.
+    left_out
+        Mean square error on them; infinite where the others foretell none.
+    notes
+        What a reader must know, a sentence each.
+    """
+
+    form: Form
+    hulls: Hulls
+    count: int
+    fit: LinearFit
+    domain: Domain
+    spread: float
+    left_out: float
+    notes: tuple[str, ...]
+
+    @property
+    def coefficient_sd(self) -> Float64:
+        """(p,) Standard deviations of the coefficients; infinite where left open."""
+        is_open = self.fit.undetermined(np.eye(len(self.fit.coefficients))) > OPEN
+        known = np.sqrt(np.maximum(np.diag(self.fit.covariance), 0.0))
+        return np.where(is_open, np.inf, known)
+
+    @property
+    def criterion(self) -> float:
+        """F of S4 (3): mean square of what the fit leaves."""
+        return self.fit.sse / len(self.hulls)
+
+    def predict(self, hulls: Hulls) -> list[Prediction]:
+        """
+        Predict hulls; where that may not be used, with all reasons.
+
+        Notes
+        -----
+        A row is refused that the data leave open, that is outside their convex
+        hull, whose leverage is beyond that of all data, that is below 0, or where a
+        trend of `EXPECTATIONS` is wrong by more than `FIRM` standard deviations.
+        """
+        columns = self.form.columns(hulls)
+        value, leverage = self.fit.predict(columns), self.fit.leverage(columns)
+        is_open = self.fit.undetermined(columns) > OPEN
+        sd = self.spread * np.sqrt(self.fit.variance * (1.0 + leverage))
+        sd[is_open] = np.inf
+        reasons = self.domain.reasons(self.form.place(hulls))
+        most = float(self.fit.leverages.max())
+        for i, told in enumerate(reasons):
+            if is_open[i]:
+                told.append(
+                    f'the data determine {self.fit.rank} of {len(self.fit.coefficients)} '
+                    'combinations of coefficients, and this hull needs another'
+                )
+            elif leverage[i] > most * (1.0 + OPEN):
+                told.append(f'leverage {leverage[i]:.2g}, {most:.2g} at most among the data')
+            if value[i] < 0.0:
+                told.append('against physics: below 0')
+        for text, wrong in self._wrong_trends(hulls):
+            for i in np.flatnonzero(wrong).tolist():
+                reasons[i].append(f'against physics: resistance {text}, here it does not')
+        return [
+            Prediction(float(each), float(spread), tuple(told))
+            for each, spread, told in zip(value, sd, reasons)
+        ]
+
+    def _wrong_trends(self, hulls: Hulls) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        for expected in EXPECTATIONS:
+            up = self.form.columns(expected.move(hulls, 1.0 + _STEP))
+            down = self.form.columns(expected.move(hulls, 1.0 - _STEP))
+            along = (up - down) / (2.0 * _STEP)
+            slope = expected.sign * self.fit.predict(along)
+            sd = self.spread * np.sqrt(self.fit.variance * self.fit.leverage(along))
+            known = self.fit.undetermined(along) <= OPEN
+            is_wrong = (slope < -FIRM * sd) & known & (hulls.Fr <= expected.froude_max)
+            yield expected.text, is_wrong
+
+
+def fit_residual(hulls: Hulls, values: Float64, *, form: str) -> ResidualFit:
+    """
+    Fit a form, or the one that foretells hulls left out best.
+
+    Where no hull can be foretold from the others, the smaller residual
+    variance decides.
+
+    Parameters
+    ----------
+    hulls
+        Measured, n rows.
+    values : (n,)
+        Residual resistance, coefficient or per weight.
+    form
+        A name of `FORMS`, or `AUTO`.
+
+    Raises
+    ------
+    DataError
+        If rows are too few.
+
+    Notes
+    -----
+    S4 (1) to (3), least squares with scaled columns.
+    """
+    if form != AUTO:
+        return fit_form(FORMS[form], hulls, values)
+    fits = [
+        fit_form(each, hulls, values)
+        for each in FORMS.values()
+        if hulls.lcb is not None or not each.needs_lcb
+    ]
+    return min(fits, key=lambda found: (found.left_out, found.fit.variance))
+
+
+def leave_hulls_out(form: Form, hulls: Hulls, values: Float64) -> tuple[Float64, Float64, Float64]:
+    """
+    Predict each hull from all others.
+
+    Returns
+    -------
+    error : (n,)
+        Predicted less measured; NaN where the others leave a hull open.
+    sd : (n,)
+        Standard deviation as the fit to the others states it.
+    leverage : (n,)
+        Over the largest of the others.
+    """
+    groups = hulls.groups()
+    error, sd, leverage = (np.full(len(values), np.nan) for _ in range(3))
+    for number in range(groups.max() + 1):
+        out = groups == number
+        if out.all():
+            continue
+        fit = least_squares(form.columns(hulls.take(~out)), values[~out])
+        columns = form.columns(hulls.take(out))
+        known = fit.undetermined(columns) <= OPEN
+        size = fit.leverage(columns)
+        error[out] = np.where(known, fit.predict(columns) - values[out], np.nan)
+        sd[out] = np.sqrt(fit.variance * (1.0 + size))
+        leverage[out] = size / fit.leverages.max()
+    return error, sd, leverage
+
+
+def fit_form(form: Form, hulls: Hulls, values: Float64) -> ResidualFit:
+    """
+    Fit any form that is linear in its coefficients; see `fit_residual`.
+    """
+    fit = least_squares(form.columns(hulls), values)
+    if fit.freedom < 1:
+        raise DataError(
+            form.name,
+            [
+                f'{len(hulls)} row(s) determine {fit.rank} coefficients and leave no scatter; '
+                'give more hulls or Froude numbers'
+            ],
+        )
+    count = int(hulls.groups().max()) + 1
+    error, sd, _ = leave_hulls_out(form, hulls, values)
+    known = np.isfinite(error) & (sd > 0.0)
+    hulls_known = len(np.unique(hulls.groups()[known]))
+    spread, left_out = 1.0, float('inf')
+    notes = []
+    if fit.rank < len(fit.coefficients):
+        notes.append(
+            f'{count} hulls determine {fit.rank} of {len(fit.coefficients)} coefficients: '
+            'single ones mean nothing, and hulls that need the others are refused.'
+        )
+    if hulls_known >= _ENOUGH:
+        spread = max(1.0, float(np.sqrt(np.mean((error[known] / sd[known]) ** 2))))
+        left_out = float(np.mean(error[known] ** 2))
+    else:
+        notes.append(
+            'How far a new hull is off is not known: too few hulls can be foretold from the '
+            'others. The sd holds the scatter of these hulls alone.'
+        )
+    if hulls.Fr.max() > form.froude_max:
+        notes.append(
+            f'Fr goes up to {hulls.Fr.max():g}, the form was made for {form.froude_max:g} at most.'
+        )
+    if hulls.contradictions:
+        notes.append(
+            f'{hulls.contradictions} row(s) state C_B and slenderness that contradict each '
+            'other; both are used as they are.'
+        )
+    return ResidualFit(
+        form=form,
+        hulls=hulls,
+        count=count,
+        fit=fit,
+        domain=Domain.of(form.variables, form.place(hulls)),
+        spread=spread,
+        left_out=left_out,
+        notes=tuple(notes),
+    )

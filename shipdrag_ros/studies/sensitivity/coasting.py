@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which values of a ship file matter to a coastdown, and to its diagnosis.
+
+Motions are counted in standard deviations of the usual instruments, so that a
+value matters as far as a record can show that it is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Action
+from shipdrag_ros.studies.sensitivity.coast import (
+    LOG_SD_M_S,
+    POSITION_SD_M,
+    SLOWED,
+    Coast,
+    coast_from,
+    slowest_m_s,
+)
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Responses, Selection, vary
+from shipdrag_ros.studies.sensitivity.mimics import Mimic, mimics
+from shipdrag_ros.studies.sensitivity.particulars import Particular, particulars
+
+_CHECK_FRACTION = 0.85  # of the speed, in the check
+_SMALL, _FOUR = slice(0, 2), slice(0, 4)  # columns of CHANGES
+_SD = slice(4, 6)  # and the stated sd behind them
+
+
+@dataclass(frozen=True)
+class Importance:
+    """
+    What a wrong value does.
+
+    Attributes
+    ----------
+    particular
+    estimated, stated
+        Relative change of r(v), root mean square over the speeds of the coast,
+        by 10 per cent of the value: of the r that is estimated from a record,
+        and of the one that the ship file states.
+    tolerable
+        Relative error that moves the record as far as all stated uncertainties
+        together; NaN where none is stated, infinite where it does not move it.
+    """
+
+    particular: Particular
+    estimated: float
+    stated: float
+    tolerable: float
+
+
+@dataclass(frozen=True)
+class CoastCheck:
+    """
+    A coastdown with all dropped values 10 per cent wrong, so that they add up.
+
+    Attributes
+    ----------
+    coast
+        From another speed.
+    speed_m_s, position_m
+        Root mean square differences.
+    """
+
+    coast: Coast
+    speed_m_s: float
+    position_m: float
+
+
+@dataclass(frozen=True)
+class CoastStudy:
+    """
+    What matters to the coastdowns of a ship.
+
+    Attributes
+    ----------
+    ship
+    coast
+    losses
+        Of `CHANGES`, and of plus and minus one stated standard deviation; root
+        mean square, in standard deviations of the instruments.
+    selection
+        By the mean over `CHANGES`.
+    importance
+        One a value.
+    mimics
+        One an effect that the ship file lets act.
+    check
+    """
+
+    ship: Ship
+    coast: Coast
+    losses: Losses
+    selection: Selection
+    importance: tuple[Importance, ...]
+    mimics: tuple[Mimic, ...]
+    check: CoastCheck
+
+    @property
+    def mean(self) -> Float64:
+        """Mean loss of each value over `CHANGES`, by which it is kept."""
+        return Losses(self.losses.names, self.losses.table[:, _FOUR]).mean
+
+
+def study_coast(ship: Ship, coast: Coast, *, keep: int | None = None) -> CoastStudy:
+    """
+    Find which values of a ship file must be known well.
+
+    Parameters
+    ----------
+    ship
+    coast
+    keep
+        How many values; those of which an error of 10 per cent moves the
+        record beyond the noise of its instruments by default.
+
+    Raises
+    ------
+    SensitivityError
+        If there are not so many.
+    """
+    listed = particulars(ship, speed_m_s=coast.scenario.speed_m_s)
+    whole = _respond(ship, coast, listed)
+    coasting = replace(whole, differences=whole.differences[:, :, coast.after_stop])
+    losses = coasting.losses()
+    four = Losses(losses.names, losses.table[:, _FOUR])
+    if keep is None:
+        keep = max(1, int(np.sum(_mean(losses.table[:, _SMALL]) >= 1.0)))
+    selection = four.select(keep)
+    return CoastStudy(
+        ship,
+        coast,
+        losses,
+        selection,
+        _importance(ship, coast, listed, losses),
+        mimics(ship, coast, listed, whole.slopes() / CHANGES[0]),
+        _check(ship, coast, listed, coasting, selection),
+    )
+
+
+def _respond(ship: Ship, coast: Coast, listed: Sequence[Particular]) -> Responses:
+    def simulate(factors: Float64) -> Float64:
+        return np.stack([_reading(_changed(ship, listed, row), coast) for row in factors])
+
+    names = [one.key for one in listed]
+    steps = np.array([[*CHANGES, one.sd, -one.sd] for one in listed])
+    return vary(simulate, names, np.ones(len(names)), steps)
+
+
+def _changed(ship: Ship, listed: Sequence[Particular], factors: Float64) -> Ship:
+    for one, factor in zip(listed, factors):
+        if factor != 1.0:
+            ship = one.scaled(ship, float(factor))
+    return ship
+
+
+def _reading(ship: Ship, coast: Coast) -> Float64:
+    try:
+        reading: Float64 = coast.read(ship, [Action()])[0]
+    except ShipdragError:  # a value so far off that the baseline does not hold the speed
+        return np.full((len(coast.time_s), 3), np.nan)
+    return reading
+
+
+def _mean(table: Float64) -> Float64:
+    """Return the mean of each row over what is known; 0 where nothing is."""
+    known = np.isfinite(table)
+    return np.asarray(np.where(known, table, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1))
+
+
+def _importance(
+    ship: Ship, coast: Coast, listed: Sequence[Particular], losses: Losses
+) -> tuple[Importance, ...]:
+    top = coast.scenario.speed_m_s
+    speeds = np.linspace(SLOWED * top, top, 50)
+    speeds = speeds[speeds >= ship.baseline_range_m_s[0]]
+
+    def both(changed: Ship) -> tuple[Float64, Float64]:
+        return 1.0 + changed.n_r(speeds), changed.resistance_n(speeds) / changed.mass_kg
+
+    small = _mean(losses.table[:, _SMALL])
+    known = float(np.linalg.norm(_mean(losses.table[:, _SD]))) or np.nan
+    found = []
+    for one, loss in zip(listed, small):
+        shifts = []
+        for before, after in zip(both(ship), both(one.scaled(ship, 1.0 - CHANGES[0]))):
+            shifts.append(float(np.sqrt(np.mean((after / before - 1.0) ** 2))))
+        tolerable = CHANGES[0] * known / loss if loss > 0.0 else math.inf
+        found.append(Importance(one, shifts[0], shifts[1], tolerable))
+    return tuple(found)
+
+
+def _check(
+    ship: Ship,
+    coast: Coast,
+    listed: Sequence[Particular],
+    responses: Responses,
+    selection: Selection,
+) -> CoastCheck:
+    shift = responses.slopes(0, 1).reshape(len(listed), -1, 3)[:, -1, 1]
+    signs = np.where(shift < 0.0, -1.0, 1.0)
+    dropped = [one.key in selection.dropped for one in listed]
+    factors = np.where(dropped, 1.0 + CHANGES[0] * signs, 1.0)
+    other = coast_from(ship, max(_CHECK_FRACTION * coast.scenario.speed_m_s, slowest_m_s(ship)))
+    true, wrong = (
+        _reading(one, other)[other.after_stop] for one in (ship, _changed(ship, listed, factors))
+    )
+    rms = np.sqrt(np.mean((wrong - true) ** 2, axis=0))
+    return CoastCheck(other, float(rms[0]) * LOG_SD_M_S, float(rms[1]) * POSITION_SD_M)

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of what matters: rankings, manoeuvres beside each other, maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.manoeuvring.motion import Motion
+from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
+from shipdrag_ros.studies.sensitivity.steering import Experiment, SteeringStudy
+
+_PALE = '#c3d3df'
+
+
+def ranking_picture(found: SteeringStudy) -> Figure:
+    """
+    Draw the mean losses of all derivatives, the largest first.
+    """
+    losses, order = found.losses, found.losses.ranking
+    places = np.arange(len(order))
+    chosen = [losses.names.index(name) for name in order]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.8), layout='constrained')
+        axis = figure.subplots()
+        count = len(found.selection.kept)
+        for part, color, label in (
+            (slice(0, count), BLUE, 'kept'),
+            (slice(count, None), _PALE, 'set to 0'),
+        ):
+            axis.bar(places[part], losses.mean[chosen][part], color=color, label=label)
+        axis.plot(
+            places,
+            found.mean_norms.mean[chosen],
+            linestyle='none',
+            marker='_',
+            color=VERMILION,
+            label='by the mean norm',
+        )
+        if found.selection.threshold > 0.0:
+            axis.axhline(found.selection.threshold, color='#555555', linewidth=0.8)
+        axis.set_yscale('log')
+        axis.set_xticks(places, order, rotation=90)
+        axis.set_xlim(-0.7, len(order) - 0.3)
+        axis.set_ylabel('mean loss [-]')
+        axis.grid(visible=False, axis='x')
+        axis.legend(loc='upper right')
+    return figure
+
+
+def check_picture(found: SteeringStudy) -> Figure:
+    """
+    Draw heading and rudder, speeds and yaw rate of the full and the reduced models.
+    """
+    full, kept = found.check.full, found.check.reduced
+    by_group = found.group_check.reduced
+    lines: Sequence[tuple[Motion, str, str, str]] = (
+        (full, 'full', '#444444', '-'),
+        (kept, f'{len(found.selection.kept)} derivatives kept', VERMILION, '--'),
+        (by_group, f'{found.independent} measurements kept', BLUE, ':'),
+    )
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 5.2), layout='constrained')
+        axes = figure.subplots(2, 2, sharex=True)
+        for motion, label, color, style in lines:
+            for axis, name, values in (
+                (axes[0, 0], 'heading [deg]', np.degrees(motion.heading_rad)),
+                (axes[0, 1], 'r [deg/s]', np.degrees(motion.yaw_rate_rad_s)),
+                (axes[1, 0], 'u [m/s]', motion.surge_m_s),
+                (axes[1, 1], 'v [m/s]', motion.sway_m_s),
+            ):
+                axis.plot(motion.time_s, values, color=color, linestyle=style, label=label)
+                axis.set_ylabel(name)
+        for axis in axes[1]:
+            axis.set_xlabel('time after the first order [s]')
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc='outside upper center', ncols=len(labels))
+    return figure
+
+
+def design_picture(shown: Experiment) -> Figure:
+    """
+    Draw the losses of all derivatives in all manoeuvres as a map.
+    """
+    manoeuvres = [manoeuvre.name for manoeuvre in shown.manoeuvres]
+    with matplotlib.rc_context({**STYLE, 'axes.grid': False}):
+        figure = Figure(figsize=(9.0, 3.0), layout='constrained')
+        axis = figure.subplots()
+        largest = float(np.max(shown.loss))
+        image = axis.imshow(
+            np.maximum(shown.loss.T, 1e-5 * largest),
+            norm=LogNorm(1e-4 * largest, largest),
+            cmap='Blues',
+            aspect='auto',
+        )
+        best = np.argmax(shown.loss, axis=1)
+        axis.plot(
+            np.arange(len(best)), best, linestyle='none', marker='o', color=ORANGE, markersize=4
+        )
+        axis.set_xticks(np.arange(len(shown.names)), shown.names, rotation=90)
+        axis.set_yticks(np.arange(len(manoeuvres)), manoeuvres)
+        figure.colorbar(image, label='loss of 10 %; dot: most')
+    return figure
+
+
+def surge_picture(time_s: Float64, speeds: Sequence[tuple[str, Float64]]) -> Figure:
+    """
+    Draw the surge speed of one manoeuvre after several changes of a derivative.
+
+    Parameters
+    ----------
+    time_s : (n,)
+    speeds
+        What was changed, and the speed (n,) [m/s].
+    """
+    styles = (('#444444', '-'), (BLUE, '--'), (GREEN, '-.'), (VERMILION, ':'), (ORANGE, '--'))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.2), layout='constrained')
+        axis = figure.subplots()
+        for (label, speed), (color, style) in zip(speeds, styles):
+            axis.plot(time_s, speed, color=color, linestyle=style, label=label)
+        axis.set_xlabel('time after the first order [s]')
+        axis.set_ylabel('u [m/s]')
+        axis.legend(loc='upper right', ncols=len(speeds))
+    return figure
+
+
+def particulars_picture(found: CoastStudy) -> Figure:
+    """
+    Draw the change of the record by each value, the largest on top.
+    """
+    order = (*found.selection.kept, *found.selection.dropped)
+    table = found.losses.table[[found.losses.names.index(name) for name in order]]
+    places = np.arange(len(order))[::-1]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 0.8 + 0.28 * len(order)), layout='constrained')
+        axis = figure.subplots()
+        axis.barh(
+            places, table[:, :2].mean(axis=1), color=_PALE, height=0.7, label='10 per cent wrong'
+        )
+        axis.barh(
+            places,
+            np.nan_to_num(table[:, 4:6].mean(axis=1)),
+            color=BLUE,
+            height=0.35,
+            label='wrong by the stated standard deviation',
+        )
+        axis.axvline(1.0, color='#555555', linewidth=0.8, label='noise of one sample')
+        axis.set_xscale('log')
+        axis.set_yticks(places, order)
+        axis.set_xlabel('root mean square change of the record [sd of log and position]')
+        axis.grid(visible=False, axis='y')
+        axis.legend(loc='lower right')
+    return figure
+
+
+def mimic_picture(found: CoastStudy) -> Figure:
+    """
+    Draw how much of each effect is left when a value is blamed for it.
+    """
+    places = np.arange(len(found.mimics))[::-1]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 0.8 + 0.28 * len(places)), layout='constrained')
+        axis = figure.subplots()
+        left = [mimic.left for mimic in found.mimics]
+        axis.barh(places, left, color=BLUE, height=0.65)
+        for place, mimic in zip(places, found.mimics):
+            text = f'{mimic.particular.key} {mimic.error:+.0%}'
+            axis.text(mimic.left + 0.01, place, text, va='center', fontsize=7)
+        axis.set_yticks(places, [mimic.effect.name for mimic in found.mimics])
+        axis.set_xlim(0.0, 1.5)
+        axis.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0])
+        axis.set_xlabel('part of the effect that is left')
+        axis.grid(visible=False, axis='y')
+    return figure

@@ -1,0 +1,313 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which derivatives of a steered ship matter, and which manoeuvre shows each.
+
+Speeds are made pure numbers by the ship's speed, the yaw rate by speed over
+length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, overshoots_rad, turn, zigzag
+from shipdrag_ros.studies.manoeuvring.motion import Motion
+from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
+from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.sensitivity.loss import (
+    CHANGES,
+    Losses,
+    Norm,
+    Responses,
+    Selection,
+    Simulator,
+    own_share,
+    relative,
+    vary,
+)
+
+CHECKED_BY = zigzag(25.0)
+CONTROL_S = 0.1  # between two looks of the helmsman in that check
+APPROACH_S = 10.0  # with the rudder amidships before it
+DESIGN = (
+    *(zigzag(angle) for angle in (5.0, 10.0, 15.0, 20.0, 25.0, 35.0)),
+    *(turn(angle) for angle in (10.0, 20.0, 35.0)),
+)
+_UP, _DOWN = slice(0, None, 2), slice(1, None, 2)  # columns of CHANGES
+_SMALL, _LARGE = slice(0, 2), slice(2, 4)
+_TEN, TINY = (0.1, -0.1), (1e-3, -1e-3)  # tiny ones: what is not linear would look like no other
+
+
+@dataclass(frozen=True)
+class Observations:
+    """
+    What S3 says of its losses, of ours; medians over the parameters.
+
+    Attributes
+    ----------
+    unlike
+        By how much the losses of + and - differ, relative: of 10 and of 50
+        per cent.
+    growth
+        Loss of 50 over that of 10 per cent.
+    """
+
+    unlike: tuple[float, float]
+    growth: float
+
+    @classmethod
+    def of(cls, losses: Losses) -> Observations:
+        """
+        Look at the losses of `CHANGES`.
+        """
+        table = losses.table
+        unlike = np.abs(table[:, _UP] / table[:, _DOWN] - 1.0)
+        growth = table[:, _LARGE].mean(axis=1) / table[:, _SMALL].mean(axis=1)
+        small, large = np.nanmedian(unlike, axis=0).tolist()
+        return cls((small, large), float(np.nanmedian(growth)))
+
+
+@dataclass(frozen=True)
+class Check:
+    """
+    A manoeuvre of the full and of a reduced model.
+
+    Attributes
+    ----------
+    manoeuvre
+    full, reduced
+        Their motions.
+    """
+
+    manoeuvre: Manoeuvre
+    full: Motion
+    reduced: Motion
+
+    @property
+    def overshoots_rad(self) -> tuple[Float64, Float64]:
+        """First and second, of the full and of the reduced model; fewer where there are fewer."""
+        full, reduced = (
+            overshoots_rad(motion, self.manoeuvre)[:2] for motion in (self.full, self.reduced)
+        )
+        return full, reduced
+
+    @property
+    def rms_difference(self) -> dict[str, float]:
+        """Root mean square over the manoeuvre, by quantity; not finite where a model is lost."""
+        names = ('surge_m_s', 'sway_m_s', 'yaw_rate_rad_s', 'heading_rad')
+        pairs = ((getattr(self.full, name), getattr(self.reduced, name)) for name in names)
+        return {
+            name: float(np.sqrt(np.mean((full - reduced) ** 2)))
+            for name, (full, reduced) in zip(names, pairs)
+        }
+
+
+@dataclass(frozen=True)
+class SteeringStudy:
+    """
+    S3's analysis of one ship.
+
+    Attributes
+    ----------
+    ship
+    manoeuvre
+        That the losses are of.
+    losses, mean_norms
+        By the two norms.
+    selection
+        By the root mean square.
+    check
+        Of the derivatives that are kept.
+    groups
+        Losses where derivatives that are one measurement change together.
+    group_selection
+        As many measurements as the kept derivatives hold.
+    group_check
+        Of all derivatives of these measurements.
+    """
+
+    ship: SteeredShip
+    manoeuvre: Manoeuvre
+    losses: Losses
+    mean_norms: Losses
+    selection: Selection
+    check: Check
+    groups: Losses
+    group_selection: Selection
+    group_check: Check
+
+    @property
+    def independent(self) -> int:
+        """How many measurements the kept derivatives hold."""
+        return _independent(self.ship, self.selection.kept)
+
+    @property
+    def group_derivatives(self) -> tuple[str, ...]:
+        """All derivatives of the kept measurements."""
+        return _of_groups(self.ship, self.group_selection.kept)
+
+    @property
+    def norms_agree(self) -> bool:
+        """Whether both norms keep the same derivatives."""
+        kept = self.selection.kept
+        return set(kept) == set(self.mean_norms.select(len(kept)).kept)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """
+    What each manoeuvre shows of each derivative.
+
+    Attributes
+    ----------
+    names
+        Of the p derivatives.
+    manoeuvres
+        m of them.
+    loss : (p, m)
+        Of 10 per cent, root mean square.
+    own_share : (p, m)
+        Part of it that no mixture of the other derivatives makes.
+    own_share_together : (p,)
+        The same where all manoeuvres are made.
+    """
+
+    names: tuple[str, ...]
+    manoeuvres: tuple[Manoeuvre, ...]
+    loss: Float64
+    own_share: Float64
+    own_share_together: Float64
+
+    @property
+    def best(self) -> tuple[Manoeuvre, ...]:
+        """The manoeuvre that shows most of each derivative."""
+        return tuple(self.manoeuvres[i] for i in np.argmax(self.loss, axis=1))
+
+
+def simulator(ship: SteeredShip, manoeuvre: Manoeuvre, *, control_s: float = 0.0) -> Simulator:
+    """
+    Return motions (k, n, 3) of a manoeuvre as a function of the derivatives.
+
+    Parameters
+    ----------
+    control_s
+        As in `steer`. A helmsman who looks now and then reverses a whole look
+        earlier or later after the smallest change, which hides it; hence he
+        reverses at the very moment by default.
+    """
+    scale = np.array([1.0, 1.0, 1.0 / ship.length_m]) * ship.speed_m_s
+
+    def simulate(derivatives: Float64) -> Float64:
+        motions: Float64 = steer(ship, manoeuvre, derivatives, control_s=control_s).speeds / scale
+        return motions
+
+    return simulate
+
+
+def respond(
+    ship: SteeredShip,
+    manoeuvre: Manoeuvre,
+    *,
+    changes: Sequence[float] = CHANGES,
+    control_s: float = 0.0,
+) -> Responses:
+    """
+    Change each derivative by fractions of it; `control_s` as in `simulator`.
+    """
+    simulate = simulator(ship, manoeuvre, control_s=control_s)
+    return vary(simulate, FORM, ship.values, relative(FORM, ship.values, changes))
+
+
+def respond_by_groups(
+    ship: SteeredShip, manoeuvre: Manoeuvre, *, changes: Sequence[float] = CHANGES
+) -> Responses:
+    """
+    Change derivatives that are one measurement together.
+
+    Each group has the name of its first.
+    """
+    simulate = simulator(ship, manoeuvre)
+    names = [group[0] for group in ship.groups]
+    place = np.array([names.index(ship.multiples.get(name, name)) for name in FORM])
+    factors = np.ones(len(names))
+
+    def simulate_groups(sets: Float64) -> Float64:
+        return simulate(ship.values * sets[:, place])
+
+    return vary(simulate_groups, names, factors, relative(names, factors, changes))
+
+
+def check(ship: SteeredShip, kept: Sequence[str], *, manoeuvre: Manoeuvre = CHECKED_BY) -> Check:
+    """
+    Sail a manoeuvre without the derivatives that are not kept.
+
+    The helmsman looks every `CONTROL_S` after an approach of `APPROACH_S`, as in
+    published figures.
+    """
+    reduced = np.where([name in kept for name in FORM], ship.values, 0.0)
+    sets = np.array([ship.values, reduced])
+    both = steer(ship, manoeuvre, sets, control_s=CONTROL_S, approach_s=APPROACH_S)
+    return Check(manoeuvre, both[0], both[1])
+
+
+def study(ship: SteeredShip, manoeuvre: Manoeuvre, *, keep: int) -> SteeringStudy:
+    """
+    Find which derivatives matter, and try the model without the others.
+
+    Parameters
+    ----------
+    ship
+    manoeuvre
+        S3: a 15/15 zigzag.
+    keep
+        How many derivatives; S3: 24.
+
+    Raises
+    ------
+    SensitivityError
+        If there are not so many.
+    """
+    responses = respond(ship, manoeuvre)
+    losses = responses.losses()
+    selection = losses.select(keep)
+    groups = respond_by_groups(ship, manoeuvre).losses()
+    group_selection = groups.select(_independent(ship, selection.kept))
+    return SteeringStudy(
+        ship=ship,
+        manoeuvre=manoeuvre,
+        losses=losses,
+        mean_norms=responses.losses(Norm.MEAN_NORM),
+        selection=selection,
+        check=check(ship, selection.kept),
+        groups=groups,
+        group_selection=group_selection,
+        group_check=check(ship, _of_groups(ship, group_selection.kept)),
+    )
+
+
+def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> Experiment:
+    """
+    Find which manoeuvre makes which derivative visible.
+    """
+    changes = (*_TEN, *TINY)
+    responses = [respond(ship, manoeuvre, changes=changes) for manoeuvre in manoeuvres]
+    slopes = [one.slopes(2, 3) for one in responses]
+    return Experiment(
+        FORM,
+        tuple(manoeuvres),
+        np.column_stack([one.losses().table[:, :2].mean(axis=1) for one in responses]),
+        np.column_stack([own_share(one) for one in slopes]),
+        own_share(np.hstack(slopes)),
+    )
+
+
+def _independent(ship: SteeredShip, kept: Sequence[str]) -> int:
+    return len({ship.multiples.get(name, name) for name in kept})
+
+
+def _of_groups(ship: SteeredShip, kept: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for group in ship.groups if group[0] in kept for name in group)

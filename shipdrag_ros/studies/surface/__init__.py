@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Polynomial surfaces of coefficients: S5."""
+
+from shipdrag_ros.studies.study import Study
+
+STUDY = Study(
+    'surface',
+    'polynomial surface of coefficients, with the degree they show',
+    ('shipdrag surface table.csv --inputs alpha,beta --target c_x --report surface.html',),
+)

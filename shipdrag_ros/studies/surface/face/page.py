@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a fitted surface: its words, its pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from shipdrag_ros.regression import Prediction, Surface
+from shipdrag_ros.report.document import Picture, write_page
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.surface.face import cells as fit_cells
+from shipdrag_ros.studies.surface.face import pictures as fit_pictures
+
+
+def sentence(surface: Surface, target: str) -> str:
+    """
+    Say in words what was found.
+    """
+    rmse = float(np.sqrt(surface.fit.variance))
+    return (
+        f'{target} is a polynomial of degree {surface.degree} in '
+        f'{", ".join(surface.inputs)}: {len(surface.polynomial.powers)} terms, RMSE {rmse:.4g}.'
+    )
+
+
+def write_surface(
+    path: Path,
+    surface: Surface,
+    *,
+    source: str,
+    target: str,
+    points: Float64,
+    values: Float64,
+    predictions: Sequence[Prediction],
+) -> None:
+    """
+    Write a surface as one HTML file.
+
+    Parameters
+    ----------
+    path
+        The file; an existing one is replaced.
+    surface
+        The fit.
+    source, target
+        Where the data come from, and what was measured.
+    points : (n, d)
+        Data.
+    values : (n,)
+        Data.
+    predictions
+        Asked for besides; may be empty.
+    """
+    tables = [
+        ('Degrees tried; F and p of the step from the degree before', fit_cells.degrees(surface)),
+        ('Coefficients of raw powers', fit_cells.coefficients(surface)),
+    ]
+    if predictions:
+        tables.append(('Predictions', fit_cells.predictions(predictions)))
+    pictures = [
+        Picture.of(
+            fit_pictures.degree_picture(surface),
+            'Residual standard deviation against the degree; the lowest degree on the plateau '
+            'is chosen.',
+        ),
+        Picture.of(
+            fit_pictures.residual_picture(surface.polynomial(points), values, target),
+            'What the surface leaves of the data.',
+        ),
+    ]
+    if len(surface.inputs) == 2:
+        pictures.append(
+            Picture.of(
+                fit_pictures.contour_picture(surface, points, target),
+                'The surface; dots are the data.',
+            )
+        )
+    write_page(
+        path,
+        'fit.html',
+        title=f'Surface of {target} over {", ".join(surface.inputs)}',
+        source=source,
+        sentence=sentence(surface, target),
+        notes=surface.notes,
+        pictures=pictures,
+        tables=tables,
+    )

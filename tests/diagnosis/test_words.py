@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every verdict has a sentence that does not say more than is known."""
+
+from __future__ import annotations
+
+import pytest
+
+from shipdrag_ros.diagnosis import Candidate, Diagnosis, Gap, Named, Verdict, Where
+from shipdrag_ros.diagnosis import tables as diagnosis_cells
+from shipdrag_ros.diagnosis.words import answers, probability, sentence
+from shipdrag_ros.ship import Uncertain
+
+FOULING = Named('fouling', 0.9995, {'friction_factor': Uncertain(0.4013, 0.0121)})
+WAVES = Named('waves', 0.95, {'force_n': Uncertain(51234.0, 3000.0), 'from': Uncertain(-1.0, 0.0)})
+
+
+def diagnosis(
+    verdict: Verdict,
+    *candidates: tuple[tuple[str, ...], float],
+    nothing: float = 0.0,
+    unnamed: float = 0.0,
+    effects: tuple[Named, ...] = (),
+) -> Diagnosis:
+    return Diagnosis(
+        verdict=verdict,
+        effects=effects,
+        candidates=tuple(Candidate(*each) for each in candidates),
+        nothing=nothing,
+        unnamed=unnamed,
+        would_decide=(),
+        where=Where('force', (12.0, 900.0), (3.0, 7.5)),
+        before=Gap(0.2, None, 20.0),
+        after=None,
+        held_out_before=None,
+        held_out_after=None,
+        baseline='stated',
+        best=effects,
+    )
+
+
+@pytest.mark.parametrize(
+    ('found', 'said'),
+    [
+        (
+            diagnosis(Verdict.NONE, ((), 0.97), nothing=0.97),
+            'Model and data agree: nothing is missing that these runs could show (probability '
+            '97.0 %).',
+        ),
+        (
+            diagnosis(Verdict.NONE, (('fouling',), 0.7), ((), 0.3), nothing=0.3),
+            'No effect can be named: fouling is the likeliest (70.0 %), but a baseline that is '
+            'further off than stated would explain these runs as well (30.0 %).',
+        ),
+        (
+            diagnosis(Verdict.NONE, ((), 0.2), nothing=0.2, unnamed=0.8),
+            'No effect can be named: something without a name is the likeliest (80.0 %), but a '
+            'baseline that is further off than stated would explain these runs as well (20.0 %).',
+        ),
+        (
+            diagnosis(Verdict.NAMED, (('fouling',), 0.9995), effects=(FOULING,)),
+            'Missing in the model: fouling (friction factor 0.401 ± 0.024); probability > 99.9 %.',
+        ),
+        (
+            diagnosis(Verdict.NAMED, (('waves',), 0.95), effects=(WAVES,)),
+            'Missing in the model: waves (force (51200 ± 6000) N, from astern); probability '
+            '95.0 %.',
+        ),
+        (
+            diagnosis(Verdict.ONE_OF, (('log_scale',), 0.6), (('radar_scale',), 0.4)),
+            'Missing is one of these: log scale (60.0 %), radar scale (40.0 %). These runs cannot '
+            'tell them apart.',
+        ),
+        (
+            diagnosis(Verdict.ONE_OF, (('waves',), 0.3), (('wind',), 0.2), unnamed=0.5),
+            'Missing is one of these: waves (30.0 %), wind (20.0 %), or something without a name '
+            '(50.0 %). These runs cannot tell them apart.',
+        ),
+        (
+            diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),
+            'Something is missing that is none of the known effects, in the force on the ship, 12 '
+            'to 900 s after the stop, at 3.0 to 7.5 m/s.',
+        ),
+        (
+            diagnosis(Verdict.UNKNOWN, (('wind',), 0.98)),
+            'Something is missing that is none of the known effects, in the force on the ship, 12 '
+            'to 900 s after the stop, at 3.0 to 7.5 m/s. The likeliest of them, wind, leaves more '
+            'than noise.',
+        ),
+    ],
+)
+def test_a_verdict_in_a_sentence(found: Diagnosis, said: str) -> None:
+    assert sentence(found) == said
+
+
+def test_answers_add_up() -> None:
+    found = diagnosis(Verdict.ONE_OF, (('wind',), 0.6), (('current', 'waves'), 0.3), nothing=0.04)
+    told = answers(found)
+    assert [each.words for each in told] == [
+        'wind',
+        'current + waves',
+        'nothing is missing',
+        'something without a name',
+        'all others together',
+    ]
+    assert sum(each.probability for each in told) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ('value', 'said'),
+    [(1.0, '> 99.9 %'), (0.98, '98.0 %'), (0.001, '0.1 %'), (1e-9, '< 0.1 %')],
+)
+def test_nothing_is_told_to_be_certain(value: float, said: str) -> None:
+    assert probability(value) == said
+
+
+def test_tables_leave_out_what_is_not_there() -> None:
+    found = diagnosis(Verdict.NAMED, (('fouling',), 0.9995), effects=(FOULING,))
+    assert diagnosis_cells.gaps(found).rows == (('model as stated', '0.200', '-', '20.00'),)
+    (row,) = diagnosis_cells.parameters(found.effects).rows
+    assert row[:4] == ('fouling', 'friction_factor', '0.401', '0.012')
+    size, side = diagnosis_cells.parameters([WAVES]).rows
+    assert size[2:4] == ('51200', '3000')
+    assert side[2:4] == ('astern', '-')
+    assert diagnosis_cells.noise(found.traces).rows == ()

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A coastdown is found, and handed on whole, where the clock of the log is off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.replay import clocks_apart, coast_windows, replay
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+
+START_NS = 1_700_000_000_000_000_000
+S = 1_000_000_000
+LOG = Channel.SPEED_THROUGH_WATER
+STOP_S = 400.0
+
+
+def with_clock(block: Block, offset_s: float, *, silent_s: tuple[float, float]) -> Block:
+    """Set the clock of the log, which says nothing for a while; fixes become rare."""
+    log = block.channel == LOG
+    second = (block.stamp_ns - START_NS) / S
+    silent = log & (second > silent_s[0]) & (second < silent_s[1])
+    rare = (block.channel == Channel.POSITION) & (np.round(second) % 60 != 0)
+    stamps = block.stamp_ns + np.where(log, round(offset_s * S), 0)
+    return in_arrival_order([replace(block, stamp_ns=stamps)[~silent & ~rare]])
+
+
+@pytest.mark.parametrize('shaft', [True, False])
+@pytest.mark.parametrize('offset_s', [-36.0, -9.0, 9.0])
+def test_a_log_whose_clock_is_off_is_heard(
+    ship, parameters, voyage, write_run, tmp_path, offset_s: float, shaft: bool
+) -> None:
+    block = with_clock(voyage(), offset_s, silent_s=(600.0, 640.0))
+    if not shaft:
+        block = block[block.channel != Channel.SHAFT]
+    (run,) = open_runs([write_run(tmp_path / 'apart.mcap', block, ship=ship)])
+    result = replay(run, parameters=parameters)
+    counts = result.inputs['speed_through_water']
+    assert counts.rejected['late' if offset_s < 0.0 else 'future'] > 0.9 * counts.messages
+    assert result.coastdowns == ()
+
+    assert clocks_apart(result) == ('speed_through_water',)
+    ((coastdown, window),) = coast_windows(result)
+    assert coastdown.ended_by is EndedBy.RECORD_END  # the clock is not silence
+    assert coastdown.estimate is None
+    # the shaft stops by its own clock, the speed falls by that of the log
+    expected_s = STOP_S + (0.0 if shaft else offset_s)
+    np.testing.assert_allclose((coastdown.start_ns - START_NS) / S, expected_s, atol=8.0)
+    inside = (block.stamp_ns >= window.start_ns) & (block.stamp_ns <= window.end_ns)
+    log = inside & (block.channel == LOG)
+    np.testing.assert_array_equal(window.speed_through_water.value, block.value[log, 0])
+
+
+def test_what_the_clocks_do_not_ask_for_is_not_done(
+    ship, parameters, voyage, write_run, tmp_path
+) -> None:
+    (run,) = open_runs([write_run(tmp_path / 'sound.mcap', voyage(), ship=ship)])
+    result = replay(run, parameters=parameters)
+    assert clocks_apart(result) == ()
+    ((coastdown, _),) = coast_windows(result)
+    assert (coastdown,) == result.coastdowns
+    assert coastdown.estimate is not None
+
+
+def test_a_window_that_was_given_stays(ship, parameters, voyage, write_run, tmp_path) -> None:
+    block = with_clock(voyage(), -9.0, silent_s=(600.0, 640.0))
+    (run,) = open_runs([write_run(tmp_path / 'apart.mcap', block, ship=ship)])
+    result = replay(run, parameters=parameters, window=(450.0, 900.0))
+    ((coastdown, window),) = coast_windows(result)
+    assert coastdown.ended_by is EndedBy.GIVEN
+    assert (window.start_ns, window.end_ns) == (coastdown.start_ns, coastdown.end_ns)
+    assert len(window.speed_through_water.value) > 400

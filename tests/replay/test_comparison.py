@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was recorded beside what is replayed, message by message."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.coastdown.events import Event, Update
+from shipdrag_ros.messages import OutputMessage, outputs
+from shipdrag_ros.replay import Recorded
+from shipdrag_ros.replay.comparison import Comparison
+
+
+def message(stamp_ns: int, payload: bytes = b'', name: str = 'speed') -> OutputMessage:
+    kind = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+    return OutputMessage(f'/coastdown_node/{name}', kind, payload, stamp_ns)
+
+
+@pytest.mark.parametrize(
+    ('recorded', 'replayed', 'expected'),
+    [
+        ([], [1, 2], (0, 0, None)),
+        ([1, 2, 3], [1, 2, 3], (3, 3, None)),
+        ([3, 4], [1, 2, 3, 4, 5], (2, 2, None)),
+        ([1, 3], [1, 2, 3], (3, 2, 'at 2 ns: recorded nothing, replayed')),
+        ([1, 2, 3], [1, 3], (3, 2, 'at 2 ns: recorded 0 bytes')),
+        ([1, 2], [], (2, 0, 'at 1 ns: recorded')),
+        ([5, 6, 1, 2], [5, 6, 1, 2], (4, 4, None)),
+    ],
+)
+def test_comparison(
+    recorded: list[int], replayed: list[int], expected: tuple[int, int, str | None]
+) -> None:
+    comparison = Comparison(iter([message(stamp) for stamp in recorded]))
+    for stamp in replayed:
+        comparison.add(message(stamp))
+    found = comparison.finish()
+    assert (found.compared, found.identical) == expected[:2]
+    if expected[2] is None:
+        assert found.first_difference is None
+    else:
+        assert found.first_difference is not None
+        assert expected[2] in found.first_difference
+
+
+def test_topics_are_compared_each_for_itself() -> None:
+    recorded = [message(stamp, name=name) for name in ('speed', 'resistance') for stamp in (1, 2)]
+    comparison = Comparison(iter([*recorded, message(1, name='events')]))
+    for stamp in (1, 2):
+        for name in ('speed', 'resistance', 'events'):
+            comparison.add(message(stamp, name=name))
+    assert comparison.finish() == Recorded(4, 4, None)
+
+
+def test_a_figure_that_differs_is_shown(recording: tuple[Path, list[Event]]) -> None:
+    (run,) = open_runs([recording[0]])
+    original = list(run.outputs())
+    updates = [event for event in recording[1] if isinstance(event, Update)]
+    changed = replace(
+        updates[3], estimate=replace(updates[3].estimate, last_resistance_m_s2=0.125)
+    )
+    comparison = Comparison(iter(original))
+    for event in [*updates[:3], changed, *updates[4:]]:
+        for each in outputs(event):
+            comparison.add(each)
+    found = comparison.finish()
+    assert found.compared - found.identical == 2  # and the final curve, which was not given
+    assert found.largest_difference == np.inf  # of that curve
+    assert found.first_difference is not None
+    assert 'replayed 0.125 m/s^2' in found.first_difference
+    assert f'/coastdown_node/resistance at {changed.stamp_ns} ns' in found.first_difference
+
+
+def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) -> None:
+    updates = [event for event in recording[1] if isinstance(event, Update)]
+    last = updates[3].estimate.last_resistance_m_s2
+    curve = updates[3].estimate.curve
+    for changed, difference in (
+        (replace(updates[3].estimate, last_resistance_m_s2=last * (1.0 - 1e-13)), 1e-13),
+        (
+            replace(
+                updates[3].estimate,
+                curve=replace(curve, resistance_m_s2=curve.resistance_m_s2 * 1.01),
+            ),
+            0.01 / 1.01,
+        ),
+    ):
+        comparison = Comparison(iter(outputs(updates[3])))
+        for each in outputs(replace(updates[3], estimate=changed)):
+            comparison.add(each)
+        assert comparison.finish().largest_difference == pytest.approx(difference, rel=0.01)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A window given by hand says what would have ended a coastdown that was watched."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import BagWriter, open_runs
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, Event
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import Recorded, replay
+from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
+from shipdrag_ros.ship import ConstantAddedMass, Ship
+
+WriteRun = Callable[..., Path]
+START_NS = 1_700_000_000_000_000_000
+BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass(value=0.1))
+
+
+def coasted(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> Coastdown:
+    """Coast for 100 s with this heading, and after 100 s turn right round."""
+    time_s = np.arange(200.0)
+    stamps = START_NS + (time_s * 1e9).astype(np.int64)
+    speed = 4.0 / (1.0 + time_s / 50.0) + np.random.default_rng(1).normal(0.0, 0.01, 200)
+    yaw = np.concatenate([yaw_rad, np.linspace(yaw_rad[-1], yaw_rad[-1] + 3.0, 100)])
+    yaw = np.arctan2(np.sin(yaw), np.cos(yaw))
+    with BagWriter(path) as bag:
+        bag.write_samples(
+            in_arrival_order(
+                [
+                    Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed),
+                    Block.of(Channel.HEADING, stamps, yaw),
+                ]
+            )
+        )
+    (run,) = open_runs([path])
+    (coastdown,) = replay(run, ship=BOAT, parameters=parameters, window=(0.0, 99.0)).coastdowns
+    assert coastdown.estimate is not None, coastdown.failure
+    return coastdown
+
+
+@pytest.mark.parametrize(
+    ('swing_deg', 'turn_rad', 'told'),
+    [(30.0, 0.35, True), (30.0, 0.6, False), (15.0, 0.35, False)],
+)
+def test_a_turn_inside_the_window(
+    tmp_path: Path, swing_deg: float, turn_rad: float, told: bool
+) -> None:
+    # across the cut at 180 degrees, where the reading jumps
+    yaw = np.pi - 0.1 + np.linspace(0.0, np.radians(swing_deg), 100)
+    coastdown = coasted(tmp_path / 'a.mcap', yaw, Parameters(turn_rad=turn_rad))
+    assert ([cut.reason for cut in coastdown.cuts] == [Dismissal.TURN]) is told
+    assert (coastdown.end_ns == START_NS + 99 * 10**9) is not told
+    if told:
+        assert f'swings over {swing_deg:.0f} degrees' in coastdown.cuts[0].text
+        assert coastdown.end_ns == pytest.approx(START_NS + 66e9, abs=2e9)
+
+
+def test_a_turn_all_the_time_is_told_and_not_cut(tmp_path: Path) -> None:
+    coastdown = coasted(tmp_path / 'a.mcap', np.linspace(0.0, 3.0, 100), Parameters())
+    assert coastdown.cuts == ()
+    assert coastdown.estimate is not None
+    assert 'swings over 17' in coastdown.estimate.notes[0]
+
+
+def test_a_window_is_estimated_without_an_onset(recording: tuple[Path, list[Event]]) -> None:
+    (run,) = open_runs([recording[0]])
+    result = replay(run, window=(430.0, 1000.0))
+    (coastdown,) = result.coastdowns
+    assert coastdown.ended_by is EndedBy.GIVEN
+    assert coastdown.onset_detected_ns is None
+    assert coastdown.start_ns == START_NS + 430_000_000_000
+    assert coastdown.end_ns == START_NS + 1_000_000_000_000
+    assert coastdown.estimate is not None
+    assert coastdown.heading_rad == pytest.approx(0.7, abs=0.005)
+    assert coastdown.estimate.samples['speed_through_water'] == 571
+    assert result.recorded == Recorded(0, 0, None)
+    shorter = replay(run, window=(430.0, 700.0)).coastdowns[0].estimate
+    assert shorter is not None
+    assert shorter.curve.speed_m_s[0] > coastdown.estimate.curve.speed_m_s[0]
+
+
+def test_the_heading_of_a_window_follows_the_convention(
+    recording: tuple[Path, list[Event]], parameters: Parameters
+) -> None:
+    (run,) = open_runs([recording[0]])
+    compass = replace(parameters, heading_convention='compass')
+    for window in ((410.0, 1000.0), (0.0, 1000.0)):
+        (coastdown,) = replay(run, parameters=compass, window=window).coastdowns
+        assert coastdown.heading_rad == pytest.approx(pi / 2 - 0.7, abs=0.02)
+
+
+def test_a_window_that_gives_nothing_says_why(recording: tuple[Path, list[Event]]) -> None:
+    (run,) = open_runs([recording[0]])
+    (coastdown,) = replay(run, window=(10.0, 11.0)).coastdowns
+    assert coastdown.estimate is None
+    assert coastdown.failure
+
+
+@pytest.mark.parametrize(
+    'window', [(-1.0, 5.0), (5.0, 5.0), (6.0, 5.0), (2000.0, 3000.0), (0.0, np.nan), (0.0, np.inf)]
+)
+def test_a_window_outside_of_the_bag(
+    recording: tuple[Path, list[Event]], window: tuple[float, float]
+) -> None:
+    (run,) = open_runs([recording[0]])
+    with pytest.raises(BagError, match=r'window .* s: expected 0 <= start < end inside of .*live'):
+        replay(run, window=window)
+
+
+def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+) -> None:
+    block = voyage()
+    later = replace(block, receive_ns=block.receive_ns + 3600 * 10**9)
+    results = []
+    for name, each in (('a', block), ('b', later)):
+        (run,) = open_runs([write_run(tmp_path / f'{name}.mcap', each, ship)])
+        results.append(replay(run, window=(410.0, 1000.0)).coastdowns[0])
+    assert results[0].start_ns == results[1].start_ns
+    assert results[0].estimate is not None
+    assert results[1].estimate is not None
+    np.testing.assert_array_equal(
+        results[0].estimate.curve.resistance_m_s2, results[1].estimate.curve.resistance_m_s2
+    )
+
+
+def test_a_clock_set_in_a_window_is_no_estimate(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+) -> None:
+    block = voyage()
+    second = replace(block, receive_ns=block.receive_ns + 1200 * 10**9)
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', concatenate([block, second]), ship)])
+    (coastdown,) = replay(run, window=(410.0, 2000.0)).coastdowns
+    assert coastdown.failure is not None
+    assert 'a clock was set in the window' in coastdown.failure

@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Replay gives what the node gave, bit for bit, and tells where it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import BagWriter, open_runs
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event, Onset, Reset, Update
+from shipdrag_ros.errors import BagError, ParameterError, ShipFileError
+from shipdrag_ros.messages import encode, types
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult, replay
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.ship import Ship
+
+WriteRun = Callable[..., Path]
+
+
+def replayed(path: Path) -> ReplayResult:
+    (run,) = open_runs([path])
+    assert run.warnings == ()
+    return replay(run)
+
+
+def test_replay_gives_the_live_figures_bit_for_bit(
+    recording: tuple[Path, list[Event]], ship: Ship, parameters: Parameters
+) -> None:
+    path, events = recording
+    result = replayed(path)
+    updates = [event for event in events if isinstance(event, Update)]
+    assert len(updates) > 10
+    # speed, resistance and curve of each, and the curve once more at the end
+    assert result.recorded == Recorded(3 * len(updates) + 1, 3 * len(updates) + 1, None)
+    assert result.parameters == parameters
+    assert result.ship == ship
+    (coastdown,) = result.coastdowns
+    assert coastdown.ended_by is EndedBy.RECORD_END
+    assert coastdown.estimate is not None
+    curve = coastdown.estimate.valid_curve
+    np.testing.assert_allclose(
+        curve.resistance_m_s2[5:-5], curve.speed_m_s[5:-5] ** 2 / 3000.0, rtol=0.2
+    )
+    assert [type(event) for event in result.events] == [Onset, Coastdown]
+    assert result.inputs['shaft'].messages == result.inputs['shaft'].used == 1100
+    assert list(result.inputs) == ['speed_through_water', 'position', 'heading', 'shaft']
+
+
+def test_also_when_recording_starts_in_mid_run(
+    ship: Ship, tmp_path: Path, voyage: Callable[..., Block], live: type[Any]
+) -> None:
+    block = voyage()
+    messages = list(encode(block))
+    session = live(ship)
+    begin = int(0.7 * len(messages))  # in the coastdown
+    for message in messages[:begin]:
+        session.receive(message)
+    before = sum(isinstance(event, Update) for event in session.events)
+    assert before > 3
+    session.start(tmp_path / 'a.mcap', ring=messages[:begin])
+    for message in messages[begin:]:
+        session.receive(message)
+    session.stop(int(block.receive_ns[-1]))
+    result = replayed(tmp_path / 'a.mcap')
+    after = sum(isinstance(event, Update) for event in session.events) - before
+    assert result.recorded == Recorded(3 * after + 1, 3 * after + 1, None)
+
+
+def test_also_when_recording_stops_before_the_node(
+    ship: Ship, tmp_path: Path, voyage: Callable[..., Block], live: type[Any]
+) -> None:
+    block = voyage()
+    session = live(ship)
+    session.start(tmp_path / 'a.mcap')
+    for message in encode(block):
+        session.receive(message)
+    session.stop(int(block.receive_ns[-1]), finish=False)
+    result = replayed(tmp_path / 'a.mcap')
+    updates = sum(isinstance(event, Update) for event in session.events)
+    assert result.recorded == Recorded(3 * updates, 3 * updates, None)
+    assert len(result.coastdowns) == 1  # which the recording does not know to have ended
+
+
+def test_also_after_a_reset_in_the_coastdown(
+    ship: Ship, tmp_path: Path, voyage: Callable[..., Block], live: type[Any]
+) -> None:
+    block = voyage()
+    messages = list(encode(block))
+    at = int(0.75 * len(messages))
+    session = live(ship)
+    session.start(tmp_path / 'a.mcap')
+    for message in messages[:at]:
+        session.receive(message)
+    session.reset(messages[at - 1].log_ns)
+    for message in messages[at:]:
+        session.receive(message)
+    session.stop(int(block.receive_ns[-1]))
+    result = replayed(tmp_path / 'a.mcap')
+    assert result.recorded.compared == result.recorded.identical > 10
+    assert [coastdown.ended_by for coastdown in result.coastdowns] == [EndedBy.RESET]
+    assert Reset(messages[at - 1].log_ns, 'service') in result.events
+
+
+def test_another_ship_or_parameters_are_used_and_not_compared(
+    recording: tuple[Path, list[Event]], ship: Ship, parameters: Parameters
+) -> None:
+    path, _ = recording
+    (run,) = open_runs([path])
+    own = replay(run)
+    larger = replay(run, ship=replace(ship, length_m=170.0))
+    assert larger.recorded == Recorded(0, 0, None)
+    assert larger.ship.length_m == 170.0
+    assert own.coastdowns[0].estimate is not None
+    assert larger.coastdowns[0].estimate is not None
+    assert (
+        larger.coastdowns[0].estimate.curve.froude[-1]
+        < own.coastdowns[0].estimate.curve.froude[-1]
+    )
+    speed_only = replay(run, parameters=replace(parameters, estimator='s1_speed'))
+    assert speed_only.recorded == Recorded(0, 0, None)
+    assert speed_only.coastdowns[0].estimate is not None
+    assert speed_only.coastdowns[0].estimate.estimator == 's1_speed'
+    # the same as its own, given explicitly, is compared
+    assert replay(run, ship=ship, parameters=parameters).recorded == own.recorded
+
+
+def test_progress_is_told_and_ends_at_the_total(recording: tuple[Path, list[Event]]) -> None:
+    (run,) = open_runs([recording[0]])
+    told: list[tuple[int, int]] = []
+    replay(run, progress=lambda done, total: told.append((done, total)))
+    assert told[-1] == (4400, 4400)
+    assert len(told) > 1
+
+
+def test_rejected_samples_are_counted_in_a_window_and_in_a_replay(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+) -> None:
+    block = voyage(steady_s=60.0, coast_s=60.0)
+    value = block.value.copy()
+    log = np.flatnonzero(block.channel == Channel.SPEED_THROUGH_WATER)
+    value[log[10], 0] = np.nan
+    value[log[20], 0] = 99.0
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', replace(block, value=value), ship)])
+    for window in (None, (0.0, 100.0)):
+        counts = replay(run, window=window).inputs['speed_through_water']
+        assert counts.rejected == {'nan': 1, 'absurd': 1}
+        assert counts.used == counts.messages - 2
+
+
+def test_unreadable_messages_and_wrong_types_are_counted_among_the_rejected(
+    tmp_path: Path, ship: Ship
+) -> None:
+    (good,) = encode(Block.of(Channel.SHAFT, [1], [2.0]))
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for payload in (good.payload, b'', good.payload[:20]):
+            bag.write('/shaft', good.type, payload, log_ns=1, publish_ns=1)
+        bag.write('/depth', good.type, good.payload, log_ns=2, publish_ns=2)
+        bag.write('/log', good.type, good.payload, log_ns=2, publish_ns=2)
+    (run,) = open_runs([tmp_path / 'a.mcap'], remap={'/log': 'speed_through_water'})
+    result = replay(run, ship=ship)
+    assert result.inputs['shaft'].messages == 3
+    assert result.inputs['shaft'].used == 1
+    assert result.inputs['shaft'].rejected == {'malformed': 2}
+    assert result.inputs['depth'].rejected == {'type': 1}
+    assert result.inputs['speed_through_water'].rejected == {'type': 1}
+
+
+def test_of_several_joints_a_message_each_reading_is_counted(tmp_path: Path, ship: Ship) -> None:
+    joints = ['shaft_port', 'pitch_port', *(f'shaft_{letter}' for letter in 'abcd')]
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        for i in range(1, 11):
+            message = types.make(
+                types.JOINT_STATE,
+                header=types.header(i * 10**9, ''),
+                name=joints,
+                position=np.full(6, 0.5),
+                velocity=np.full(6, np.nan if i == 4 else 7.0),
+                effort=np.empty(0),
+            )
+            payload = types.serialize(types.JOINT_STATE, message)
+            bag.write('/shaft', types.JOINT_STATE, payload, log_ns=i * 10**9, publish_ns=i * 10**9)
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    counts = replay(run, ship=ship).inputs['shaft']
+    assert counts == InputCounts(10, 9 * 4 + 10, {'surplus_joint': 10, 'nan': 4})
+
+
+def test_a_bag_without_a_ship_file_asks_for_one(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+) -> None:
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', voyage()[:50])])
+    with pytest.raises(BagError, match=r'a\.mcap.* no ship\.yaml attached; give one with --ship'):
+        replay(run)
+    assert replay(run, ship=ship).parameters == Parameters()
+
+
+def test_attachments_that_cannot_be_used_are_told(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+) -> None:
+    (run,) = open_runs(
+        [write_run(tmp_path / 'a.mcap', voyage()[:9], ship, parameters='window: 1')]
+    )
+    with pytest.raises(ParameterError, match=r"a\.mcap: parameters\.yaml(.|\n)*'window': unknown"):
+        replay(run)
+    with BagWriter(tmp_path / 'b.mcap') as bag:
+        bag.attach('ship.yaml', 'length_m: -1')
+        bag.register('/shaft', 'sensor_msgs/msg/JointState')
+    (run,) = open_runs([tmp_path / 'b.mcap'])
+    with pytest.raises(ShipFileError, match=r'b\.mcap: ship\.yaml'):
+        replay(run)
+
+
+def test_a_bag_without_inputs_says_what_it_has(tmp_path: Path, ship: Ship) -> None:
+    with BagWriter(tmp_path / 'a.mcap') as bag:
+        bag.register('/gps', 'sensor_msgs/msg/NavSatFix')
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    with pytest.raises(BagError, match=r'it has /gps \(sensor_msgs/msg/NavSatFix\): name one'):
+        replay(run, ship=ship)

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Batched manoeuvres against an integration that shares no code with them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import isinf
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.studies.manoeuvring.manoeuvre import Side, turn, zigzag
+from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
+from shipdrag_ros.studies.manoeuvring.simulate import steer
+
+SHIP = mariner()
+U, L = SHIP.speed_m_s, SHIP.length_m
+EVEN = [i for i, name in enumerate(FORM) if name[1] == '0']  # alike to both sides
+
+
+def rates(state, ordered):
+    """Each derivative times the powers that its name spells."""
+    du, v, r, _, _, heading, d = state
+    speed = np.hypot(U + du, v)
+    of = {'u': du / speed, 'v': v / speed, 'r': r * L / speed, 'd': d, '0': 1.0}
+    force = dict.fromkeys('XYN', 0.0)
+    for name, value in SHIP.viscous.items():
+        force[name[0]] += value * np.prod([of[letter] for letter in name[1:]])
+    m, added, lever = SHIP.mass, SHIP.inertial, SHIP.mass * SHIP.gravity_centre
+    inertia = [
+        [m - added.Yvdot, lever - added.Yrdot],
+        [lever - added.Nvdot, SHIP.yaw_inertia - added.Nrdot],
+    ]
+    sway, yaw = np.linalg.solve(inertia, [force['Y'], force['N']])
+    machine = SHIP.rudder
+    ahead, cos, sin = U + du, np.cos(heading), np.sin(heading)
+    return [
+        force['X'] / (m - added.Xudot) * speed**2 / L,
+        sway * speed**2 / L,
+        yaw * speed**2 / L**2,
+        ahead * cos - v * sin,
+        ahead * sin + v * cos,
+        r,
+        np.clip((ordered - d) / machine.lag_s, -machine.rate_rad_s, machine.rate_rad_s),
+    ]
+
+
+def integrated(manoeuvre, time_s):
+    """Sail to each reversal, then on with the other order; (n, 7)."""
+    path, state, side, now = np.empty((len(time_s), 7)), np.zeros(7), 1.0, 0.0
+    while now < time_s[-1]:
+        ordered = -side * manoeuvre.rudder_rad
+
+        def reversal(t, x, side=side):
+            return side * x[5] - manoeuvre.reverse_rad
+
+        reversal.terminal, reversal.direction = True, 1.0
+        found = solve_ivp(
+            lambda t, x, ordered=ordered: rates(x, ordered),
+            (now, time_s[-1]),
+            state,
+            events=None if isinf(manoeuvre.reverse_rad) else reversal,
+            dense_output=True,
+            rtol=1e-9,
+            atol=1e-10,
+            max_step=2.0,
+        )
+        here = (time_s >= now) & (time_s <= found.t[-1])
+        path[here] = found.sol(time_s[here]).T
+        state, now, side = found.y[:, -1], found.t[-1], -side
+    return path
+
+
+@pytest.mark.parametrize('manoeuvre', [zigzag(20.0), turn(35.0)], ids=lambda m: m.name)
+def test_agrees_with_an_independent_integration(manoeuvre):
+    motion = steer(SHIP, manoeuvre, samples=301, control_s=0.0)[0]
+    expected = integrated(manoeuvre, motion.time_s)
+    np.testing.assert_allclose(motion.surge_m_s - U, expected[:, 0], rtol=0, atol=2e-6)
+    np.testing.assert_allclose(motion.sway_m_s, expected[:, 1], rtol=0, atol=2e-6)
+    np.testing.assert_allclose(motion.yaw_rate_rad_s, expected[:, 2], rtol=0, atol=1e-7)
+    np.testing.assert_allclose(motion.position_m, expected[:, 3:5], rtol=0, atol=2e-3)
+    np.testing.assert_allclose(motion.heading_rad, expected[:, 5], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(motion.rudder_rad, -expected[:, 6], rtol=0, atol=1e-6)
+
+
+def test_a_shorter_step_changes_nothing_that_matters():
+    coarse, fine = (
+        steer(SHIP, zigzag(15.0), sample_s=sample_s, samples=samples, control_s=0.0)
+        for sample_s, samples in ((0.5, 1200), (0.01, 60_000))
+    )
+    difference = coarse.speeds[0] - fine.speeds[0, ::50]
+    assert np.max(np.abs(difference / [U, U, U / L])) < 2e-6
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    count=st.integers(2, 12),
+    manoeuvre=st.sampled_from([zigzag(15.0), turn(25.0)]),
+    control_s=st.sampled_from([0.0, 0.1, 0.5]),
+)
+def test_columns_are_single_runs_to_the_last_bit(seed, count, manoeuvre, control_s):
+    rng = np.random.default_rng(seed)
+    derivatives = SHIP.values * rng.uniform(0.8, 1.2, (count, len(FORM)))
+    together = steer(SHIP, manoeuvre, derivatives, samples=200, control_s=control_s)
+    assert len(together) == count
+    for column, values in zip(together, derivatives):
+        alone = steer(SHIP, manoeuvre, values, samples=200, control_s=control_s)[0]
+        for name in vars(alone):
+            np.testing.assert_array_equal(getattr(column, name), getattr(alone, name))
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    angle=st.floats(5.0, 35.0),
+    seed=st.integers(0, 2**32 - 1),
+    kind=st.sampled_from([zigzag, turn]),
+)
+def test_without_the_propeller_sides_are_alike(angle, seed, kind):
+    values = SHIP.values * np.random.default_rng(seed).uniform(0.9, 1.1, len(FORM))
+    values[EVEN] = 0.0
+    starboard, port = (
+        steer(SHIP, kind(angle, first=side), values, control_s=0.0)[0] for side in Side
+    )
+    mirrored = {'surge_m_s': 1.0, 'position_m': np.array([1.0, -1.0])}
+    for name in ('surge_m_s', 'sway_m_s', 'yaw_rate_rad_s', 'heading_rad', 'position_m'):
+        np.testing.assert_allclose(
+            getattr(port, name),
+            mirrored.get(name, -1.0) * getattr(starboard, name),
+            rtol=0,
+            atol=1e-12 * max(1.0, float(np.max(np.abs(getattr(port, name))))),
+        )
+
+
+def test_the_propeller_makes_them_differ():
+    starboard, port = (steer(SHIP, zigzag(15.0, first=side))[0] for side in Side)
+    assert np.max(np.abs(starboard.heading_rad + port.heading_rad)) > 0.01
+
+
+def test_the_helmsman_is_late_by_up_to_his_interval():
+    prompt, quick, slow = (
+        steer(SHIP, zigzag(25.0), control_s=control_s)[0] for control_s in (0.0, 0.1, 0.5)
+    )
+    peaks = [np.degrees(np.max(motion.heading_rad[:400])) for motion in (prompt, quick, slow)]
+    assert peaks[0] < peaks[1] < peaks[2] < peaks[0] + 0.5
+
+
+def test_the_rudder_keeps_to_its_rate_and_limit():
+    motion = steer(SHIP, zigzag(40.0), sample_s=0.1, samples=3000)[0]
+    machine = SHIP.rudder
+    assert np.max(np.abs(np.diff(motion.rudder_rad))) <= machine.rate_rad_s * 0.1 * (1 + 1e-9)
+    stiff = replace(SHIP, rudder=replace(machine, limit_rad=np.radians(34.0)))
+    with pytest.raises(
+        SimulationError, match=r"'turn:35', expected more than 0 and at most 34 degrees"
+    ):
+        steer(stiff, turn(35.0))
+    slow = replace(SHIP, rudder=replace(machine, rate_rad_s=np.radians(1.0)))
+    lagging = replace(SHIP, rudder=replace(machine, lag_s=5.0))
+    prompt = steer(SHIP, turn(35.0), samples=20)[0].rudder_rad
+    for other in (slow, lagging):
+        later = steer(other, turn(35.0), samples=20)[0].rudder_rad
+        assert np.all(later <= prompt + 1e-12)
+        assert later[12] < prompt[12] - 0.01
+
+
+def test_samples_are_where_they_were_asked_for():
+    often = steer(SHIP, turn(20.0), sample_s=0.5, samples=101)
+    seldom = steer(SHIP, turn(20.0), sample_s=5.0, samples=11)
+    np.testing.assert_allclose(often.time_s[::10], seldom.time_s)
+    np.testing.assert_allclose(often.speeds[:, ::10], seldom.speeds, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ('options', 'message'),
+    [
+        ({'sample_s': 0.25, 'control_s': 0.1}, 'sample_s is 0.25 and control_s 0.1'),
+        ({'sample_s': np.nan, 'control_s': 0.0}, 'sample_s is nan'),
+        ({'sample_s': 0.5, 'control_s': 1.0}, 'whole number of looks'),
+        ({'samples': 1}, 'samples is 1'),
+        ({'approach_s': -1.0}, 'approach_s is -1.0, expected 0 to 3600 s'),
+        ({'approach_s': np.nan}, 'approach_s is nan'),
+        ({'derivatives': np.zeros(39)}, r'shape \(1, 39\), expected \(k, 40\)'),
+    ],
+)
+def test_what_cannot_be_simulated_is_told(options, message):
+    with pytest.raises(SimulationError, match=message):
+        steer(SHIP, turn(20.0), **options)

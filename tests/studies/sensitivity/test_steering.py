@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""S3's analysis of a Mariner-class ship, and what it says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.errors import SensitivityError
+from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, turn, zigzag
+from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
+from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Norm, relative, vary
+from shipdrag_ros.studies.sensitivity.steering import (
+    DESIGN,
+    Observations,
+    check,
+    experiment,
+    respond,
+    respond_by_groups,
+    simulator,
+    study,
+)
+
+SHIP = mariner()
+ZIGZAG = zigzag(15.0)
+
+
+@pytest.fixture(scope='module')
+def found():
+    return study(SHIP, ZIGZAG, keep=24)
+
+
+def test_the_161_simulations_are_one_call(monkeypatch):
+    sizes = []
+
+    def counted(ship, manoeuvre, derivatives, **options):
+        sizes.append(derivatives.shape)
+        return steer(ship, manoeuvre, derivatives, **options)
+
+    monkeypatch.setattr('shipdrag_ros.studies.sensitivity.steering.steer', counted)
+    respond(SHIP, ZIGZAG)
+    assert sizes == [(161, 40)]
+
+
+def test_a_loss_is_that_of_two_manoeuvres(found):
+    i, change = FORM.index('Nd'), CHANGES[2]
+    values = SHIP.values
+    values[i] *= 1.0 + change
+    one, other = (steer(SHIP, ZIGZAG, v, control_s=0.0)[0] for v in (SHIP.values, values))
+    length_s = SHIP.length_m / SHIP.speed_m_s
+    squares = ((one.surge_m_s - other.surge_m_s) / SHIP.speed_m_s) ** 2
+    squares += ((one.sway_m_s - other.sway_m_s) / SHIP.speed_m_s) ** 2
+    squares += ((one.yaw_rate_rad_s - other.yaw_rate_rad_s) * length_s) ** 2
+    assert len(squares) == 1200
+    assert found.losses.table[i, 2] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-12)
+    assert found.mean_norms.table[i, 2] == pytest.approx(np.mean(np.sqrt(squares)), rel=1e-12)
+
+
+def test_what_the_paper_saw_is_there_with_both_norms(found):
+    for losses in (found.losses, found.mean_norms):
+        seen = Observations.of(losses)
+        assert seen.unlike[0] < 0.01  # + and - 10 % alike
+        assert seen.unlike[0] < seen.unlike[1] < 0.05  # + and - 50 % less so
+        assert seen.growth == pytest.approx(5.0, abs=0.02)
+        assert losses.mean.min() < 1e-4 * losses.mean.max()  # some are nearly 0
+    assert found.norms_agree
+
+
+def test_a_helmsman_who_looks_now_and_then_hides_small_changes():
+    seen = Observations.of(respond(SHIP, ZIGZAG, control_s=0.5).losses())
+    assert seen.unlike[0] > 0.1
+    assert seen.growth < 4.5
+
+
+def test_twenty_four_derivatives_are_eighteen_measurements(found):
+    assert len(found.selection.kept) == 24
+    assert len(found.selection.dropped) == 16
+    assert {'Nd', 'Yv', 'Yr', 'Nr', 'Nv', 'Xu', 'Xrv', 'Xvv'} <= set(found.selection.kept)
+    assert {'Yvdd', 'Nvdd', 'Yddd', 'Yuud', 'Y0uu', 'N0uu'} <= set(found.selection.dropped)
+    assert found.independent == 18
+    assert len(found.group_selection.kept) == 18
+    assert len(found.group_derivatives) == 29
+
+
+def test_the_reduced_model_is_close_and_closer_by_measurements(found):
+    full, reduced = np.degrees(found.check.overshoots_rad)
+    np.testing.assert_allclose(full, [8.85, 7.01], rtol=0, atol=0.006)
+    np.testing.assert_allclose(reduced, full, rtol=0, atol=1.0)
+    by_group = np.degrees(found.group_check.overshoots_rad[1])
+    assert np.max(np.abs(by_group - full)) < 0.2 < np.max(np.abs(reduced - full))
+    for name, value in found.group_check.rms_difference.items():
+        assert value < found.check.rms_difference[name]
+
+
+def test_keeping_all_changes_nothing():
+    assert set(check(SHIP, FORM).rms_difference.values()) == {0.0}
+    assert check(SHIP, FORM, manoeuvre=turn(20.0)).manoeuvre == turn(20.0)
+
+
+def test_a_model_without_nearly_everything_still_has_an_answer():
+    few = study(SHIP, ZIGZAG, keep=1)
+    assert few.selection.kept == ('Nd',)
+    assert len(few.check.overshoots_rad[1]) <= 2
+    with pytest.raises(SensitivityError, match=r'keep is 41, expected 1\.\.40'):
+        study(SHIP, ZIGZAG, keep=41)
+
+
+def test_groups_change_together():
+    groups = respond_by_groups(SHIP, ZIGZAG)
+    assert len(groups.names) == 26
+    values = SHIP.values
+    for name in ('Nd', 'Nud', 'Nuud'):
+        values[FORM.index(name)] *= 1.1
+    both = steer(SHIP, ZIGZAG, np.array([SHIP.values, values]), control_s=0.0).speeds
+    scale = np.array([1.0, 1.0, 1.0 / SHIP.length_m]) * SHIP.speed_m_s
+    expected = Norm.ROOT_MEAN_SQUARE.of((both[1] - both[0]) / scale)
+    losses = groups.losses().table[groups.names.index('Nd')]
+    assert losses[0] == pytest.approx(expected, rel=1e-9)
+    halves = respond_by_groups(SHIP, ZIGZAG, changes=(0.05,)).losses()
+    assert halves.table[halves.names.index('Nd')][0] == pytest.approx(expected / 2.0, rel=0.1)
+    alone = respond(SHIP, ZIGZAG, changes=(0.1,)).losses()
+    i = FORM.index('Nd')
+    assert alone.table.shape == (40, 1)
+    assert alone.table[i, 0] == respond(SHIP, ZIGZAG).losses().table[i, 0]
+
+
+@settings(max_examples=10, deadline=None)
+@given(change=st.floats(1e-4, 1e-2), name=st.sampled_from(FORM), angle=st.floats(5.0, 35.0))
+def test_losses_of_any_zigzag_grow_as_the_change(change, name, angle):
+    i = FORM.index(name)
+
+    def alone(sets):
+        derivatives = np.tile(SHIP.values, (len(sets), 1))
+        derivatives[:, i] = sets[:, 0]
+        return simulator(SHIP, zigzag(angle))(derivatives)
+
+    value = SHIP.values[i : i + 1]
+    steps = relative([name], value, (change, -change, 2.0 * change))
+    table = vary(alone, [name], value, steps).losses().table[0]
+    # beside a floor of what the steps of the integration leave
+    assert table[1] == pytest.approx(table[0], rel=0.2, abs=1e-6)
+    assert table[2] == pytest.approx(2.0 * table[0], rel=0.2, abs=1e-6)
+
+
+def test_which_manoeuvre_shows_which_derivative():
+    chosen: tuple[Manoeuvre, ...] = (zigzag(5.0), zigzag(35.0), turn(35.0))
+    shown = experiment(SHIP, chosen)
+    assert set(chosen) <= set(DESIGN)
+    best = dict(zip(shown.names, shown.best))
+    # the propeller's side force in the gentlest, what grows with powers of the rudder in the
+    # hardest manoeuvre
+    assert best['N0'] == best['Y0'] == zigzag(5.0)
+    assert best['Nddd'] == best['Xdd'] == zigzag(35.0)
+    single = shown.own_share
+    assert single.shape == (40, 3)
+    assert np.all((single >= 0.0) & (single <= 1.0))
+    # a steady circle is a handful of numbers, from which forty cannot be told
+    assert np.median(single[:, 2]) < 1e-3 < np.median(single[:, 1])
+    assert np.median(shown.own_share_together) > np.median(single[:, 1])
