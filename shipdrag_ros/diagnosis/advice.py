@@ -21,23 +21,23 @@ from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Problem
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.prospect import (
-    Prospect,
+    PredictedOutcome,
     Rival,
     empty,
     of_another_run,
     of_instrument,
-    resolving,
+    probability_of_naming,
     with_known,
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
-from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Weighed
+from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Measure
-from shipdrag_ros.simulation.effects import deciders
+from shipdrag_ros.simulation.effects import discriminating_measurements
 
 _MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed
@@ -58,7 +58,7 @@ _RUNS = (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED, Measure.ANOTHER_RUN)
 
 def advice(
     library: Library,
-    weighed: Weighed,
+    posterior: Posterior,
     candidates: Sequence[Candidate],
     *,
     inseparable: Sequence[frozenset[str]],
@@ -79,7 +79,7 @@ def advice(
     what may be the truth; None where it is not simulated. Among the rivals are pairs
     that the runs do not ask for, which a measurement may bring up.
     """
-    fits = _rivals(weighed)
+    fits = _rivals(posterior)
     rivals = [
         Rival(names, one.log_evidence, one.hypothesis.log_odds) for names, one in fits.items()
     ]
@@ -94,7 +94,7 @@ def advice(
             for ways in way
             for one in ways
         ):
-            named = resolving(settings, setting, rivals, inseparable=inseparable)
+            named = probability_of_naming(settings, setting, rivals, inseparable=inseparable)
             found.append(Advice(measure.value, named))
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
@@ -112,17 +112,22 @@ def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
     """
     votes: dict[Measure, float] = {}
     for one, other in combinations(candidates, 2):
-        for measure in _deciders(one, other):
+        for measure in _discriminating(one, other):
             weight = one.probability * other.probability
             votes[measure] = votes.get(measure, 0.0) + weight
     ranked = sorted(votes, key=lambda measure: -votes[measure])
     return tuple(Advice(measure.value, None) for measure in ranked)
 
 
-def _deciders(one: Candidate, other: Candidate) -> list[Measure]:
+def _discriminating(one: Candidate, other: Candidate) -> list[Measure]:
     """Return what tells two candidates apart, by what they do not share."""
     own, others = set(one.names) - set(other.names), set(other.names) - set(one.names)
-    return [measure for a in sorted(own) for b in sorted(others) for measure in deciders(a, b)]
+    return [
+        measure
+        for a in sorted(own)
+        for b in sorted(others)
+        for measure in discriminating_measurements(a, b)
+    ]
 
 
 def _reach(
@@ -141,18 +146,18 @@ def _reach(
         * sum(
             other.probability
             for other in candidates
-            if other is one or measure not in _deciders(one, other)
+            if other is one or measure not in _discriminating(one, other)
         )
     )
 
 
-def _rivals(weighed: Weighed) -> dict[tuple[str, ...], Fit]:
+def _rivals(posterior: Posterior) -> dict[tuple[str, ...], Fit]:
     """Return the most probable fits, asked for or not, nothing and something unnamed too."""
     # one that could not be fitted is none
-    fitted = [names for names, one in weighed.best.items() if np.isfinite(one.covariance).all()]
-    fitted.sort(key=lambda names: -weighed.best[names].log_evidence)
+    fitted = [names for names, one in posterior.best.items() if np.isfinite(one.covariance).all()]
+    fitted.sort(key=lambda names: -posterior.best[names].log_evidence)
     return {
-        names: weighed.best[names]
+        names: posterior.best[names]
         for place, names in enumerate(fitted)
         if place < _MOST or names in ((), UNNAMED)
     }
@@ -186,7 +191,7 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
 
 def _settings(
     measure: Measure, library: Library, fits: Sequence[Fit]
-) -> tuple[list[list[list[Prospect]]], list[int]]:
+) -> tuple[list[list[list[PredictedOutcome]]], list[int]]:
     """Return the ways in which a measurement may be read, and that of each candidate."""
     problem, first = library.problem, library.seen[0]
     if measure in _RUNS:
@@ -199,7 +204,7 @@ def _settings(
         prospects, _ = of_instrument(problem, fits, _contexts(windows, problem, library.ship))
         return [prospects], [0] * len(fits)
     # whether the water turns the shaft is seen before all else, and differs by rival
-    found: list[tuple[list[list[Prospect]], list[Float64]]] = []
+    found: list[tuple[list[list[PredictedOutcome]], list[Float64]]] = []
     for after in (_TURNING, _STANDING):
         windows = _windows(measure, problem, library.ship, after=after)
         contexts = _contexts(windows, problem, library.ship)

@@ -19,7 +19,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.diagnosis.result import Gap
-from shipdrag_ros.diagnosis.terms import hats
+from shipdrag_ros.diagnosis.terms import cubic_bsplines
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.motion_fit.steady import white_sd
 from shipdrag_ros.samples import Float64
@@ -262,7 +262,10 @@ class FormProblem:
                 sizes = rest[_SMOOTHS * j : _SMOOTHS * (j + 1)]
                 speed = (
                     speed
-                    + hats((coast.time_s - coast.time_s[0]) / coast.duration_s, _SMOOTHS).T @ sizes
+                    + cubic_bsplines(
+                        (coast.time_s - coast.time_s[0]) / coast.duration_s, _SMOOTHS
+                    ).T
+                    @ sizes
                 )
             found.append(speed)
         return np.concatenate(found)

@@ -25,7 +25,14 @@ from shipdrag_ros.diagnosis.result import (
 from shipdrag_ros.diagnosis.search import search, with_more, with_pairs
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.traces import traces
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, odd
+from shipdrag_ros.diagnosis.verdict import (
+    QUIET,
+    Posterior,
+    decide,
+    exceeds_noise,
+    has_residual_structure,
+    outside_prior,
+)
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window
@@ -87,23 +94,27 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
             break
         moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
     found = with_pairs(found)
-    library, weighed, best = found.library, found.weighed, found.best
+    library, posterior, best = found.library, found.posterior, found.best
     never = _inseparable(library)
-    alarm = weighed.nothing < QUIET and bool(best.hypothesis.names)
+    alarm = posterior.nothing < QUIET and bool(best.hypothesis.names)
     predicted = held_out(library, best) if alarm else None
     lacking = alarm and (
-        lacks(best, with_more(found))
-        or odd(best)
-        or (predicted is not None and misses(predicted.chi2_per_sample, best.best.rows))
+        has_residual_structure(best, with_more(found))
+        or outside_prior(best)
+        or (predicted is not None and exceeds_noise(predicted.chi2_per_sample, best.best.rows))
     )
     # an instrument that errs before the stop has taught the noise what it should have shown
-    restless = any(run.restless for run in seen) and not _of_the_ship(library, best)
-    if lacking or restless:
-        weighed = weighed.doubted()
-    verdict, candidates = decide(weighed, lacking=lacking or restless, inseparable=never)
+    log_ground_discrepancy = any(run.log_ground_discrepancy for run in seen) and not _of_the_ship(
+        library, best
+    )
+    if lacking or log_ground_discrepancy:
+        posterior = posterior.doubted()
+    verdict, candidates = decide(
+        posterior, lacking=lacking or log_ground_discrepancy, inseparable=never
+    )
     would_decide: tuple[Advice, ...] = ()
     if verdict is Verdict.ONE_OF:
-        would_decide = advice(library, weighed, candidates, inseparable=never)
+        would_decide = advice(library, posterior, candidates, inseparable=never)
     as_stated = frozen(library)
     missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.hypothesis.names)
     explained = best if missing else found.nothing
@@ -111,18 +122,24 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         explained = max(found.smooth, key=lambda one: one.log_likelihood)
     return Diagnosis(
         verdict=verdict,
-        effects=_named(best, weighed) if verdict is Verdict.NAMED else (),
+        effects=_named(best, posterior) if verdict is Verdict.NAMED else (),
         candidates=candidates,
-        nothing=weighed.nothing,
-        unnamed=weighed.unnamed,
+        nothing=posterior.nothing,
+        unnamed=posterior.unnamed,
         would_decide=would_decide,
-        where=_place(library, as_stated, found.smooth, verdict, restless=restless),
+        where=_place(
+            library,
+            as_stated,
+            found.smooth,
+            verdict,
+            log_ground_discrepancy=log_ground_discrepancy,
+        ),
         before=gap_of(library.problem, as_stated.best),
         after=gap_of(library.problem, best.best) if missing else None,
         held_out_before=held_out(library, None),
         held_out_after=predicted if missing else None,
         baseline='stated',
-        best=_named(best, weighed),
+        best=_named(best, posterior),
         notes=notes,
         traces=traces(library.problem, as_stated.best, explained.best),
         coastdowns_used=len(seen),
@@ -166,7 +183,7 @@ def _observed(
         'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '
         'and as much of the coastdown as is like it passes for noise'
         for run in seen
-        if run.restless
+        if run.log_ground_discrepancy
     ]
     return tuple(seen), tuple(notes)
 
@@ -178,14 +195,19 @@ def _of_the_ship(library: Library, best: Fit) -> bool:
 
 
 def _place(
-    library: Library, as_stated: Fit, smooth: Sequence[Fit], verdict: Verdict, *, restless: bool
+    library: Library,
+    as_stated: Fit,
+    smooth: Sequence[Fit],
+    verdict: Verdict,
+    *,
+    log_ground_discrepancy: bool,
 ) -> Where | None:
     """Return where model and data disagree."""
     if verdict is Verdict.NONE:
         return None
-    if not restless:
+    if not log_ground_discrepancy:
         return where(library, as_stated, smooth)
-    runs = [run for run in library.seen if run.restless]
+    runs = [run for run in library.seen if run.log_ground_discrepancy]
     speeds = [run.speed_m_s for run in runs]
     lead_in_s = max(run.lead_in_s for run in runs)
     return Where('log_radar', (-lead_in_s, 0.0), (min(speeds), max(speeds)))
@@ -199,9 +221,9 @@ def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
     return replace(ship, effects=(*ship.effects, *added))
 
 
-def _named(best: Fit, weighed: Weighed) -> tuple[Named, ...]:
+def _named(best: Fit, posterior: Posterior) -> tuple[Named, ...]:
     """Return the effects of a fit with their parameters."""
-    probability = weighed.probability[best.hypothesis.names]
+    probability = posterior.probability[best.hypothesis.names]
     found = []
     for part, place in best.hypothesis.parts:
         if not isinstance(part, EffectTerm) or part.stated:
@@ -223,6 +245,6 @@ def _inseparable(library: Library) -> list[frozenset[str]]:
     return [
         frozenset((one.name, other))
         for one in library.effects
-        for other, measures in one.look_alikes.items()
+        for other, measures in one.confounders.items()
         if not measures
     ]

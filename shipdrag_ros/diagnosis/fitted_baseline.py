@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.coast_form import SHAPES, Coast, FormFit, FormProblem
 from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Named, Verdict, Where
-from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Weighed, decide
+from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Posterior, decide
 from shipdrag_ros.ship import Ship, Uncertain
 
 _APART_RAD = 0.5  # between headings of runs, from which they tell what turns with the Earth
@@ -59,27 +59,27 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
     log[()] = nothing.log_evidence + math.log(_NOTHING)
     log[UNNAMED] = smooth.log_evidence + math.log(_UNNAMED)
     total = float(logsumexp(list(log.values())))
-    weighed = Weighed({}, {names: math.exp(each - total) for names, each in log.items()})
-    first = weighed.named()[0]
+    posterior = Posterior({}, {names: math.exp(each - total) for names, each in log.items()})
+    first = posterior.named()[0]
     best = fits.get(first, nothing)
-    alarm = bool(first) and weighed.nothing < QUIET
+    alarm = bool(first) and posterior.nothing < QUIET
     lacking = alarm and more.log_evidence > earth.log_evidence + _LACK_NATS
     forces = frozenset(_EARTH) if apart else frozenset((*_EARTH, *_LOG_ALONE))
     verdict, candidates = decide(
-        weighed, lacking=lacking and first != _LOG_ALONE, inseparable=[forces]
+        posterior, lacking=lacking and first != _LOG_ALONE, inseparable=[forces]
     )
     named: tuple[Named, ...] = ()
     if verdict is Verdict.NAMED and first == _LOG_ALONE:
         offset = Uncertain(float(best.value[-1]), float(best.sd[-1]))
-        named = (Named('log_offset', weighed.probability[first], {'offset_m_s': offset}),)
+        named = (Named('log_offset', posterior.probability[first], {'offset_m_s': offset}),)
     missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(first)
     speeds = np.concatenate([coast.speed_m_s for coast in seen])
     return Diagnosis(
         verdict=verdict,
         effects=named,
         candidates=candidates,
-        nothing=weighed.nothing,
-        unnamed=weighed.unnamed,
+        nothing=posterior.nothing,
+        unnamed=posterior.unnamed,
         would_decide=declared(candidates) if verdict is Verdict.ONE_OF else (),
         where=None
         if verdict is Verdict.NONE

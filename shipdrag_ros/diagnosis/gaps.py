@@ -12,7 +12,7 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Problem
 from shipdrag_ros.diagnosis.result import Gap, Where
-from shipdrag_ros.diagnosis.terms import EffectTerm, PlaceTerm
+from shipdrag_ros.diagnosis.terms import EffectTerm, RunNuisance
 from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION
 from shipdrag_ros.samples import Float64
 
@@ -50,10 +50,10 @@ def frozen(library: Library) -> Fit:
     """
     nothing = library.nothing
     places = tuple(
-        replace(term, scatter=0.0) if isinstance(term, PlaceTerm) else term
-        for term in nothing.row_terms
+        replace(term, scatter=0.0) if isinstance(term, RunNuisance) else term
+        for term in nothing.measurement_terms
     )
-    as_stated = replace(nothing, terms=nothing.terms[1:], row_terms=places)
+    as_stated = replace(nothing, terms=nothing.terms[1:], measurement_terms=places)
     return fit(library.problem, [as_stated], [library.start(as_stated)])[0]
 
 

@@ -23,9 +23,9 @@ from shipdrag_ros.diagnosis.terms import (
     BaselineTerm,
     EffectTerm,
     ForceTerm,
-    FormTerm,
-    PlaceTerm,
-    RowTerm,
+    MeasurementTerm,
+    ModelErrorTerm,
+    RunNuisance,
     SpeedErrorTerm,
     Term,
     scope_runs,
@@ -89,7 +89,7 @@ class Library:
         )
         scatter = self.ship.baseline.run_scatter
         places = tuple(
-            PlaceTerm(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None, scatter)
+            RunNuisance(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None, scatter)
             for j, run in enumerate(self.seen)
         )
         given: list[Term] = [
@@ -140,7 +140,7 @@ class Library:
                 only_run=run,
             )
             sd = effect.formula_sd
-            forms = (*base.forms, FormTerm(term, sd)) if sd > 0.0 else base.forms
+            forms = (*base.forms, ModelErrorTerm(term, sd)) if sd > 0.0 else base.forms
             terms = (*base.terms, term)
             found.append(
                 replace(
@@ -163,10 +163,10 @@ class Library:
         if channel == 'force':
             top = 1.05 * max(run.speed_m_s for run in self.seen)
             return replace(found, terms=(*base.terms, ForceTerm(self.problem.ship, top)))
-        errors: list[RowTerm] = [
+        errors: list[MeasurementTerm] = [
             SpeedErrorTerm(j, channel == 'log', run.speed_m_s) for j, run in enumerate(self.seen)
         ]
-        return replace(found, row_terms=(*base.row_terms, *errors))
+        return replace(found, measurement_terms=(*base.measurement_terms, *errors))
 
     def transferred(self, other: Hypothesis, *, runs: Sequence[int]) -> Hypothesis:
         """

@@ -21,9 +21,9 @@ from shipdrag_ros.diagnosis.terms import (
     BaselineTerm,
     EffectTerm,
     ForceTerm,
-    FormTerm,
+    MeasurementTerm,
+    ModelErrorTerm,
     Predicted,
-    RowTerm,
     SpeedErrorTerm,
     Term,
 )
@@ -46,7 +46,7 @@ class Hypothesis:
     ----------
     names
         Of the effects, sorted; none: nothing is missing.
-    terms, row_terms
+    terms, measurement_terms
         All that is fitted, the baseline's uncertainty included.
     forms
         How far effects among the terms may depart from their formulas.
@@ -61,20 +61,20 @@ class Hypothesis:
 
     names: tuple[str, ...]
     terms: tuple[Term, ...]
-    row_terms: tuple[RowTerm, ...]
-    forms: tuple[FormTerm, ...] = ()
+    measurement_terms: tuple[MeasurementTerm, ...]
+    forms: tuple[ModelErrorTerm, ...] = ()
     weight: float = 0.0
     log_odds: float = 0.0
     discrepancy: str = ''
 
     @cached_property
-    def parts(self) -> tuple[tuple[Term | RowTerm | FormTerm, int], ...]:
+    def parts(self) -> tuple[tuple[Term | MeasurementTerm | ModelErrorTerm, int], ...]:
         """All that has unknowns, with the place of its first."""
-        found: list[tuple[Term | RowTerm | FormTerm, int]] = []
+        found: list[tuple[Term | MeasurementTerm | ModelErrorTerm, int]] = []
         place = 0
-        parts: tuple[Term | RowTerm | FormTerm, ...] = (
+        parts: tuple[Term | MeasurementTerm | ModelErrorTerm, ...] = (
             *self.terms,
-            *self.row_terms,
+            *self.measurement_terms,
             *self.forms,
         )
         for part in parts:
@@ -390,7 +390,7 @@ class Problem:
             table[1 + unknown, :n] = (predicted[column].along - base.along) / step
             table[1 + unknown, n : n + k] = (predicted[column].across - base.across) / step
             table[1 + unknown, n + k :] = (context[column] - context[plan.base]) / step
-        added = [term.columns(seen, run, base) for term in hypothesis.row_terms]
+        added = [term.columns(seen, run, base) for term in hypothesis.measurement_terms]
         for form, other in zip(hypothesis.forms, plan.without):
             trace = base.along - predicted[other].along, base.across - predicted[other].across
             added.append(form.columns(seen, trace))

@@ -38,7 +38,7 @@ _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8
 _KNOWN_S = 5.0  # of the time of the stop
-_RESTLESS_M_S = 0.15  # six times what is usual
+_DISCREPANCY_M_S = 0.15  # six times what is usual
 
 
 @dataclass(frozen=True)
@@ -115,9 +115,9 @@ class Observation:
         return float(self.time_s[-1]) - self.lead_in_s
 
     @property
-    def restless(self) -> bool:
+    def log_ground_discrepancy(self) -> bool:
         """Whether log and way over ground wander apart as water seldom makes them."""
-        return self.along.water_m_s > _RESTLESS_M_S
+        return self.along.water_m_s > _DISCREPANCY_M_S
 
     @classmethod
     def of(

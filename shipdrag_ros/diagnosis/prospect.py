@@ -24,12 +24,12 @@ from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.terms import (
     BaselineTerm,
     EffectTerm,
-    PlaceTerm,
+    RunNuisance,
     SpeedErrorTerm,
     Term,
     scope_runs,
 )
-from shipdrag_ros.diagnosis.verdict import Weighed, decide, simplest
+from shipdrag_ros.diagnosis.verdict import Posterior, decide, prune_by_bayes_factor
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable
@@ -38,7 +38,7 @@ Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Prospect:
+class PredictedOutcome:
     """
     What one rival predicts of a measurement, whitened rows.
 
@@ -107,7 +107,7 @@ class Rival:
 
 def of_another_run(
     problem: Problem, fits: Sequence[Fit], run: Observation
-) -> list[list[Prospect]]:
+) -> list[list[PredictedOutcome]]:
     """
     Return what fitted hypotheses predict of a run that is yet to be made.
 
@@ -143,18 +143,20 @@ def of_another_run(
             weights.append(log_weight)
             whose.append(number)
     linear = replace(problem, seen=(run,)).linearise(there, at)
-    ways: list[list[Prospect]] = [[] for _ in fits]
+    ways: list[list[PredictedOutcome]] = [[] for _ in fits]
     for number, found, (covariance, precision), log_weight in zip(
         whose, linear, before, weights, strict=True
     ):
         table = found.tables[0]
-        ways[number].append(Prospect(-table[0], table[1:], covariance, precision, log_weight))
+        ways[number].append(
+            PredictedOutcome(-table[0], table[1:], covariance, precision, log_weight)
+        )
     return ways
 
 
 def of_instrument(
     problem: Problem, fits: Sequence[Fit], contexts: Sequence[Context]
-) -> tuple[list[list[Prospect]], list[Float64]]:
+) -> tuple[list[list[PredictedOutcome]], list[Float64]]:
     """
     Return what fitted hypotheses predict of an instrument in the runs there are.
 
@@ -182,16 +184,16 @@ def of_instrument(
         both = list(zip(linear.tables, linear.residuals, contexts, strict=True))
         table = np.hstack([table[:, table.shape[1] - len(c) :] for table, _, c in both])
         precision = np.asarray(np.linalg.inv(one.covariance), np.float64)
-        prospects.append([Prospect(-table[0], table[1:], one.covariance, precision)])
+        prospects.append([PredictedOutcome(-table[0], table[1:], one.covariance, precision)])
         values.append(-np.concatenate([left[len(left) - len(c) :] for _, left, c in both]))
     return prospects, values
 
 
 def with_known(
-    prospects: Sequence[Sequence[Prospect]],
+    prospects: Sequence[Sequence[PredictedOutcome]],
     fits: Sequence[Fit],
     sd: Mapping[str, Sequence[float]],
-) -> list[list[Prospect]]:
+) -> list[list[PredictedOutcome]]:
     """
     Return the same where a measurement tells some unknowns directly.
 
@@ -205,9 +207,9 @@ def with_known(
     for ways, one in zip(prospects, fits, strict=True):
         mean, slope = [], []
         for part, place in one.hypothesis.parts:
-            if not isinstance(part, BaselineTerm | PlaceTerm):
+            if not isinstance(part, BaselineTerm | RunNuisance):
                 continue
-            run = part.run if isinstance(part, PlaceTerm) else 0
+            run = part.run if isinstance(part, RunNuisance) else 0
             for at, unknown in enumerate(part.unknowns, place):
                 known = sd[unknown.name][run] if unknown.name in sd else 0.0
                 if known > 0.0:
@@ -229,8 +231,8 @@ def with_known(
     return found
 
 
-def resolving(
-    settings: Sequence[Sequence[Sequence[Prospect]]],
+def probability_of_naming(
+    settings: Sequence[Sequence[Sequence[PredictedOutcome]]],
     setting: Sequence[int],
     rivals: Sequence[Rival],
     *,
@@ -253,7 +255,9 @@ def resolving(
     """
     rng = np.random.default_rng(_SEED)
     log_odds = {rival.names: rival.log_odds for rival in rivals}
-    probability = simplest({rival.names: rival.log_evidence for rival in rivals}, log_odds)
+    probability = prune_by_bayes_factor(
+        {rival.names: rival.log_evidence for rival in rivals}, log_odds
+    )
     share = np.array([probability.get(rival.names, 0.0) for rival in rivals])
     counts = np.diff(np.round(_DRAWS * np.concatenate([[0.0], np.cumsum(share)])).astype(int))
     named = 0
@@ -266,13 +270,13 @@ def resolving(
             for rival, ways in zip(rivals, settings[way], strict=True)
         ]
         for log in np.array(evidence).T.tolist():
-            after = simplest(dict(zip(log_odds, log, strict=True)), log_odds)
-            verdict, _ = decide(Weighed({}, after), lacking=False, inseparable=inseparable)
+            after = prune_by_bayes_factor(dict(zip(log_odds, log, strict=True)), log_odds)
+            verdict, _ = decide(Posterior({}, after), lacking=False, inseparable=inseparable)
             named += verdict is Verdict.NAMED
     return named / int(counts.sum())
 
 
-def _drawn(ways: Sequence[Prospect], count: int, rng: np.random.Generator) -> Float64:
+def _drawn(ways: Sequence[PredictedOutcome], count: int, rng: np.random.Generator) -> Float64:
     """Return outcomes of a rival, of each way as many as it is probable."""
     weight = np.exp([one.log_weight for one in ways])
     of_way = rng.multinomial(count, weight / weight.sum())
@@ -301,8 +305,8 @@ def _transferred(hypothesis: Hypothesis, *, runs: int) -> list[tuple[Hypothesis,
     # it, is not known of the next
     rows = tuple(
         replace(term)
-        for term in hypothesis.row_terms
-        if isinstance(term, PlaceTerm | SpeedErrorTerm) and term.run == 0
+        for term in hypothesis.measurement_terms
+        if isinstance(term, RunNuisance | SpeedErrorTerm) and term.run == 0
     )
     log_weight = 0.0
     choices: list[list[list[Term]]] = []

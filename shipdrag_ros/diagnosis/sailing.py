@@ -19,7 +19,7 @@ from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.prior import UNNAMED_ODDS, nothing_missing
 from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Gap, Named, Verdict, Where
 from shipdrag_ros.diagnosis.sailing_model import SMOOTH, LegFit, LegModel
-from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Weighed, decide, simplest
+from shipdrag_ros.diagnosis.verdict import QUIET, UNNAMED, Posterior, decide, prune_by_bayes_factor
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Int64
 from shipdrag_ros.ship import Uncertain
@@ -74,22 +74,22 @@ def diagnose_sailing(
     pairs = [pair for pair in combinations(names, 2) if set(pair) != _SCALES]
     hypotheses = [(), *((name,) for name in names), *pairs]
     fits = {each: model.fit(each) for each in (*hypotheses, _BENT)}
-    weighed = Weighed({}, _probabilities(fits, names))
-    best = fits[weighed.named()[0]]
+    posterior = Posterior({}, _probabilities(fits, names))
+    best = fits[posterior.named()[0]]
     inseparable = [_SCALES] if 'radar_scale' in names else []
     if legs.direction is Direction.UNKNOWN:
         inseparable.append(_SET_APART)
     more = model.fit((*best.names, SMOOTH))
-    lacking = weighed.nothing < QUIET and _lacks(best, more)
-    verdict, candidates = decide(weighed, lacking=lacking, inseparable=inseparable)
+    lacking = posterior.nothing < QUIET and _lacks(best, more)
+    verdict, candidates = decide(posterior, lacking=lacking, inseparable=inseparable)
     missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.names)
-    found = _named(best, weighed.probability[best.names])
+    found = _named(best, posterior.probability[best.names])
     return Diagnosis(
         verdict=verdict,
         effects=found if verdict is Verdict.NAMED else (),
         candidates=candidates,
-        nothing=weighed.nothing,
-        unnamed=weighed.unnamed,
+        nothing=posterior.nothing,
+        unnamed=posterior.unnamed,
         would_decide=declared(candidates) if verdict is Verdict.ONE_OF else (),
         where=None if verdict is Verdict.NONE else _where(legs, best),
         before=_gap(fits[()]),
@@ -127,7 +127,7 @@ def _probabilities(
         each: fits[_BENT if each == UNNAMED else each].log_evidence + nothing + odds
         for each, odds in log_odds.items()
     }
-    return simplest(log, log_odds)
+    return prune_by_bayes_factor(log, log_odds)
 
 
 def _lacks(best: LegFit, more: LegFit) -> bool:

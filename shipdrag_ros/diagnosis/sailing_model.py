@@ -19,7 +19,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
 from shipdrag_ros.diagnosis.legs import Legs
-from shipdrag_ros.diagnosis.terms import hats
+from shipdrag_ros.diagnosis.terms import cubic_bsplines
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
 
@@ -127,7 +127,7 @@ class LegModel:
     def _bumps(self) -> Float64:
         """What neither a scale nor an offset is, (6, n)."""
         speed = self.legs.ground_m_s
-        bumps = hats(speed / speed.max(), _SMOOTHS).T
+        bumps = cubic_bsplines(speed / speed.max(), _SMOOTHS).T
         line = np.array([np.ones(len(speed)), speed]).T
         found: Float64 = (bumps - line @ np.linalg.lstsq(line, bumps, rcond=1e-6)[0]).T
         return found

@@ -23,7 +23,7 @@ _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 
 
-def promise(problem: Problem, base: Fit, hypotheses: Sequence[Hypothesis]) -> Float64:
+def screening_score(problem: Problem, base: Fit, hypotheses: Sequence[Hypothesis]) -> Float64:
     """
     Return about what log evidence hypotheses with one effect more will reach.
 

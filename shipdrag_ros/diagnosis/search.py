@@ -12,9 +12,9 @@ import numpy as np
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.hypotheses import Library
 from shipdrag_ros.diagnosis.linear import Hypothesis
-from shipdrag_ros.diagnosis.screening import promise
-from shipdrag_ros.diagnosis.terms import PlaceTerm
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, mode_of, weigh
+from shipdrag_ros.diagnosis.screening import screening_score
+from shipdrag_ros.diagnosis.terms import RunNuisance
+from shipdrag_ros.diagnosis.verdict import QUIET, Posterior, mode_of, posterior_of
 from shipdrag_ros.simulation.effects import find
 
 _PAIRED = 4  # most probable names that pairs are tried with
@@ -41,9 +41,9 @@ class Found:
     fits: tuple[Fit, ...]
 
     @cached_property
-    def weighed(self) -> Weighed:
+    def posterior(self) -> Posterior:
         """All with their probabilities."""
-        return weigh(self.fits)
+        return posterior_of(self.fits)
 
     @property
     def smooth(self) -> tuple[Fit, ...]:
@@ -53,14 +53,14 @@ class Found:
     @property
     def best(self) -> Fit:
         """The most probable of what has a name, or is nothing."""
-        return self.weighed.best[self.weighed.named()[0]]
+        return self.posterior.best[self.posterior.named()[0]]
 
     def stop_moved_s(self, run: int) -> float:
         """
         Return by how much the best fit moves the stop of a run.
         """
         for part, place in self.best.hypothesis.parts:
-            if isinstance(part, PlaceTerm) and part.run == run:
+            if isinstance(part, RunNuisance) and part.run == run:
                 at = part.place_of_stop
                 return part.unknowns[at].value(float(self.best.best.z[place + at]))
         raise AssertionError(f'run {run} has no place')
@@ -83,9 +83,9 @@ def with_pairs(found: Found) -> Found:
     """
     Fit pairs besides, where something is missing.
     """
-    if found.weighed.nothing >= QUIET:
+    if found.posterior.nothing >= QUIET:
         return found
-    pairs = _pairs(found.library, found.weighed)
+    pairs = _pairs(found.library, found.posterior)
     return replace(found, fits=(*found.fits, *pairs))
 
 
@@ -104,7 +104,7 @@ def _likeliest_starts(
     library: Library, hypotheses: Sequence[Hypothesis], near: Fit
 ) -> list[Hypothesis]:
     """Keep the most promising starts of each hypothesis."""
-    promised = promise(library.problem, near, hypotheses)
+    promised = screening_score(library.problem, near, hypotheses)
     kept: dict[tuple[object, ...], list[Hypothesis]] = {}
     for i in np.argsort(-promised):
         found = kept.setdefault(mode_of(hypotheses[i]), [])
@@ -113,19 +113,19 @@ def _likeliest_starts(
     return [one for ones in kept.values() for one in ones]
 
 
-def _pairs(library: Library, weighed: Weighed) -> list[Fit]:
+def _pairs(library: Library, posterior: Posterior) -> list[Fit]:
     """Fit pairs of the likeliest names with all others."""
-    first = [names for names in weighed.named() if names][:_PAIRED]
+    first = [names for names in posterior.named() if names][:_PAIRED]
     tried: list[tuple[float, Hypothesis, Fit]] = []
     for names in first:
-        base = weighed.best[names]
+        base = posterior.best[names]
         hypotheses = [
             hypothesis
             for effect in library.effects
             if all(effect.goes_with(find(name)) for name in names)
             for hypothesis in library.with_effect(base.hypothesis, effect)
         ]
-        promised = promise(library.problem, base, hypotheses).tolist()
+        promised = screening_score(library.problem, base, hypotheses).tolist()
         tried += [(p, one, base) for p, one in zip(promised, hypotheses, strict=True)]
     tried.sort(key=lambda one: -one[0])
     kept: dict[tuple[object, ...], tuple[Hypothesis, Fit]] = {}

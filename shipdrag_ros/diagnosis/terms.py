@@ -209,7 +209,7 @@ def baseline_parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
     if isinstance(ship.baseline, CoefficientBaseline):
         viscous = viscous_n(ship, speed_m_s)
         parts = [viscous, total - ship.air_drag_n(speed_m_s) - viscous]
-    return np.vstack([*parts, total * hats(speed_m_s / top_m_s, _SHAPES)])
+    return np.vstack([*parts, total * cubic_bsplines(speed_m_s / top_m_s, _SHAPES)])
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,7 @@ class Predicted:
 
 
 @dataclass(frozen=True)
-class FormTerm:
+class ModelErrorTerm:
     """
     How far an effect may depart from its formula, smoothly over the run.
 
@@ -297,7 +297,7 @@ class FormTerm:
         return along, bumps[:, seen.across.at] * trace[1]
 
 
-class RowTerm(Protocol):
+class MeasurementTerm(Protocol):
     """A part that adds to what is measured."""
 
     @property
@@ -309,7 +309,7 @@ class RowTerm(Protocol):
 
 
 @dataclass(frozen=True)
-class PlaceTerm:
+class RunNuisance:
     """
     What is a run's own: where it began, its heading, when the engine stopped.
 
@@ -407,17 +407,17 @@ class SpeedErrorTerm:
 def _over_run(seen: Observation, count: int) -> Float64:
     """Return bumps over a coastdown, (count, m); the first one holds all that was before."""
     after = np.clip((seen.time_s - seen.lead_in_s) / seen.duration_s, 0.0, 1.0)
-    return _kept_hats(after.tobytes(), count)
+    return _kept_bsplines(after.tobytes(), count)
 
 
 @lru_cache(maxsize=32)
-def _kept_hats(x: bytes, count: int) -> Float64:
-    return hats(np.frombuffer(x), count)
+def _kept_bsplines(x: bytes, count: int) -> Float64:
+    return cubic_bsplines(np.frombuffer(x), count)
 
 
 @lru_cache(maxsize=8)
 def _bumps(top_m_s: float, speeds: bytes) -> Float64:
-    return hats(np.frombuffer(speeds) / top_m_s, _DISCREPANCIES)
+    return cubic_bsplines(np.frombuffer(speeds) / top_m_s, _DISCREPANCIES)
 
 
 def _nothing(seen: Observation, unknowns: int) -> tuple[Float64, Float64]:
@@ -425,7 +425,7 @@ def _nothing(seen: Observation, unknowns: int) -> tuple[Float64, Float64]:
     return np.zeros((unknowns, len(seen.along))), np.zeros((unknowns, across))
 
 
-def hats(x: Float64, count: int) -> Float64:
+def cubic_bsplines(x: Float64, count: int) -> Float64:
     """
     Return smooth bumps that add up to 1, (count, n), at x in 0 .. 1.
 

@@ -30,7 +30,7 @@ _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not kno
 
 
 @dataclass(frozen=True)
-class Weighed:
+class Posterior:
     """
     Hypotheses with their probabilities.
 
@@ -55,7 +55,7 @@ class Weighed:
         """Probability of something without a name."""
         return self.probability.get(UNNAMED, 0.0)
 
-    def doubted(self) -> Weighed:
+    def doubted(self) -> Posterior:
         """
         Return the same where the best name leaves more than noise.
 
@@ -65,7 +65,7 @@ class Weighed:
             return self
         share = (1.0 - CERTAIN) / (1.0 - self.unnamed)
         scaled = {names: share * p for names, p in self.probability.items()}
-        return Weighed(self.best, {**scaled, UNNAMED: CERTAIN})
+        return Posterior(self.best, {**scaled, UNNAMED: CERTAIN})
 
     def named(self) -> list[tuple[str, ...]]:
         """
@@ -78,7 +78,7 @@ class Weighed:
 UNNAMED = ('?',)
 
 
-def weigh(fits: Sequence[Fit]) -> Weighed:
+def posterior_of(fits: Sequence[Fit]) -> Posterior:
     """
     Give hypotheses their probabilities.
 
@@ -98,10 +98,12 @@ def weigh(fits: Sequence[Fit]) -> Weighed:
         found = modes.setdefault(key, {})
         found[mode] = max(found.get(mode, -math.inf), fit.log_evidence)
     log = {key: float(logsumexp(list(found.values()))) for key, found in modes.items()}
-    return Weighed(best, simplest(log, {key: best[key].hypothesis.log_odds for key in log}))
+    return Posterior(
+        best, prune_by_bayes_factor(log, {key: best[key].hypothesis.log_odds for key in log})
+    )
 
 
-def simplest(
+def prune_by_bayes_factor(
     log_evidence: Mapping[tuple[str, ...], float], log_odds: Mapping[tuple[str, ...], float]
 ) -> dict[tuple[str, ...], float]:
     """
@@ -146,7 +148,7 @@ def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
     return (hypothesis.names, hypothesis.discrepancy, *sorted(ways))
 
 
-def lacks(fit: Fit, with_more: Sequence[Fit]) -> bool:
+def has_residual_structure(fit: Fit, with_more: Sequence[Fit]) -> bool:
     """
     Tell whether a name leaves more than noise.
 
@@ -155,12 +157,12 @@ def lacks(fit: Fit, with_more: Sequence[Fit]) -> bool:
     with_more
         The same with something smooth besides.
     """
-    if misses(fit.chi2_per_row, fit.best.rows):
+    if exceeds_noise(fit.chi2_per_row, fit.best.rows):
         return True
     return any(more.log_likelihood > fit.log_likelihood + _LACK_NATS for more in with_more)
 
 
-def odd(fit: Fit) -> bool:
+def outside_prior(fit: Fit) -> bool:
     """
     Tell whether an effect is there in a way that it is not known in.
 
@@ -177,7 +179,7 @@ def odd(fit: Fit) -> bool:
     return False
 
 
-def misses(chi2_per_row: float, rows: int) -> bool:
+def exceeds_noise(chi2_per_row: float, rows: int) -> bool:
     """
     Tell whether what is left is more than noise, as well as that is known.
     """
@@ -185,7 +187,7 @@ def misses(chi2_per_row: float, rows: int) -> bool:
 
 
 def decide(
-    weighed: Weighed, *, lacking: bool, inseparable: Sequence[frozenset[str]]
+    posterior: Posterior, *, lacking: bool, inseparable: Sequence[frozenset[str]]
 ) -> tuple[Verdict, tuple[Candidate, ...]]:
     """
     Return verdict and candidates.
@@ -197,30 +199,30 @@ def decide(
     inseparable
         Effects that no record can tell apart.
     """
-    candidates = _smallest(weighed)
-    first = weighed.named()[0]
+    candidates = _smallest(posterior)
+    first = posterior.named()[0]
     if lacking:
         return Verdict.UNKNOWN, candidates
-    if weighed.nothing >= QUIET:
+    if posterior.nothing >= QUIET:
         return Verdict.NONE, candidates
-    if weighed.unnamed > 0.5:
+    if posterior.unnamed > 0.5:
         return Verdict.UNKNOWN, candidates
     alone = not any(set(first) & group for group in inseparable)
-    if alone and weighed.probability[first] >= CERTAIN:
+    if alone and posterior.probability[first] >= CERTAIN:
         return Verdict.NAMED, candidates
-    if weighed.unnamed > 1.0 - CERTAIN and len(candidates) == 1:
+    if posterior.unnamed > 1.0 - CERTAIN and len(candidates) == 1:
         return Verdict.UNKNOWN, candidates
     return Verdict.ONE_OF, candidates
 
 
-def _smallest(weighed: Weighed) -> tuple[Candidate, ...]:
+def _smallest(posterior: Posterior) -> tuple[Candidate, ...]:
     """Return the fewest names that hold almost all of what has a name."""
-    total = 1.0 - weighed.unnamed
+    total = 1.0 - posterior.unnamed
     found: list[Candidate] = []
     held = 0.0
-    for names in weighed.named():
-        found.append(Candidate(names, weighed.probability[names]))
-        held += weighed.probability[names]
+    for names in posterior.named():
+        found.append(Candidate(names, posterior.probability[names]))
+        held += posterior.probability[names]
         if held >= _SET * total:
             break
     return tuple(found)

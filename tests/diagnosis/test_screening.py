@@ -10,7 +10,7 @@ import pytest
 
 from shipdrag_ros.diagnosis.fitting import fit
 from shipdrag_ros.diagnosis.hypotheses import Library
-from shipdrag_ros.diagnosis.screening import promise
+from shipdrag_ros.diagnosis.screening import screening_score
 
 
 @pytest.mark.parametrize('hidden', ['current=0.3', 'fouling=0.3', 'turning=25', 'log_lag=20'])
@@ -20,7 +20,7 @@ def test_what_is_hidden_promises_most_and_keeps_it(
     library = library_of(hidden)
     nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
     hypotheses = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
-    promised = promise(library.problem, nothing, hypotheses)
+    promised = screening_score(library.problem, nothing, hypotheses)
     order = np.argsort(-promised)
     best = list(dict.fromkeys(hypotheses[i].names for i in order))
     # look-alikes may promise as much
@@ -35,5 +35,5 @@ def test_where_nothing_is_hidden_nothing_is_promised(library_of: Callable[..., L
     library = library_of()
     nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
     hypotheses = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
-    promised = promise(library.problem, nothing, hypotheses)
+    promised = screening_score(library.problem, nothing, hypotheses)
     assert np.all(promised < nothing.log_evidence)

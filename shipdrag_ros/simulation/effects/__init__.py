@@ -18,7 +18,15 @@ from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 
-__all__ = ['LIBRARY', 'action_of', 'deciders', 'find', 'look_alikes', 'parse', 'values_of']
+__all__ = [
+    'LIBRARY',
+    'action_of',
+    'confounders',
+    'discriminating_measurements',
+    'find',
+    'parse',
+    'values_of',
+]
 
 
 def _found() -> Iterator[Effect]:
@@ -45,21 +53,21 @@ def find(name: str) -> Effect:
     return LIBRARY[name]
 
 
-def look_alikes(name: str) -> tuple[str, ...]:
+def confounders(name: str) -> tuple[str, ...]:
     """
     Return the effects that leave nearly the same trace.
 
     It is enough that one of two declares it.
     """
-    declared_by = (other.name for other in LIBRARY.values() if name in other.look_alikes)
-    return tuple(sorted({*LIBRARY[name].look_alikes, *declared_by}))
+    declared_by = (other.name for other in LIBRARY.values() if name in other.confounders)
+    return tuple(sorted({*LIBRARY[name].confounders, *declared_by}))
 
 
-def deciders(one: str, other: str) -> tuple[Measure, ...]:
+def discriminating_measurements(one: str, other: str) -> tuple[Measure, ...]:
     """
     Return what tells two look-alikes apart; nothing: no record can.
     """
-    declared = (*LIBRARY[one].look_alikes.get(other, ()), *LIBRARY[other].look_alikes.get(one, ()))
+    declared = (*LIBRARY[one].confounders.get(other, ()), *LIBRARY[other].confounders.get(one, ()))
     return tuple(dict.fromkeys(declared))
 
 

@@ -36,7 +36,7 @@ EFFECT = Effect(
     formula='velocity over ground = velocity through water + current; the air drag feels it too',
     source='kinematics',
     act=_act,
-    look_alikes={
+    confounders={
         'log_offset': (Measure.RECIPROCAL_RUN,),
         'radar_scale': (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED),
         'log_scale': (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED),

@@ -27,7 +27,7 @@ EFFECT = Effect(
     formula='u + offset',
     source='definition',
     act=_act,
-    look_alikes={
+    confounders={
         'wind': (Measure.RADAR, Measure.WIND),
         'log_dead_band': (Measure.OTHER_SPEED,),
     },

@@ -27,7 +27,7 @@ EFFECT = Effect(
     formula='(1 + factor) u',
     source='definition',
     act=_act,
-    look_alikes={
+    confounders={
         'radar_scale': (Measure.THIRD_SPEED,),
         'log_offset': (Measure.OTHER_SPEED, Measure.THIRD_SPEED),
     },

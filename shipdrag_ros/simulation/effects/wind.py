@@ -39,7 +39,7 @@ EFFECT = Effect(
     formula_sd=0.15,
     act=_act,
     struck_out_by=('wind_apparent',),
-    look_alikes={
+    confounders={
         'waves': (Measure.WIND, Measure.OTHER_SPEED),
         'windmilling_propeller': (Measure.RECIPROCAL_RUN, Measure.WIND, Measure.SHAFT),
         'fouling': (Measure.RECIPROCAL_RUN, Measure.WIND),
