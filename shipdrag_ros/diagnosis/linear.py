@@ -1,40 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Hypotheses about runs, simulated and made linear.
-
-All that all hypotheses need of a run, each with a step in each of its unknowns,
-are columns of one batched simulation.
+A hypothesis of any model, and its whitened rows linear about some unknowns.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.noise import apply
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.terms import (
-    BaselineTerm,
-    EffectTerm,
-    ForceTerm,
-    MeasurementTerm,
-    ModelErrorTerm,
-    Predicted,
-    SpeedErrorTerm,
-    Term,
-)
 from shipdrag_ros.diagnosis.unknowns import Unknown
-from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import Action, Columns, Frame, Scenario, simulate_columns
 
-_STEP_Z = 0.02  # of the differences, in units of the prior
-_STEP_M_S = 0.01  # of the steady speed
+
+class Part(Protocol):
+    """A part of a hypothesis that leaves something open."""
+
+    @property
+    def unknowns(self) -> tuple[Unknown, ...]:
+        """Its parameters."""
+
+    @property
+    def one_size(self) -> Sequence[int]:
+        """Places among its unknowns of those that are all usual or all small."""
 
 
 @dataclass(frozen=True)
@@ -47,37 +39,33 @@ class Hypothesis:
     names
         Of the effects, sorted; none: nothing is missing.
     terms, measurement_terms
-        All that is fitted, the baseline's uncertainty included.
-    forms
+        All that is fitted, of the kinds that its model knows: what acts, and
+        what adds to the measurements.
+    model_errors
         How far effects among the terms may depart from their formulas.
-    weight
+    log_prior
         Logarithm of the prior probability.
     log_odds
-        Of the names before the data, over nothing, in whatever way they are there.
+        Prior log odds of the names over nothing, in whatever way they are there.
     discrepancy
-        'force', 'log' or 'radar' where something smooth without a name is
-        fitted besides; '' without.
+        Channel in which something smooth without a name is fitted besides; ''
+        without.
     """
 
     names: tuple[str, ...]
-    terms: tuple[Term, ...]
-    measurement_terms: tuple[MeasurementTerm, ...]
-    forms: tuple[ModelErrorTerm, ...] = ()
-    weight: float = 0.0
+    terms: tuple[Any, ...]
+    measurement_terms: tuple[Any, ...] = ()
+    model_errors: tuple[Any, ...] = ()
+    log_prior: float = 0.0
     log_odds: float = 0.0
     discrepancy: str = ''
 
     @cached_property
-    def parts(self) -> tuple[tuple[Term | MeasurementTerm | ModelErrorTerm, int], ...]:
-        """All that has unknowns, with the place of its first."""
-        found: list[tuple[Term | MeasurementTerm | ModelErrorTerm, int]] = []
+    def parts(self) -> tuple[tuple[Any, int], ...]:
+        """Each `Part`, with the place of its first unknown."""
+        found: list[tuple[Part, int]] = []
         place = 0
-        parts: tuple[Term | MeasurementTerm | ModelErrorTerm, ...] = (
-            *self.terms,
-            *self.measurement_terms,
-            *self.forms,
-        )
-        for part in parts:
+        for part in (*self.terms, *self.measurement_terms, *self.model_errors):
             found.append((part, place))
             place += len(part.unknowns)
         return tuple(found)
@@ -90,17 +78,11 @@ class Hypothesis:
         Those of something smooth, and the components of a current or a wind: where
         one is small, so are the others.
         """
-        found = []
-        for part, place in self.parts:
-            if isinstance(part, ForceTerm | SpeedErrorTerm):
-                found.append([place + k for k in range(len(part.unknowns))])
-            elif isinstance(part, EffectTerm) and len(part.components) > 1:
-                found.append([place + k for k in part.components])
-        return found
+        return [[place + k for k in part.one_size] for part, place in self.parts if part.one_size]
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """In the order of the parts; the steady speeds of the runs are behind them."""
+        """In the order of the parts; parameters without a prior are behind them."""
         return tuple(unknown for part, _ in self.parts for unknown in part.unknowns)
 
 
@@ -113,9 +95,10 @@ class Linear:
     ----------
     hypothesis
     z : (p,)
-        Of its unknowns, then the steady speed of each run [m/s].
+        Of its unknowns, then the parameters without a prior.
     tables
-        (1 + p, rows) of each run: residual, then derivatives of the prediction.
+        (1 + p, rows) of each run: whitened residual, then whitened derivatives of
+        the prediction by z.
     residuals
         (rows,) of each run, not whitened.
     """
@@ -154,293 +137,3 @@ class Linear:
             matrix += np.einsum('ai,bi->ab', table[1:], table[1:])
             fall += table[1:] @ table[0]
         return matrix, fall
-
-
-@dataclass
-class _Batch:
-    """Columns of one simulation, as they are asked for."""
-
-    actions: list[Action] = field(default_factory=list)
-    speeds: list[float] = field(default_factory=list)
-
-    def add(self, action: Action, speed_m_s: float) -> int:
-        """Ask for a column; return its number."""
-        self.actions.append(action)
-        self.speeds.append(speed_m_s)
-        return len(self.actions) - 1
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """
-    Which columns a hypothesis needs of a run.
-
-    Attributes
-    ----------
-    base
-        At its unknowns.
-    steps
-        Unknown, column and size of the step of each.
-    without
-        Without each effect whose form is open.
-    """
-
-    base: int
-    steps: list[tuple[int, int, float]]
-    without: list[int]
-
-
-@dataclass(frozen=True)
-class Problem:
-    """
-    What all hypotheses share.
-
-    Attributes
-    ----------
-    ship
-        Without effects: those that its file states are terms.
-    seen
-        The runs.
-    reference_rad
-        Heading of the first of all runs.
-    """
-
-    ship: Ship
-    seen: tuple[Observation, ...]
-    reference_rad: float
-
-    @cached_property
-    def frames(self) -> tuple[Frame, ...]:
-        """One a run; effects of the earth lie along the first run."""
-        return tuple(
-            Frame(
-                self.ship,
-                Scenario(
-                    speed_m_s=run.speed_m_s,
-                    lead_in_s=run.lead_in_s,
-                    # beyond the last row, whatever the difference is rounded to
-                    duration_s=run.duration_s + 1e-6,
-                    heading_rad=run.heading_rad,
-                ),
-                self.reference_rad,
-            )
-            for run in self.seen
-        )
-
-    def linearise(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        at: Sequence[Float64],
-        near: Sequence[Linear | None] | None = None,
-    ) -> list[Linear]:
-        """
-        Return the whitened rows of each hypothesis about some unknowns.
-
-        Parameters
-        ----------
-        near
-            The same about unknowns near by: the derivatives by what is known
-            well beforehand, the baseline, are taken from there.
-        """
-        before = near or [None] * len(hypotheses)
-        runs = [self._run(j, hypotheses, at, before) for j in range(len(self.seen))]
-        return [
-            Linear(
-                hypothesis,
-                z,
-                tuple(run[i][0] for run in runs),
-                tuple(run[i][1] for run in runs),
-            )
-            for i, (hypothesis, z) in enumerate(zip(hypotheses, at, strict=True))
-        ]
-
-    def responses(
-        self, base: Linear, terms: Sequence[tuple[Term, Sequence[float]]]
-    ) -> list[Float64]:
-        """
-        Return what terms with given values, one at a time, would change in the whitened rows.
-
-        Returns
-        -------
-        list of (terms, rows)
-            Of each run; 0 where it cannot be simulated.
-        """
-        found = []
-        for j, (frame, seen) in enumerate(zip(self.frames, self.seen, strict=True)):
-            batch = _Batch()
-            speed = float(base.z[len(base.hypothesis.unknowns) + j])
-            acting = self._acting(j, base.hypothesis, base.z)
-            whole = sum((term.action(frame, j, values) for term, _, values in acting), Action())
-            batch.add(whole, speed)
-            for term, values in terms:
-                more = term.action(frame, j, values) if term.acts_in(j) else Action()
-                batch.add(whole + more, speed)
-            columns = self._simulate(j, batch)
-            context = seen.context.predict(columns, batch.actions)
-            rows = np.array(
-                [
-                    np.concatenate([each.along, each.across, of_context])
-                    for each, of_context in zip(_predicted(seen, columns), context, strict=True)
-                ]
-            )
-            change = rows[1:] - rows[0]
-            change[~np.isfinite(change).all(axis=1)] = 0.0
-            found.append(self._whitened(j, change))
-        return found
-
-    def predict(self, run: int, linear: Linear) -> Predicted:
-        """
-        Return what a hypothesis predicts of a run, without its row terms.
-        """
-        batch = _Batch()
-        plan = self._plan(run, linear.hypothesis, linear.z, batch)
-        columns = self._simulate(run, batch)
-        return _predicted(self.seen[run], columns)[plan.base]
-
-    def _simulate(self, run: int, batch: _Batch) -> Columns:
-        frame = self.frames[run]
-        return simulate_columns(
-            self.ship,
-            frame.scenario,
-            batch.actions,
-            self.seen[run].time_s,
-            speed_m_s=np.array(batch.speeds),
-        )
-
-    def _run(
-        self,
-        run: int,
-        hypotheses: Sequence[Hypothesis],
-        at: Sequence[Float64],
-        near: Sequence[Linear | None],
-    ) -> list[tuple[Float64, Float64]]:
-        batch, seen = _Batch(), self.seen[run]
-        plans = [
-            self._plan(run, h, z, batch, known=before is not None)
-            for h, z, before in zip(hypotheses, at, near, strict=True)
-        ]
-        columns = self._simulate(run, batch)
-        predicted = _predicted(seen, columns)
-        context = seen.context.predict(columns, batch.actions)
-        found = []
-        for hypothesis, z, plan, before in zip(hypotheses, at, plans, near, strict=True):
-            table, residual = self._table(run, hypothesis, z, plan, predicted, context)
-            if before is not None:
-                kept = [1 + unknown for unknown in _known(hypothesis)]
-                table[kept] = before.tables[run][kept]
-            found.append((table, residual))
-        return found
-
-    def _plan(
-        self, run: int, hypothesis: Hypothesis, z: Float64, batch: _Batch, *, known: bool = False
-    ) -> _Plan:
-        skipped = set(_known(hypothesis)) if known else set()
-        frame = self.frames[run]
-        speed = float(z[len(hypothesis.unknowns) + run])
-        acting = self._acting(run, hypothesis, z)
-        actions = [term.action(frame, run, values) for term, _, values in acting]
-        whole = sum(actions, Action())
-        base = batch.add(whole, speed)
-        steps: list[tuple[int, int, float]] = []
-        without: dict[int, int] = {}
-        open_forms = {id(form.term) for form in hypothesis.forms}
-        for i, (term, place, values) in enumerate(acting):
-            others = sum((action for j, action in enumerate(actions) if j != i), Action())
-            if id(term) in open_forms:
-                without[id(term)] = batch.add(others, speed)
-            for k, unknown in enumerate(term.unknowns):
-                value = unknown.value(z[place + k] + _STEP_Z)
-                if value != values[k] and place + k not in skipped:
-                    stepped = [*values[:k], value, *values[k + 1 :]]
-                    column = batch.add(others + term.action(frame, run, stepped), speed)
-                    steps.append((place + k, column, _STEP_Z))
-        column = batch.add(whole, speed + _STEP_M_S)
-        steps.append((len(hypothesis.unknowns) + run, column, _STEP_M_S))
-        return _Plan(base, steps, [without.get(id(form.term), base) for form in hypothesis.forms])
-
-    def _acting(
-        self, run: int, hypothesis: Hypothesis, z: Float64
-    ) -> list[tuple[Term, int, list[float]]]:
-        """Return what acts in a run, the places of its unknowns and their values."""
-        return [
-            (term, place, [u.value(z[place + i]) for i, u in enumerate(term.unknowns)])
-            for term, (_, place) in zip(hypothesis.terms, hypothesis.parts)
-            if term.acts_in(run)
-        ]
-
-    def _table(
-        self,
-        run: int,
-        hypothesis: Hypothesis,
-        z: Float64,
-        plan: _Plan,
-        predicted: list[Predicted],
-        context: Float64,
-    ) -> tuple[Float64, Float64]:
-        """Return whitened rows, and the residual as it is."""
-        seen, base = self.seen[run], predicted[plan.base]
-        n = len(seen.along)
-        k = 0 if seen.across is None else len(seen.across)
-        table = np.zeros((1 + len(z), n + k + len(seen.context)))
-        table[0, :n] = seen.along.rows.value - base.along
-        if seen.across is not None:
-            table[0, n : n + k] = seen.across.rows.value - base.across
-        table[0, n + k :] = seen.context.value - context[plan.base]
-        for unknown, column, step in plan.steps:
-            table[1 + unknown, :n] = (predicted[column].along - base.along) / step
-            table[1 + unknown, n : n + k] = (predicted[column].across - base.across) / step
-            table[1 + unknown, n + k :] = (context[column] - context[plan.base]) / step
-        added = [term.columns(seen, run, base) for term in hypothesis.measurement_terms]
-        for form, other in zip(hypothesis.forms, plan.without):
-            trace = base.along - predicted[other].along, base.across - predicted[other].across
-            added.append(form.columns(seen, trace))
-        behind = hypothesis.parts[len(hypothesis.terms) :]
-        for (part, place), (along, across) in zip(behind, added, strict=True):
-            for i, of_part in enumerate(part.unknowns):
-                at = place + i
-                table[1 + at, :n], table[1 + at, n : n + k] = along[i], across[i]
-                table[0] -= table[1 + at] * of_part.value(z[at])
-                table[1 + at] *= of_part.slope(z[at])
-        residual = table[0].copy()
-        return self._whitened(run, table), residual
-
-    def _whitened(self, run: int, table: Float64) -> Float64:
-        """Whiten lines of rows; as they are where one is not finite."""
-        if not np.isfinite(table).all():
-            return table
-        seen = self.seen[run]
-        n = len(seen.along)
-        k = 0 if seen.across is None else len(seen.across)
-        parts = [apply(seen.along.whitener, table[:, :n])]
-        if seen.across is not None:
-            parts.append(apply(seen.across.whitener, table[:, n : n + k]))
-        parts.append(apply(seen.context.whitener, table[:, n + k :]))
-        return np.hstack(parts)
-
-
-def _known(hypothesis: Hypothesis) -> list[int]:
-    """Return the unknowns of the baseline, which stay near where they were."""
-    return [
-        place + k
-        for part, place in hypothesis.parts
-        if isinstance(part, BaselineTerm)
-        for k in range(len(part.unknowns))
-    ]
-
-
-def _predicted(seen: Observation, columns: Columns) -> list[Predicted]:
-    """Return what each column predicts of the rows."""
-    cos, sin = math.cos(seen.heading_rad), math.sin(seen.heading_rad)
-    place, velocity = columns.radar_position_m, columns.velocity_over_ground_m_s
-    ahead = cos * place[..., 0] + sin * place[..., 1]
-    to_port = cos * place[..., 1] - sin * place[..., 0]
-    ground = cos * velocity[..., 0] + sin * velocity[..., 1]
-    kind, at = seen.along.rows.kind, seen.along.at
-    along = ahead[:, at]
-    along[:, kind == LOG] = columns.log_m_s[:, at[kind == LOG]]
-    along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
-    across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
-    speed = columns.speed_through_water_m_s
-    return [
-        Predicted(along[i], across[i], speed[i], ground[i], ahead[i]) for i in range(len(along))
-    ]

@@ -16,20 +16,16 @@ from itertools import product
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, RunNuisance, SpeedErrorTerm, Term
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Problem
+from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.observation import Measured, Observation
+from shipdrag_ros.diagnosis.posterior import Posterior, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
-from shipdrag_ros.diagnosis.terms import (
-    BaselineTerm,
-    EffectTerm,
-    RunNuisance,
-    SpeedErrorTerm,
-    Term,
-    scope_runs,
-)
-from shipdrag_ros.diagnosis.verdict import Posterior, decide, prune_by_bayes_factor
+from shipdrag_ros.diagnosis.simulated import CoastSimulation
+from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
+from shipdrag_ros.diagnosis.verdict import decide
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable
@@ -106,7 +102,7 @@ class Rival:
 
 
 def of_another_run(
-    problem: Problem, fits: Sequence[Fit], run: Observation
+    simulated: CoastSimulation, fits: Sequence[Fit], run: Observation
 ) -> list[list[PredictedOutcome]]:
     """
     Return what fitted hypotheses predict of a run that is yet to be made.
@@ -127,7 +123,7 @@ def of_another_run(
     weights: list[float] = []
     whose: list[int] = []
     for number, one in enumerate(fits):
-        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(problem.seen)):
+        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(simulated.seen)):
             kept = _places(one.hypothesis, hypothesis)
             z = np.array([*(unknown.start for unknown in hypothesis.unknowns), run.speed_m_s])
             covariance = np.diag([*(float(u.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0])
@@ -142,7 +138,7 @@ def of_another_run(
             there.append(hypothesis)
             weights.append(log_weight)
             whose.append(number)
-    linear = replace(problem, seen=(run,)).linearise(there, at)
+    linear = replace(simulated, seen=(run,)).linearise(there, at)
     ways: list[list[PredictedOutcome]] = [[] for _ in fits]
     for number, found, (covariance, precision), log_weight in zip(
         whose, linear, before, weights, strict=True
@@ -155,7 +151,7 @@ def of_another_run(
 
 
 def of_instrument(
-    problem: Problem, fits: Sequence[Fit], contexts: Sequence[Context]
+    simulated: CoastSimulation, fits: Sequence[Fit], contexts: Sequence[Context]
 ) -> tuple[list[list[PredictedOutcome]], list[Float64]]:
     """
     Return what fitted hypotheses predict of an instrument in the runs there are.
@@ -174,9 +170,9 @@ def of_instrument(
     """
     seen = tuple(
         replace(run, context=replace(context, value=np.zeros(len(context))))
-        for run, context in zip(problem.seen, contexts, strict=True)
+        for run, context in zip(simulated.seen, contexts, strict=True)
     )
-    found = replace(problem, seen=seen).linearise(
+    found = replace(simulated, seen=seen).linearise(
         [one.hypothesis for one in fits], [one.best.z for one in fits]
     )
     prospects, values = [], []
@@ -323,7 +319,9 @@ def _transferred(hypothesis: Hypothesis, *, runs: int) -> list[tuple[Hypothesis,
     found = []
     for chosen in product(*choices):
         kept = (first, *(term for terms in chosen for term in terms))
-        forms = tuple(form for form in hypothesis.forms if any(form.term is t for t in kept))
+        forms = tuple(
+            form for form in hypothesis.model_errors if any(form.term is t for t in kept)
+        )
         found.append((Hypothesis(hypothesis.names, kept, rows, forms), log_weight))
     return found
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, baseline_parts
 from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.scatter import Normal, Shared, share
-from shipdrag_ros.diagnosis.terms import BaselineTerm, baseline_parts
 from shipdrag_ros.diagnosis.unknowns import Tail
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
@@ -36,7 +37,7 @@ class SharedBaseline:
 
     Attributes
     ----------
-    library
+    model
     fitted
         Nothing missing, all runs together.
     names
@@ -49,7 +50,7 @@ class SharedBaseline:
         Lowest and highest of all runs.
     """
 
-    library: Library
+    model: CoastModel
     fitted: Fit
     names: tuple[str, ...]
     unit: Float64
@@ -61,9 +62,9 @@ class SharedBaseline:
         """Fit the runs."""
         ship = _opened(ship)
         seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
-        library = Library(ship, seen, seen[0].heading_rad)
-        nothing = library.nothing
-        fitted = fit(library.problem, [nothing], [library.start(nothing)])[0]
+        model = CoastModel(ship, seen, seen[0].heading_rad)
+        nothing = model.nothing
+        fitted = fit(model, [nothing], [start(model, nothing)])[0]
         if not np.isfinite(fitted.best.cost):
             low, high = ship.baseline_range_m_s
             raise DiagnosisError(
@@ -75,9 +76,9 @@ class SharedBaseline:
         scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.WIDE]
         shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
         shared = [*scales, *shapes]
-        speeds = [library.problem.predict(j, fitted.best).speed for j in range(len(seen))]
+        speeds = [model.simulated.predict(j, fitted.best).speed for j in range(len(seen))]
         return cls(
-            library,
+            model,
             fitted,
             tuple(unknowns[i].name for i in scales),
             np.array([unknowns[i].slope(0.0) for i in shared]),

@@ -18,6 +18,7 @@ from scipy.special import expit, ndtr
 
 from shipdrag_ros.simulation.effect import Prior, Shape
 
+_TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 _WORSE, _HOW_OFTEN = 3.0, 0.1  # times worse than stated that a baseline is, in so many cases
 
 
@@ -78,6 +79,13 @@ def _odds(z: float) -> float:
     """Return the logarithm of the odds that a baseline that is z off is worse than stated."""
     before = math.log(_HOW_OFTEN / (_WORSE * (1.0 - _HOW_OFTEN)))
     return before + 0.5 * z * z * (1.0 - 1.0 / _WORSE**2)
+
+
+def trial_z(unknown: Unknown) -> float:
+    """
+    Return z of a likely size, for one that is tried before it is fitted.
+    """
+    return unknown.start or _TRIAL_Z
 
 
 def scaled(name: str, sd: float, *, mean: float = 0.0, tail: Tail = Tail.NORMAL) -> Unknown:

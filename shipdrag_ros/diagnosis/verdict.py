@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-From fits to a verdict: a name only where the data can tell.
+From a posterior to a verdict: a name only where the data can tell.
 
 Evidence names; a smooth discrepancy that a name does not explain takes the name
 back; what nothing in a record can tell apart stays a set.
@@ -9,179 +9,158 @@ back; what nothing in a record can tell apart stays a set.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from scipy.special import logsumexp
 
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis
-from shipdrag_ros.diagnosis.result import Candidate, Verdict
+from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
+from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, Gap, Named, Verdict
+from shipdrag_ros.diagnosis.search import Found
 from shipdrag_ros.diagnosis.terms import EffectTerm
+from shipdrag_ros.ship import Uncertain
 
-CERTAIN = 0.9  # probability from which an effect is named
-QUIET = 0.1  # of nothing missing, from which nothing is said
 _SET = 0.99  # of the candidates
-_ASKED = math.log(10.0)  # of evidence, from where it is strong (Jeffreys 1961)
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
-_ODD_SD = 2.5  # standard deviations of what is expected of an effect, its size apart
+_SHAPE_SD = 2.5  # prior standard deviations of a shape parameter of an effect
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
 
 
 @dataclass(frozen=True)
-class Posterior:
+class Judgement:
     """
-    Hypotheses with their probabilities.
+    A verdict, and what it rests on.
 
     Attributes
     ----------
-    best
-        Best fit of each: by the names, or by what is unnamed.
-    probability
-        Of each name or pair (none: nothing is missing), and of '?' (unnamed).
+    found
+    posterior
+        Where the verdict is doubted, something unnamed is in it as probable as one
+        must be to be named.
+    verdict
+    candidates
     """
 
-    best: dict[tuple[str, ...], Fit]
-    probability: dict[tuple[str, ...], float]
+    found: Found
+    posterior: Posterior
+    verdict: Verdict
+    candidates: tuple[Candidate, ...]
 
     @property
-    def nothing(self) -> float:
-        """Probability that nothing is missing."""
-        return self.probability[()]
+    def missing(self) -> bool:
+        """Whether the most probable hypothesis explains something that is missing."""
+        names = self.found.best.hypothesis.names
+        return self.verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(names)
 
     @property
-    def unnamed(self) -> float:
-        """Probability of something without a name."""
-        return self.probability.get(UNNAMED, 0.0)
+    def best(self) -> tuple[Named, ...]:
+        """Effects of the most probable hypothesis, with their parameters."""
+        fit = self.found.best
+        probability = self.posterior.probability[fit.hypothesis.names]
+        found = []
+        for part, place in fit.hypothesis.parts:
+            if not isinstance(part, EffectTerm) or part.stated:
+                continue
+            values = {name: Uncertain(value, 0.0) for name, value in part.fixed}
+            for i, unknown in enumerate(part.unknowns, place):
+                z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
+                values[unknown.name] = Uncertain(unknown.value(z), abs(unknown.slope(z)) * sd)
+            ordered = {q.name: values[q.name] for q in part.effect.parameters}
+            found.append(Named(part.effect.name, probability, ordered))
+        return tuple(sorted(found, key=lambda effect: effect.name))
 
-    def doubted(self) -> Posterior:
+    def diagnosis(self, **rest: Any) -> Diagnosis:
         """
-        Return the same where the best name leaves more than noise.
+        Return the result.
 
-        Something without a name is then as probable as one must be to be named.
+        Parameters
+        ----------
+        **rest
+            What the verdict does not tell, as in `Diagnosis`.
         """
-        if self.unnamed >= CERTAIN:
-            return self
-        share = (1.0 - CERTAIN) / (1.0 - self.unnamed)
-        scaled = {names: share * p for names, p in self.probability.items()}
-        return Posterior(self.best, {**scaled, UNNAMED: CERTAIN})
-
-    def named(self) -> list[tuple[str, ...]]:
-        """
-        Return what has a name, or is nothing, most probable first.
-        """
-        names = [names for names in self.probability if names != UNNAMED]
-        return sorted(names, key=lambda names: -self.probability[names])
+        return Diagnosis(
+            verdict=self.verdict,
+            effects=self.best if self.verdict is Verdict.NAMED else (),
+            candidates=self.candidates,
+            nothing=self.posterior.nothing,
+            unnamed=self.posterior.unnamed,
+            best=self.best,
+            **rest,
+        )
 
 
-UNNAMED = ('?',)
-
-
-def posterior_of(fits: Sequence[Fit]) -> Posterior:
+def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False) -> Judgement:
     """
-    Give hypotheses their probabilities.
+    Return the verdict on what a search found.
 
     Parameters
     ----------
-    fits
-        Several of the same names differ in where the fit began, of which the
-        best counts, or in a choice.
+    found
+    held_out
+        Of runs predicted from others with the most probable hypothesis; None
+        without.
+    distrusted
+        The measurements themselves are known to be wrong.
     """
-    best: dict[tuple[str, ...], Fit] = {}
-    modes: dict[tuple[str, ...], dict[tuple[object, ...], float]] = {}
-    for fit in fits:
-        key = UNNAMED if fit.hypothesis.discrepancy else fit.hypothesis.names
-        if key not in best or fit.log_evidence > best[key].log_evidence:
-            best[key] = fit
-        mode = mode_of(fit.hypothesis)
-        found = modes.setdefault(key, {})
-        found[mode] = max(found.get(mode, -math.inf), fit.log_evidence)
-    log = {key: float(logsumexp(list(found.values()))) for key, found in modes.items()}
-    return Posterior(
-        best, prune_by_bayes_factor(log, {key: best[key].hypothesis.log_odds for key in log})
+    best, posterior = found.best, found.posterior
+    doubted = distrusted or (
+        found.alarm
+        and (
+            has_residual_structure(best, found.with_discrepancy())
+            or outside_prior(best)
+            or (held_out is not None and exceeds_noise(held_out.chi2_per_sample, best.best.rows))
+        )
     )
+    if doubted:
+        posterior = posterior.doubted()
+    verdict, candidates = decide(posterior, lacking=doubted, inseparable=found.model.inseparable)
+    return Judgement(found, posterior, verdict, candidates)
 
 
-def prune_by_bayes_factor(
-    log_evidence: Mapping[tuple[str, ...], float], log_odds: Mapping[tuple[str, ...], float]
-) -> dict[tuple[str, ...], float]:
+def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:
     """
-    Return probabilities, where an effect that the data do not ask for is left out.
-
-    A record in which an effect cannot be seen speaks neither for nor against it.
-    What it leaves to a name with such an effect belongs to the name alone.
+    Tell whether a hypothesis leaves more than noise.
 
     Parameters
     ----------
-    log_evidence
-        Of names, prior included.
-    log_odds
-        Of names before the data, over nothing.
-    """
-    kept = dict(log_evidence)
-    asked = {names: log_evidence[names] - log_odds[names] for names in kept}
-    for names in sorted(log_evidence, key=lambda names: -len(names)):
-        fewer = [
-            other
-            for other in log_evidence
-            if len(other) == len(names) - 1 and set(other) < set(names) and names != UNNAMED
-        ]
-        if not fewer:
-            continue
-        alone = max(fewer, key=lambda other: asked[other])
-        if asked[names] <= asked[alone] + _ASKED:
-            kept[alone] = float(np.logaddexp(kept[alone], kept.pop(names)))
-    total = logsumexp(list(kept.values()))
-    return {names: math.exp(log - total) for names, log in kept.items()}
-
-
-def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
-    """
-    Return names, and what tells a mode apart from others of the same names.
-    """
-    ways = [
-        (term.effect.name, term.fixed, term.signs, str(term.only_run))
-        for term in hypothesis.terms
-        if isinstance(term, EffectTerm)
-    ]
-    return (hypothesis.names, hypothesis.discrepancy, *sorted(ways))
-
-
-def has_residual_structure(fit: Fit, with_more: Sequence[Fit]) -> bool:
-    """
-    Tell whether a name leaves more than noise.
-
-    Parameters
-    ----------
-    with_more
+    fit
+    with_discrepancy
         The same with something smooth besides.
     """
     if exceeds_noise(fit.chi2_per_row, fit.best.rows):
         return True
-    return any(more.log_likelihood > fit.log_likelihood + _LACK_NATS for more in with_more)
+    limit = fit.log_likelihood + _LACK_NATS
+    return any(more.log_likelihood > limit for more in with_discrepancy)
 
 
 def outside_prior(fit: Fit) -> bool:
     """
-    Tell whether an effect is there in a way that it is not known in.
+    Tell whether a shape parameter of an effect lies beyond 2.5 prior sd.
 
     However large it is, a turn that hardly changes the heading, or is over in some
-    seconds, is something else.
+    seconds, is something else. Sizes, and components of one, are no shape.
     """
-    for part, place in fit.hypothesis.parts:
-        if not isinstance(part, EffectTerm) or part.stated:
-            continue
-        size = part.effect.parameters[0].name
-        for i, unknown in enumerate(part.unknowns):
-            if unknown.name != size and abs(float(fit.best.z[place + i])) > _ODD_SD:
-                return True
-    return False
+    return any(
+        abs(float(fit.best.z[place + i])) > _SHAPE_SD
+        for part, place in fit.hypothesis.parts
+        if isinstance(part, EffectTerm) and not part.stated
+        for i, unknown in enumerate(part.unknowns)
+        if unknown.name != part.effect.parameters[0].name and i not in part.one_size
+    )
 
 
 def exceeds_noise(chi2_per_row: float, rows: int) -> bool:
     """
     Tell whether what is left is more than noise, as well as that is known.
+
+    Parameters
+    ----------
+    chi2_per_row
+        Mean square of the whitened residuals.
+    rows
+        Their number.
     """
     return chi2_per_row > 1.0 + _LACK_SD * math.sqrt(2.0 / rows) + _LACK_SLACK
 

@@ -51,6 +51,24 @@ class Measure(StrEnum):
     FAST_CHANGE = 'a quick change of speed at a known time'
 
 
+class WithoutBaseline(StrEnum):
+    """
+    What shows an effect although nothing is known of the ship's resistance.
+
+    Attributes
+    ----------
+    LOG_TRACK
+        The log held against the track over ground, on many courses and at many
+        speeds. Such an effect acts alike on all ships.
+    CONSTANT_FORCE
+        A constant part of the deceleration beside a form of the resistance
+        that is fitted to the coastdown itself.
+    """
+
+    LOG_TRACK = 'log_track'
+    CONSTANT_FORCE = 'constant_force'
+
+
 class Shape(StrEnum):
     """Kinds of prior distributions."""
 
@@ -321,6 +339,13 @@ class Effect:
         From a frame and the values of the parameters, in their order.
     needs
         Keys of the ship file without which it cannot act.
+    errs_in
+        Inputs whose readings it falsifies; of an effect of a sensor.
+    without_baseline
+        What shows it without a baseline, and a sentence on how it looks there
+        ('': nothing to add).
+    in_geodetic
+        Whether it can be where positions are latitude and longitude.
     """
 
     name: str
@@ -335,6 +360,9 @@ class Effect:
     formula_sd: float = 0.0
     odds: float = 0.04
     needs: tuple[str, ...] = ()
+    errs_in: tuple[str, ...] = ()
+    without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)
+    in_geodetic: bool = True
 
     def goes_with(self, other: Effect) -> bool:
         """

@@ -8,8 +8,9 @@ diagnosis and documentation find it here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from importlib import import_module
+from itertools import combinations
 from pkgutil import iter_modules
 from types import MappingProxyType
 
@@ -24,6 +25,7 @@ __all__ = [
     'confounders',
     'discriminating_measurements',
     'find',
+    'inseparable',
     'parse',
     'values_of',
 ]
@@ -69,6 +71,32 @@ def discriminating_measurements(one: str, other: str) -> tuple[Measure, ...]:
     """
     declared = (*LIBRARY[one].confounders.get(other, ()), *LIBRARY[other].confounders.get(one, ()))
     return tuple(dict.fromkeys(declared))
+
+
+def inseparable(
+    effects: Sequence[Effect], *, measured: Collection[Measure] = tuple(Measure)
+) -> tuple[frozenset[str], ...]:
+    """
+    Return pairs of confounders that some measurements do not tell apart.
+
+    Parameters
+    ----------
+    effects
+        That may be missing.
+    measured
+        What is measured; by default all that can be.
+
+    Returns
+    -------
+    tuple of frozenset
+        Pairs of names.
+    """
+    return tuple(
+        frozenset((one.name, other.name))
+        for one, other in combinations(effects, 2)
+        if other.name in confounders(one.name)
+        and not set(measured) & set(discriminating_measurements(one.name, other.name))
+    )
 
 
 def parse(text: str) -> StatedEffect:

@@ -32,4 +32,5 @@ EFFECT = Effect(
     confounders={
         'windmilling_propeller': (Measure.RADAR, Measure.SHAFT),
     },
+    errs_in=('speed_through_water',),
 )

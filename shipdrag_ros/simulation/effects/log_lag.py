@@ -30,4 +30,5 @@ EFFECT = Effect(
     odds=0.02,
     act=_act,
     confounders={'time_offset': (Measure.FAST_CHANGE,)},
+    errs_in=('speed_through_water',),
 )

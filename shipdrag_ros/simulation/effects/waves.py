@@ -16,6 +16,7 @@ from shipdrag_ros.simulation.effect import (
     Quantity,
     Scope,
     Shape,
+    WithoutBaseline,
     log_normal,
 )
 
@@ -66,4 +67,5 @@ EFFECT = Effect(
         'locked_propeller': (Measure.RECIPROCAL_RUN,),
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.SHAFT),
     },
+    without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
 )

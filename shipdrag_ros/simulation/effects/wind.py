@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    WithoutBaseline,
+    normal,
+)
 
 
 def _act(frame: Frame, head_m_s: float, cross_m_s: float) -> Action:
@@ -46,4 +54,5 @@ EFFECT = Effect(
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.WIND, Measure.SHAFT),
     },
     needs=('air',),
+    without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
 )
