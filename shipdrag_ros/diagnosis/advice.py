@@ -19,8 +19,7 @@ from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
-from shipdrag_ros.diagnosis.prospect import (
+from shipdrag_ros.diagnosis.outcomes import (
     PredictedOutcome,
     Rival,
     empty,
@@ -29,6 +28,7 @@ from shipdrag_ros.diagnosis.prospect import (
     probability_of_naming,
     with_known,
 )
+from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.estimation.motion_fit.coast import LOG
@@ -197,8 +197,8 @@ def _settings(
         return [of_another_run(simulated, fits, run)], [0] * len(fits)
     if measure is not Measure.SHAFT:
         windows = _windows(measure, simulated, model.ship)
-        prospects, _ = of_instrument(simulated, fits, _contexts(windows, simulated, model.ship))
-        return [prospects], [0] * len(fits)
+        outcomes, _ = of_instrument(simulated, fits, _contexts(windows, simulated, model.ship))
+        return [outcomes], [0] * len(fits)
     # whether the water turns the shaft is seen before all else, and differs by rival
     found: list[tuple[list[list[PredictedOutcome]], list[Float64]]] = []
     for after in (_TURNING, _STANDING):
@@ -206,14 +206,14 @@ def _settings(
         contexts = _contexts(windows, simulated, model.ship)
         if any(len(context.at_shaft) == 0 for context in contexts):
             return [], []
-        prospects, values = of_instrument(simulated, fits, contexts)
+        outcomes, values = of_instrument(simulated, fits, contexts)
         # the time of the stop and the run-down are read from the shaft as well
         seen = [RunDown.of(window, model.ship) for window in windows]
         sd = {
             'stop': [each.stop_sd_s for each in seen],
             'run-down': [each.run_down_sd_s for each in seen],
         }
-        found.append((with_known(prospects, fits, sd), values))
+        found.append((with_known(outcomes, fits, sd), values))
     (where_turning, values), (where_standing, _) = found
     seen_to_stand = [int(np.median(value[:3]) <= _TURNS) for value in values]
     return [where_turning, where_standing], seen_to_stand

@@ -30,8 +30,7 @@ from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, nothing_missing
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
-from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
-from shipdrag_ros.diagnosis.unknowns import trial_z
+from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs, trial_z
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.samples import Float64

@@ -18,8 +18,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from shipdrag_ros.diagnosis.linear import Part
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
-from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, scaled
+from shipdrag_ros.diagnosis.terms import EffectTerm, Tail, Unknown, cubic_bsplines, scaled
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship

@@ -18,7 +18,7 @@ from scipy.special import log_ndtr
 
 from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
 from shipdrag_ros.diagnosis.model import Linearised
-from shipdrag_ros.diagnosis.unknowns import Tail
+from shipdrag_ros.diagnosis.terms import Tail
 from shipdrag_ros.samples import Float64
 
 _ANEW = (0, 3)  # iterations in which all derivatives are found anew

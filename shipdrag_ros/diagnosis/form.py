@@ -18,112 +18,37 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from scipy.linalg import block_diag, solve_triangular
-from scipy.optimize import minimize
+from scipy.linalg import block_diag
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.diagnose import CoastRun
+from shipdrag_ros.diagnosis.direct import DirectModel, gap_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Part
+from shipdrag_ros.diagnosis.linear import Hypothesis, Part
+from shipdrag_ros.diagnosis.mean_speeds import MeanSpeeds
 from shipdrag_ros.diagnosis.model import start
-from shipdrag_ros.diagnosis.noise import bin_means
-from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Gap, Verdict, Where
+from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Verdict, Where
 from shipdrag_ros.diagnosis.search import search
-from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
-from shipdrag_ros.diagnosis.unknowns import Unknown, scaled, trial_z
+from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
 from shipdrag_ros.diagnosis.verdict import Judgement, judge
-from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.motion_fit.steady import white_sd
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Frame, Scenario
 from shipdrag_ros.simulation.effect import Effect, Scope, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
-_BINS, _LEAST_ROWS = 150, 20
 _SD_OF_LOG = 2.0  # of a and b
 _SHAPES, _SHAPE_SD = 5, 0.15  # of the resistance about the fitted form, relative
 _START_SD = 0.2  # of the first speed, relative
 _FORCE_SD = 0.15  # of a constant force, relative to the first deceleration
 _OFFSET_SD, _SPLINE_SD, _SPLINES = 0.1, 0.05, 6  # of the reading, relative to the first speed
 _WIDE = 3.0  # prior widths while noise is learnt
-_NOISE_SD_OF_LOG = np.array([1.5, 1.0])
+_SD_OF_LOG_NOISE = np.array([1.5, 1.0])
 _EVALUATIONS = 80
-_STEP_Z = 1e-3
 _APART_RAD = 0.5  # between headings of runs, from which they tell what turns with the Earth
 _NOTHING, _ONE, _UNNAMED = 0.5, 0.42, 0.08  # probabilities before the data
 _SWINGS_RAD = 0.2
-
-
-@dataclass(frozen=True)
-class Coast:
-    """
-    A coastdown, averaged over bins.
-
-    Attributes
-    ----------
-    time_s, speed_m_s, white_sd_m_s : (n,)
-        From the start of the window; the first is where the speed is highest.
-    heading_rad
-        NaN where it is not known.
-    swing_rad
-        Of the heading during the run; 0 where it is not known.
-    """
-
-    by_log: bool
-    time_s: Float64
-    speed_m_s: Float64
-    white_sd_m_s: Float64
-    heading_rad: float
-    swing_rad: float
-
-    @property
-    def duration_s(self) -> float:
-        """Time from the highest speed to the end."""
-        return float(self.time_s[-1] - self.time_s[0])
-
-    @classmethod
-    def of(cls, run: CoastRun) -> Coast:
-        """
-        Average a run from its highest speed on.
-
-        Raises
-        ------
-        DiagnosisError
-            If there are too few speeds, or none ahead.
-        """
-        window = run.window
-        by_log = len(window.speed_through_water) >= 2 * _LEAST_ROWS
-        series = window.speed_through_water if by_log else window.speed_over_ground
-        if len(series) < 2 * _LEAST_ROWS:
-            raise DiagnosisError(
-                f'{run.name}: {len(series)} speeds in the coastdown, and the ship file has no '
-                f'baseline; to fit one, at least {2 * _LEAST_ROWS} speeds through water or over '
-                'ground are needed: give a record with a speed, or a ship file with `baseline`'
-            )
-        time = np.asarray((series.time_ns - window.start_ns) * 1e-9, np.float64)
-        edges = np.linspace(time[0], time[-1] + 1e-6, min(_BINS, len(time) // 2) + 1)[1:]
-        when, mean, count = bin_means(time, series.value, edges)
-        top = int(np.argmax(mean))  # until then the thrust has not run down
-        yaw = window.heading.value
-        if not mean[top] > 0.0:
-            raise DiagnosisError(
-                f'{run.name}: the speed is never above 0: give a record of a ship under way ahead'
-            )
-        if len(mean) - top < _LEAST_ROWS:
-            raise DiagnosisError(
-                f'{run.name}: the speed is highest {when[top]:.0f} s after the begin and there '
-                'is too little after it: give a record that begins at the stop'
-            )
-        return cls(
-            by_log,
-            when[top:],
-            mean[top:],
-            (max(white_sd(series.value), 1e-4 * float(mean[top])) / np.sqrt(count))[top:],
-            float(np.angle(np.exp(1j * yaw).mean())) if len(yaw) else math.nan,
-            float(np.ptp(np.unwrap(yaw))) if len(yaw) else 0.0,
-        )
 
 
 @dataclass(frozen=True)
@@ -153,7 +78,7 @@ class SmoothReadingTerm(GaussianTerm):
 
 
 @dataclass(frozen=True)
-class FormModel:
+class FormModel(DirectModel):
     """
     Coastdowns and the form of the resistance that is fitted to them; a `Model`.
 
@@ -167,16 +92,12 @@ class FormModel:
     """
 
     ship: Ship
-    seen: Sequence[Coast]
+    seen: Sequence[MeanSpeeds]
     factor: Float64
     channels: ClassVar[tuple[str, ...]] = ('reading',)
-    iterations: ClassVar[int] = 40
-    converged: ClassVar[float] = 1e-4
-    hopeless: ClassVar[float] = math.inf
-    free: ClassVar[Float64] = np.empty(0)
 
     @classmethod
-    def learnt(cls, ship: Ship, seen: Sequence[Coast]) -> FormModel:
+    def learnt(cls, ship: Ship, seen: Sequence[MeanSpeeds]) -> FormModel:
         """
         Learn the noise, colour included, of the runs themselves: none is known before.
 
@@ -189,28 +110,16 @@ class FormModel:
         white = cls(ship, seen, np.eye(sum(len(coast.time_s) for coast in seen)) * 1e-2)
         pushed = replace(white.nothing, terms=(*white.nothing.terms, white._force))
         rough = fit(white, [pushed], [start(white, pushed)])[0].best
-        slopes = white.factor @ rough.tables[0][1:].T * _WIDE
-        left = rough.residuals[0]
-        duration = max(coast.duration_s for coast in seen)
-        units = np.array([max(float(left.std()), 1e-6), 0.1 * duration])
-
-        def factor(x: Float64) -> Float64:
-            size, time = units * np.exp(x)
-            blocks = [
-                size**2 * np.exp(-np.abs(coast.time_s[:, None] - coast.time_s) / time)
-                + np.diag(coast.white_sd_m_s**2)
-                for coast in seen
-            ]
-            return np.asarray(block_diag(*blocks), np.float64)
-
-        def cost(x: Float64) -> float:
-            whole = np.linalg.cholesky(factor(x) + slopes @ slopes.T)
-            white = solve_triangular(whole, left, lower=True)
-            log_det = 2.0 * float(np.log(np.diag(whole)).sum())
-            return float(white @ white) + log_det + float(((x / _NOISE_SD_OF_LOG) ** 2).sum())
-
-        found = minimize(cost, np.zeros(2), method='Nelder-Mead', options={'maxfev': _EVALUATIONS})
-        return cls(ship, seen, np.asarray(np.linalg.cholesky(factor(found.x)), np.float64))
+        residual = rough.residuals[0]
+        units = np.array([max(float(residual.std()), 1e-6), 0.1 * white._duration_s])
+        factor = learn_factor(
+            lambda x: _covariance(seen, units * np.exp(x)),
+            residual,
+            white.factor @ rough.tables[0][1:].T * _WIDE,
+            sd_of_log=_SD_OF_LOG_NOISE,
+            evaluations=_EVALUATIONS,
+        )
+        return cls(ship, seen, factor)
 
     @property
     def by_log(self) -> bool:
@@ -296,43 +205,15 @@ class FormModel:
             discrepancy=channel,
         )
 
-    def linearise(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        at: Sequence[Float64],
-        near: Sequence[Linear | None] | None = None,
-    ) -> list[Linear]:
-        """
-        Return the whitened speeds of each hypothesis about some unknowns.
-        """
-        found = []
-        measured = np.concatenate([coast.speed_m_s for coast in self.seen])
-        for hypothesis, z in zip(hypotheses, at, strict=True):
-            steps = _STEP_Z * np.eye(len(z))
-            columns = z[:, None] + np.hstack([np.zeros((len(z), 1)), steps, -steps])
-            with np.errstate(over='ignore', invalid='ignore'):  # a motion that runs away
-                predicted = self._predict(hypothesis, columns)
-                ahead, behind = np.split(predicted[:, 1:], 2, axis=1)
-                slopes = (ahead - behind) / (2.0 * _STEP_Z)
-                residual = measured - predicted[:, 0]
-                table = self._whitened(np.column_stack([residual, slopes]))
-            found.append(Linear(hypothesis, z, (table,), (residual,)))
-        return found
+    @cached_property
+    def measured(self) -> Float64:
+        """Speeds that are read [m/s]."""
+        return np.concatenate([coast.speed_m_s for coast in self.seen])
 
-    def responses(self, base: Linear, hypotheses: Sequence[Hypothesis]) -> Float64:
+    def predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
         """
-        Return the linear response to the last term of each, (hypotheses, rows).
+        Return the speeds that are read [m/s], (n, k), at unknowns (p, k).
         """
-        before = self._predict(base.hypothesis, base.z[:, None])[:, 0]
-        found = []
-        for hypothesis in hypotheses:
-            first, *others = hypothesis.terms[-1].unknowns
-            z = np.concatenate([base.z, [trial_z(first)], [u.start for u in others]])
-            found.append(self._predict(hypothesis, z[:, None])[:, 0] - before)
-        return self._whitened(np.array(found).T)
-
-    def _predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
-        """Return the speeds that are read, (n, k), at unknowns (p, k)."""
         count = z.shape[1]
         force, offset, splines = np.zeros((2, count)), np.zeros(count), None
         for part, place in hypothesis.parts:
@@ -361,11 +242,6 @@ class FormModel:
                 speed = speed + cubic_bsplines(since, _SPLINES).T @ splines[j]
             found.append(speed + offset)
         return np.concatenate(found)
-
-    def _whitened(self, columns: Float64) -> Float64:
-        """Return whitened lines of columns, (k, n)."""
-        found = solve_triangular(self.factor, columns, lower=True, check_finite=False).T
-        return np.ascontiguousarray(found, np.float64)
 
     @property
     def _top_m_s(self) -> float:
@@ -406,7 +282,7 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
     DiagnosisError
         If a run has too few samples of a speed.
     """
-    seen = [Coast.of(run) for run in runs]
+    seen = [MeanSpeeds.of(run) for run in runs]
     model = FormModel.learnt(ship, seen)
     found = search(model)
     judged = judge(found)
@@ -421,8 +297,8 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
     return judged.diagnosis(
         would_decide=declared(judged.candidates) if judged.verdict is Verdict.ONE_OF else (),
         where=None if judged.verdict is Verdict.NONE else place,
-        before=_gap(found.nothing),
-        after=_gap(explained) if judged.missing else None,
+        before=gap_of_speeds(found.nothing),
+        after=gap_of_speeds(explained) if judged.missing else None,
         held_out_before=None,
         held_out_after=None,
         baseline='fitted_here',
@@ -432,9 +308,15 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
     )
 
 
-def _gap(fit: Fit) -> Gap:
-    residual = fit.best.residuals[0]
-    return Gap(float(np.sqrt(np.mean(residual**2))), None, fit.chi2_per_row)
+def _covariance(seen: Sequence[MeanSpeeds], sizes: Float64) -> Float64:
+    """Return the covariance of the noise; sizes are its slow part [m/s] and a time [s]."""
+    slow, time_s = sizes
+    blocks = [
+        slow**2 * np.exp(-np.abs(coast.time_s[:, None] - coast.time_s) / time_s)
+        + np.diag(coast.white_sd_m_s**2)
+        for coast in seen
+    ]
+    return np.asarray(block_diag(*blocks), np.float64)
 
 
 def _notes(model: FormModel, judged: Judgement, fit: Fit) -> list[str]:

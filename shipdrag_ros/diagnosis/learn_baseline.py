@@ -16,8 +16,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from shipdrag_ros.diagnosis.diagnose import CoastRun
-from shipdrag_ros.diagnosis.scatter import Factor, Shared, factor
-from shipdrag_ros.diagnosis.shared_baseline import SharedBaseline
+from shipdrag_ros.diagnosis.shared_baseline import Factor, Shared, SharedBaseline, factor
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.reciprocal import combine

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.unknowns import Unknown
+from shipdrag_ros.diagnosis.terms import Unknown
 from shipdrag_ros.samples import Float64
 
 

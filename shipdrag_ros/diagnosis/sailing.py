@@ -18,18 +18,16 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from scipy.linalg import solve_triangular
-from scipy.optimize import minimize
 
 from shipdrag_ros.diagnosis.advice import declared
+from shipdrag_ros.diagnosis.direct import DirectModel, gap_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
+from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, nothing_missing, start
-from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Gap, Verdict, Where
+from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Verdict, Where
 from shipdrag_ros.diagnosis.search import Found, search, with_pairs
-from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
-from shipdrag_ros.diagnosis.unknowns import Unknown, scaled, trial_z
+from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -48,7 +46,6 @@ _TYPICAL_S = (120.0, 1200.0)  # correlation of the log's error and of slow water
 _WATER_M_S = 0.04
 _SD_OF_LOG = np.array([1.0, 1.0, 0.7, 0.8, 0.8])
 _EVALUATIONS = 400
-_STEP_Z = 1e-4
 _QUARTERS = ('east', 'north', 'west', 'south')
 # what log and track show acts alike on all ships, so that any will do
 _ANY_SHIP = Ship(
@@ -77,7 +74,7 @@ class LogErrorTerm:
 
 
 @dataclass(frozen=True)
-class SailingModel:
+class SailingModel(DirectModel):
     """
     What a log reads on legs, by hypothesis; a `Model`.
 
@@ -91,10 +88,6 @@ class SailingModel:
     legs: Legs
     factor: Float64
     channels: ClassVar[tuple[str, ...]] = ('log',)
-    iterations: ClassVar[int] = 16
-    converged: ClassVar[float] = 1e-4
-    hopeless: ClassVar[float] = math.inf
-    free: ClassVar[Float64] = np.empty(0)
 
     @classmethod
     def learnt(cls, legs: Legs) -> SailingModel:
@@ -112,33 +105,18 @@ class SailingModel:
             priors.
         """
         white = cls(legs, np.eye(len(legs)) * 0.05)
-        rough = white.fit_of(white._wide).best
-        slopes = white.factor @ rough.tables[0][1:].T
-        left = rough.residuals[0] + slopes @ rough.z
-        open_ = slopes @ slopes.T
-        typical = max(float(np.median(np.abs(rough.residuals[0]))), 1e-3)
+        rough = white.fit_of(white.together).best
+        residual = rough.residuals[0]
+        typical = max(float(np.median(np.abs(residual))), 1e-3)
         units = np.array([typical, typical, _WATER_M_S, *_TYPICAL_S])
-
-        def cost(x: Float64) -> float:
-            factor = np.linalg.cholesky(_covariance(legs, units * np.exp(x)) + open_)
-            residual = solve_triangular(factor, left, lower=True, check_finite=False)
-            log_det = 2.0 * float(np.log(np.diag(factor)).sum())
-            return float(residual @ residual) + log_det + float(((x / _SD_OF_LOG) ** 2).sum())
-
-        corners = np.vstack([np.zeros(5), 0.7 * np.eye(5)])
-        found = minimize(
-            cost,
-            corners[0],
-            method='Nelder-Mead',
-            options={
-                'maxfev': _EVALUATIONS,
-                'xatol': 0.05,
-                'fatol': 0.05,
-                'initial_simplex': corners,
-            },
+        factor = learn_factor(
+            lambda x: _covariance(legs, units * np.exp(x)),
+            residual,
+            white.factor @ rough.tables[0][1:].T * _WIDE,
+            sd_of_log=_SD_OF_LOG,
+            evaluations=_EVALUATIONS,
         )
-        covariance = _covariance(legs, units * np.exp(found.x))
-        return cls(legs, np.asarray(np.linalg.cholesky(covariance), np.float64))
+        return cls(legs, factor)
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -167,19 +145,6 @@ class SailingModel:
     def nothing(self) -> Hypothesis:
         """The log reads the speed through water, and the water lies still."""
         return Hypothesis((), (), log_prior=math.log(nothing_missing(self.effects, places=1)))
-
-    @property
-    def _wide(self) -> Hypothesis:
-        """All effects that sailing tells apart, under wide priors."""
-        sd = [[_WIDE * q.prior.second for q in effect.parameters] for effect in self.together]
-        gaussian = [tuple((0.0, each) for each in of_effect) for of_effect in sd]
-        return Hypothesis(
-            tuple(effect.name for effect in self.together),
-            tuple(
-                EffectTerm(effect, _ANY_SHIP, gaussian=prior)
-                for effect, prior in zip(self.together, gaussian, strict=True)
-            ),
-        )
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
         """
@@ -210,45 +175,18 @@ class SailingModel:
         log_prior = base.log_prior + math.log(UNNAMED_ODDS)
         return replace(base, terms=(*base.terms, *more), log_prior=log_prior, discrepancy=channel)
 
-    def linearise(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        at: Sequence[Float64],
-        near: Sequence[Linear | None] | None = None,
-    ) -> list[Linear]:
-        """
-        Return the whitened legs of each hypothesis about some unknowns.
-        """
-        found = []
-        for hypothesis, z in zip(hypotheses, at, strict=True):
-            residual = self.legs.log_m_s - self.predict(hypothesis, z)
-            steps = _STEP_Z * np.eye(len(z))
-            slopes = [
-                self.predict(hypothesis, z + step) - self.predict(hypothesis, z - step)
-                for step in steps
-            ]
-            lines = np.vstack([residual, *(each / (2.0 * _STEP_Z) for each in slopes)])
-            table = solve_triangular(self.factor, lines.T, lower=True, check_finite=False).T
-            found.append(Linear(hypothesis, z, (np.ascontiguousarray(table),), (residual,)))
-        return found
-
-    def responses(self, base: Linear, hypotheses: Sequence[Hypothesis]) -> Float64:
-        """
-        Return the linear response to the last term of each, (hypotheses, legs).
-        """
-        found = []
-        for hypothesis in hypotheses:
-            first, *others = hypothesis.terms[-1].unknowns
-            z = np.concatenate([base.z, [trial_z(first)], [u.start for u in others]])
-            changed = self.predict(hypothesis, z) - self.predict(base.hypothesis, base.z)
-            found.append(changed)
-        table = np.reshape(found, (len(hypotheses), len(self.legs))).T
-        return np.asarray(solve_triangular(self.factor, table, lower=True).T, np.float64)
+    @property
+    def measured(self) -> Float64:
+        """What the log reads [m/s]."""
+        return self.legs.log_m_s
 
     def predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
         """
-        Return what the log reads [m/s], (n,).
+        Return what the log reads [m/s], (n, k), at unknowns (p, k).
         """
+        return np.array([self._predict(hypothesis, column) for column in z.T]).T
+
+    def _predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
         action, extra = Action(), np.zeros(len(self.legs))
         for part, place in hypothesis.parts:
             values = [u.value(float(z[place + i])) for i, u in enumerate(part.unknowns)]
@@ -262,10 +200,13 @@ class SailingModel:
         through = self.legs.through_water((east * radar, north * radar)) / radar
         return (1.0 + action.log_factor) * through + action.log_offset_m_s + extra
 
-    def fit_of(self, hypothesis: Hypothesis) -> Fit:
+    def fit_of(self, effects: Sequence[Effect]) -> Fit:
         """
-        Return the fit of one hypothesis.
+        Return the fit of some effects at once.
         """
+        hypothesis = self.nothing
+        for effect in effects:
+            (hypothesis,) = self.with_effect(hypothesis, effect)
         return fit(self, [hypothesis], [start(self, hypothesis)])[0]
 
     @cached_property
@@ -318,11 +259,8 @@ def diagnose_sailing(
     """
     legs = Legs.of(records, parameters)
     model = SailingModel.learnt(legs)
-    every = model.nothing
-    for effect in model.together:
-        (every,) = model.with_effect(every, effect)
     # legs that no effect and no noise explains
-    outlier = np.abs(model.fit_of(every).best.tables[0][0]) > _OUTLIER
+    outlier = np.abs(model.fit_of(model.together).best.tables[0][0]) > _OUTLIER
     if outlier.any():
         legs = legs[np.flatnonzero(~outlier)]
         model = SailingModel.learnt(legs)
@@ -331,8 +269,8 @@ def diagnose_sailing(
     return judged.diagnosis(
         would_decide=declared(judged.candidates) if judged.verdict is Verdict.ONE_OF else (),
         where=None if judged.verdict is Verdict.NONE else _where(model, found.best),
-        before=_gap(found.nothing),
-        after=_gap(found.best) if judged.missing else None,
+        before=gap_of_speeds(found.nothing),
+        after=gap_of_speeds(found.best) if judged.missing else None,
         held_out_before=None,
         held_out_after=None,
         baseline='none',
@@ -343,11 +281,6 @@ def diagnose_sailing(
         examined=(LOG_TRACK,),
         no_coastdown=no_coastdown,
     )
-
-
-def _gap(fit: Fit) -> Gap:
-    residual = fit.best.residuals[0]
-    return Gap(float(np.sqrt(np.mean(residual**2))), None, fit.chi2_per_row)
 
 
 def _where(model: SailingModel, best: Fit) -> Where:

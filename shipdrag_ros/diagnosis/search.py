@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.linear import Hypothesis
 from shipdrag_ros.diagnosis.model import Model, start
 from shipdrag_ros.diagnosis.posterior import QUIET, Posterior, mode_of, posterior_of
-from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, trial_z
+from shipdrag_ros.diagnosis.terms import Tail, Unknown, trial_z
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
 

@@ -15,7 +15,7 @@ from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import fit
 from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.prospect import PredictedOutcome, with_known
+from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, with_known
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
