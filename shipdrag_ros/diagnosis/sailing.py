@@ -184,7 +184,10 @@ class SailingModel(DirectModel):
         """
         Return what the log reads [m/s], (n, k), at unknowns (p, k).
         """
-        return np.array([self._predict(hypothesis, column) for column in z.T]).T
+        found = np.empty((len(self.legs), z.shape[1]))
+        for k, column in enumerate(z.T):
+            found[:, k] = self._predict(hypothesis, column)
+        return found
 
     def _predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
         action, extra = Action(), np.zeros(len(self.legs))
