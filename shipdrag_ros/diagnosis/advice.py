@@ -28,9 +28,9 @@ from shipdrag_ros.diagnosis.outcomes import (
     probability_of_naming,
     with_known,
 )
-from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
+from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window

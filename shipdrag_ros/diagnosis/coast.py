@@ -26,8 +26,7 @@ from shipdrag_ros.diagnosis.coast_terms import (
     Term,
 )
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
-from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, nothing_missing
+from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, Linear, nothing_missing
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs, trial_z

@@ -16,7 +16,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from shipdrag_ros.diagnosis.linear import Part
+from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import EffectTerm, Tail, Unknown, cubic_bsplines, scaled
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND, POSITION

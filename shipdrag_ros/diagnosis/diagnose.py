@@ -19,8 +19,8 @@ from shipdrag_ros.diagnosis.result import (
     Verdict,
     Where,
 )
-from shipdrag_ros.diagnosis.search import Found, search, with_pairs
-from shipdrag_ros.diagnosis.verdict import judge
+from shipdrag_ros.diagnosis.search import search, with_pairs
+from shipdrag_ros.diagnosis.verdict import Found, judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window

@@ -18,8 +18,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
-from shipdrag_ros.diagnosis.model import Model
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Model
 from shipdrag_ros.diagnosis.result import Gap
 from shipdrag_ros.diagnosis.terms import trial_z
 from shipdrag_ros.samples import Float64

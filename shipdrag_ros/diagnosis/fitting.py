@@ -16,8 +16,7 @@ from itertools import chain, product
 import numpy as np
 from scipy.special import log_ndtr
 
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
-from shipdrag_ros.diagnosis.model import Linearised
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Linearised
 from shipdrag_ros.diagnosis.terms import Tail
 from shipdrag_ros.samples import Float64
 

@@ -25,9 +25,8 @@ from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.direct import DirectModel, gap_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Part
 from shipdrag_ros.diagnosis.mean_speeds import MeanSpeeds
-from shipdrag_ros.diagnosis.model import start
+from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
 from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Verdict, Where
 from shipdrag_ros.diagnosis.search import search
 from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled

@@ -11,8 +11,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
-from shipdrag_ros.diagnosis.model import start
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear, start
 from shipdrag_ros.diagnosis.observation import Measured
 from shipdrag_ros.diagnosis.result import Compared, Gap, Trace, Where
 from shipdrag_ros.diagnosis.simulated import CoastSimulation

@@ -11,6 +11,7 @@ the very effect that is sought.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,7 +57,7 @@ class Measured:
     rows
         `POSITION` rows are distances along the direction [m].
     whitener : (n, n)
-        Makes of residuals what is white, of variance 1; lower triangular.
+        Inverse Cholesky factor of the noise covariance.
     water_m_s
         Slow motion of the water that the whitener takes for noise: by how much
         log and way over ground wander apart in the steady record.
@@ -170,22 +171,8 @@ class Observation:
             for input_, found in series.items()
         }
         heading_rad, heading_sd = _heading(window, series, seconds, lead_in_s, parameters)
-        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-        parts: list[_Part] = []
-        across: list[_Part] = []
         edges = _edges(lead_in_s, max(float(time[-1]) for time in seconds.values()))
-        for input_, found in series.items():
-            sd, time = record.white_sd[input_], seconds[input_]
-            if input_ != 'position':
-                keep = _kept(found.value, sd)
-                part = _condensed(time[keep], found.value[keep], edges, sd, KINDS[input_])
-                parts.append(part)
-                continue
-            east, north = (found.value - found.value[0]).T
-            ahead, to_port = cos * east + sin * north, cos * north - sin * east
-            keep = _kept(ahead, sd) & _kept(to_port, sd)
-            parts.append(_condensed(time[keep], ahead[keep], edges, sd, POSITION))
-            across.append(_condensed(time[keep], to_port[keep], edges, sd, POSITION))
+        parts, across = _condensed_all(series, seconds, edges, record.white_sd, heading_rad)
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
         learnt = _Learner(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
@@ -363,6 +350,31 @@ def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
 def _condensed(time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int) -> _Part:
     when, mean, count = bin_means(time_s, value, edges)
     return _Part(when, kind, mean, sd**2 / count)
+
+
+def _condensed_all(
+    series: dict[str, Series],
+    seconds: dict[str, Float64],
+    edges: Float64,
+    white_sd: Mapping[str, float],
+    heading_rad: float,
+) -> tuple[list[_Part], list[_Part]]:
+    """Return the rows along the heading, and those to port of it."""
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    along: list[_Part] = []
+    across: list[_Part] = []
+    for input_, found in series.items():
+        sd, time = white_sd[input_], seconds[input_]
+        if input_ != 'position':
+            keep = _kept(found.value, sd)
+            along.append(_condensed(time[keep], found.value[keep], edges, sd, KINDS[input_]))
+            continue
+        east, north = (found.value - found.value[0]).T
+        ahead, to_port = cos * east + sin * north, cos * north - sin * east
+        keep = _kept(ahead, sd) & _kept(to_port, sd)
+        along.append(_condensed(time[keep], ahead[keep], edges, sd, POSITION))
+        across.append(_condensed(time[keep], to_port[keep], edges, sd, POSITION))
+    return along, across
 
 
 def _heading(

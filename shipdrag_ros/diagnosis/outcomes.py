@@ -19,13 +19,12 @@ import numpy as np
 from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, RunNuisance, SpeedErrorTerm, Term
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis
+from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.observation import Measured, Observation
-from shipdrag_ros.diagnosis.posterior import Posterior, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
-from shipdrag_ros.diagnosis.verdict import decide
+from shipdrag_ros.diagnosis.verdict import Posterior, decide, prune_by_bayes_factor
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, Predicted, Term
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.noise import apply
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 from shipdrag_ros.diagnosis.coast_terms import ForceTerm
 from shipdrag_ros.diagnosis.fitting import fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.terms import Tail, Unknown, scaled
 from shipdrag_ros.samples import Float64
 
