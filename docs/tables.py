@@ -16,7 +16,7 @@ from pathlib import Path
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.simulation import Quantity
-from shipdrag_ros.simulation.effects import LIBRARY, deciders, look_alikes
+from shipdrag_ros.simulation.effects import LIBRARY, confounders, discriminating_measurements
 
 DOCS = Path(__file__).resolve().parent
 README = DOCS.parent / 'README.md'
@@ -156,10 +156,10 @@ def effect_look_alikes() -> str:
         [
             f'`{name}`',
             f'`{other}`',
-            '; '.join(deciders(name, other)) or 'nothing that can be recorded',
+            '; '.join(discriminating_measurements(name, other)) or 'nothing that can be recorded',
         ]
         for name in LIBRARY
-        for other in look_alikes(name)
+        for other in confounders(name)
         if name < other
     )
     return _table(['effect', 'looks like', 'what decides'], rows)

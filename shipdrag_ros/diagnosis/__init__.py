@@ -2,21 +2,22 @@
 """Which effect is missing where model and data disagree."""
 
 from shipdrag_ros.diagnosis.diagnose import CoastRun, diagnose, with_effects
-from shipdrag_ros.diagnosis.fitted_baseline import diagnose_fitted
+from shipdrag_ros.diagnosis.form import diagnose_fitted
 from shipdrag_ros.diagnosis.legs import SailingRecord
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
     Advice,
     Candidate,
+    Compared,
     Diagnosis,
     Gap,
     Named,
+    Trace,
     Verdict,
     Where,
 )
 from shipdrag_ros.diagnosis.sailing import diagnose_sailing
-from shipdrag_ros.diagnosis.traces import Compared, Trace
 
 __all__ = [
     'FORCE',

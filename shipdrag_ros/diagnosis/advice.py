@@ -15,29 +15,29 @@ from itertools import combinations
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.hypotheses import Library
-from shipdrag_ros.diagnosis.linear import Problem
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.prospect import (
-    Prospect,
+from shipdrag_ros.diagnosis.outcomes import (
+    PredictedOutcome,
     Rival,
     empty,
     of_another_run,
     of_instrument,
-    resolving,
+    probability_of_naming,
     with_known,
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
-from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Weighed
+from shipdrag_ros.diagnosis.simulated import CoastSimulation
+from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.estimation.ode_fit.coast import LOG
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Measure
-from shipdrag_ros.simulation.effects import deciders
+from shipdrag_ros.simulation.effects import discriminating_measurements
 
 _MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed
@@ -57,11 +57,9 @@ _RUNS = (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED, Measure.ANOTHER_RUN)
 
 
 def advice(
-    library: Library,
-    weighed: Weighed,
+    model: CoastModel,
+    posterior: Posterior,
     candidates: Sequence[Candidate],
-    *,
-    inseparable: Sequence[frozenset[str]],
 ) -> tuple[Advice, ...]:
     """
     Return what would decide, the most promising first.
@@ -70,8 +68,6 @@ def advice(
     ----------
     candidates
         That the runs cannot tell apart.
-    inseparable
-        Effects that no record can tell apart, which are never named.
 
     Notes
     -----
@@ -79,30 +75,30 @@ def advice(
     what may be the truth; None where it is not simulated. Among the rivals are pairs
     that the runs do not ask for, which a measurement may bring up.
     """
-    fits = _rivals(weighed)
+    fits = _rivals(posterior)
     rivals = [
         Rival(names, one.log_evidence, one.hypothesis.log_odds) for names, one in fits.items()
     ]
     found: list[Advice] = []
     for measure in (*_RUNS, *_INSTRUMENTS):
-        if _measured(measure, library.seen):
+        if _measured(measure, model.seen):
             continue
-        settings, setting = _settings(measure, library, list(fits.values()))
+        settings, setting = _settings(measure, model, list(fits.values()))
         if settings and all(
             np.isfinite(one.slope).all() and len(one.mean)
             for way in settings
             for ways in way
             for one in ways
         ):
-            named = resolving(settings, setting, rivals, inseparable=inseparable)
+            named = probability_of_naming(settings, setting, rivals, inseparable=model.inseparable)
             found.append(Advice(measure.value, named))
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
     ranked = {each: each.probability or 0.0 for each in promising}
     for each in declared(candidates):
         measure = Measure(each.measure)
-        if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, library.seen):
-            ranked[each] = _reach(measure, candidates, inseparable)
+        if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, model.seen):
+            ranked[each] = _reach(measure, candidates, model.inseparable)
     return tuple(sorted(ranked, key=lambda each: -ranked[each]))
 
 
@@ -112,17 +108,22 @@ def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
     """
     votes: dict[Measure, float] = {}
     for one, other in combinations(candidates, 2):
-        for measure in _deciders(one, other):
+        for measure in _discriminating(one, other):
             weight = one.probability * other.probability
             votes[measure] = votes.get(measure, 0.0) + weight
     ranked = sorted(votes, key=lambda measure: -votes[measure])
     return tuple(Advice(measure.value, None) for measure in ranked)
 
 
-def _deciders(one: Candidate, other: Candidate) -> list[Measure]:
+def _discriminating(one: Candidate, other: Candidate) -> list[Measure]:
     """Return what tells two candidates apart, by what they do not share."""
     own, others = set(one.names) - set(other.names), set(other.names) - set(one.names)
-    return [measure for a in sorted(own) for b in sorted(others) for measure in deciders(a, b)]
+    return [
+        measure
+        for a in sorted(own)
+        for b in sorted(others)
+        for measure in discriminating_measurements(a, b)
+    ]
 
 
 def _reach(
@@ -141,18 +142,18 @@ def _reach(
         * sum(
             other.probability
             for other in candidates
-            if other is one or measure not in _deciders(one, other)
+            if other is one or measure not in _discriminating(one, other)
         )
     )
 
 
-def _rivals(weighed: Weighed) -> dict[tuple[str, ...], Fit]:
+def _rivals(posterior: Posterior) -> dict[tuple[str, ...], Fit]:
     """Return the most probable fits, asked for or not, nothing and something unnamed too."""
     # one that could not be fitted is none
-    fitted = [names for names, one in weighed.best.items() if np.isfinite(one.covariance).all()]
-    fitted.sort(key=lambda names: -weighed.best[names].log_evidence)
+    fitted = [names for names, one in posterior.best.items() if np.isfinite(one.covariance).all()]
+    fitted.sort(key=lambda names: -posterior.best[names].log_evidence)
     return {
-        names: weighed.best[names]
+        names: posterior.best[names]
         for place, names in enumerate(fitted)
         if place < _MOST or names in ((), UNNAMED)
     }
@@ -185,34 +186,34 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
 
 
 def _settings(
-    measure: Measure, library: Library, fits: Sequence[Fit]
-) -> tuple[list[list[list[Prospect]]], list[int]]:
+    measure: Measure, model: CoastModel, fits: Sequence[Fit]
+) -> tuple[list[list[list[PredictedOutcome]]], list[int]]:
     """Return the ways in which a measurement may be read, and that of each candidate."""
-    problem, first = library.problem, library.seen[0]
+    simulated, first = model.simulated, model.seen[0]
     if measure in _RUNS:
         opposite = math.pi if measure is Measure.RECIPROCAL_RUN else 0.0
         slower = _SLOWER if measure is Measure.OTHER_SPEED else 1.0
         run = _another(first, first.heading_rad + opposite, slower * first.speed_m_s)
-        return [of_another_run(problem, fits, run)], [0] * len(fits)
+        return [of_another_run(simulated, fits, run)], [0] * len(fits)
     if measure is not Measure.SHAFT:
-        windows = _windows(measure, problem, library.ship)
-        prospects, _ = of_instrument(problem, fits, _contexts(windows, problem, library.ship))
-        return [prospects], [0] * len(fits)
+        windows = _windows(measure, simulated, model.ship)
+        outcomes, _ = of_instrument(simulated, fits, _contexts(windows, simulated, model.ship))
+        return [outcomes], [0] * len(fits)
     # whether the water turns the shaft is seen before all else, and differs by rival
-    found: list[tuple[list[list[Prospect]], list[Float64]]] = []
+    found: list[tuple[list[list[PredictedOutcome]], list[Float64]]] = []
     for after in (_TURNING, _STANDING):
-        windows = _windows(measure, problem, library.ship, after=after)
-        contexts = _contexts(windows, problem, library.ship)
+        windows = _windows(measure, simulated, model.ship, after=after)
+        contexts = _contexts(windows, simulated, model.ship)
         if any(len(context.at_shaft) == 0 for context in contexts):
             return [], []
-        prospects, values = of_instrument(problem, fits, contexts)
+        outcomes, values = of_instrument(simulated, fits, contexts)
         # the time of the stop and the run-down are read from the shaft as well
-        seen = [RunDown.of(window, library.ship) for window in windows]
+        seen = [RunDown.of(window, model.ship) for window in windows]
         sd = {
             'stop': [each.stop_sd_s for each in seen],
             'run-down': [each.run_down_sd_s for each in seen],
         }
-        found.append((with_known(prospects, fits, sd), values))
+        found.append((with_known(outcomes, fits, sd), values))
     (where_turning, values), (where_standing, _) = found
     seen_to_stand = [int(np.median(value[:3]) <= _TURNS) for value in values]
     return [where_turning, where_standing], seen_to_stand
@@ -233,12 +234,12 @@ def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observ
 
 
 def _windows(
-    measure: Measure, problem: Problem, ship: Ship, *, after: float = 0.0
+    measure: Measure, simulated: CoastSimulation, ship: Ship, *, after: float = 0.0
 ) -> list[Window]:
     """Return what an instrument may read in each run; `after` is the shaft after its fall."""
     windows = []
     channel = _INSTRUMENTS[measure]
-    for run in problem.seen:
+    for run in simulated.seen:
         stop = run.context.stop
         time_s = np.arange(0.0, run.time_s[-1], _READING_S)
         gusts = 0.5 * _GUSTS_M_S * (-1.0) ** (time_s // 60.0)
@@ -261,9 +262,9 @@ def _windows(
     return windows
 
 
-def _contexts(windows: Sequence[Window], problem: Problem, ship: Ship) -> list[Context]:
+def _contexts(windows: Sequence[Window], simulated: CoastSimulation, ship: Ship) -> list[Context]:
     """Return what an instrument would add to each run."""
     return [
         Context.of(window, ship, run.time_s, run.context.stop)
-        for window, run in zip(windows, problem.seen, strict=True)
+        for window, run in zip(windows, simulated.seen, strict=True)
     ]

@@ -6,12 +6,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from shipdrag_ros.diagnosis.advice import advice
-from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, where
-from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
     FORCE,
@@ -22,16 +19,15 @@ from shipdrag_ros.diagnosis.result import (
     Verdict,
     Where,
 )
-from shipdrag_ros.diagnosis.search import search, with_more, with_pairs
-from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.diagnosis.traces import traces
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, decide, lacks, misses, odd
+from shipdrag_ros.diagnosis.search import search, with_pairs
+from shipdrag_ros.diagnosis.verdict import Found, judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.ode_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
+from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.effect import Scope
+from shipdrag_ros.simulation.effects import find
 
 _NEAR_S = 4.0  # by which a stop may be moved without seeing the run anew
 _LOOKS = 3  # at a run
@@ -102,50 +98,38 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):
         seen, notes = _observed(runs, ship, parameters, moved_s)
-        found = search(Library(ship, seen, seen[0].heading_rad))
-        more_s = {run.name: found.stop_moved_s(j) for j, run in enumerate(seen)}
+        model = CoastModel(ship, seen, seen[0].heading_rad)
+        found = search(model)
+        more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
             break
         moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
     found = with_pairs(found)
-    library, weighed, best = found.library, found.weighed, found.best
-    never = _inseparable(library)
-    alarm = weighed.nothing < QUIET and bool(best.hypothesis.names)
-    predicted = held_out(library, best) if alarm else None
-    lacking = alarm and (
-        lacks(best, with_more(found))
-        or odd(best)
-        or (predicted is not None and misses(predicted.chi2_per_sample, best.best.rows))
-    )
+    best = found.best
+    predicted = held_out(model, best) if found.alarm else None
     # an instrument that errs before the stop has taught the noise what it should have shown
-    restless = any(run.restless for run in seen) and not _of_the_ship(library, best)
-    if lacking or restless:
-        weighed = weighed.doubted()
-    verdict, candidates = decide(weighed, lacking=lacking or restless, inseparable=never)
+    distrusted = any(run.log_ground_discrepancy for run in seen) and not _of_the_ship(found)
+    judged = judge(found, held_out=predicted, distrusted=distrusted)
     would_decide: tuple[Advice, ...] = ()
-    if verdict is Verdict.ONE_OF:
-        would_decide = advice(library, weighed, candidates, inseparable=never)
-    as_stated = frozen(library)
-    missing = verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(best.hypothesis.names)
-    explained = best if missing else found.nothing
-    if verdict is Verdict.UNKNOWN:
+    if judged.verdict is Verdict.ONE_OF:
+        would_decide = advice(model, judged.posterior, judged.candidates)
+    as_stated = frozen(model)
+    explained = best if judged.missing else found.nothing
+    if judged.verdict is Verdict.UNKNOWN:
         explained = max(found.smooth, key=lambda one: one.log_likelihood)
-    return Diagnosis(
-        verdict=verdict,
-        effects=_named(best, weighed) if verdict is Verdict.NAMED else (),
-        candidates=candidates,
-        nothing=weighed.nothing,
-        unnamed=weighed.unnamed,
+    place: Where | None = None
+    if judged.verdict is not Verdict.NONE:
+        place = _before_the_stop(seen) if distrusted else where(model, as_stated, found.smooth)
+    return judged.diagnosis(
         would_decide=would_decide,
-        where=_place(library, as_stated, found.smooth, verdict, restless=restless),
-        before=gap_of(library.problem, as_stated.best),
-        after=gap_of(library.problem, best.best) if missing else None,
-        held_out_before=held_out(library, None),
-        held_out_after=predicted if missing else None,
+        where=place,
+        before=gap_of(model.simulated, as_stated.best),
+        after=gap_of(model.simulated, best.best) if judged.missing else None,
+        held_out_before=held_out(model, None),
+        held_out_after=predicted if judged.missing else None,
         baseline='stated',
-        best=_named(best, weighed),
         notes=notes,
-        traces=traces(library.problem, as_stated.best, explained.best),
+        traces=traces(model.simulated, as_stated.best, explained.best),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
     )
@@ -187,26 +171,20 @@ def _observed(
         'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '
         'and as much of the coastdown as is like it passes for noise'
         for run in seen
-        if run.restless
+        if run.log_ground_discrepancy
     ]
     return tuple(seen), tuple(notes)
 
 
-def _of_the_ship(library: Library, best: Fit) -> bool:
+def _of_the_ship(found: Found) -> bool:
     """Tell whether what is missing acts on the ship, whatever water and instruments do."""
-    scopes = {effect.scope for effect in library.effects if effect.name in best.hypothesis.names}
-    return bool(scopes) and scopes <= {Scope.HULL, Scope.RUN}
+    names = found.best.hypothesis.names
+    return bool(names) and {find(name).scope for name in names} <= {Scope.HULL, Scope.RUN}
 
 
-def _place(
-    library: Library, as_stated: Fit, smooth: Sequence[Fit], verdict: Verdict, *, restless: bool
-) -> Where | None:
-    """Return where model and data disagree."""
-    if verdict is Verdict.NONE:
-        return None
-    if not restless:
-        return where(library, as_stated, smooth)
-    runs = [run for run in library.seen if run.restless]
+def _before_the_stop(seen: Sequence[Observation]) -> Where:
+    """Return that log and way over ground disagree before the stop already."""
+    runs = [run for run in seen if run.log_ground_discrepancy]
     speeds = [run.speed_m_s for run in runs]
     lead_in_s = max(run.lead_in_s for run in runs)
     return Where('log_radar', (-lead_in_s, 0.0), (min(speeds), max(speeds)))
@@ -218,32 +196,3 @@ def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
     """
     added = tuple(StatedEffect(effect.name, dict(effect.parameters)) for effect in effects)
     return replace(ship, effects=(*ship.effects, *added))
-
-
-def _named(best: Fit, weighed: Weighed) -> tuple[Named, ...]:
-    """Return the effects of a fit with their parameters."""
-    probability = weighed.probability[best.hypothesis.names]
-    found = []
-    for part, place in best.hypothesis.parts:
-        if not isinstance(part, EffectTerm) or part.stated:
-            continue
-        values: dict[str, Uncertain] = {}
-        for i, unknown in enumerate(part.unknowns):
-            z = float(best.best.z[place + i])
-            sd = abs(unknown.slope(z)) * float(np.sqrt(best.covariance[place + i, place + i]))
-            values[unknown.name] = Uncertain(unknown.value(z), sd)
-        for name, value in part.fixed:
-            values[name] = Uncertain(value, 0.0)
-        ordered = {q.name: values[q.name] for q in part.effect.parameters}
-        found.append(Named(part.effect.name, probability, ordered))
-    return tuple(sorted(found, key=lambda effect: effect.name))
-
-
-def _inseparable(library: Library) -> list[frozenset[str]]:
-    """Return look-alikes that no record of a coastdown tells apart."""
-    return [
-        frozenset((one.name, other))
-        for one in library.effects
-        for other, measures in one.look_alikes.items()
-        if not measures
-    ]

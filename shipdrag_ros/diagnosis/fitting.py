@@ -16,16 +16,13 @@ from itertools import chain, product
 import numpy as np
 from scipy.special import log_ndtr
 
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Problem
-from shipdrag_ros.diagnosis.unknowns import Tail
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Linearised
+from shipdrag_ros.diagnosis.terms import Tail
 from shipdrag_ros.samples import Float64
 
-_ITERATIONS = 16
 _ANEW = (0, 3)  # iterations in which all derivatives are found anew
-_CONVERGED = 0.02  # fall of -2 ln posterior
 _DAMPING = 1e-2
 _HOPELESS = 1e4  # damping
-_FAR = 80.0  # of -2 ln posterior behind the best, from where nothing has a chance
 _NEARER = 0.2  # part of the way to the best that a step must make good from there
 _SMALL = 0.25  # of usual
 
@@ -57,7 +54,7 @@ class Fit:
     @property
     def log_likelihood(self) -> float:
         """Evidence without the prior probability."""
-        return self.log_evidence - self.hypothesis.weight
+        return self.log_evidence - self.hypothesis.log_prior
 
     @property
     def chi2_per_row(self) -> float:
@@ -66,7 +63,7 @@ class Fit:
 
 
 def fit(
-    problem: Problem,
+    model: Linearised,
     hypotheses: Sequence[Hypothesis],
     starts: Sequence[Float64],
 ) -> list[Fit]:
@@ -75,27 +72,45 @@ def fit(
 
     Parameters
     ----------
+    model
+        That the hypotheses are of.
+    hypotheses
     starts
         (p,) each, as `Linear.z`.
+
+    Returns
+    -------
+    list of Fit
+        In the order of the hypotheses.
+
+    Notes
+    -----
+    Levenberg and Marquardt, all hypotheses in step; one that is far behind the
+    best and hardly comes nearer is left where it is.
     """
-    states = [_State(h, z.copy()) for h, z in zip(hypotheses, starts, strict=True)]
+    states = [
+        _State(h, z.copy(), model.converged) for h, z in zip(hypotheses, starts, strict=True)
+    ]
     active = states
-    for number in range(_ITERATIONS):
+    for number in range(model.iterations):
         if not active:
             break
         near = [None if number in _ANEW else s.best for s in active]
-        points = problem.linearise([s.hypothesis for s in active], [s.trial for s in active], near)
+        points = model.linearise([s.hypothesis for s in active], [s.trial for s in active], near)
         for state, point in zip(active, points, strict=True):
             state.take(point)
         best = min(state.cost for state in states)
-        active = [state for state in active if not state.done and not state.lost(best)]
+        active = [
+            state for state in active if not state.done and not state.lost(best, model.hopeless)
+        ]
     return [state.result() for state in states]
 
 
 class _State:
     """A hypothesis on its way to the best fit."""
 
-    def __init__(self, hypothesis: Hypothesis, z: Float64) -> None:
+    def __init__(self, hypothesis: Hypothesis, z: Float64, converged: float) -> None:
+        self.converged = converged
         self.hypothesis = hypothesis
         self.trial = z
         self.best: Linear | None = None
@@ -111,7 +126,7 @@ class _State:
         if self.best is None or point.cost < self.best.cost + 1e-9:
             self.fallen = math.inf if self.best is None else self.best.cost - point.cost
             self.best = point
-            self.done = self.fallen < _CONVERGED or not math.isfinite(point.cost)
+            self.done = self.fallen < self.converged or not math.isfinite(point.cost)
             self.damping = 0.2 * self.damping if self.damping > 1e-4 else 0.0
         else:
             self.damping = max(8.0 * self.damping, _DAMPING)
@@ -124,12 +139,12 @@ class _State:
         """-2 ln of the posterior at the best so far."""
         return math.inf if self.best is None else self.best.cost
 
-    def lost(self, cost: float) -> bool:
+    def lost(self, cost: float, hopeless: float) -> bool:
         """
         Tell whether it is far behind another one, and hardly comes nearer.
         """
         behind = self.cost - cost
-        return behind > _FAR and self.fallen < _NEARER * behind
+        return behind > hopeless and self.fallen < _NEARER * behind
 
     def _step(self) -> Float64:
         assert self.best is not None
@@ -164,7 +179,7 @@ class _State:
             if any(small):
                 log_evidence = np.logaddexp(log_evidence, self._if_small([*chain(*small)]))
         log_evidence = float(log_evidence) - len(groups) * math.log(2.0)
-        return Fit(best, covariance, log_evidence + self.hypothesis.weight)
+        return Fit(best, covariance, log_evidence + self.hypothesis.log_prior)
 
     def _if_small(self, places: list[int]) -> float:
         """Return the log evidence where some unknowns are small."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far model and data are apart, and where."""
+"""How far model and data are apart, where, and what each run looks like."""
 
 from __future__ import annotations
 
@@ -8,26 +8,31 @@ from dataclasses import replace
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.hypotheses import Library
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear, Problem
-from shipdrag_ros.diagnosis.result import Gap, Where
-from shipdrag_ros.diagnosis.terms import EffectTerm, PlaceTerm
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear, start
+from shipdrag_ros.diagnosis.observation import Measured
+from shipdrag_ros.diagnosis.result import Compared, Gap, Trace, Where
+from shipdrag_ros.diagnosis.simulated import CoastSimulation
+from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION
+from shipdrag_ros.estimation.ode_fit.record import KINDS
 from shipdrag_ros.samples import Float64
 
 _PARTS = 12  # of a coastdown, in telling where a gap is
 _SHARE = 0.9  # of the excess, between the ends of where it is
 _EVEN_NATS = 3.0  # of evidence by which two channels are not told apart
 _ROUNDS = 3
+_ACROSS = 'position_across'
 
 
-def gap_of(problem: Problem, linear: Linear) -> Gap:
+def gap_of(simulated: CoastSimulation, linear: Linear) -> Gap:
     """
     Return how far a fitted model is from the runs.
     """
     speeds, places = [], []
-    for seen, residual in zip(problem.seen, linear.residuals, strict=True):
+    for seen, residual in zip(simulated.seen, linear.residuals, strict=True):
         n = len(seen.along)
         along, kind = residual[:n], seen.along.rows.kind
         coasting = seen.along.rows.time_s >= seen.lead_in_s
@@ -44,20 +49,20 @@ def _rms(parts: Sequence[Float64]) -> float | None:
     return float(np.sqrt(np.mean(whole**2))) if len(whole) else None
 
 
-def frozen(library: Library) -> Fit:
+def frozen(model: CoastModel) -> Fit:
     """
     Fit where and how fast the runs began, the ship being as its file states it.
     """
-    nothing = library.nothing
+    nothing = model.nothing
     places = tuple(
-        replace(term, scatter=0.0) if isinstance(term, PlaceTerm) else term
-        for term in nothing.row_terms
+        replace(term, scatter=0.0) if isinstance(term, RunNuisance) else term
+        for term in nothing.measurement_terms
     )
-    as_stated = replace(nothing, terms=nothing.terms[1:], row_terms=places)
-    return fit(library.problem, [as_stated], [library.start(as_stated)])[0]
+    as_stated = replace(nothing, terms=nothing.terms[1:], measurement_terms=places)
+    return fit(model, [as_stated], [start(model, as_stated)])[0]
 
 
-def held_out(library: Library, found: Fit | None) -> Gap | None:
+def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
     """
     Predict each run from the others, and tell how far off that is.
 
@@ -72,18 +77,18 @@ def held_out(library: Library, found: Fit | None) -> Gap | None:
     covariance holds that of the prediction. A run with an effect that is its own
     cannot be predicted; None where that is so of all.
     """
-    if len(library.seen) < 2:
+    if len(model.seen) < 2:
         return None
     gaps, rows = [], []
-    for j, run in enumerate(library.seen):
-        alone = replace(library, seen=(run,))
+    for j, run in enumerate(model.seen):
+        alone = replace(model, seen=(run,))
         if found is None:
             linear = frozen(alone).best
         elif _has_its_own(found.hypothesis, j):
             continue
         else:
-            linear = _predicted(library, j, found)
-        gaps.append(gap_of(alone.problem, linear))
+            linear = predicted(model, j, found)
+        gaps.append(gap_of(alone.simulated, linear))
         rows.append(linear.rows)
     if not gaps:
         return None
@@ -108,20 +113,20 @@ def _mean_square(values: Sequence[float | None]) -> float | None:
     return float(np.sqrt(np.mean(np.square(known)))) if known else None
 
 
-def _predicted(library: Library, run: int, found: Fit) -> Linear:
+def predicted(model: CoastModel, run: int, found: Fit) -> Linear:
     """Predict a run, learning from the others what belongs to it too."""
-    rest = [i for i in range(len(library.seen)) if i != run]
-    others = replace(library, seen=tuple(library.seen[i] for i in rest))
-    alone = replace(library, seen=(library.seen[run],))
+    rest = [i for i in range(len(model.seen)) if i != run]
+    others = replace(model, seen=tuple(model.seen[i] for i in rest))
+    alone = replace(model, seen=(model.seen[run],))
     there = others.transferred(found.hypothesis, runs=rest)
-    learnt = fit(others.problem, [there], [others.start(there)])[0]
+    learnt = fit(others, [there], [start(others, there)])[0]
     here = alone.transferred(found.hypothesis, runs=[run])
     shared = sum(len(term.unknowns) for term in here.terms)
-    z = alone.start(here)
+    z = start(alone, here)
     z[:shared] = learnt.best.z[:shared]
     mean = z[:shared].copy()
     precision = np.linalg.pinv(learnt.covariance[:shared, :shared], hermitian=True)
-    linear = alone.problem.linearise([here], [z])[0]
+    linear = alone.linearise([here], [z])[0]
     for _ in range(_ROUNDS):
         if not np.isfinite(linear.cost):
             break
@@ -132,11 +137,11 @@ def _predicted(library: Library, run: int, found: Fit) -> Linear:
         matrix[:shared, :shared] += precision
         fall[:shared] -= precision @ (linear.z[:shared] - mean)
         step = np.linalg.lstsq(matrix, fall, rcond=1e-13)[0]
-        linear = alone.problem.linearise([here], [linear.z + step])[0]
+        linear = alone.linearise([here], [linear.z + step])[0]
     return linear
 
 
-def where(library: Library, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
+def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
     """
     Return in which channel, and when, model and data disagree.
 
@@ -157,7 +162,7 @@ def where(library: Library, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
     if {'log', 'radar'} <= near:
         channel = 'log_radar'
     times, speeds = [], []
-    for j, seen in enumerate(library.seen):
+    for j, seen in enumerate(model.seen):
         excess = np.zeros(_PARTS)
         white = as_stated.best.tables[j][0]
         after = (seen.along.rows.time_s - seen.lead_in_s) / seen.duration_s
@@ -171,14 +176,60 @@ def where(library: Library, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
         first = int(np.searchsorted(share, 0.5 * (1.0 - _SHARE)))
         last = int(np.searchsorted(share, 0.5 * (1.0 + _SHARE)))
         ends = np.array([first, last + 1]) / _PARTS * seen.duration_s
-        speed = library.problem.predict(j, as_stated.best).speed
+        speed = model.simulated.predict(j, as_stated.best).speed
         times.append(ends)
         speeds.append(np.interp(ends + seen.lead_in_s, seen.time_s, speed))
     if not times:
-        whole = max(seen.duration_s for seen in library.seen)
-        return Where(channel, (0.0, whole), (0.0, max(s.speed_m_s for s in library.seen)))
+        whole = max(seen.duration_s for seen in model.seen)
+        return Where(channel, (0.0, whole), (0.0, max(s.speed_m_s for s in model.seen)))
     return Where(
         channel,
         (float(np.min(times)), float(np.max(times))),
         (float(np.min(speeds)), float(np.max(speeds))),
     )
+
+
+def traces(simulated: CoastSimulation, before: Linear, after: Linear) -> tuple[Trace, ...]:
+    """
+    Return each run as it was measured and as two models have it.
+
+    Parameters
+    ----------
+    simulated
+        That both were fitted to.
+    before, after
+        Two models at their best fit.
+    """
+    return tuple(_trace(simulated, j, before, after) for j in range(len(simulated.seen)))
+
+
+def _trace(simulated: CoastSimulation, run: int, before: Linear, after: Linear) -> Trace:
+    seen = simulated.seen[run]
+    speed = simulated.predict(run, after).speed
+    n = len(seen.along)
+    blocks: list[tuple[str, Measured, slice]] = [(name, seen.along, slice(0, n)) for name in KINDS]
+    if seen.across is not None:
+        blocks.append((_ACROSS, seen.across, slice(n, n + len(seen.across))))
+    found = []
+    for quantity, block, part in blocks:
+        own = np.ones(len(block), bool)
+        if quantity in KINDS:
+            own = block.rows.kind == KINDS[quantity]
+        if not own.any():
+            continue
+        measured = block.rows.value[own]
+        noise = np.linalg.inv(block.whitener)
+        found.append(
+            Compared(
+                quantity,
+                block.rows.time_s[own] - seen.lead_in_s,
+                speed[block.at[own]],
+                measured,
+                measured - before.residuals[run][part][own],
+                measured - after.residuals[run][part][own],
+                np.sqrt(np.sum(noise[own] ** 2, axis=1)),
+                before.tables[run][0, part][own],
+                after.tables[run][0, part][own],
+            )
+        )
+    return Trace(seen.name, seen.lead_in_s, tuple(found))

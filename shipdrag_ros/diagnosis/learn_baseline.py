@@ -16,8 +16,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from shipdrag_ros.diagnosis.diagnose import CoastRun
-from shipdrag_ros.diagnosis.scatter import Factor, Shared, factor
-from shipdrag_ros.diagnosis.shared_baseline import SharedBaseline
+from shipdrag_ros.diagnosis.shared_baseline import Factor, Shared, SharedBaseline, factor
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
@@ -196,7 +195,7 @@ def _scaled(
     source: str,
 ) -> Baseline:
     """Return the baseline with what was learnt, in the form that it has."""
-    base = problem.library.ship.baseline
+    base = problem.model.ship.baseline
     if isinstance(base, CoefficientBaseline):
         friction, wave = 1.0 + mean
         return replace(
@@ -273,7 +272,7 @@ def _source(shared: Shared, runs: int, speed_m_s: tuple[float, float], begun: Sh
 def _warnings(runs: Sequence[CleanRun], ship: Ship, problem: SharedBaseline) -> list[str]:
     found = []
     if ship.baseline is None:
-        base = problem.library.ship.baseline
+        base = problem.model.ship.baseline
         assert base is not None
         found.append(f'the ship file states no baseline: it is a table of r(v), {base.source}')
     if len(runs) < ENOUGH:

@@ -11,14 +11,15 @@ the very effect that is sought.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
+from scipy.optimize import least_squares
 
 from shipdrag_ros.diagnosis.context import Context, Stop
-from shipdrag_ros.diagnosis.kink import kink_s
 from shipdrag_ros.diagnosis.noise import Damping, bin_means, learn, whiten
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
@@ -37,8 +38,11 @@ _NEIGHBOURS = 9  # an outlier is told from the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8
+_KINK_BEFORE_S, _KINK_AFTER_S = 240.0, 240.0  # of the onset that was found
+_KINK_LEAST = 20  # samples on either side
+_FARTHEST_S = 90.0
 _KNOWN_S = 5.0  # of the time of the stop
-_RESTLESS_M_S = 0.15  # six times what is usual
+_DISCREPANCY_M_S = 0.15  # six times what is usual
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ class Measured:
     rows
         `POSITION` rows are distances along the direction [m].
     whitener : (n, n)
-        Makes of residuals what is white, of variance 1; lower triangular.
+        Inverse Cholesky factor of the noise covariance.
     water_m_s
         Slow motion of the water that the whitener takes for noise: by how much
         log and way over ground wander apart in the steady record.
@@ -115,9 +119,9 @@ class Observation:
         return float(self.time_s[-1]) - self.lead_in_s
 
     @property
-    def restless(self) -> bool:
+    def log_ground_discrepancy(self) -> bool:
         """Whether log and way over ground wander apart as water seldom makes them."""
-        return self.along.water_m_s > _RESTLESS_M_S
+        return self.along.water_m_s > _DISCREPANCY_M_S
 
     @classmethod
     def of(
@@ -167,22 +171,8 @@ class Observation:
             for input_, found in series.items()
         }
         heading_rad, heading_sd = _heading(window, series, seconds, lead_in_s, parameters)
-        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-        parts: list[_Part] = []
-        across: list[_Part] = []
         edges = _edges(lead_in_s, max(float(time[-1]) for time in seconds.values()))
-        for input_, found in series.items():
-            sd, time = record.white_sd[input_], seconds[input_]
-            if input_ != 'position':
-                keep = _kept(found.value, sd)
-                part = _condensed(time[keep], found.value[keep], edges, sd, KINDS[input_])
-                parts.append(part)
-                continue
-            east, north = (found.value - found.value[0]).T
-            ahead, to_port = cos * east + sin * north, cos * north - sin * east
-            keep = _kept(ahead, sd) & _kept(to_port, sd)
-            parts.append(_condensed(time[keep], ahead[keep], edges, sd, POSITION))
-            across.append(_condensed(time[keep], to_port[keep], edges, sd, POSITION))
+        parts, across = _condensed_all(series, seconds, edges, record.white_sd, heading_rad)
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
         learnt = _Learner(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
@@ -263,13 +253,63 @@ class _Learner:
         return np.maximum(damping, 1e-6), inertia
 
 
+def stop_time_s(time_s: Float64, speed_m_s: Float64, *, sd_m_s: float, run_down_s: float) -> float:
+    """
+    Return when the engine stopped, from the speed alone; 0 where that cannot be told.
+
+    A diagnosis moves the stop by little steps about where it was taken to be, which
+    serves for some seconds; an onset found without the shaft is off by more.
+
+    Parameters
+    ----------
+    time_s, speed_m_s : (n,)
+        Ascending; from the onset that was found.
+    sd_m_s
+        Of the noise; what is farther off counts less.
+    run_down_s
+        Of the thrust, which ends as exp(-t / run_down_s).
+
+    Returns
+    -------
+    float
+        From the onset that was found [s].
+
+    Notes
+    -----
+    Steady until the stop, then v0 / (1 + c s), the fall of a ship under a
+    resistance as the square of her speed, with s the time less what the thrust
+    gives back of it. So simple a form is off by some 2 s.
+    """
+    near = (time_s > -_KINK_BEFORE_S) & (time_s < _KINK_AFTER_S)
+    time, speed = time_s[near], speed_m_s[near]
+    if min((time < 0.0).sum(), (time >= 0.0).sum()) < _KINK_LEAST:
+        return 0.0
+    top = float(np.median(speed[time <= 0.5 * time[0]]))
+    last = float(np.median(speed[-_KINK_LEAST:]))
+    if not 0.0 < last < top:
+        return 0.0
+
+    def left(unknown: Float64) -> Float64:
+        steady, fall, stop_s = unknown
+        since = np.maximum(time - stop_s, 0.0)
+        if run_down_s > 0.0:
+            since = since - run_down_s * (1.0 - np.exp(-since / run_down_s))
+        result: Float64 = (speed - steady / (1.0 + np.maximum(fall, 0.0) * since)) / sd_m_s
+        return result
+
+    guess = np.array([top, (top / last - 1.0) / time[-1], 0.0])
+    found = least_squares(left, guess, loss='soft_l1', x_scale=[top, guess[1], 10.0])
+    stop_s = float(found.x[2])
+    return stop_s if abs(stop_s) < _FARTHEST_S else 0.0
+
+
 def _stopped(window: Window, run_down: RunDown, record: Record) -> RunDown:
     """Move the stop to where the speed begins to fall, if there is a speed."""
     assert window.before is not None
     for input_ in ('speed_through_water', 'speed_over_ground'):
         if input_ in record.white_sd:
             both = _joined(getattr(window.before, input_), getattr(window, input_), 0)
-            stop_s = kink_s(
+            stop_s = stop_time_s(
                 np.asarray((both.time_ns - run_down.stop_ns) * 1e-9, np.float64),
                 both.value,
                 sd_m_s=record.white_sd[input_],
@@ -310,6 +350,31 @@ def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
 def _condensed(time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int) -> _Part:
     when, mean, count = bin_means(time_s, value, edges)
     return _Part(when, kind, mean, sd**2 / count)
+
+
+def _condensed_all(
+    series: dict[str, Series],
+    seconds: dict[str, Float64],
+    edges: Float64,
+    white_sd: Mapping[str, float],
+    heading_rad: float,
+) -> tuple[list[_Part], list[_Part]]:
+    """Return the rows along the heading, and those to port of it."""
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    along: list[_Part] = []
+    across: list[_Part] = []
+    for input_, found in series.items():
+        sd, time = white_sd[input_], seconds[input_]
+        if input_ != 'position':
+            keep = _kept(found.value, sd)
+            along.append(_condensed(time[keep], found.value[keep], edges, sd, KINDS[input_]))
+            continue
+        east, north = (found.value - found.value[0]).T
+        ahead, to_port = cos * east + sin * north, cos * north - sin * east
+        keep = _kept(ahead, sd) & _kept(to_port, sd)
+        along.append(_condensed(time[keep], ahead[keep], edges, sd, POSITION))
+        across.append(_condensed(time[keep], to_port[keep], edges, sd, POSITION))
+    return along, across
 
 
 def _heading(

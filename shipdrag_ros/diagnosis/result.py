@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from shipdrag_ros.diagnosis.traces import Trace
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.sections import Uncertain
 
 FORCE = 'force'  # on the ship, against her baseline
@@ -96,6 +96,61 @@ class Gap:
     rms_speed_m_s: float | None
     rms_position_m: float | None
     chi2_per_sample: float
+
+
+@dataclass(frozen=True)
+class Compared:
+    """
+    One measured quantity of a run, held against the model.
+
+    Attributes
+    ----------
+    quantity
+        An input; `position` is the distance along the heading, and
+        `position_across` the one to port of it.
+    time_s : (n,)
+        After the engine stop; negative in the steady record.
+    speed_m_s : (n,)
+        Through water, of the model after.
+    measured : (n,)
+        Means over short times [m/s or m].
+    before, after : (n,)
+        Of the model as its file states it, and with what explains the run.
+    sd : (n,)
+        Of the noise, its slow disturbances included.
+    white_before, white_after : (n,)
+        Residuals, whitened by that noise: independent, of sd 1.
+    """
+
+    quantity: str
+    time_s: Float64
+    speed_m_s: Float64
+    measured: Float64
+    before: Float64
+    after: Float64
+    sd: Float64
+    white_before: Float64
+    white_after: Float64
+
+
+@dataclass(frozen=True)
+class Trace:
+    """
+    A run.
+
+    Attributes
+    ----------
+    name
+        For the user.
+    lead_in_s
+        Length of the steady record, from which the noise is learnt.
+    compared
+        Each quantity that was measured.
+    """
+
+    name: str
+    lead_in_s: float
+    compared: tuple[Compared, ...]
 
 
 @dataclass(frozen=True)

@@ -1,136 +1,139 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All hypotheses about some runs, fitted: singles, and pairs where something is missing."""
+"""
+All hypotheses of a model about a record, fitted: singles, and pairs where something is missing.
+
+Which of them are worth a fit is judged by the linear response to one added
+effect of a likely size: how much of it there is, and how far the rest of the
+hypothesis gives way, is linear. So a column a hypothesis is enough, where a fit
+takes hundreds.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.hypotheses import Library
-from shipdrag_ros.diagnosis.linear import Hypothesis
-from shipdrag_ros.diagnosis.screening import promise
-from shipdrag_ros.diagnosis.terms import PlaceTerm
-from shipdrag_ros.diagnosis.verdict import QUIET, Weighed, mode_of, weigh
+from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
+from shipdrag_ros.diagnosis.terms import Tail, Unknown, trial_z
+from shipdrag_ros.diagnosis.verdict import QUIET, Found, Posterior, mode_of
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
 
 _PAIRED = 4  # most probable names that pairs are tried with
 _PAIRS = 12  # that are fitted
 _STARTS = 2  # of each hypothesis that are fitted
+_AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 
 
-@dataclass(frozen=True)
-class Found:
-    """
-    What a search found.
-
-    Attributes
-    ----------
-    library
-    nothing
-        The fit where nothing is missing.
-    fits
-        Of everything.
-    """
-
-    library: Library
-    nothing: Fit
-    fits: tuple[Fit, ...]
-
-    @cached_property
-    def weighed(self) -> Weighed:
-        """All with their probabilities."""
-        return weigh(self.fits)
-
-    @property
-    def smooth(self) -> tuple[Fit, ...]:
-        """Fits with something unnamed instead, one a channel."""
-        return tuple(one for one in self.fits if one.hypothesis.discrepancy)
-
-    @property
-    def best(self) -> Fit:
-        """The most probable of what has a name, or is nothing."""
-        return self.weighed.best[self.weighed.named()[0]]
-
-    def stop_moved_s(self, run: int) -> float:
-        """
-        Return by how much the best fit moves the stop of a run.
-        """
-        for part, place in self.best.hypothesis.parts:
-            if isinstance(part, PlaceTerm) and part.run == run:
-                at = part.place_of_stop
-                return part.unknowns[at].value(float(self.best.best.z[place + at]))
-        raise AssertionError(f'run {run} has no place')
-
-
-def search(library: Library) -> Found:
+def search(model: Model) -> Found:
     """
     Fit nothing, each effect, and something unnamed.
+
+    Parameters
+    ----------
+    model
+        With the record that it is held against.
     """
-    nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
-    named = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
-    unnamed = [library.with_discrepancy(library.nothing, c) for c in library.channels()]
-    likely = _likeliest_starts(library, named, nothing)
+    nothing = fit(model, [model.nothing], [start(model, model.nothing)])[0]
+    named = [h for effect in model.effects for h in model.with_effect(model.nothing, effect)]
+    likely = _likeliest_starts(model, named, nothing)
+    unnamed = [model.with_discrepancy(model.nothing, channel) for channel in model.channels]
     both = [*likely, *unnamed]
-    fits = fit(library.problem, both, [library.start(h, nothing) for h in both])
-    return Found(library, nothing, (nothing, *fits))
+    fits = fit(model, both, [start(model, one, nothing.best) for one in both])
+    return Found(model, nothing, (nothing, *fits))
 
 
 def with_pairs(found: Found) -> Found:
     """
-    Fit pairs besides, where something is missing.
+    Fit pairs of effects besides, where something is missing.
+
+    Pairs are of the most probable names with all others; confounders that nothing
+    tells apart are no pair.
     """
-    if found.weighed.nothing >= QUIET:
+    if found.posterior.nothing >= QUIET:
         return found
-    pairs = _pairs(found.library, found.weighed)
-    return replace(found, fits=(*found.fits, *pairs))
+    return replace(found, fits=(*found.fits, *_pairs(found.model, found.posterior)))
 
 
-def with_more(found: Found) -> tuple[Fit, ...]:
+def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -> Float64:
     """
-    Return fits of something smooth besides the best.
+    Return about what log evidence hypotheses with one effect more will reach.
+
+    Parameters
+    ----------
+    model
+    base
+        What they add to.
+    hypotheses
+        Their last term is the effect, from where its fit begins.
+
+    Returns
+    -------
+    (hypotheses,)
+        With the prior, less the constant that `Fit.log_evidence` leaves out.
     """
-    library, best = found.library, found.best
-    if not best.hypothesis.names:
-        return found.smooth
-    more = [library.with_discrepancy(best.hypothesis, c) for c in library.channels()]
-    return tuple(fit(library.problem, more, [library.start(h, best) for h in more]))
+    first = [hypothesis.terms[-1].unknowns[0] for hypothesis in hypotheses]
+    mean, precision = np.array([_amount(unknown) for unknown in first]).T
+    responses = model.responses(base.best, hypotheses)
+    tables = np.hstack(base.best.tables)
+    matrix, _ = base.best.normal
+    across = tables[1:] @ responses.T
+    given_way = np.linalg.lstsq(matrix, across, rcond=1e-13)[0]
+    own = np.einsum('ai,ai->a', responses, responses) - np.einsum('ia,ia->a', across, given_way)
+    own = np.maximum(own, 0.0) + precision
+    # at the best fit of the base the residual is as good as square to all that it has
+    fall = responses @ tables[0] + precision * mean
+    gain = 0.5 * (fall**2 / own - precision * mean**2) - 0.5 * np.log(own / precision)
+    log_prior = np.array([hypothesis.log_prior for hypothesis in hypotheses])
+    found: Float64 = base.log_likelihood + gain + log_prior
+    return found
+
+
+def _amount(first: Unknown) -> tuple[float, float]:
+    """Return mean and precision of the size, in parts of that which is tried."""
+    if first.tail is Tail.HALF or first.start == 0.0:
+        return 0.0, trial_z(first) ** 2
+    return 1.0, 1.0 / _AMOUNT_SD**2
 
 
 def _likeliest_starts(
-    library: Library, hypotheses: Sequence[Hypothesis], near: Fit
+    model: Model, hypotheses: Sequence[Hypothesis], near: Fit
 ) -> list[Hypothesis]:
     """Keep the most promising starts of each hypothesis."""
-    promised = promise(library.problem, near, hypotheses)
+    modes = [mode_of(hypothesis) for hypothesis in hypotheses]
+    if all(modes.count(mode) <= _STARTS for mode in set(modes)):
+        return list(hypotheses)
     kept: dict[tuple[object, ...], list[Hypothesis]] = {}
-    for i in np.argsort(-promised):
-        found = kept.setdefault(mode_of(hypotheses[i]), [])
+    for i in np.argsort(-screening_score(model, near, hypotheses)):
+        found = kept.setdefault(modes[i], [])
         if len(found) < _STARTS:
             found.append(hypotheses[i])
     return [one for ones in kept.values() for one in ones]
 
 
-def _pairs(library: Library, weighed: Weighed) -> list[Fit]:
+def _pairs(model: Model, posterior: Posterior) -> list[Fit]:
     """Fit pairs of the likeliest names with all others."""
-    first = [names for names in weighed.named() if names][:_PAIRED]
+    first = [names for names in posterior.named() if names][:_PAIRED]
     tried: list[tuple[float, Hypothesis, Fit]] = []
     for names in first:
-        base = weighed.best[names]
+        base = posterior.best[names]
         hypotheses = [
             hypothesis
-            for effect in library.effects
+            for effect in model.effects
             if all(effect.goes_with(find(name)) for name in names)
-            for hypothesis in library.with_effect(base.hypothesis, effect)
+            and not any({effect.name, *names} <= group for group in model.inseparable)
+            for hypothesis in model.with_effect(base.hypothesis, effect)
         ]
-        promised = promise(library.problem, base, hypotheses).tolist()
-        tried += [(p, one, base) for p, one in zip(promised, hypotheses, strict=True)]
+        if hypotheses:
+            scores = screening_score(model, base, hypotheses).tolist()
+            tried += [(score, one, base) for score, one in zip(scores, hypotheses, strict=True)]
     tried.sort(key=lambda one: -one[0])
     kept: dict[tuple[object, ...], tuple[Hypothesis, Fit]] = {}
     for _, hypothesis, base in tried:
         if len(kept) < _PAIRS:
             kept.setdefault(mode_of(hypothesis), (hypothesis, base))
-    starts = [library.start(hypothesis, base) for hypothesis, base in kept.values()]
-    return fit(library.problem, [hypothesis for hypothesis, _ in kept.values()], starts)
+    starts = [start(model, hypothesis, base.best) for hypothesis, base in kept.values()]
+    return fit(model, [hypothesis for hypothesis, _ in kept.values()], starts)

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A baseline that several runs share, as normal equations of its unknowns.
+A baseline that several runs share, and by how much single runs differ besides.
 
-Only r / (1 + n_r) shows in a coastdown: n_r is as the ship file states it, and
-what is learnt is the retardation.
+Each run is linear in shared unknowns, the same in all, and has a factor of its
+own on the resistance as a whole. How far these factors scatter is learnt with
+the rest: no two runs meet the same hull, sea and air. Only r / (1 + n_r) shows in
+a coastdown: n_r is as the ship file states it, and what is learnt is the
+retardation.
 """
 
 from __future__ import annotations
@@ -13,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, baseline_parts
 from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.scatter import Normal, Shared, share
-from shipdrag_ros.diagnosis.terms import BaselineTerm, baseline_parts
-from shipdrag_ros.diagnosis.unknowns import Tail
+from shipdrag_ros.diagnosis.terms import Tail
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -27,6 +30,146 @@ from shipdrag_ros.ship import CoefficientSd, Ship, TableBaseline
 
 _LEAST_SD = 0.005  # what is stated more surely is learnt all the same
 _POINTS = 60
+_SCATTERS = np.geomspace(1e-4, 1.0, 81)  # of the factors, that are tried
+
+
+@dataclass(frozen=True)
+class Normal:
+    """
+    What a run tells, as normal equations about some point.
+
+    Attributes
+    ----------
+    matrix : (q, q)
+    fall : (q,)
+        The step from the point that the run alone asks for is matrix^-1 fall.
+    """
+
+    matrix: Float64
+    fall: Float64
+
+    @classmethod
+    def without(cls, matrix: Float64, fall: Float64, kept: int) -> Normal:
+        """
+        Return the equations of the first unknowns, whatever the others are.
+        """
+        own = matrix[kept:, kept:]
+        across = np.linalg.solve(own, np.column_stack([matrix[kept:, :kept], fall[kept:]]))
+        return cls(
+            matrix[:kept, :kept] - matrix[:kept, kept:] @ across[:, :kept],
+            fall[:kept] - matrix[:kept, kept:] @ across[:, kept],
+        )
+
+    def at(self, step: Float64) -> Normal:
+        """
+        Return the same about a point that is a step away.
+        """
+        return Normal(self.matrix, self.fall - self.matrix @ step)
+
+
+@dataclass(frozen=True)
+class Shared:
+    """
+    What runs have in common.
+
+    Attributes
+    ----------
+    step : (q,)
+        Mean, from the point that the runs are linear about.
+    covariance : (q, q)
+    scatter, scatter_low, scatter_high
+        Standard deviation of the factors of single runs: median, 16 and 84 %.
+    """
+
+    step: Float64
+    covariance: Float64
+    scatter: float
+    scatter_low: float
+    scatter_high: float
+
+
+@dataclass(frozen=True)
+class Factor:
+    """
+    By what factor - 1 a run differs from what others share.
+
+    Attributes
+    ----------
+    value, sd
+    away
+        In standard deviations, the scatter included.
+    """
+
+    value: float
+    sd: float
+    away: float
+
+
+def share(
+    runs: Sequence[Normal], prior: Normal, along: Float64, *, usual_scatter: float
+) -> Shared:
+    """
+    Learn what runs share, and their scatter.
+
+    Parameters
+    ----------
+    runs
+        About the same point.
+    prior
+        Of what is shared.
+    along : (q,)
+        What a factor of 1 + 1 on a run does to the unknowns.
+    usual_scatter
+        Half-Cauchy scale of the scatter before the data.
+
+    Notes
+    -----
+    Random effects with the scatter integrated over: its marginal posterior
+    weighs the mean and the covariance at each scatter.
+    """
+    log_weight = np.empty(len(_SCATTERS))
+    steps, covariances = [], []
+    for i, scatter in enumerate(_SCATTERS):
+        matrix, fall = prior.matrix.copy(), prior.fall.copy()
+        # density of the scatter itself, on a grid of its logarithm
+        log = np.log(scatter) - np.log1p((scatter / usual_scatter) ** 2)
+        for run in runs:
+            pull, push = run.matrix @ along, float(along @ run.fall)
+            freedom = 1.0 / scatter**2 + float(along @ pull)
+            matrix += run.matrix - np.outer(pull, pull) / freedom
+            fall += run.fall - pull * push / freedom
+            log += 0.5 * (push**2 / freedom - np.log(scatter**2 * freedom))
+        covariance = np.linalg.inv(matrix)
+        step = covariance @ fall
+        log_weight[i] = log + 0.5 * (fall @ step - np.linalg.slogdet(matrix)[1])
+        steps.append(step)
+        covariances.append(covariance)
+    weight = np.exp(log_weight - log_weight.max())
+    weight /= weight.sum()
+    table = np.array(steps)
+    mean = weight @ table
+    about = table - mean
+    covariance = np.tensordot(weight, np.array(covariances), 1) + (weight * about.T) @ about
+    low, middle, high = np.exp(
+        np.interp((0.16, 0.5, 0.84), np.cumsum(weight) - 0.5 * weight, np.log(_SCATTERS))
+    )
+    return Shared(mean, covariance, float(middle), float(low), float(high))
+
+
+def factor(run: Normal, others: Shared, along: Float64) -> Factor:
+    """
+    Hold a run against what others share.
+    """
+    known = np.linalg.inv(others.covariance)
+    run = run.at(others.step)
+    pull = run.matrix @ along
+    through = np.linalg.solve(known + run.matrix, np.column_stack([pull, run.fall]))
+    information = float(along @ pull - pull @ through[:, 0])
+    value = float(along @ run.fall - pull @ through[:, 1]) / information
+    variance = 1.0 / information
+    return Factor(
+        value, float(np.sqrt(variance)), value / float(np.sqrt(variance + others.scatter**2))
+    )
 
 
 @dataclass(frozen=True)
@@ -36,7 +179,7 @@ class SharedBaseline:
 
     Attributes
     ----------
-    library
+    model
     fitted
         Nothing missing, all runs together.
     names
@@ -49,7 +192,7 @@ class SharedBaseline:
         Lowest and highest of all runs.
     """
 
-    library: Library
+    model: CoastModel
     fitted: Fit
     names: tuple[str, ...]
     unit: Float64
@@ -61,9 +204,9 @@ class SharedBaseline:
         """Fit the runs."""
         ship = _opened(ship)
         seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
-        library = Library(ship, seen, seen[0].heading_rad)
-        nothing = library.nothing
-        fitted = fit(library.problem, [nothing], [library.start(nothing)])[0]
+        model = CoastModel(ship, seen, seen[0].heading_rad)
+        nothing = model.nothing
+        fitted = fit(model, [nothing], [start(model, nothing)])[0]
         if not np.isfinite(fitted.best.cost):
             low, high = ship.baseline_range_m_s
             raise DiagnosisError(
@@ -75,9 +218,9 @@ class SharedBaseline:
         scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.WIDE]
         shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
         shared = [*scales, *shapes]
-        speeds = [library.problem.predict(j, fitted.best).speed for j in range(len(seen))]
+        speeds = [model.simulated.predict(j, fitted.best).speed for j in range(len(seen))]
         return cls(
-            library,
+            model,
             fitted,
             tuple(unknowns[i].name for i in scales),
             np.array([unknowns[i].slope(0.0) for i in shared]),

@@ -1,54 +1,137 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The parts that hypotheses are put together from, each with its unknowns.
+What a hypothesis leaves open: unknowns with a prior, and the parts that hold them.
 
-A `Term` acts on the ship and is simulated; `Rows` add to what is measured, and
-need no simulation.
+Every unknown is fitted as z, standard normal before the data, so that the
+evidence of hypotheses can be compared whatever the units of their parameters.
+An effect, and B-splines for what has no name, are parts of all models.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from typing import ClassVar, Protocol
+from enum import Enum, auto
+from functools import cached_property
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.interpolate import BSpline
+from scipy.special import expit, ndtr
 
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, of_prior, scaled
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.ship.baseline import CoefficientBaseline
 from shipdrag_ros.simulation import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Scope, Shape
-from shipdrag_ros.simulation.hydrodynamics import viscous_n
+from shipdrag_ros.simulation.effect import Effect, Frame, Prior, Scope, Shape
 
-SHAPE_SD = 0.01  # of a baseline's form, beyond what its coefficients can follow
-FREE_SHAFT, FREE_SHAFT_SD = 0.5, 0.15  # shaft speed of a free propeller over that under power
-_SHAPES = 5
-_DISCREPANCIES = 6
-_FORMS = 4
-_FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
-_CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
-_SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
+_TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
+_WORSE, _HOW_OFTEN = 3.0, 0.1  # times worse than stated that a baseline is, in so many cases
 
 
-class Term(Protocol):
-    """A part that acts on the ship."""
+class Tail(Enum):
+    """How the prior of z falls off."""
 
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """What it leaves open."""
+    NORMAL = auto()
+    HALF = auto()  # twice the normal one, of z >= 0
+    WIDE = auto()  # a baseline may be three times worse than stated, but hardly more
+    FLAT = auto()  # the data alone decide
 
-    def acts_in(self, run: int) -> bool:
-        """Tell whether it does anything in a run."""
 
-    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
-        """Return what it does in a run."""
+@dataclass(frozen=True)
+class Unknown:
+    """
+    One number to be fitted.
+
+    Attributes
+    ----------
+    name
+    tail
+    value
+        From z to the number in its unit.
+    slope
+        Its derivative.
+    start
+        z that a fit begins from.
+    """
+
+    name: str
+    tail: Tail
+    value: Callable[[float], float]
+    slope: Callable[[float], float]
+    start: float = 0.0
+
+    def penalty(self, z: float) -> float:
+        """
+        Return -2 ln of the prior, less a constant.
+        """
+        if self.tail is Tail.FLAT:
+            return 0.0
+        if self.tail is Tail.WIDE:
+            return z * z - 2.0 * float(np.logaddexp(0.0, _odds(z)))
+        return z * z
+
+    def weight(self, z: float) -> float:
+        """
+        Return the precision that gives the slope of the penalty at z.
+        """
+        if self.tail is Tail.FLAT:
+            return 0.0
+        if self.tail is Tail.WIDE:
+            return 1.0 - float(expit(_odds(z))) * (1.0 - 1.0 / _WORSE**2)
+        return 1.0
+
+
+def _odds(z: float) -> float:
+    """Return the logarithm of the odds that a baseline that is z off is worse than stated."""
+    before = math.log(_HOW_OFTEN / (_WORSE * (1.0 - _HOW_OFTEN)))
+    return before + 0.5 * z * z * (1.0 - 1.0 / _WORSE**2)
+
+
+def trial_z(unknown: Unknown) -> float:
+    """
+    Return z of a likely size, for one that is tried before it is fitted.
+    """
+    return unknown.start or _TRIAL_Z
+
+
+def scaled(name: str, sd: float, *, mean: float = 0.0, tail: Tail = Tail.NORMAL) -> Unknown:
+    """
+    Return an unknown that is mean + sd z.
+    """
+    return Unknown(name, tail, lambda z: mean + sd * z, lambda z: sd)
+
+
+def of_prior(name: str, prior: Prior, *, start: float = 0.0, sign: float = 1.0) -> Unknown:
+    """
+    Return an unknown of the prior that an effect states.
+
+    Parameters
+    ----------
+    sign
+        Where the prior leaves it open.
+    """
+    a, b = sign * prior.first, prior.second
+    match prior.shape:
+        case Shape.HALF_NORMAL:
+            return Unknown(name, Tail.HALF, lambda z: b * z, lambda z: b, start)
+        case Shape.LOG_NORMAL | Shape.EITHER_SIGN:
+            return Unknown(
+                name,
+                Tail.NORMAL,
+                lambda z: a * math.exp(b * z),
+                lambda z: a * b * math.exp(b * z),
+                start,
+            )
+        case Shape.UNIFORM:
+            return Unknown(
+                name,
+                Tail.NORMAL,
+                lambda z: a + (b - a) * float(ndtr(z)),
+                lambda z: (b - a) * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi),
+                start,
+            )
+        case _:
+            return Unknown(name, Tail.NORMAL, lambda z: a + b * z, lambda z: b, start)
 
 
 @dataclass(frozen=True)
@@ -69,8 +152,10 @@ class EffectTerm:
         Of parameters that have either, by name.
     only_run
         Where an effect of a single run is looked for; None: in all runs.
+    gaussian
+        Mean and sd of each parameter [SI], in place of the priors of the effect.
     stated
-        Value and sd of each parameter where the ship file states them.
+        Whether it is part of the model as its file states it, and no hypothesis.
     """
 
     effect: Effect
@@ -79,16 +164,17 @@ class EffectTerm:
     fixed: tuple[tuple[str, float], ...] = ()
     signs: tuple[tuple[str, float], ...] = ()
     only_run: int | None = None
-    stated: tuple[tuple[float, float], ...] = ()
+    gaussian: tuple[tuple[float, float], ...] = ()
+    stated: bool = False
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
         """Its parameters, without those that are fixed."""
         quantities = [quantity.of(self.ship) for quantity in self.effect.parameters]
-        if self.stated:
+        if self.gaussian:
             return tuple(
-                scaled(quantity.name, sd, mean=value)
-                for quantity, (value, sd) in zip(quantities, self.stated, strict=True)
+                scaled(quantity.name, sd, mean=mean)
+                for quantity, (mean, sd) in zip(quantities, self.gaussian, strict=True)
             )
         free = [quantity for quantity in quantities if quantity.name not in dict(self.fixed)]
         starts = self.starts or (0.0,) * len(free)
@@ -106,12 +192,11 @@ class EffectTerm:
         return self.effect.scope is Scope.RUN and not self.stated
 
     @property
-    def components(self) -> list[int]:
-        """Places, among its unknowns, of sizes that may have either sign and are not stated."""
-        if self.stated:
-            return []
+    def one_size(self) -> Sequence[int]:
+        """Places of components, which may have either sign: where one is small, so are all."""
         free = [q for q in self.effect.parameters if q.name not in dict(self.fixed)]
-        return [i for i, q in enumerate(free) if q.prior.shape is Shape.NORMAL]
+        found = [i for i, q in enumerate(free) if q.prior.shape is Shape.NORMAL]
+        return () if self.stated or len(found) < 2 else found
 
     def acts_in(self, run: int) -> bool:
         """Tell whether it does anything in a run."""
@@ -129,307 +214,29 @@ class EffectTerm:
         return [fixed[q.name] if q.name in fixed else next(free) for q in self.effect.parameters]
 
 
-@dataclass(frozen=True)
-class BaselineTerm:
+def scope_runs(effect: Effect, runs: int) -> tuple[int | None, ...]:
     """
-    What is not known of the baseline, as far as its file says.
+    Return where an effect may be: in all runs (None), or in any single one.
+    """
+    if effect.scope is Scope.RUN and runs > 1:
+        return (None, *range(runs))
+    return (None,)
 
-    Attributes
+
+def cubic_bsplines(x: Float64, count: int) -> Float64:
+    """
+    Return cubic B-splines on even knots, which add up to 1.
+
+    Parameters
     ----------
-    ship
-    top_m_s
-        Highest speed of the runs.
-    run_down_change_s
-        By how much the thrust of each run is known to run down more slowly
-        than the ship file says.
-    run_down_sd_s
-        Of the thrust; 0: known.
-    """
+    x : (n,)
+        Knots are over 0 .. 1; beyond them the splines keep their value at the end.
+    count
+        Number of splines, 4 or more.
 
-    ship: Ship
-    top_m_s: float
-    run_down_change_s: tuple[float, ...]
-    run_down_sd_s: float
-
-    @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Scales of its parts, its shape, n_r, run-down."""
-        base = self.ship.baseline
-        assert base is not None
-        if isinstance(base, CoefficientBaseline):
-            scales = {'friction': base.relative_sd.friction, 'wave': base.relative_sd.wave}
-        else:
-            scales = {'resistance': base.relative_sd}
-        found = [scaled(name, sd, tail=Tail.WIDE) for name, sd in scales.items()]
-        found += [scaled(f'shape {k}', SHAPE_SD) for k in range(_SHAPES)]
-        # a retardation that is known stays so whatever n_r is
-        known = base.relative_sd_of == 'retardation'
-        found.append(scaled('n_r', 0.0 if known else self.ship.added_mass.sd))
-        found.append(scaled('run-down', self.run_down_sd_s))
-        found.append(scaled('free shaft', FREE_SHAFT_SD, mean=FREE_SHAFT))
-        return tuple(found)
-
-    def acts_in(self, run: int) -> bool:
-        """Tell that the ship is the same in all runs."""
-        return True
-
-    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
-        """Return the departure from the stated baseline."""
-        *given, n_r, run_down_s, free_shaft = values
-        scales = np.array(given)
-        base = self.ship.baseline
-        if isinstance(base, CoefficientBaseline) and base.relative_sd.correlation:
-            # the scale of the wave resistance is stated as if that of friction were right
-            rho, sd = base.relative_sd.correlation, base.relative_sd
-            scales[1] *= (1.0 - rho**2) ** 0.5
-            if sd.friction > 0.0:
-                scales[1] += rho * sd.wave / sd.friction * scales[0]
-        return Action(
-            resistance=(lambda speed: self._departure(speed, scales),),
-            n_r_change=n_r,
-            run_down_change_s=self.run_down_change_s[run] + run_down_s,
-            free_shaft=free_shaft,
-        )
-
-    def _departure(self, speed_m_s: Float64, scales: Float64) -> Float64:
-        result: Float64 = scales @ baseline_parts(self.ship, self.top_m_s, speed_m_s.tobytes())
-        return result
-
-
-@lru_cache(maxsize=8)
-def baseline_parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
-    """
-    Return what each scale and shape of a baseline adds [N], (p, n).
-
-    Kept, as speeds recur, hence the bytes of an array.
-    """
-    speed_m_s = np.frombuffer(speeds)
-    total = ship.resistance_n(speed_m_s)
-    parts = [total]
-    if isinstance(ship.baseline, CoefficientBaseline):
-        viscous = viscous_n(ship, speed_m_s)
-        parts = [viscous, total - ship.air_drag_n(speed_m_s) - viscous]
-    return np.vstack([*parts, total * hats(speed_m_s / top_m_s, _SHAPES)])
-
-
-@dataclass(frozen=True)
-class ForceTerm:
-    """
-    Any smooth resistance beyond the baseline, as a function of the speed.
-    """
-
-    ship: Ship
-    top_m_s: float
-
-    @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Its sizes about some speeds [N]."""
-        sd = _FORCE_SD * float(self.ship.resistance_n(self.top_m_s))
-        return tuple(scaled(f'force {k}', sd) for k in range(_DISCREPANCIES))
-
-    def acts_in(self, run: int) -> bool:
-        """Tell that it acts in all runs."""
-        return True
-
-    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
-        """Return the extra resistance."""
-        sizes = np.array(values)
-
-        def extra(speed_m_s: Float64) -> Float64:
-            result: Float64 = sizes @ _bumps(self.top_m_s, speed_m_s.tobytes())
-            return result
-
-        return Action(resistance=(extra,))
-
-
-@dataclass(frozen=True)
-class Predicted:
-    """
-    What one column of a simulation predicts of a run.
-
-    Attributes
-    ----------
-    along, across : (n,), (k,)
-        Rows.
-    speed, over_ground : (m,)
-        Speed through water, and velocity along the heading over ground, at the
-        times of the observation.
-    distance : (m,)
-        Over ground, along the heading.
-    """
-
-    along: Float64
-    across: Float64
-    speed: Float64
-    over_ground: Float64
-    distance: Float64
-
-
-@dataclass(frozen=True)
-class FormTerm:
-    """
-    How far an effect may depart from its formula, smoothly over the run.
-
-    Attributes
-    ----------
-    term
-        The effect.
-    sd
-        Relative.
-    """
-
-    term: EffectTerm
-    sd: float
-
-    @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Departures about some times, relative to the trace of the effect."""
-        return tuple(scaled(f'form {k}', self.sd) for k in range(_FORMS))
-
-    def columns(
-        self, seen: Observation, trace: tuple[Float64, Float64]
-    ) -> tuple[Float64, Float64]:
-        """Return (4, n) of the rows along and (4, k) of those across, per unit value."""
-        bumps = _over_run(seen, _FORMS)
-        along = bumps[:, seen.along.at] * trace[0]
-        if seen.across is None:
-            return along, np.zeros((_FORMS, 0))
-        return along, bumps[:, seen.across.at] * trace[1]
-
-
-class RowTerm(Protocol):
-    """A part that adds to what is measured."""
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """What it leaves open."""
-
-    def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (p, n) of the rows along and (p, k) of those across, per unit value."""
-
-
-@dataclass(frozen=True)
-class PlaceTerm:
-    """
-    What is a run's own: where it began, its heading, when the engine stopped.
-
-    Attributes
-    ----------
-    run
-    heading_sd_rad, stop_sd_s
-    scatter
-        Of the resistance from run to run, relative.
-
-    Notes
-    -----
-    A coastdown under 1 + c times the resistance is the same motion, 1 + c
-    times as fast in time.
-    """
-
-    run: int
-    heading_sd_rad: float
-    stop_sd_s: float
-    has_positions: bool
-    scatter: float = 0.0
-    place_of_stop: ClassVar[int] = 3  # among the unknowns
-
-    @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Place [m], heading [rad], stop [s], factor on the resistance, - 1, clocks [s]."""
-        # where no row shows it, a place with a prior leaves the evidence as it is
-        tail = Tail.FLAT if self.has_positions else Tail.NORMAL
-        return (
-            scaled('ahead', 1.0, tail=tail),
-            scaled('to port', 1.0, tail=tail),
-            scaled('heading', self.heading_sd_rad),
-            scaled('stop', self.stop_sd_s),
-            scaled('factor', self.scatter),
-            scaled('log late', _CLOCKS_SD_S if self.has_positions else 0.0),
-        )
-
-    def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (6, n) and (6, k)."""
-        along, across = _nothing(seen, 6)
-        if run != self.run:
-            return along, across
-        kind, at = seen.along.rows.kind, seen.along.at
-        position = kind == POSITION
-        along[0, position] = 1.0
-        after = seen.time_s >= seen.lead_in_s
-        slowing = np.where(after, np.gradient(base.speed, seen.time_s), 0.0)
-        gained = np.where(after, base.over_ground[0] - base.over_ground, 0.0)
-        along[3] = np.where(position, gained[at], -slowing[at])
-        since = np.maximum(seen.time_s - seen.lead_in_s, 0.0)
-        way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
-        along[4] = np.where(position, (since * base.speed - way)[at], (since * slowing)[at])
-        along[5] = np.where(kind == LOG, -slowing[at], 0.0)
-        if seen.across is not None:
-            across[1] = 1.0
-            across[2] = base.distance[seen.across.at]
-        return along, across
-
-
-@dataclass(frozen=True)
-class SpeedErrorTerm:
-    """
-    Any smooth error of the log, or of radar and GNSS, as a function of time.
-    """
-
-    run: int
-    of_log: bool
-    speed_m_s: float
-
-    @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Its sizes about some times [m/s]."""
-        sd = _SPEED_SD * self.speed_m_s
-        what = 'log' if self.of_log else 'radar'
-        return tuple(scaled(f'{what} {k}', sd) for k in range(_DISCREPANCIES))
-
-    def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (6, n) and (6, k)."""
-        along, across = _nothing(seen, _DISCREPANCIES)
-        if run != self.run:
-            return along, across
-        # one for the lead-in, the others over the coastdown
-        error = _over_run(seen, _DISCREPANCIES)
-        kind, at = seen.along.rows.kind, seen.along.at
-        if self.of_log:
-            along[:, kind == LOG] = error[:, at[kind == LOG]]
-            return along, across
-        along[:, kind == OVER_GROUND] = error[:, at[kind == OVER_GROUND]]
-        steps = 0.5 * (error[:, 1:] + error[:, :-1]) * np.diff(seen.time_s)
-        way = np.concatenate([np.zeros((_DISCREPANCIES, 1)), np.cumsum(steps, axis=1)], axis=1)
-        along[:, kind == POSITION] = way[:, at[kind == POSITION]]
-        return along, across
-
-
-def _over_run(seen: Observation, count: int) -> Float64:
-    """Return bumps over a coastdown, (count, m); the first one holds all that was before."""
-    after = np.clip((seen.time_s - seen.lead_in_s) / seen.duration_s, 0.0, 1.0)
-    return _kept_hats(after.tobytes(), count)
-
-
-@lru_cache(maxsize=32)
-def _kept_hats(x: bytes, count: int) -> Float64:
-    return hats(np.frombuffer(x), count)
-
-
-@lru_cache(maxsize=8)
-def _bumps(top_m_s: float, speeds: bytes) -> Float64:
-    return hats(np.frombuffer(speeds) / top_m_s, _DISCREPANCIES)
-
-
-def _nothing(seen: Observation, unknowns: int) -> tuple[Float64, Float64]:
-    across = 0 if seen.across is None else len(seen.across)
-    return np.zeros((unknowns, len(seen.along))), np.zeros((unknowns, across))
-
-
-def hats(x: Float64, count: int) -> Float64:
-    """
-    Return smooth bumps that add up to 1, (count, n), at x in 0 .. 1.
-
-    Beyond 1 the last one stays at its end.
+    Returns
+    -------
+    (count, n)
     """
     degree = 3
     inner = np.linspace(0.0, 1.0, count - degree + 1)
@@ -437,12 +244,3 @@ def hats(x: Float64, count: int) -> Float64:
     flat = np.clip(np.asarray(x, np.float64), 0.0, 1.0).reshape(-1)
     table = BSpline.design_matrix(flat, knots, degree).toarray()
     return np.ascontiguousarray(table.T).reshape(count, *np.shape(x))
-
-
-def scope_runs(effect: Effect, runs: int) -> tuple[int | None, ...]:
-    """
-    Return where an effect may be: in all runs, or in any single one.
-    """
-    if effect.scope is Scope.RUN and runs > 1:
-        return (None, *range(runs))
-    return (None,)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-From fits to a verdict: a name only where the data can tell.
+From fits to posterior probabilities, and to a verdict: a name only where the data can tell.
 
 Evidence names; a smooth discrepancy that a name does not explain takes the name
 back; what nothing in a record can tell apart stays a set.
@@ -11,26 +11,30 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.special import logsumexp
 
-from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis
-from shipdrag_ros.diagnosis.result import Candidate, Verdict
+from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
+from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, Gap, Named, Verdict
 from shipdrag_ros.diagnosis.terms import EffectTerm
+from shipdrag_ros.ship import Uncertain
 
+UNNAMED = ('?',)  # stands among the names for something without one
 CERTAIN = 0.9  # probability from which an effect is named
 QUIET = 0.1  # of nothing missing, from which nothing is said
+_LOG_BAYES_FACTOR = math.log(10.0)  # from where evidence is strong (Jeffreys 1961)
 _SET = 0.99  # of the candidates
-_ASKED = math.log(10.0)  # of evidence, from where it is strong (Jeffreys 1961)
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
-_ODD_SD = 2.5  # standard deviations of what is expected of an effect, its size apart
+_SHAPE_SD = 2.5  # prior standard deviations of a shape parameter of an effect
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
 
 
 @dataclass(frozen=True)
-class Weighed:
+class Posterior:
     """
     Hypotheses with their probabilities.
 
@@ -55,7 +59,7 @@ class Weighed:
         """Probability of something without a name."""
         return self.probability.get(UNNAMED, 0.0)
 
-    def doubted(self) -> Weighed:
+    def doubted(self) -> Posterior:
         """
         Return the same where the best name leaves more than noise.
 
@@ -65,7 +69,7 @@ class Weighed:
             return self
         share = (1.0 - CERTAIN) / (1.0 - self.unnamed)
         scaled = {names: share * p for names, p in self.probability.items()}
-        return Weighed(self.best, {**scaled, UNNAMED: CERTAIN})
+        return Posterior(self.best, {**scaled, UNNAMED: CERTAIN})
 
     def named(self) -> list[tuple[str, ...]]:
         """
@@ -75,10 +79,7 @@ class Weighed:
         return sorted(names, key=lambda names: -self.probability[names])
 
 
-UNNAMED = ('?',)
-
-
-def weigh(fits: Sequence[Fit]) -> Weighed:
+def posterior_of(fits: Sequence[Fit]) -> Posterior:
     """
     Give hypotheses their probabilities.
 
@@ -90,35 +91,46 @@ def weigh(fits: Sequence[Fit]) -> Weighed:
     """
     best: dict[tuple[str, ...], Fit] = {}
     modes: dict[tuple[str, ...], dict[tuple[object, ...], float]] = {}
-    for fit in fits:
-        key = UNNAMED if fit.hypothesis.discrepancy else fit.hypothesis.names
-        if key not in best or fit.log_evidence > best[key].log_evidence:
-            best[key] = fit
-        mode = mode_of(fit.hypothesis)
+    for one in fits:
+        key = UNNAMED if one.hypothesis.discrepancy else one.hypothesis.names
+        if key not in best or one.log_evidence > best[key].log_evidence:
+            best[key] = one
+        mode = mode_of(one.hypothesis)
         found = modes.setdefault(key, {})
-        found[mode] = max(found.get(mode, -math.inf), fit.log_evidence)
+        found[mode] = max(found.get(mode, -math.inf), one.log_evidence)
     log = {key: float(logsumexp(list(found.values()))) for key, found in modes.items()}
-    return Weighed(best, simplest(log, {key: best[key].hypothesis.log_odds for key in log}))
+    return Posterior(
+        best, prune_by_bayes_factor(log, {key: best[key].hypothesis.log_odds for key in log})
+    )
 
 
-def simplest(
+def prune_by_bayes_factor(
     log_evidence: Mapping[tuple[str, ...], float], log_odds: Mapping[tuple[str, ...], float]
 ) -> dict[tuple[str, ...], float]:
     """
-    Return probabilities, where an effect that the data do not ask for is left out.
+    Return posterior probabilities, dropping an effect whose Bayes factor is below 10.
 
     A record in which an effect cannot be seen speaks neither for nor against it.
-    What it leaves to a name with such an effect belongs to the name alone.
+    The probability of a name with such an effect goes to the name alone.
 
     Parameters
     ----------
     log_evidence
         Of names, prior included.
     log_odds
-        Of names before the data, over nothing.
+        Prior log odds of names over nothing.
+
+    Returns
+    -------
+    dict
+        Of the names that are left; adds up to 1.
+
+    Notes
+    -----
+    A factor of 10 is strong evidence by Jeffreys, Theory of Probability (1961).
     """
     kept = dict(log_evidence)
-    asked = {names: log_evidence[names] - log_odds[names] for names in kept}
+    factor = {names: log_evidence[names] - log_odds[names] for names in kept}
     for names in sorted(log_evidence, key=lambda names: -len(names)):
         fewer = [
             other
@@ -127,8 +139,8 @@ def simplest(
         ]
         if not fewer:
             continue
-        alone = max(fewer, key=lambda other: asked[other])
-        if asked[names] <= asked[alone] + _ASKED:
+        alone = max(fewer, key=lambda other: factor[other])
+        if factor[names] <= factor[alone] + _LOG_BAYES_FACTOR:
             kept[alone] = float(np.logaddexp(kept[alone], kept.pop(names)))
     total = logsumexp(list(kept.values()))
     return {names: math.exp(log - total) for names, log in kept.items()}
@@ -146,46 +158,192 @@ def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
     return (hypothesis.names, hypothesis.discrepancy, *sorted(ways))
 
 
-def lacks(fit: Fit, with_more: Sequence[Fit]) -> bool:
+@dataclass(frozen=True)
+class Found:
     """
-    Tell whether a name leaves more than noise.
+    What a search found.
+
+    Attributes
+    ----------
+    model
+    nothing
+        The fit where nothing is missing.
+    fits
+        Of everything.
+    """
+
+    model: Model
+    nothing: Fit
+    fits: tuple[Fit, ...]
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """Posterior probabilities of all."""
+        return posterior_of(self.fits)
+
+    @property
+    def smooth(self) -> tuple[Fit, ...]:
+        """Fits with something unnamed instead, one a channel."""
+        return tuple(one for one in self.fits if one.hypothesis.discrepancy)
+
+    @property
+    def best(self) -> Fit:
+        """The most probable of what has a name, or is nothing."""
+        return self.posterior.best[self.posterior.named()[0]]
+
+    @property
+    def alarm(self) -> bool:
+        """Whether something is missing, and has a name."""
+        return self.posterior.nothing < QUIET and bool(self.best.hypothesis.names)
+
+    def with_discrepancy(self) -> tuple[Fit, ...]:
+        """Return fits of something smooth besides the best, one a channel."""
+        model, best = self.model, self.best
+        if not best.hypothesis.names:
+            return self.smooth
+        more = [model.with_discrepancy(best.hypothesis, channel) for channel in model.channels]
+        return tuple(fit(model, more, [start(model, one, best.best) for one in more]))
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """
+    A verdict, and what it rests on.
+
+    Attributes
+    ----------
+    found
+    posterior
+        Where the verdict is doubted, something unnamed is in it as probable as one
+        must be to be named.
+    verdict
+    candidates
+    """
+
+    found: Found
+    posterior: Posterior
+    verdict: Verdict
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def missing(self) -> bool:
+        """Whether the most probable hypothesis explains something that is missing."""
+        names = self.found.best.hypothesis.names
+        return self.verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(names)
+
+    @property
+    def best(self) -> tuple[Named, ...]:
+        """Effects of the most probable hypothesis, with their parameters."""
+        fit = self.found.best
+        probability = self.posterior.probability[fit.hypothesis.names]
+        found = []
+        for part, place in fit.hypothesis.parts:
+            if not isinstance(part, EffectTerm) or part.stated:
+                continue
+            values = {name: Uncertain(value, 0.0) for name, value in part.fixed}
+            for i, unknown in enumerate(part.unknowns, place):
+                z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
+                values[unknown.name] = Uncertain(unknown.value(z), abs(unknown.slope(z)) * sd)
+            ordered = {q.name: values[q.name] for q in part.effect.parameters}
+            found.append(Named(part.effect.name, probability, ordered))
+        return tuple(sorted(found, key=lambda effect: effect.name))
+
+    def diagnosis(self, **rest: Any) -> Diagnosis:
+        """
+        Return the result.
+
+        Parameters
+        ----------
+        **rest
+            What the verdict does not tell, as in `Diagnosis`.
+        """
+        return Diagnosis(
+            verdict=self.verdict,
+            effects=self.best if self.verdict is Verdict.NAMED else (),
+            candidates=self.candidates,
+            nothing=self.posterior.nothing,
+            unnamed=self.posterior.unnamed,
+            best=self.best,
+            **rest,
+        )
+
+
+def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False) -> Judgement:
+    """
+    Return the verdict on what a search found.
 
     Parameters
     ----------
-    with_more
+    found
+    held_out
+        Of runs predicted from others with the most probable hypothesis; None
+        without.
+    distrusted
+        The measurements themselves are known to be wrong.
+    """
+    best, posterior = found.best, found.posterior
+    doubted = distrusted or (
+        found.alarm
+        and (
+            has_residual_structure(best, found.with_discrepancy())
+            or outside_prior(best)
+            or (held_out is not None and exceeds_noise(held_out.chi2_per_sample, best.best.rows))
+        )
+    )
+    if doubted:
+        posterior = posterior.doubted()
+    verdict, candidates = decide(posterior, lacking=doubted, inseparable=found.model.inseparable)
+    return Judgement(found, posterior, verdict, candidates)
+
+
+def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:
+    """
+    Tell whether a hypothesis leaves more than noise.
+
+    Parameters
+    ----------
+    fit
+    with_discrepancy
         The same with something smooth besides.
     """
-    if misses(fit.chi2_per_row, fit.best.rows):
+    if exceeds_noise(fit.chi2_per_row, fit.best.rows):
         return True
-    return any(more.log_likelihood > fit.log_likelihood + _LACK_NATS for more in with_more)
+    limit = fit.log_likelihood + _LACK_NATS
+    return any(more.log_likelihood > limit for more in with_discrepancy)
 
 
-def odd(fit: Fit) -> bool:
+def outside_prior(fit: Fit) -> bool:
     """
-    Tell whether an effect is there in a way that it is not known in.
+    Tell whether a shape parameter of an effect lies beyond 2.5 prior sd.
 
     However large it is, a turn that hardly changes the heading, or is over in some
-    seconds, is something else.
+    seconds, is something else. Sizes, and components of one, are no shape.
     """
-    for part, place in fit.hypothesis.parts:
-        if not isinstance(part, EffectTerm) or part.stated:
-            continue
-        size = part.effect.parameters[0].name
-        for i, unknown in enumerate(part.unknowns):
-            if unknown.name != size and abs(float(fit.best.z[place + i])) > _ODD_SD:
-                return True
-    return False
+    return any(
+        abs(float(fit.best.z[place + i])) > _SHAPE_SD
+        for part, place in fit.hypothesis.parts
+        if isinstance(part, EffectTerm) and not part.stated
+        for i, unknown in enumerate(part.unknowns)
+        if unknown.name != part.effect.parameters[0].name and i not in part.one_size
+    )
 
 
-def misses(chi2_per_row: float, rows: int) -> bool:
+def exceeds_noise(chi2_per_row: float, rows: int) -> bool:
     """
     Tell whether what is left is more than noise, as well as that is known.
+
+    Parameters
+    ----------
+    chi2_per_row
+        Mean square of the whitened residuals.
+    rows
+        Their number.
     """
     return chi2_per_row > 1.0 + _LACK_SD * math.sqrt(2.0 / rows) + _LACK_SLACK
 
 
 def decide(
-    weighed: Weighed, *, lacking: bool, inseparable: Sequence[frozenset[str]]
+    posterior: Posterior, *, lacking: bool, inseparable: Sequence[frozenset[str]]
 ) -> tuple[Verdict, tuple[Candidate, ...]]:
     """
     Return verdict and candidates.
@@ -197,30 +355,30 @@ def decide(
     inseparable
         Effects that no record can tell apart.
     """
-    candidates = _smallest(weighed)
-    first = weighed.named()[0]
+    candidates = _smallest(posterior)
+    first = posterior.named()[0]
     if lacking:
         return Verdict.UNKNOWN, candidates
-    if weighed.nothing >= QUIET:
+    if posterior.nothing >= QUIET:
         return Verdict.NONE, candidates
-    if weighed.unnamed > 0.5:
+    if posterior.unnamed > 0.5:
         return Verdict.UNKNOWN, candidates
     alone = not any(set(first) & group for group in inseparable)
-    if alone and weighed.probability[first] >= CERTAIN:
+    if alone and posterior.probability[first] >= CERTAIN:
         return Verdict.NAMED, candidates
-    if weighed.unnamed > 1.0 - CERTAIN and len(candidates) == 1:
+    if posterior.unnamed > 1.0 - CERTAIN and len(candidates) == 1:
         return Verdict.UNKNOWN, candidates
     return Verdict.ONE_OF, candidates
 
 
-def _smallest(weighed: Weighed) -> tuple[Candidate, ...]:
+def _smallest(posterior: Posterior) -> tuple[Candidate, ...]:
     """Return the fewest names that hold almost all of what has a name."""
-    total = 1.0 - weighed.unnamed
+    total = 1.0 - posterior.unnamed
     found: list[Candidate] = []
     held = 0.0
-    for names in weighed.named():
-        found.append(Candidate(names, weighed.probability[names]))
-        held += weighed.probability[names]
+    for names in posterior.named():
+        found.append(Candidate(names, posterior.probability[names]))
+        held += posterior.probability[names]
         if held >= _SET * total:
             break
     return tuple(found)

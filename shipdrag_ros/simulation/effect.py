@@ -51,6 +51,24 @@ class Measure(StrEnum):
     FAST_CHANGE = 'a quick change of speed at a known time'
 
 
+class WithoutBaseline(StrEnum):
+    """
+    What shows an effect although nothing is known of the ship's resistance.
+
+    Attributes
+    ----------
+    LOG_TRACK
+        The log held against the track over ground, on many courses and at many
+        speeds. Such an effect acts alike on all ships.
+    CONSTANT_FORCE
+        A constant part of the deceleration beside a form of the resistance
+        that is fitted to the coastdown itself.
+    """
+
+    LOG_TRACK = 'log_track'
+    CONSTANT_FORCE = 'constant_force'
+
+
 class Shape(StrEnum):
     """Kinds of prior distributions."""
 
@@ -181,7 +199,7 @@ def uniform(low: float, high: float) -> Prior:
 
 
 @dataclass(frozen=True)
-class Measuring:
+class Scale:
     """
     What a size is counted in, so that one prior serves ships of all sizes.
 
@@ -197,11 +215,11 @@ class Measuring:
     of: Callable[[Ship], float]
 
 
-ABSOLUTE = Measuring('', lambda ship: 1.0)
-WEIGHTS = Measuring('weight of the ship', lambda ship: ship.mass_kg * GRAVITY_M_S2)
-AREAS = Measuring('V^(2/3)', lambda ship: ship.displaced_volume_m3 ** (2.0 / 3.0))
-SPEEDS = Measuring('sqrt(g L)', lambda ship: float(ship.speed(1.0)))
-DRAUGHTS = Measuring('draught', lambda ship: ship.draught_m or math.nan)
+ABSOLUTE = Scale('', lambda ship: 1.0)
+WEIGHTS = Scale('weight of the ship', lambda ship: ship.mass_kg * GRAVITY_M_S2)
+AREAS = Scale('V^(2/3)', lambda ship: ship.displaced_volume_m3 ** (2.0 / 3.0))
+SPEEDS = Scale('sqrt(g L)', lambda ship: float(ship.speed(1.0)))
+DRAUGHTS = Scale('draught', lambda ship: ship.draught_m or math.nan)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,7 +253,7 @@ class Quantity:
     high: float
     default: float | None = None
     words: Mapping[str, float] = field(default_factory=dict)
-    measured_in: Measuring = ABSOLUTE
+    measured_in: Scale = ABSOLUTE
 
     def of(self, ship: Ship) -> Quantity:
         """
@@ -312,7 +330,7 @@ class Effect:
         How far what the effect does may depart from its formula, relative.
     odds
         That it is missing in a model, before any data.
-    look_alikes
+    confounders
         Effects of nearly the same trace, and what decides from each; nothing:
         no record can.
     not_with
@@ -321,6 +339,13 @@ class Effect:
         From a frame and the values of the parameters, in their order.
     needs
         Keys of the ship file without which it cannot act.
+    errs_in
+        Inputs whose readings it falsifies; of an effect of a sensor.
+    without_baseline
+        What shows it without a baseline, and a sentence on how it looks there
+        ('': nothing to add).
+    in_geodetic
+        Whether it can be where positions are latitude and longitude.
     """
 
     name: str
@@ -330,11 +355,14 @@ class Effect:
     source: str
     act: Callable[..., Action]
     struck_out_by: tuple[str, ...] = ()
-    look_alikes: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
+    confounders: Mapping[str, tuple[Measure, ...]] = field(default_factory=dict)
     not_with: tuple[str, ...] = ()
     formula_sd: float = 0.0
     odds: float = 0.04
     needs: tuple[str, ...] = ()
+    errs_in: tuple[str, ...] = ()
+    without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)
+    in_geodetic: bool = True
 
     def goes_with(self, other: Effect) -> bool:
         """

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -19,7 +19,7 @@ from shipdrag_ros.simulation.effects import parse
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 
 
-def library_of(*effects: str) -> Library:
+def model_of(*effects: str) -> CoastModel:
     """See a run in which effects are hidden."""
     scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1200.0, heading_rad=0.7)
     truth = simulate(SHIP, scenario, effects=[parse(text) for text in effects], reference_rad=0.7)
@@ -29,12 +29,20 @@ def library_of(*effects: str) -> Library:
         block, first + 1200 * 10**9, int(block.stamp_ns.max()), before_ns=first
     )
     seen = Observation.of(window, SHIP, Parameters(), name='run')
-    return Library(SHIP, (seen,), seen.heading_rad)
+    return CoastModel(SHIP, (seen,), seen.heading_rad)
 
 
-@pytest.fixture(name='library_of')
-def library_of_fixture() -> Callable[..., Library]:
+@pytest.fixture(name='model_of')
+def model_of_fixture() -> Callable[..., CoastModel]:
     """
     Return what sees a run in which effects are hidden.
     """
-    return library_of
+    return model_of
+
+
+@pytest.fixture(scope='package', name='cargo')
+def cargo_fixture() -> Ship:
+    """
+    Return the ship of the reference experiment.
+    """
+    return SHIP

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import fit
-from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.prospect import Prospect, with_known
-from shipdrag_ros.diagnosis.terms import PlaceTerm
+from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, with_known
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -97,18 +98,18 @@ def test_what_is_measured_already_is_not_advised(current: Diagnosis) -> None:
 def test_stop_that_is_read_from_a_shaft_is_one_row_more(known_s: float) -> None:
     window = run('current=0.06').window
     seen = Observation.of(window, SHIP, Parameters(), name='first')
-    library = Library(SHIP, (seen,), seen.heading_rad)
-    one = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
+    model = CoastModel(SHIP, (seen,), seen.heading_rad)
+    one = fit(model, [model.nothing], [start(model, model.nothing)])[0]
     count = len(one.best.z)
-    before = Prospect(np.zeros(0), np.zeros((count, 0)), one.covariance, np.eye(count))
+    before = PredictedOutcome(np.zeros(0), np.zeros((count, 0)), one.covariance, np.eye(count))
     ((after,),) = with_known([[before]], [one], {'stop': [known_s]})
     if known_s == 0.0:
         assert after.mean.shape == (0,)
         return
     (place,) = (
-        place + PlaceTerm.place_of_stop
+        place + RunNuisance.place_of_stop
         for part, place in one.hypothesis.parts
-        if isinstance(part, PlaceTerm)
+        if isinstance(part, RunNuisance)
     )
     slope = np.zeros((count, 1))
     slope[place] = seen.stop_sd_s / known_s

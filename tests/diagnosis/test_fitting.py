@@ -3,16 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from shipdrag_ros.diagnosis.coast_terms import ForceTerm
 from shipdrag_ros.diagnosis.fitting import fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
-from shipdrag_ros.diagnosis.terms import ForceTerm
-from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, scaled
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear
+from shipdrag_ros.diagnosis.terms import Tail, Unknown, scaled
 from shipdrag_ros.samples import Float64
 
 
@@ -21,6 +23,7 @@ class OneSize:
     """A part with one unknown."""
 
     unknowns: tuple[Unknown, ...]
+    one_size: ClassVar[Sequence[int]] = ()
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,9 @@ class Straight:
 
     value: Float64
     slope: Float64
+    iterations: ClassVar[int] = 16
+    converged: ClassVar[float] = 0.02
+    hopeless: ClassVar[float] = 80.0
 
     def linearise(
         self, hypotheses: list[Hypothesis], at: list[Float64], near: object = None
@@ -83,6 +89,7 @@ class OneForce(ForceTerm):
     """Something unnamed of one unknown."""
 
     unknowns = (scaled('force', 1.0),)  # type: ignore[assignment]
+    one_size = (0,)
 
 
 def test_what_has_no_name_may_be_large_or_small() -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.hypotheses import Library
+from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -30,7 +31,7 @@ INPUTS = (
 
 
 @pytest.fixture(scope='module')
-def library() -> Library:
+def model() -> CoastModel:
     scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1200.0, heading_rad=0.7)
     truth = simulate(SHIP, scenario)
     block = sense(truth, standard_sensors(rate_hz=1.0, noise=1.0, inputs=INPUTS), seed=5)
@@ -39,11 +40,11 @@ def library() -> Library:
         block, first + 1200 * 10**9, int(block.stamp_ns.max()), before_ns=first
     )
     seen = Observation.of(window, SHIP, Parameters(), name='run')
-    return Library(SHIP, (seen,), seen.heading_rad)
+    return CoastModel(SHIP, (seen,), seen.heading_rad)
 
 
-def test_an_observation_is_condensed_and_knows_the_stop(library: Library) -> None:
-    seen = library.seen[0]
+def test_an_observation_is_condensed_and_knows_the_stop(model: CoastModel) -> None:
+    seen = model.seen[0]
     assert seen.heading_rad == pytest.approx(0.7, abs=0.01)
     # it ends with the last whole bin
     assert seen.duration_s == pytest.approx(1200.0, abs=15.0)
@@ -53,20 +54,20 @@ def test_an_observation_is_condensed_and_knows_the_stop(library: Library) -> Non
     assert set(seen.along.rows.kind.tolist()) == {0, 1, 2}
 
 
-def test_what_is_right_leaves_only_noise(library: Library) -> None:
-    nothing = library.nothing
-    linear = library.problem.linearise([nothing], [library.start(nothing)])[0]
-    n = len(library.seen[0].along)
+def test_what_is_right_leaves_only_noise(model: CoastModel) -> None:
+    nothing = model.nothing
+    linear = model.linearise([nothing], [start(model, nothing)])[0]
+    n = len(model.seen[0].along)
     white = linear.tables[0][0]
-    kind = library.seen[0].along.rows.kind
+    kind = model.seen[0].along.rows.kind
     # the place is not fitted yet
     assert np.mean(white[:n][kind != 2] ** 2) < 1.6
 
 
 @pytest.mark.parametrize('name', ['current', 'fouling', 'wind', 'log_lag', 'shallow_water'])
-def test_the_derivatives_are_those_of_the_residual(library: Library, name: str) -> None:
-    hypothesis = library.with_effect(library.nothing, find(name))[0]
-    z = library.start(hypothesis)
+def test_the_derivatives_are_those_of_the_residual(model: CoastModel, name: str) -> None:
+    hypothesis = model.with_effect(model.nothing, find(name))[0]
+    z = start(model, hypothesis)
     count = len(hypothesis.unknowns)
     step = 0.05
     moved = []
@@ -74,7 +75,7 @@ def test_the_derivatives_are_those_of_the_residual(library: Library, name: str) 
         other = z.copy()
         other[i] += step if i < count else 0.01
         moved.append(other)
-    base, *others = library.problem.linearise([hypothesis] * (1 + len(z)), [z, *moved])
+    base, *others = model.linearise([hypothesis] * (1 + len(z)), [z, *moved])
     table = base.tables[0]
     size = np.sqrt(np.mean(table[1:] ** 2, axis=1))
     for i, other in enumerate(others):
@@ -83,37 +84,37 @@ def test_the_derivatives_are_those_of_the_residual(library: Library, name: str) 
         assert off < 0.05 * size[i] + 1e-6, (i, [u.name for u in hypothesis.unknowns][i])
 
 
-def test_hypotheses_together_are_as_each_alone(library: Library) -> None:
-    every = [library.nothing, *library.with_effect(library.nothing, find('turning'))[:2]]
-    starts = [library.start(hypothesis) for hypothesis in every]
-    together = library.problem.linearise(every, starts)
+def test_hypotheses_together_are_as_each_alone(model: CoastModel) -> None:
+    every = [model.nothing, *model.with_effect(model.nothing, find('turning'))[:2]]
+    starts = [start(model, hypothesis) for hypothesis in every]
+    together = model.linearise(every, starts)
     for hypothesis, z, one in zip(every, starts, together, strict=True):
-        alone = library.problem.linearise([hypothesis], [z])[0]
+        alone = model.linearise([hypothesis], [z])[0]
         np.testing.assert_allclose(one.tables[0], alone.tables[0], rtol=1e-9, atol=1e-9)
 
 
-def test_derivatives_by_the_baseline_can_be_kept(library: Library) -> None:
-    hypothesis = library.with_effect(library.nothing, find('fouling'))[0]
-    z = library.start(hypothesis)
-    once = library.problem.linearise([hypothesis], [z])[0]
-    again = library.problem.linearise([hypothesis], [z], [once])[0]
+def test_derivatives_by_the_baseline_can_be_kept(model: CoastModel) -> None:
+    hypothesis = model.with_effect(model.nothing, find('fouling'))[0]
+    z = start(model, hypothesis)
+    once = model.linearise([hypothesis], [z])[0]
+    again = model.linearise([hypothesis], [z], [once])[0]
     np.testing.assert_allclose(again.tables[0], once.tables[0], rtol=1e-9, atol=1e-9)
 
 
-def test_wind_and_depth_are_felt_by_their_sensors(library: Library) -> None:
-    context = library.seen[0].context
+def test_wind_and_depth_are_felt_by_their_sensors(model: CoastModel) -> None:
+    context = model.seen[0].context
     for name, rows in (('wind', slice(0, 2 * len(context.at_wind))), ('shallow_water', None)):
-        hypothesis = library.with_effect(library.nothing, find(name))[0]
-        z = library.start(hypothesis)
+        hypothesis = model.with_effect(model.nothing, find(name))[0]
+        z = start(model, hypothesis)
         place = next(p for part, p in hypothesis.parts if part is hypothesis.terms[-1])
         z[place] = 0.5 if name == 'wind' else -0.5
-        table = library.problem.linearise([hypothesis], [z])[0].tables[0]
+        table = model.linearise([hypothesis], [z])[0].tables[0]
         behind = table[0][len(table[0]) - len(context) :]
         at = rows or slice(2 * len(context.at_wind), 2 * len(context.at_wind) + 1)
         assert np.abs(behind[at]).max() > 3.0
 
 
-def test_effects_that_a_ship_file_states_are_part_of_the_model(library: Library) -> None:
+def test_effects_that_a_ship_file_states_are_part_of_the_model(model: CoastModel) -> None:
     fouled = Ship.from_yaml(
         SHIP.to_yaml().replace(
             'effects: []',
@@ -122,11 +123,11 @@ def test_effects_that_a_ship_file_states_are_part_of_the_model(library: Library)
         subject='ship',
     )
     assert fouled.effects
-    stated = replace(library, ship=fouled)
-    slower = stated.problem.linearise([stated.nothing], [stated.start(stated.nothing)])[0]
-    clean = library.problem.linearise([library.nothing], [library.start(library.nothing)])[0]
-    n = len(library.seen[0].along)
-    log = library.seen[0].along.rows.kind == 0
-    coast = library.seen[0].along.rows.time_s > library.seen[0].lead_in_s + 300.0
+    stated = replace(model, ship=fouled)
+    slower = stated.linearise([stated.nothing], [start(stated, stated.nothing)])[0]
+    clean = model.linearise([model.nothing], [start(model, model.nothing)])[0]
+    n = len(model.seen[0].along)
+    log = model.seen[0].along.rows.kind == 0
+    coast = model.seen[0].along.rows.time_s > model.seen[0].lead_in_s + 300.0
     at = np.flatnonzero(log & coast)
     assert np.all(slower.residuals[0][:n][at] > clean.residuals[0][:n][at] + 0.05)

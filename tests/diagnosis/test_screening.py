@@ -8,32 +8,35 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.fitting import fit
-from shipdrag_ros.diagnosis.hypotheses import Library
-from shipdrag_ros.diagnosis.screening import promise
+from shipdrag_ros.diagnosis.model import start
+from shipdrag_ros.diagnosis.search import screening_score
 
 
 @pytest.mark.parametrize('hidden', ['current=0.3', 'fouling=0.3', 'turning=25', 'log_lag=20'])
 def test_what_is_hidden_promises_most_and_keeps_it(
-    hidden: str, library_of: Callable[..., Library]
+    hidden: str, model_of: Callable[..., CoastModel]
 ) -> None:
-    library = library_of(hidden)
-    nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
-    hypotheses = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
-    promised = promise(library.problem, nothing, hypotheses)
+    model = model_of(hidden)
+    nothing = fit(model, [model.nothing], [start(model, model.nothing)])[0]
+    hypotheses = [h for e in model.effects for h in model.with_effect(model.nothing, e)]
+    promised = screening_score(model, nothing, hypotheses)
     order = np.argsort(-promised)
     best = list(dict.fromkeys(hypotheses[i].names for i in order))
     # look-alikes may promise as much
     assert (hidden.partition('=')[0],) in best[:6]
     first = hypotheses[order[0]]
-    found = fit(library.problem, [first], [library.start(first, nothing)])[0]
+    found = fit(model, [first], [start(model, first, nothing.best)])[0]
     gained = found.log_evidence - nothing.log_evidence
     assert 0.3 * gained < promised[order[0]] - nothing.log_evidence < 3.0 * gained
 
 
-def test_where_nothing_is_hidden_nothing_is_promised(library_of: Callable[..., Library]) -> None:
-    library = library_of()
-    nothing = fit(library.problem, [library.nothing], [library.start(library.nothing)])[0]
-    hypotheses = [h for e in library.effects for h in library.with_effect(library.nothing, e)]
-    promised = promise(library.problem, nothing, hypotheses)
+def test_where_nothing_is_hidden_nothing_is_promised(
+    model_of: Callable[..., CoastModel],
+) -> None:
+    model = model_of()
+    nothing = fit(model, [model.nothing], [start(model, model.nothing)])[0]
+    hypotheses = [h for e in model.effects for h in model.with_effect(model.nothing, e)]
+    promised = screening_score(model, nothing, hypotheses)
     assert np.all(promised < nothing.log_evidence)

@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Linear
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.result import Verdict
-from shipdrag_ros.diagnosis.verdict import decide, lacks, misses, simplest, weigh
+from shipdrag_ros.diagnosis.verdict import (
+    decide,
+    exceeds_noise,
+    has_residual_structure,
+    posterior_of,
+    prune_by_bayes_factor,
+)
 
 TWINS = [frozenset(('added_mass', 'displacement'))]
 
@@ -27,7 +33,7 @@ def fitted(
 
 def verdict(*fits: Fit, lacking: bool = False) -> Verdict:
     """Decide on fits."""
-    return decide(weigh(fits), lacking=lacking, inseparable=TWINS)[0]
+    return decide(posterior_of(fits), lacking=lacking, inseparable=TWINS)[0]
 
 
 def test_one_that_stands_out_is_named() -> None:
@@ -37,7 +43,7 @@ def test_one_that_stands_out_is_named() -> None:
 
 def test_two_that_are_alike_stay_a_set_of_both() -> None:
     fits = fitted(evidence=-9.0), fitted('fouling', evidence=0.0), fitted('cable', evidence=-0.3)
-    found, candidates = decide(weigh(fits), lacking=False, inseparable=TWINS)
+    found, candidates = decide(posterior_of(fits), lacking=False, inseparable=TWINS)
     assert found is Verdict.ONE_OF
     assert [each.names for each in candidates] == [('fouling',), ('cable',)]
     assert sum(each.probability for each in candidates) >= 0.99
@@ -56,7 +62,7 @@ def test_what_leaves_more_than_noise_is_unknown() -> None:
 
 
 def test_a_doubted_name_gives_way_to_something_unnamed() -> None:
-    sure = weigh([fitted(evidence=-50.0), fitted('current', evidence=0.0)])
+    sure = posterior_of([fitted(evidence=-50.0), fitted('current', evidence=0.0)])
     doubted = sure.doubted()
     assert doubted.unnamed == pytest.approx(0.9)
     assert doubted.probability[('current',)] == pytest.approx(0.1)
@@ -72,29 +78,29 @@ def test_twins_are_never_named_alone() -> None:
 def test_an_effect_that_the_data_do_not_ask_for_is_left_to_what_is_simpler() -> None:
     odds = {(): 0.0, ('a',): -3.0, ('b',): -3.0, ('a', 'b'): -6.0}
     # a is asked for by 10 nats; b, and b beside a, by none
-    found = simplest({(): 0.0, ('a',): 7.0, ('b',): -3.0, ('a', 'b'): 4.0}, odds)
+    found = prune_by_bayes_factor({(): 0.0, ('a',): 7.0, ('b',): -3.0, ('a', 'b'): 4.0}, odds)
     assert set(found) == {(), ('a',)}
     assert found[()] == pytest.approx((1.0 + math.exp(-3.0)) / sum(map(math.exp, (0, 7, -3, 4))))
     assert sum(found.values()) == pytest.approx(1.0)
     # b beside a is asked for by 3 nats more than its odds
-    found = simplest({(): 0.0, ('a',): 7.0, ('b',): -3.0, ('a', 'b'): 7.0}, odds)
+    found = prune_by_bayes_factor({(): 0.0, ('a',): 7.0, ('b',): -3.0, ('a', 'b'): 7.0}, odds)
     assert set(found) == {(), ('a',), ('a', 'b')}
 
 
 def test_several_starts_of_a_hypothesis_count_once() -> None:
-    once = weigh([fitted(evidence=0.0), fitted('current', evidence=0.0)])
-    twice = weigh([fitted(evidence=0.0), *[fitted('current', evidence=0.0)] * 3])
+    once = posterior_of([fitted(evidence=0.0), fitted('current', evidence=0.0)])
+    twice = posterior_of([fitted(evidence=0.0), *[fitted('current', evidence=0.0)] * 3])
     assert once.probability == twice.probability
 
 
 def test_something_smooth_besides_takes_a_name_back() -> None:
     name = fitted('current', evidence=0.0)
-    assert not lacks(name, [fitted('current', evidence=4.0, discrepancy='log')])
-    assert lacks(name, [fitted('current', evidence=6.0, discrepancy='log')])
-    assert lacks(fitted('current', evidence=0.0, chi2=200.0), [])
+    assert not has_residual_structure(name, [fitted('current', evidence=4.0, discrepancy='log')])
+    assert has_residual_structure(name, [fitted('current', evidence=6.0, discrepancy='log')])
+    assert has_residual_structure(fitted('current', evidence=0.0, chi2=200.0), [])
 
 
 @pytest.mark.parametrize(('rows', 'limit'), [(100, 1.77), (400, 1.48)])
 def test_what_is_more_than_noise_depends_on_the_number_of_rows(rows: int, limit: float) -> None:
-    assert misses(limit + 0.01, rows)
-    assert not misses(limit - 0.01, rows)
+    assert exceeds_noise(limit + 0.01, rows)
+    assert not exceeds_noise(limit - 0.01, rows)

@@ -29,7 +29,13 @@ from shipdrag_ros.simulation import (
     standard_sensors,
 )
 from shipdrag_ros.simulation import effects as library
-from shipdrag_ros.simulation.effects import LIBRARY, action_of, deciders, look_alikes, parse
+from shipdrag_ros.simulation.effects import (
+    LIBRARY,
+    action_of,
+    confounders,
+    discriminating_measurements,
+    parse,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 CARGO = Ship.load(ROOT / 'config' / 'vitus_bering.yaml')
@@ -118,7 +124,7 @@ def test_a_declaration_is_whole(name):
     assert effect.formula
     assert effect.source
     assert set(effect.struck_out_by) <= set(INPUTS)
-    assert set(effect.look_alikes) <= set(LIBRARY) - {name}
+    assert set(effect.confounders) <= set(LIBRARY) - {name}
     assert effect.parameters[0].default is None
     for quantity in effect.quantities(CARGO):
         assert quantity.meaning
@@ -139,10 +145,12 @@ def test_a_prior_lies_in_what_is_accepted(name):
 def test_whatever_looks_alike_does_so_both_ways_and_only_mass_is_never_told():
     undecided = set()
     for name in LIBRARY:
-        for other in look_alikes(name):
-            assert name in look_alikes(other)
-            assert set(deciders(name, other)) == set(deciders(other, name))
-            if not deciders(name, other):
+        for other in confounders(name):
+            assert name in confounders(other)
+            assert set(discriminating_measurements(name, other)) == set(
+                discriminating_measurements(other, name)
+            )
+            if not discriminating_measurements(name, other):
                 undecided |= {name, other}
     assert undecided == {'added_mass', 'displacement'}
 

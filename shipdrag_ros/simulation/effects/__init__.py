@@ -8,8 +8,9 @@ diagnosis and documentation find it here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from importlib import import_module
+from itertools import combinations
 from pkgutil import iter_modules
 from types import MappingProxyType
 
@@ -18,7 +19,16 @@ from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 
-__all__ = ['LIBRARY', 'action_of', 'deciders', 'find', 'look_alikes', 'parse', 'values_of']
+__all__ = [
+    'LIBRARY',
+    'action_of',
+    'confounders',
+    'discriminating_measurements',
+    'find',
+    'inseparable',
+    'parse',
+    'values_of',
+]
 
 
 def _found() -> Iterator[Effect]:
@@ -45,22 +55,48 @@ def find(name: str) -> Effect:
     return LIBRARY[name]
 
 
-def look_alikes(name: str) -> tuple[str, ...]:
+def confounders(name: str) -> tuple[str, ...]:
     """
     Return the effects that leave nearly the same trace.
 
     It is enough that one of two declares it.
     """
-    declared_by = (other.name for other in LIBRARY.values() if name in other.look_alikes)
-    return tuple(sorted({*LIBRARY[name].look_alikes, *declared_by}))
+    declared_by = (other.name for other in LIBRARY.values() if name in other.confounders)
+    return tuple(sorted({*LIBRARY[name].confounders, *declared_by}))
 
 
-def deciders(one: str, other: str) -> tuple[Measure, ...]:
+def discriminating_measurements(one: str, other: str) -> tuple[Measure, ...]:
     """
     Return what tells two look-alikes apart; nothing: no record can.
     """
-    declared = (*LIBRARY[one].look_alikes.get(other, ()), *LIBRARY[other].look_alikes.get(one, ()))
+    declared = (*LIBRARY[one].confounders.get(other, ()), *LIBRARY[other].confounders.get(one, ()))
     return tuple(dict.fromkeys(declared))
+
+
+def inseparable(
+    effects: Sequence[Effect], *, measured: Collection[Measure] = tuple(Measure)
+) -> tuple[frozenset[str], ...]:
+    """
+    Return pairs of confounders that some measurements do not tell apart.
+
+    Parameters
+    ----------
+    effects
+        That may be missing.
+    measured
+        What is measured; by default all that can be.
+
+    Returns
+    -------
+    tuple of frozenset
+        Pairs of names.
+    """
+    return tuple(
+        frozenset((one.name, other.name))
+        for one, other in combinations(effects, 2)
+        if other.name in confounders(one.name)
+        and not set(measured) & set(discriminating_measurements(one.name, other.name))
+    )
 
 
 def parse(text: str) -> StatedEffect:

@@ -30,5 +30,5 @@ EFFECT = Effect(
     formula_sd=0.05,
     odds=0.01,
     act=_act,
-    look_alikes={'displacement': ()},
+    confounders={'displacement': ()},
 )

@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    WithoutBaseline,
+    normal,
+)
 
 
 def _act(frame: Frame, along_track_m_s: float, cross_track_m_s: float) -> Action:
@@ -36,10 +44,16 @@ EFFECT = Effect(
     formula='velocity over ground = velocity through water + current; the air drag feels it too',
     source='kinematics',
     act=_act,
-    look_alikes={
+    confounders={
         'log_offset': (Measure.RECIPROCAL_RUN,),
         'radar_scale': (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED),
         'log_scale': (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED),
         'current_change': (Measure.ANOTHER_RUN,),
+    },
+    without_baseline={
+        WithoutBaseline.LOG_TRACK: 'a current turns with the course',
+        WithoutBaseline.CONSTANT_FORCE: 'current stands in the set for a speed that is imported '
+        'as through water and was measured over ground (motion capture, GNSS); a log does not '
+        'feel one',
     },
 )

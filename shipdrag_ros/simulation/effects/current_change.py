@@ -31,7 +31,7 @@ EFFECT = Effect(
     formula_sd=0.3,
     odds=0.02,
     act=_act,
-    look_alikes={
+    confounders={
         'log_scale': (Measure.RECIPROCAL_RUN,),
         'radar_scale': (Measure.RECIPROCAL_RUN,),
     },

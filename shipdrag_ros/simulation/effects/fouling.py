@@ -33,7 +33,7 @@ EFFECT = Effect(
     source='ITTC-57; a baseline that is a table has k = 0.2',
     formula_sd=0.05,
     act=_act,
-    look_alikes={
+    confounders={
         'locked_propeller': (Measure.SHAFT, Measure.FREE_PROPELLER, Measure.CLEAN_HULL),
         'windmilling_propeller': (Measure.SHAFT, Measure.CLEAN_HULL),
         'towed_cable': (Measure.WITHOUT_CABLE, Measure.CLEAN_HULL),

@@ -39,7 +39,7 @@ EFFECT = Effect(
     formula_sd=0.1,
     act=_act,
     struck_out_by=('shaft',),
-    look_alikes={
+    confounders={
         'towed_cable': (Measure.WITHOUT_CABLE, Measure.SHAFT),
         'windmilling_propeller': (Measure.SHAFT,),
         'added_mass': (Measure.SHAFT,),

@@ -29,7 +29,8 @@ EFFECT = Effect(
     formula_sd=0.4,
     odds=0.02,
     act=_act,
-    look_alikes={
+    confounders={
         'windmilling_propeller': (Measure.RADAR, Measure.SHAFT),
     },
+    errs_in=('speed_through_water',),
 )

@@ -29,5 +29,6 @@ EFFECT = Effect(
     formula_sd=0.1,
     odds=0.02,
     act=_act,
-    look_alikes={'time_offset': (Measure.FAST_CHANGE,)},
+    confounders={'time_offset': (Measure.FAST_CHANGE,)},
+    errs_in=('speed_through_water',),
 )

@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    WithoutBaseline,
+    normal,
+)
 
 
 def _act(frame: Frame, offset_m_s: float) -> Action:
@@ -27,8 +35,13 @@ EFFECT = Effect(
     formula='u + offset',
     source='definition',
     act=_act,
-    look_alikes={
+    confounders={
         'wind': (Measure.RADAR, Measure.WIND),
         'log_dead_band': (Measure.OTHER_SPEED,),
+    },
+    errs_in=('speed_through_water',),
+    without_baseline={
+        WithoutBaseline.LOG_TRACK: 'an offset is the same at all speeds',
+        WithoutBaseline.CONSTANT_FORCE: '',
     },
 )

@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    WithoutBaseline,
+    normal,
+)
 
 
 def _act(frame: Frame, factor: float) -> Action:
@@ -27,8 +35,12 @@ EFFECT = Effect(
     formula='(1 + factor) u',
     source='definition',
     act=_act,
-    look_alikes={
+    confounders={
         'radar_scale': (Measure.THIRD_SPEED,),
         'log_offset': (Measure.OTHER_SPEED, Measure.THIRD_SPEED),
+    },
+    errs_in=('speed_through_water',),
+    without_baseline={
+        WithoutBaseline.LOG_TRACK: 'a scale grows with the speed, on every course',
     },
 )

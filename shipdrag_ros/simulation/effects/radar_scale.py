@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, WithoutBaseline, normal
 
 
 def _act(frame: Frame, factor: float) -> Action:
@@ -27,4 +27,10 @@ EFFECT = Effect(
     formula='(1 + factor) (x, y)',
     source='definition',
     act=_act,
+    errs_in=('position', 'speed_over_ground'),
+    without_baseline={
+        WithoutBaseline.LOG_TRACK: 'a scale grows with the speed, on every course',
+    },
+    # the scale of latitude and longitude is that of the Earth
+    in_geodetic=False,
 )

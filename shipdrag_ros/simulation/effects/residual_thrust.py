@@ -40,7 +40,7 @@ EFFECT = Effect(
     formula_sd=0.2,
     act=_act,
     struck_out_by=('shaft',),
-    look_alikes={
+    confounders={
         'log_lag': (Measure.SHAFT, Measure.RADAR),
         'time_offset': (Measure.SHAFT,),
         'added_mass': (Measure.SHAFT, Measure.ANOTHER_RUN),

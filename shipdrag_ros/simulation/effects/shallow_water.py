@@ -96,7 +96,7 @@ EFFECT = Effect(
     formula_sd=0.15,
     act=_act,
     struck_out_by=('depth',),
-    look_alikes={
+    confounders={
         'fouling': (Measure.DEPTH, Measure.DEEP_WATER),
         'locked_propeller': (Measure.DEPTH, Measure.DEEP_WATER, Measure.SHAFT),
         'towed_cable': (Measure.DEPTH, Measure.DEEP_WATER, Measure.WITHOUT_CABLE),

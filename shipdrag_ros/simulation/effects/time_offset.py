@@ -28,4 +28,5 @@ EFFECT = Effect(
     source='definition',
     odds=0.02,
     act=_act,
+    errs_in=('speed_through_water',),
 )

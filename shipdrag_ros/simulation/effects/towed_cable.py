@@ -40,7 +40,7 @@ EFFECT = Effect(
     source='S2: R0 in the self-similar region',
     formula_sd=0.05,
     act=_act,
-    look_alikes={
+    confounders={
         'added_mass': (Measure.WITHOUT_CABLE,),
         'displacement': (Measure.DRAUGHT, Measure.WITHOUT_CABLE),
     },

@@ -94,7 +94,7 @@ EFFECT = Effect(
     formula_sd=0.3,
     act=_act,
     struck_out_by=('heading', 'rudder'),
-    look_alikes={
+    confounders={
         'windmilling_propeller': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
         'current_change': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
     },

@@ -16,6 +16,7 @@ from shipdrag_ros.simulation.effect import (
     Quantity,
     Scope,
     Shape,
+    WithoutBaseline,
     log_normal,
 )
 
@@ -61,9 +62,10 @@ EFFECT = Effect(
     'order with Faltinsen et al. (1980), 1 + 2 omega u / g',
     formula_sd=0.3,
     act=_act,
-    look_alikes={
+    confounders={
         'fouling': (Measure.RECIPROCAL_RUN,),
         'locked_propeller': (Measure.RECIPROCAL_RUN,),
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.SHAFT),
     },
+    without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
 )

@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    WithoutBaseline,
+    normal,
+)
 
 
 def _act(frame: Frame, head_m_s: float, cross_m_s: float) -> Action:
@@ -39,11 +47,12 @@ EFFECT = Effect(
     formula_sd=0.15,
     act=_act,
     struck_out_by=('wind_apparent',),
-    look_alikes={
+    confounders={
         'waves': (Measure.WIND, Measure.OTHER_SPEED),
         'windmilling_propeller': (Measure.RECIPROCAL_RUN, Measure.WIND, Measure.SHAFT),
         'fouling': (Measure.RECIPROCAL_RUN, Measure.WIND),
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.WIND, Measure.SHAFT),
     },
     needs=('air',),
+    without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
 )

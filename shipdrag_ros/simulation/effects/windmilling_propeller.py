@@ -68,6 +68,6 @@ EFFECT = Effect(
     formula_sd=0.2,
     act=_act,
     struck_out_by=('shaft',),
-    look_alikes={'towed_cable': (Measure.WITHOUT_CABLE, Measure.SHAFT)},
+    confounders={'towed_cable': (Measure.WITHOUT_CABLE, Measure.SHAFT)},
     needs=('propeller',),
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.kink import kink_s
+from shipdrag_ros.diagnosis.observation import stop_time_s
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, simulate
@@ -31,7 +31,7 @@ def test_the_stop_is_found_to_some_seconds(wrong_s: float) -> None:
     away = []
     for seed in range(6):
         time, speed = speed_of(seed)
-        found = kink_s(time + wrong_s, speed, sd_m_s=0.05, run_down_s=RUN_DOWN_S)
+        found = stop_time_s(time + wrong_s, speed, sd_m_s=0.05, run_down_s=RUN_DOWN_S)
         away.append(abs(found - wrong_s))
     assert max(away) < 4.0
 
@@ -39,12 +39,14 @@ def test_the_stop_is_found_to_some_seconds(wrong_s: float) -> None:
 def test_outliers_do_not_move_it() -> None:
     time, speed = speed_of(7)
     speed[::23] *= 1.5
-    assert kink_s(time, speed, sd_m_s=0.05, run_down_s=RUN_DOWN_S) == pytest.approx(0.0, abs=5.0)
+    assert stop_time_s(time, speed, sd_m_s=0.05, run_down_s=RUN_DOWN_S) == pytest.approx(
+        0.0, abs=5.0
+    )
 
 
 def test_where_nothing_falls_or_too_little_is_there_nothing_is_moved() -> None:
     time, speed = speed_of(8)
     steady = np.full(len(time), 8.0)
-    assert kink_s(time, steady, sd_m_s=0.05, run_down_s=RUN_DOWN_S) == 0.0
+    assert stop_time_s(time, steady, sd_m_s=0.05, run_down_s=RUN_DOWN_S) == 0.0
     late = time > -10.0
-    assert kink_s(time[late], speed[late], sd_m_s=0.05, run_down_s=RUN_DOWN_S) == 0.0
+    assert stop_time_s(time[late], speed[late], sd_m_s=0.05, run_down_s=RUN_DOWN_S) == 0.0

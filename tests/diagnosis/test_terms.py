@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipdrag_ros.diagnosis.unknowns import Tail, Unknown, of_prior, scaled
+from shipdrag_ros.diagnosis.terms import Tail, Unknown, of_prior, scaled
 from shipdrag_ros.simulation.effect import Prior, half_normal, log_normal, normal, uniform
 
 PRIORS = [normal(0.3, mean=0.1), half_normal(0.2), log_normal(2.0, 0.5), uniform(-1.0, 4.0)]

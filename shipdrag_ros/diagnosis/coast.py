@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Which hypotheses there are: nothing, each effect, pairs, something unnamed.
+Coastdowns held against a stated baseline: the hypotheses about them.
 
 Effects are found in the library; none is known here by its name.
 """
@@ -12,30 +12,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Problem
-from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.prior import UNNAMED_ODDS, nothing_missing
-from shipdrag_ros.diagnosis.terms import (
+from shipdrag_ros.diagnosis.coast_terms import (
     BaselineTerm,
-    EffectTerm,
     ForceTerm,
-    FormTerm,
-    PlaceTerm,
-    RowTerm,
+    MeasurementTerm,
+    ModelErrorTerm,
+    RunNuisance,
     SpeedErrorTerm,
     Term,
-    scope_runs,
 )
+from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, Linear, nothing_missing
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.simulated import CoastSimulation
+from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs, trial_z
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.ode_fit.coast import LOG
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
-from shipdrag_ros.simulation.effects import LIBRARY, find
+from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
 DISCREPANCIES = ('force', 'log', 'radar')
 _EVERYWHERE = (-1.8, -1.4, -1.0, -0.6, -0.2, 0.2, 0.8)  # z of what may be anywhere
@@ -43,7 +43,7 @@ _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find
 
 
 @dataclass(frozen=True)
-class Library:
+class CoastModel:
     """
     The hypotheses about some runs.
 
@@ -60,11 +60,15 @@ class Library:
     ship: Ship
     seen: tuple[Observation, ...]
     reference_rad: float
+    # each iteration is a simulation
+    iterations: ClassVar[int] = 16
+    converged: ClassVar[float] = 0.02
+    hopeless: ClassVar[float] = 80.0
 
     @cached_property
-    def problem(self) -> Problem:
+    def simulated(self) -> CoastSimulation:
         """What all share."""
-        return Problem(replace(self.ship, effects=()), self.seen, self.reference_rad)
+        return CoastSimulation(replace(self.ship, effects=()), self.seen, self.reference_rad)
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -79,7 +83,7 @@ class Library:
                 f'ship {self.ship.name!r} has no baseline to hold a run against; '
                 'add `baseline` to its ship file, or learn one with `shipdrag baseline`'
             )
-        ship = self.problem.ship
+        ship = self.simulated.ship
         stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
         baseline = BaselineTerm(
             ship,
@@ -89,19 +93,20 @@ class Library:
         )
         scatter = self.ship.baseline.run_scatter
         places = tuple(
-            PlaceTerm(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None, scatter)
+            RunNuisance(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None, scatter)
             for j, run in enumerate(self.seen)
         )
         given: list[Term] = [
             EffectTerm(
                 find(effect.name),
                 ship,
-                stated=tuple(
+                gaussian=tuple(
                     (effect.parameters[q.name].value, effect.parameters[q.name].sd)
                     if q.name in effect.parameters
                     else (q.of(ship).default or 0.0, 0.0)
                     for q in find(effect.name).parameters
                 ),
+                stated=True,
             )
             for effect in self.ship.effects
         ]
@@ -109,7 +114,7 @@ class Library:
             (),
             (baseline, *given),
             places,
-            weight=math.log(nothing_missing(self.effects, places=len(DISCREPANCIES))),
+            log_prior=math.log(nothing_missing(self.effects, places=len(DISCREPANCIES))),
         )
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
@@ -128,27 +133,28 @@ class Library:
         runs = scope_runs(effect, len(self.seen))
         names = tuple(sorted((*base.names, effect.name)))
         log_odds = math.log(effect.odds)
-        weight = base.weight + log_odds - math.log(len(words) * len(signs) * len(runs))
+        log_prior = base.log_prior + log_odds - math.log(len(words) * len(signs) * len(runs))
         found = []
         for start, word, sign, run in product(starts, words, signs, runs):
             term = EffectTerm(
                 effect,
-                self.problem.ship,
+                self.simulated.ship,
                 start,
                 fixed=_named(choices, word),
                 signs=_named(signed, sign),
                 only_run=run,
             )
-            sd = effect.formula_sd
-            forms = (*base.forms, FormTerm(term, sd)) if sd > 0.0 else base.forms
+            errors = base.model_errors
+            if effect.formula_sd > 0.0:
+                errors = (*errors, ModelErrorTerm(term, effect.formula_sd))
             terms = (*base.terms, term)
             found.append(
                 replace(
                     base,
                     names=names,
                     terms=terms,
-                    forms=forms,
-                    weight=weight,
+                    model_errors=errors,
+                    log_prior=log_prior,
                     log_odds=base.log_odds + log_odds,
                 )
             )
@@ -158,15 +164,15 @@ class Library:
         """
         Return a hypothesis with something smooth and unnamed besides.
         """
-        weight = base.weight + math.log(UNNAMED_ODDS)
-        found = replace(base, discrepancy=channel, weight=weight)
+        log_prior = base.log_prior + math.log(UNNAMED_ODDS)
+        found = replace(base, discrepancy=channel, log_prior=log_prior)
         if channel == 'force':
             top = 1.05 * max(run.speed_m_s for run in self.seen)
-            return replace(found, terms=(*base.terms, ForceTerm(self.problem.ship, top)))
-        errors: list[RowTerm] = [
+            return replace(found, terms=(*base.terms, ForceTerm(self.simulated.ship, top)))
+        errors: list[MeasurementTerm] = [
             SpeedErrorTerm(j, channel == 'log', run.speed_m_s) for j, run in enumerate(self.seen)
         ]
-        return replace(found, row_terms=(*base.row_terms, *errors))
+        return replace(found, measurement_terms=(*base.measurement_terms, *errors))
 
     def transferred(self, other: Hypothesis, *, runs: Sequence[int]) -> Hypothesis:
         """
@@ -191,29 +197,56 @@ class Library:
                 own.append(replace(term, only_run=runs.index(term.only_run)))
         return replace(self.nothing, names=other.names, terms=(*self.nothing.terms, *kept, *own))
 
+    @cached_property
     def channels(self) -> tuple[str, ...]:
-        """
-        Return where something unnamed can be.
-        """
+        """Where something unnamed can be."""
         kinds = set(np.concatenate([run.along.rows.kind for run in self.seen]).tolist())
         if kinds == {LOG} or LOG not in kinds:
             return ('force',)
         return DISCREPANCIES
 
-    def start(self, hypothesis: Hypothesis, near: Fit | None = None) -> Float64:
+    def stop_moved_s(self, fit: Fit, run: int) -> float:
         """
-        Return unknowns to begin from: those of a fit where it has them.
+        Return by how much a fit moves the stop of a run.
         """
-        z = np.array([u.start for u in hypothesis.unknowns])
-        speeds = np.array([run.speed_m_s for run in self.seen])
-        if near is None:
-            return np.concatenate([z, speeds])
-        known = {id(part): place for part, place in near.hypothesis.parts}
-        for part, place in hypothesis.parts:
-            if id(part) in known:
-                size = len(part.unknowns)
-                z[place : place + size] = near.best.z[known[id(part)] : known[id(part)] + size]
-        return np.concatenate([z, near.best.z[len(near.hypothesis.unknowns) :]])
+        for part, place in fit.hypothesis.parts:
+            if isinstance(part, RunNuisance) and part.run == run:
+                at = part.place_of_stop
+                return part.unknowns[at].value(float(fit.best.z[place + at]))
+        raise AssertionError(f'run {run} has no place')
+
+    @property
+    def inseparable(self) -> tuple[frozenset[str], ...]:
+        """Confounders that no record of a coastdown tells apart."""
+        return inseparable(self.effects)
+
+    @property
+    def free(self) -> Float64:
+        """Steady speeds of the runs [m/s]."""
+        return np.array([run.speed_m_s for run in self.seen])
+
+    def linearise(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        at: Sequence[Float64],
+        near: Sequence[Linear | None] | None = None,
+    ) -> list[Linear]:
+        """
+        Return the whitened rows of each hypothesis about some unknowns.
+        """
+        return self.simulated.linearise(hypotheses, at, near)
+
+    def responses(self, base: Linear, hypotheses: Sequence[Hypothesis]) -> Float64:
+        """
+        Return the linear response to the last term of each, (hypotheses, rows).
+        """
+        terms: list[tuple[Term, list[float]]] = []
+        for hypothesis in hypotheses:
+            term = hypothesis.terms[-1]
+            first, *others = term.unknowns
+            sizes = [first.value(trial_z(first)), *(u.value(u.start) for u in others)]
+            terms.append((term, sizes))
+        return np.hstack(self.simulated.responses(base, terms))
 
 
 def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:

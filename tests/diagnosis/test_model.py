@@ -8,7 +8,7 @@ from itertools import combinations
 
 import pytest
 
-from shipdrag_ros.diagnosis.prior import UNNAMED_ODDS, nothing_missing
+from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, nothing_missing
 from shipdrag_ros.simulation.effects import LIBRARY
 
 

@@ -16,20 +16,15 @@ from itertools import product
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, RunNuisance, SpeedErrorTerm, Term
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.linear import Hypothesis, Problem
+from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.observation import Measured, Observation
 from shipdrag_ros.diagnosis.result import Verdict
-from shipdrag_ros.diagnosis.terms import (
-    BaselineTerm,
-    EffectTerm,
-    PlaceTerm,
-    SpeedErrorTerm,
-    Term,
-    scope_runs,
-)
-from shipdrag_ros.diagnosis.verdict import Weighed, decide, simplest
+from shipdrag_ros.diagnosis.simulated import CoastSimulation
+from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
+from shipdrag_ros.diagnosis.verdict import Posterior, decide, prune_by_bayes_factor
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable
@@ -38,7 +33,7 @@ Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Prospect:
+class PredictedOutcome:
     """
     What one rival predicts of a measurement, whitened rows.
 
@@ -106,8 +101,8 @@ class Rival:
 
 
 def of_another_run(
-    problem: Problem, fits: Sequence[Fit], run: Observation
-) -> list[list[Prospect]]:
+    simulated: CoastSimulation, fits: Sequence[Fit], run: Observation
+) -> list[list[PredictedOutcome]]:
     """
     Return what fitted hypotheses predict of a run that is yet to be made.
 
@@ -127,7 +122,7 @@ def of_another_run(
     weights: list[float] = []
     whose: list[int] = []
     for number, one in enumerate(fits):
-        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(problem.seen)):
+        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(simulated.seen)):
             kept = _places(one.hypothesis, hypothesis)
             z = np.array([*(unknown.start for unknown in hypothesis.unknowns), run.speed_m_s])
             covariance = np.diag([*(float(u.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0])
@@ -142,19 +137,21 @@ def of_another_run(
             there.append(hypothesis)
             weights.append(log_weight)
             whose.append(number)
-    linear = replace(problem, seen=(run,)).linearise(there, at)
-    ways: list[list[Prospect]] = [[] for _ in fits]
+    linear = replace(simulated, seen=(run,)).linearise(there, at)
+    ways: list[list[PredictedOutcome]] = [[] for _ in fits]
     for number, found, (covariance, precision), log_weight in zip(
         whose, linear, before, weights, strict=True
     ):
         table = found.tables[0]
-        ways[number].append(Prospect(-table[0], table[1:], covariance, precision, log_weight))
+        ways[number].append(
+            PredictedOutcome(-table[0], table[1:], covariance, precision, log_weight)
+        )
     return ways
 
 
 def of_instrument(
-    problem: Problem, fits: Sequence[Fit], contexts: Sequence[Context]
-) -> tuple[list[list[Prospect]], list[Float64]]:
+    simulated: CoastSimulation, fits: Sequence[Fit], contexts: Sequence[Context]
+) -> tuple[list[list[PredictedOutcome]], list[Float64]]:
     """
     Return what fitted hypotheses predict of an instrument in the runs there are.
 
@@ -172,9 +169,9 @@ def of_instrument(
     """
     seen = tuple(
         replace(run, context=replace(context, value=np.zeros(len(context))))
-        for run, context in zip(problem.seen, contexts, strict=True)
+        for run, context in zip(simulated.seen, contexts, strict=True)
     )
-    found = replace(problem, seen=seen).linearise(
+    found = replace(simulated, seen=seen).linearise(
         [one.hypothesis for one in fits], [one.best.z for one in fits]
     )
     prospects, values = [], []
@@ -182,16 +179,16 @@ def of_instrument(
         both = list(zip(linear.tables, linear.residuals, contexts, strict=True))
         table = np.hstack([table[:, table.shape[1] - len(c) :] for table, _, c in both])
         precision = np.asarray(np.linalg.inv(one.covariance), np.float64)
-        prospects.append([Prospect(-table[0], table[1:], one.covariance, precision)])
+        prospects.append([PredictedOutcome(-table[0], table[1:], one.covariance, precision)])
         values.append(-np.concatenate([left[len(left) - len(c) :] for _, left, c in both]))
     return prospects, values
 
 
 def with_known(
-    prospects: Sequence[Sequence[Prospect]],
+    prospects: Sequence[Sequence[PredictedOutcome]],
     fits: Sequence[Fit],
     sd: Mapping[str, Sequence[float]],
-) -> list[list[Prospect]]:
+) -> list[list[PredictedOutcome]]:
     """
     Return the same where a measurement tells some unknowns directly.
 
@@ -205,9 +202,9 @@ def with_known(
     for ways, one in zip(prospects, fits, strict=True):
         mean, slope = [], []
         for part, place in one.hypothesis.parts:
-            if not isinstance(part, BaselineTerm | PlaceTerm):
+            if not isinstance(part, BaselineTerm | RunNuisance):
                 continue
-            run = part.run if isinstance(part, PlaceTerm) else 0
+            run = part.run if isinstance(part, RunNuisance) else 0
             for at, unknown in enumerate(part.unknowns, place):
                 known = sd[unknown.name][run] if unknown.name in sd else 0.0
                 if known > 0.0:
@@ -229,8 +226,8 @@ def with_known(
     return found
 
 
-def resolving(
-    settings: Sequence[Sequence[Sequence[Prospect]]],
+def probability_of_naming(
+    settings: Sequence[Sequence[Sequence[PredictedOutcome]]],
     setting: Sequence[int],
     rivals: Sequence[Rival],
     *,
@@ -253,7 +250,9 @@ def resolving(
     """
     rng = np.random.default_rng(_SEED)
     log_odds = {rival.names: rival.log_odds for rival in rivals}
-    probability = simplest({rival.names: rival.log_evidence for rival in rivals}, log_odds)
+    probability = prune_by_bayes_factor(
+        {rival.names: rival.log_evidence for rival in rivals}, log_odds
+    )
     share = np.array([probability.get(rival.names, 0.0) for rival in rivals])
     counts = np.diff(np.round(_DRAWS * np.concatenate([[0.0], np.cumsum(share)])).astype(int))
     named = 0
@@ -266,13 +265,13 @@ def resolving(
             for rival, ways in zip(rivals, settings[way], strict=True)
         ]
         for log in np.array(evidence).T.tolist():
-            after = simplest(dict(zip(log_odds, log, strict=True)), log_odds)
-            verdict, _ = decide(Weighed({}, after), lacking=False, inseparable=inseparable)
+            after = prune_by_bayes_factor(dict(zip(log_odds, log, strict=True)), log_odds)
+            verdict, _ = decide(Posterior({}, after), lacking=False, inseparable=inseparable)
             named += verdict is Verdict.NAMED
     return named / int(counts.sum())
 
 
-def _drawn(ways: Sequence[Prospect], count: int, rng: np.random.Generator) -> Float64:
+def _drawn(ways: Sequence[PredictedOutcome], count: int, rng: np.random.Generator) -> Float64:
     """Return outcomes of a rival, of each way as many as it is probable."""
     weight = np.exp([one.log_weight for one in ways])
     of_way = rng.multinomial(count, weight / weight.sum())
@@ -301,8 +300,8 @@ def _transferred(hypothesis: Hypothesis, *, runs: int) -> list[tuple[Hypothesis,
     # it, is not known of the next
     rows = tuple(
         replace(term)
-        for term in hypothesis.row_terms
-        if isinstance(term, PlaceTerm | SpeedErrorTerm) and term.run == 0
+        for term in hypothesis.measurement_terms
+        if isinstance(term, RunNuisance | SpeedErrorTerm) and term.run == 0
     )
     log_weight = 0.0
     choices: list[list[list[Term]]] = []
@@ -319,7 +318,9 @@ def _transferred(hypothesis: Hypothesis, *, runs: int) -> list[tuple[Hypothesis,
     found = []
     for chosen in product(*choices):
         kept = (first, *(term for terms in chosen for term in terms))
-        forms = tuple(form for form in hypothesis.forms if any(form.term is t for t in kept))
+        forms = tuple(
+            form for form in hypothesis.model_errors if any(form.term is t for t in kept)
+        )
         found.append((Hypothesis(hypothesis.names, kept, rows, forms), log_weight))
     return found
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from shipdrag_ros.diagnosis.prospect import Prospect, Rival, resolving
+from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, Rival, probability_of_naming
 from shipdrag_ros.diagnosis.verdict import CERTAIN
 
 DRAWN = 0.06  # twice the sd of a share of 300 draws
@@ -18,21 +18,21 @@ NOTHING = Rival((), -60.0, 0.0)
 HULL, WIND, CABLE = ('fouling',), ('wind',), ('towed_cable',)
 
 
-def prospect(mean: list[float], *, sd: float = 0.0) -> Prospect:
+def prospect(mean: list[float], *, sd: float = 0.0) -> PredictedOutcome:
     """Rows with a mean that is uncertain in the first of them."""
     slope = np.zeros((1, len(mean)))
     slope[0, 0] = sd
-    return Prospect(np.array(mean), slope, np.eye(1), np.eye(1))
+    return PredictedOutcome(np.array(mean), slope, np.eye(1), np.eye(1))
 
 
 def rivals(share: dict[tuple[str, ...], float]) -> list[Rival]:
     return [*(Rival(names, math.log(p), 0.0) for names, p in share.items()), NOTHING]
 
 
-def resolved(prospects: list[Prospect], found: list[Rival]) -> float:
+def resolved(prospects: list[PredictedOutcome], found: list[Rival]) -> float:
     """With one way in which the measurement is read; nothing predicts what the first does."""
     ways = [[one] for one in (*prospects, prospects[0])]
-    return resolving([ways], [0] * len(ways), found, inseparable=())
+    return probability_of_naming([ways], [0] * len(ways), found, inseparable=())
 
 
 @pytest.mark.parametrize('apart', [0.0, 1.0, 3.0, 6.0])
@@ -59,7 +59,9 @@ def test_what_is_open_in_both_tells_nothing_apart() -> None:
 def test_each_truth_is_read_in_its_own_way() -> None:
     alike = [[prospect([0.0])], [prospect([0.0])], [prospect([0.0])]]
     apart = [[prospect([0.0])], [prospect([9.0])], [prospect([0.0])]]
-    found = resolving([alike, apart], [0, 1, 0], rivals({HULL: 0.5, WIND: 0.5}), inseparable=())
+    found = probability_of_naming(
+        [alike, apart], [0, 1, 0], rivals({HULL: 0.5, WIND: 0.5}), inseparable=()
+    )
     assert found == pytest.approx(0.5, abs=0.01)
 
 
@@ -73,7 +75,7 @@ def test_what_no_record_tells_apart_is_never_named() -> None:
     both = [[prospect([0.0])], [prospect([9.0])], [prospect([0.0])]]
     inseparable = [frozenset((WIND[0], 'waves'))]
     share = rivals({HULL: 0.3, WIND: 0.7})
-    found = resolving([both], [0, 0, 0], share, inseparable=inseparable)
+    found = probability_of_naming([both], [0, 0, 0], share, inseparable=inseparable)
     assert found == pytest.approx(0.3, abs=0.02)
 
 
@@ -82,11 +84,11 @@ def test_pair_that_is_no_longer_asked_for_leaves_its_share_to_the_name() -> None
     same = [[prospect([0.0])], [prospect([0.0])], [prospect([0.0])]]
     apart = [[prospect([0.0])], [prospect([1.5])], [prospect([0.0])]]
     found = []
-    for times in (12.0, 1e6):  # that the pair fits better, before it is weighed how rare it is
+    for times in (12.0, 1e6):  # that the pair fits better, before it is posterior how rare it is
         pair = Rival(('fouling', 'wind'), math.log(0.4), math.log(0.4 / 0.6 / times))
         three = [alone, pair, NOTHING]
-        assert resolving([same], [0, 0, 0], three, inseparable=()) == 0.0
-        found.append(resolving([apart], [0, 0, 0], three, inseparable=()))
+        assert probability_of_naming([same], [0, 0, 0], three, inseparable=()) == 0.0
+        found.append(probability_of_naming([apart], [0, 0, 0], three, inseparable=()))
     soon_dropped, asked_for = found
     assert soon_dropped > asked_for + 0.02
 
@@ -95,6 +97,8 @@ def test_what_may_have_been_there_once_is_drawn_both_ways() -> None:
     again = replace(prospect([6.0]), log_weight=math.log(0.5))
     gone = replace(prospect([0.0]), log_weight=math.log(0.5))
     ways = [[again, gone], [prospect([0.0])], [prospect([0.0])]]
-    found = resolving([ways], [0, 0, 0], rivals({HULL: 0.5, WIND: 0.5}), inseparable=())
+    found = probability_of_naming(
+        [ways], [0, 0, 0], rivals({HULL: 0.5, WIND: 0.5}), inseparable=()
+    )
     # only where it is there again is it named: else the other is as good, or twice as good
     assert found == pytest.approx(0.25, abs=0.04)

@@ -15,19 +15,10 @@ from functools import cached_property
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, Predicted, Term
+from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.noise import apply
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.terms import (
-    BaselineTerm,
-    EffectTerm,
-    ForceTerm,
-    FormTerm,
-    Predicted,
-    RowTerm,
-    SpeedErrorTerm,
-    Term,
-)
-from shipdrag_ros.diagnosis.unknowns import Unknown
 from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -35,125 +26,6 @@ from shipdrag_ros.simulation import Action, Columns, Frame, Scenario, simulate_c
 
 _STEP_Z = 0.02  # of the differences, in units of the prior
 _STEP_M_S = 0.01  # of the steady speed
-
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """
-    What may be missing.
-
-    Attributes
-    ----------
-    names
-        Of the effects, sorted; none: nothing is missing.
-    terms, row_terms
-        All that is fitted, the baseline's uncertainty included.
-    forms
-        How far effects among the terms may depart from their formulas.
-    weight
-        Logarithm of the prior probability.
-    log_odds
-        Of the names before the data, over nothing, in whatever way they are there.
-    discrepancy
-        'force', 'log' or 'radar' where something smooth without a name is
-        fitted besides; '' without.
-    """
-
-    names: tuple[str, ...]
-    terms: tuple[Term, ...]
-    row_terms: tuple[RowTerm, ...]
-    forms: tuple[FormTerm, ...] = ()
-    weight: float = 0.0
-    log_odds: float = 0.0
-    discrepancy: str = ''
-
-    @cached_property
-    def parts(self) -> tuple[tuple[Term | RowTerm | FormTerm, int], ...]:
-        """All that has unknowns, with the place of its first."""
-        found: list[tuple[Term | RowTerm | FormTerm, int]] = []
-        place = 0
-        parts: tuple[Term | RowTerm | FormTerm, ...] = (
-            *self.terms,
-            *self.row_terms,
-            *self.forms,
-        )
-        for part in parts:
-            found.append((part, place))
-            place += len(part.unknowns)
-        return tuple(found)
-
-    @cached_property
-    def of_one_size(self) -> list[list[int]]:
-        """
-        Places of unknowns that are all usual or all small.
-
-        Those of something smooth, and the components of a current or a wind: where
-        one is small, so are the others.
-        """
-        found = []
-        for part, place in self.parts:
-            if isinstance(part, ForceTerm | SpeedErrorTerm):
-                found.append([place + k for k in range(len(part.unknowns))])
-            elif isinstance(part, EffectTerm) and len(part.components) > 1:
-                found.append([place + k for k in part.components])
-        return found
-
-    @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """In the order of the parts; the steady speeds of the runs are behind them."""
-        return tuple(unknown for part, _ in self.parts for unknown in part.unknowns)
-
-
-@dataclass(frozen=True)
-class Linear:
-    """
-    Whitened rows of a hypothesis, linear about some unknowns.
-
-    Attributes
-    ----------
-    hypothesis
-    z : (p,)
-        Of its unknowns, then the steady speed of each run [m/s].
-    tables
-        (1 + p, rows) of each run: residual, then derivatives of the prediction.
-    residuals
-        (rows,) of each run, not whitened.
-    """
-
-    hypothesis: Hypothesis
-    z: Float64
-    tables: tuple[Float64, ...]
-    residuals: tuple[Float64, ...]
-
-    @cached_property
-    def chi2(self) -> float:
-        """Sum of squared whitened residuals; infinite where it cannot be simulated."""
-        if not all(np.isfinite(table).all() for table in self.tables):
-            return math.inf
-        return sum(float(table[0] @ table[0]) for table in self.tables)
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return sum(table.shape[1] for table in self.tables)
-
-    @cached_property
-    def cost(self) -> float:
-        """-2 ln of the posterior, less a constant."""
-        return self.chi2 + sum(u.penalty(z) for u, z in zip(self.hypothesis.unknowns, self.z))
-
-    @cached_property
-    def normal(self) -> tuple[Float64, Float64]:
-        """Half the curvature of the cost, and half its fall by each unknown."""
-        weight = np.zeros(len(self.z))
-        for i, (unknown, z) in enumerate(zip(self.hypothesis.unknowns, self.z)):
-            weight[i] = unknown.weight(z)
-        matrix = np.diag(weight)
-        fall = -weight * self.z
-        for table in self.tables:
-            matrix += np.einsum('ai,bi->ab', table[1:], table[1:])
-            fall += table[1:] @ table[0]
-        return matrix, fall
 
 
 @dataclass
@@ -191,7 +63,7 @@ class _Plan:
 
 
 @dataclass(frozen=True)
-class Problem:
+class CoastSimulation:
     """
     What all hypotheses share.
 
@@ -343,10 +215,11 @@ class Problem:
         base = batch.add(whole, speed)
         steps: list[tuple[int, int, float]] = []
         without: dict[int, int] = {}
-        open_forms = {id(form.term) for form in hypothesis.forms}
+        errors = hypothesis.model_errors
+        with_errors = {id(error.term) for error in errors}
         for i, (term, place, values) in enumerate(acting):
             others = sum((action for j, action in enumerate(actions) if j != i), Action())
-            if id(term) in open_forms:
+            if id(term) in with_errors:
                 without[id(term)] = batch.add(others, speed)
             for k, unknown in enumerate(term.unknowns):
                 value = unknown.value(z[place + k] + _STEP_Z)
@@ -356,7 +229,7 @@ class Problem:
                     steps.append((place + k, column, _STEP_Z))
         column = batch.add(whole, speed + _STEP_M_S)
         steps.append((len(hypothesis.unknowns) + run, column, _STEP_M_S))
-        return _Plan(base, steps, [without.get(id(form.term), base) for form in hypothesis.forms])
+        return _Plan(base, steps, [without.get(id(error.term), base) for error in errors])
 
     def _acting(
         self, run: int, hypothesis: Hypothesis, z: Float64
@@ -390,10 +263,10 @@ class Problem:
             table[1 + unknown, :n] = (predicted[column].along - base.along) / step
             table[1 + unknown, n : n + k] = (predicted[column].across - base.across) / step
             table[1 + unknown, n + k :] = (context[column] - context[plan.base]) / step
-        added = [term.columns(seen, run, base) for term in hypothesis.row_terms]
-        for form, other in zip(hypothesis.forms, plan.without):
+        added = [term.columns(seen, run, base) for term in hypothesis.measurement_terms]
+        for error, other in zip(hypothesis.model_errors, plan.without):
             trace = base.along - predicted[other].along, base.across - predicted[other].across
-            added.append(form.columns(seen, trace))
+            added.append(error.columns(seen, trace))
         behind = hypothesis.parts[len(hypothesis.terms) :]
         for (part, place), (along, across) in zip(behind, added, strict=True):
             for i, of_part in enumerate(part.unknowns):

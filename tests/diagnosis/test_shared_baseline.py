@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.scatter import Normal, factor, share
+from shipdrag_ros.diagnosis.shared_baseline import Normal, factor, share
 
 ALONG = np.array([1.0, 1.0])
 PRIOR = Normal(np.eye(2) * 1e-4, np.zeros(2))
