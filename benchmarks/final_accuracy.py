@@ -27,8 +27,8 @@ from shipdrag_ros.estimation.ode_fit.guess import Guess
 from shipdrag_ros.estimation.ode_fit.problem import Problem
 from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
-from shipdrag_ros.estimation.ode_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.inference.noise import GaussMarkovNoise
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
@@ -168,13 +168,15 @@ def bound(case: Case, ship: Ship) -> tuple[float, float]:
     record = Record.of(window, run_down, Parameters())
     sds = {'speed_through_water': case.hull.speed_sd, 'position': case.hull.position_sd}
     record = replace(record, white_sd=sds)
-    about = Disturbance(gust_m_s2(case, ship), SLOW_S, case.log_m_s, SLOW_S)
+    slow = GaussMarkovNoise(
+        gust_m_s2=gust_m_s2(case, ship), gust_s=SLOW_S, log_m_s=case.log_m_s, log_s=SLOW_S
+    )
     guess = Guess.of(record.coast, float(ship.n_r(1.0)))
     problem = Problem.of(record, run_down, ship, guess)
     plain, _ = problem.fit_first(problem.start())
     assert plain is not None
     if case.log_m_s or case.gust_m_s:
-        problem = problem.disturbed(about, plain)
+        problem = problem.disturbed(slow, plain)
     found, _ = problem.fit_first(plain.unknowns)
     assert found is not None
     low = max(float(record.coast.value[record.coast.kind == 0][-1]), float(ship.speed(0.05)))

@@ -235,7 +235,7 @@ def test_a_closure_is_refused() -> None:
 
 def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) -> None:
     snippet = tmp_path / 'snippet.py'
-    whiten = 'from shipdrag_ros.estimation.ode_fit.whitening import whiten\n'
+    whiten = 'from shipdrag_ros.inference.noise import whiten\n'
     spread = 'from shipdrag_ros.inference.gaussian import root\n'
     snippet.write_text(f"{whiten}{spread}whiten(1, 2, 3, 'wrong')\nroot('wrong')\nroot()\n")
     told, _, status = api.run(
@@ -250,9 +250,9 @@ def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) ->
 # a live estimate, a final one and the noise of a diagnosis, printed to the last bit
 ESTIMATES = """
 import numpy as np
-from shipdrag_ros.diagnosis.noise import Colour, Damping, whiten
 from shipdrag_ros.estimation import Window, estimate, estimate_final
-from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION, Rows
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
+from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -275,10 +275,10 @@ for each in (estimate, estimate_final):
     print(found.estimator, found.curve.speed_m_s.tobytes().hex(),
           found.curve.resistance_m_s2.tobytes().hex(), found.curve.sigma_m_s2.tobytes().hex())
 kind = np.where(np.arange(n) % 2, LOG, POSITION)
-colour = Colour(np.array([1e-3, 0.02, 0.05, 2.0]), np.array([90.0, 600.0, 50.0, 50.0]))
+slow = GaussMarkovNoise(1e-3, 90.0, 0.02, 600.0, 0.05, 50.0, 2.0, 50.0)
 table = np.array([speed, way])
-whiten(Rows(time_s, kind, speed), np.full(n, 0.01), colour,
-       Damping(np.full(n, 2e-3), np.full(n, 1.05)), table)
+noise = Noise(np.full(n, 0.01), slow, np.full(n, 2e-3), np.full(n, 1.05))
+whiten(Rows(time_s, kind, speed), table, noise)
 print(table.tobytes().hex())
 """
 # functions that call those of other files, and what they call
@@ -290,7 +290,7 @@ CALLERS = (
 CALLEES = (
     'estimation.ode_fit.coast',
     'estimation.ode_fit.law',
-    'estimation.ode_fit.whitening',
+    'inference.noise',
     'estimation.log_time.model',
     'inference.gaussian',
     'regression.refit',

@@ -31,7 +31,7 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs, trial_z
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.ode_fit.coast import LOG
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape

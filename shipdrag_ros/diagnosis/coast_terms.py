@@ -19,7 +19,7 @@ from scipy.integrate import cumulative_trapezoid
 from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import EffectTerm, Tail, Unknown, cubic_bsplines, scaled
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import CoefficientBaseline

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns

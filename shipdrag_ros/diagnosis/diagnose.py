@@ -22,8 +22,8 @@ from shipdrag_ros.diagnosis.result import (
 from shipdrag_ros.diagnosis.search import search, with_pairs
 from shipdrag_ros.diagnosis.verdict import Found, judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
-from shipdrag_ros.estimation.ode_fit.coast import LOG
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.effect import Scope

@@ -16,8 +16,7 @@ from shipdrag_ros.diagnosis.observation import Measured
 from shipdrag_ros.diagnosis.result import Compared, Gap, Trace, Where
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION
-from shipdrag_ros.estimation.ode_fit.record import KINDS
+from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.samples import Float64
 
 _PARTS = 12  # of a coastdown, in telling where a gap is
@@ -207,14 +206,14 @@ def _trace(simulated: CoastSimulation, run: int, before: Linear, after: Linear) 
     seen = simulated.seen[run]
     speed = simulated.predict(run, after).speed
     n = len(seen.along)
-    blocks: list[tuple[str, Measured, slice]] = [(name, seen.along, slice(0, n)) for name in KINDS]
+    blocks: list[tuple[str, Measured, slice]] = [(name, seen.along, slice(0, n)) for name in CODES]
     if seen.across is not None:
         blocks.append((_ACROSS, seen.across, slice(n, n + len(seen.across))))
     found = []
     for quantity, block, part in blocks:
         own = np.ones(len(block), bool)
-        if quantity in KINDS:
-            own = block.rows.kind == KINDS[quantity]
+        if quantity in CODES:
+            own = block.rows.kind == CODES[quantity]
         if not own.any():
             continue
         measured = block.rows.value[own]

@@ -19,9 +19,9 @@ from enum import StrEnum
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, Int64
 

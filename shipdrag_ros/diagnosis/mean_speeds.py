@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.diagnosis.diagnose import CoastRun
-from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.ode_fit.steady import white_sd
+from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.samples import Float64
 
 _BINS, _LEAST_ROWS = 150, 20

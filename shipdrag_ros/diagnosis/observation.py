@@ -20,13 +20,14 @@ from scipy.ndimage import median_filter
 from scipy.optimize import least_squares
 
 from shipdrag_ros.diagnosis.context import Context, Stop
-from shipdrag_ros.diagnosis.noise import Damping, bin_means, learn, whiten
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.estimation.ode_fit.record import KINDS, Record
+from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.learning import most_probable
+from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, Rows, bin_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
@@ -222,7 +223,7 @@ class _Learner:
         rows = Rows(time, kind.astype(np.int64), value)
         steady = time < self.lead_in_s - self.margin_s
         damping, inertia = self._damping(np.array([self.speed_m_s]))
-        learnt = learn(
+        learnt = most_probable(
             Rows(time[steady], rows.kind[steady], value[steady]),
             variance[steady],
             damping_1_s=float(damping[0]),
@@ -232,13 +233,13 @@ class _Learner:
         after = np.maximum(time - self.lead_in_s, 0.0)
         speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
         whitener = np.eye(len(time))
-        whiten(rows, variance, learnt, Damping(*self._damping(speed)), whitener)
+        whiten(rows, whitener, Noise(variance, learnt, *self._damping(speed)))
         return Measured(
             np.searchsorted(times, time),
             rows,
             np.ascontiguousarray(whitener.T),
             # without a log it is not told from a gust
-            float(learnt.size[1]) if (rows.kind[steady] == LOG).any() else 0.0,
+            learnt.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
         )
 
     def _damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
@@ -367,7 +368,7 @@ def _condensed_all(
         sd, time = white_sd[input_], seconds[input_]
         if input_ != 'position':
             keep = _kept(found.value, sd)
-            along.append(_condensed(time[keep], found.value[keep], edges, sd, KINDS[input_]))
+            along.append(_condensed(time[keep], found.value[keep], edges, sd, CODES[input_]))
             continue
         east, north = (found.value - found.value[0]).T
         ahead, to_port = cos * east + sin * north, cos * north - sin * east

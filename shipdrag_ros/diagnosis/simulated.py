@@ -17,9 +17,9 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, Predicted, Term
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
-from shipdrag_ros.diagnosis.noise import apply
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND
+from shipdrag_ros.inference.noise import apply
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Columns, Frame, Scenario, simulate_columns

@@ -18,12 +18,9 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.curve import ValidRange, resistance_curve, specific_resistance
-from shipdrag_ros.estimation.log_time.inputs import KINDS, Inputs, gather
+from shipdrag_ros.estimation.log_time.inputs import Inputs, gather
 from shipdrag_ros.estimation.log_time.model import (
     CURRENT,
-    OVER_GROUND,
-    POSITION,
-    THROUGH_WATER,
     THRUST,
     coast_motion,
     combine,
@@ -37,6 +34,7 @@ from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.gaussian import average, condense, deviations, root
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Input
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -144,8 +142,8 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         end_ns=inputs.scale.first_ns + inputs.scale.span_ns,
         order=None,
         orders=(),
-        samples={KINDS[kind]: int(inputs.count[kind]) for kind in inputs.used},
-        noise_sd={KINDS[kind]: float(fit.noise_sd[kind]) for kind in inputs.used},
+        samples={Input(kind).key: int(inputs.count[kind]) for kind in inputs.used},
+        noise_sd={Input(kind).key: float(fit.noise_sd[kind]) for kind in inputs.used},
         curve=curve,
         froude_valid=valid.froude,
         froude_max_by=valid.by,
@@ -164,7 +162,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
 
 def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> _Fit:
     span = inputs.span_s
-    kind = next(k for k in (THROUGH_WATER, OVER_GROUND, POSITION) if inputs.count[k])
+    kind = next(k for k in (LOG, OVER_GROUND, POSITION) if inputs.count[k])
     part = inputs.part(kind)
     tc, speed = quadratic_coast(
         inputs.time_s[part], inputs.clean[part], span, 1 if kind == POSITION else 0
@@ -278,13 +276,13 @@ def _about_noise(
         gross = int(np.count_nonzero(weight[inputs.part(kind)] == 0.0))
         if gross:
             notes.append(
-                f'{KINDS[kind]}: {gross} sample(s) more than {GROSS:g} standard deviations off '
-                'were left out'
+                f'{Input(kind).key}: {gross} sample(s) more than {GROSS:g} standard deviations '
+                'off were left out'
             )
         known = inputs.known_sd[kind]
         if known and used_sd[kind] != known:
             notes.append(
-                f'{KINDS[kind]}: the residuals, {noise_sd[kind]:.3g}, contradict the stated '
+                f'{Input(kind).key}: the residuals, {noise_sd[kind]:.3g}, contradict the stated '
                 f'standard deviation {known:.3g}: it was not used'
             )
     return notes
@@ -313,7 +311,7 @@ def _check_deceleration(inputs: Inputs, motion: Motion) -> None:
 
 def _tracks(inputs: Inputs, fit: _Fit) -> dict[str, Track]:
     return {
-        KINDS[kind]: Track(
+        Input(kind).key: Track(
             inputs.stamps[kind], inputs.value[inputs.part(kind)], fit.fitted[inputs.part(kind)]
         )
         for kind in inputs.used

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.log_time.model import OVER_GROUND, POSITION, THROUGH_WATER
 from shipdrag_ros.estimation.log_time.projection import project
 from shipdrag_ros.estimation.log_time.robust import despike
 from shipdrag_ros.estimation.ode_fit.stated import stated_weight
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Input
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.regression.orthogonal import TimeScale
 from shipdrag_ros.samples import Float64, Int64
 
-KINDS = ('position', 'speed_through_water', 'speed_over_ground')
 ENOUGH = 5  # distinct stamps of an input, without which it is left out
 
 
@@ -64,13 +63,13 @@ class Inputs:
     @property
     def used(self) -> list[int]:
         """Kinds with samples."""
-        return [kind for kind in range(len(KINDS)) if self.count[kind]]
+        return [int(kind) for kind in Input if self.count[kind]]
 
     @property
     def tells_water_from_ground(self) -> bool:
         """Whether there is a log, and something over ground."""
         over_ground = self.count[POSITION] + self.count[OVER_GROUND]
-        return bool(self.count[THROUGH_WATER] and over_ground)
+        return bool(self.count[LOG] and over_ground)
 
     def part(self, kind: int) -> slice:
         """
@@ -89,7 +88,7 @@ def gather(window: Window, parameters: Parameters) -> Inputs:
     EstimationError
         If there is too little, or what there is cannot be used.
     """
-    series = (window.position, window.speed_through_water, window.speed_over_ground)
+    series: list[Series] = [getattr(window, input_.key) for input_ in Input]
     notes = []
     used: dict[int, Series] = {}
     for kind, one in enumerate(series):
@@ -97,23 +96,23 @@ def gather(window: Window, parameters: Parameters) -> Inputs:
         if stamps < ENOUGH:
             if stamps:
                 notes.append(
-                    f'{KINDS[kind]}: {len(one)} sample(s) left out, {ENOUGH} distinct stamps are '
-                    'needed'
+                    f'{Input(kind).key}: {len(one)} sample(s) left out, {ENOUGH} distinct stamps '
+                    'are needed'
                 )
             continue
         bad = int((~np.isfinite(one.value)).sum())
         if bad:
             raise EstimationError(
-                f'{KINDS[kind]}: {bad} value(s) are not finite: give accepted samples only'
+                f'{Input(kind).key}: {bad} value(s) are not finite: give accepted samples only'
             )
         used[kind] = one
     if not used:
-        counts = ', '.join(f'{name} {len(one)}' for name, one in zip(KINDS, series))
+        counts = ', '.join(f'{input_.key} {len(one)}' for input_, one in zip(Input, series))
         raise EstimationError(
             f'samples in the window: {counts}; {ENOUGH} distinct stamps or more of one input are '
             'needed: give a longer window'
         )
-    if THROUGH_WATER not in used:
+    if LOG not in used:
         notes.append('no speed through water: a current is part of the speed')
     values = [_along(one) if kind == POSITION else one.value for kind, one in used.items()]
     scale = TimeScale.of(*(one.time_ns for one in used.values()))
@@ -127,13 +126,13 @@ def gather(window: Window, parameters: Parameters) -> Inputs:
     ]
     return Inputs(
         scale,
-        tuple(used[k].time_ns if k in used else np.empty(0, np.int64) for k in range(len(KINDS))),
+        tuple(used[k].time_ns if k in used else np.empty(0, np.int64) for k in Input),
         np.concatenate(time_s),
         np.concatenate(values),
         np.concatenate([despike(value) for value in values]),
         np.concatenate(stated),
-        np.array([len(used[k]) if k in used else 0 for k in range(len(KINDS))]),
-        np.array([parameters.position_sigma_m, speed_sd, speed_sd]),
+        np.array([len(used[k]) if k in used else 0 for k in Input]),
+        np.array([speed_sd, speed_sd, parameters.position_sigma_m]),
         tuple(notes),
     )
 

@@ -14,10 +14,10 @@ import math
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND
 from shipdrag_ros.regression.refit import evaluate, refit
 from shipdrag_ros.samples import Float64, Int64
 
-POSITION, THROUGH_WATER, OVER_GROUND = range(3)  # kinds of rows, in this order
 CURRENT, SCALE, THRUST = range(3)  # columns after the polynomials
 
 _SUMS = {'reassoc', 'contract', 'nsz'}  # see regression.refit
@@ -104,31 +104,31 @@ def design(
     -------
     (polynomials + 3, n)
     """
-    n, positions = len(time), count[POSITION]
-    logs = positions + count[THROUGH_WATER]
+    n, logs = len(time), count[LOG]
+    speeds = logs + count[OVER_GROUND]
     columns = np.zeros((polynomials + THRUST + 1, n))
     stretch = 2.0 / math.log1p(span / tc)
     s, rate = np.empty(n), np.empty(n)
     for i in range(n):
         s[i] = stretch * math.log1p(time[i] / tc) - 1.0
         rate[i] = stretch / (tc + time[i])
-    columns[0, :positions] = 1.0
-    columns[1, :positions] = s[:positions]
-    columns[1, positions:] = rate[positions:]
+    columns[0, speeds:] = 1.0
+    columns[1, speeds:] = s[speeds:]
+    columns[1, :speeds] = rate[:speeds]
     twice = 2.0 * s
     # second kind, times the rate: T_j' = j U_(j-1)
     before, now = rate.copy(), twice * rate
     for j in range(2, polynomials):
-        for i in range(positions):
-            columns[j, i] = twice[i] * columns[j - 1, i] - columns[j - 2, i]
-        for i in range(positions, n):
+        for i in range(speeds):
             columns[j, i] = j * now[i]
             before[i], now[i] = now[i], twice[i] * now[i] - before[i]
-    columns[polynomials + CURRENT, :positions] = time[:positions]
-    columns[polynomials + CURRENT, logs:] = 1.0
-    columns[polynomials + SCALE, positions:logs] = speed * tc / (tc + time[positions:logs])
+        for i in range(speeds, n):
+            columns[j, i] = twice[i] * columns[j - 1, i] - columns[j - 2, i]
+    columns[polynomials + CURRENT, speeds:] = time[speeds:]
+    columns[polynomials + CURRENT, logs:speeds] = 1.0
+    columns[polynomials + SCALE, :logs] = speed * tc / (tc + time[:logs])
     for i in range(n):
-        effect = run_down if i < positions else -1.0
+        effect = -1.0 if i < speeds else run_down
         columns[polynomials + THRUST, i] = effect * run_down * math.exp(-time[i] / run_down)
     return columns
 

@@ -12,19 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.estimation.log_time.inputs import KINDS, Inputs
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.estimation.ode_fit.learning import learn
+from shipdrag_ros.estimation.log_time.inputs import Inputs
 from shipdrag_ros.estimation.ode_fit.record import LEAST_STAMPS, Record
 from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S, condense, white_sd
-from shipdrag_ros.estimation.ode_fit.whitening import CALM, Disturbance, Noise, whiten
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.learning import learn
+from shipdrag_ros.inference.noise import WHITE, GaussMarkovNoise, Noise, whiten
+from shipdrag_ros.inference.rows import CODES, Input, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-_KIND = np.array([POSITION, LOG, OVER_GROUND])  # in `whiten`, of those in `KINDS`
 _WAVES = 8  # of the steady record, slowest first, whose power is looked at
 _BY_CHANCE = 2.0  # standard deviations of that power: less shows nothing slow
 _LOST = 1e-6  # weight of a gross outlier, of a good sample's: none, but finite
@@ -37,7 +36,7 @@ class Slow:
 
     Attributes
     ----------
-    about
+    noise
         Gust force and wandering of the log.
     white_sd
         Noise of each input without the slow part, by name.
@@ -47,7 +46,7 @@ class Slow:
         Length of the steady record.
     """
 
-    about: Disturbance
+    noise: GaussMarkovNoise
     white_sd: dict[str, float]
     coast_s: float
     speed_m_s: float
@@ -67,7 +66,7 @@ class Slow:
         Learn from the record before a window; None where it shows nothing.
         """
         before = window.before
-        if before is None or max(len(getattr(window, name)) for name in KINDS) < LEAST_STAMPS:
+        if before is None or max(len(getattr(window, name)) for name in CODES) < LEAST_STAMPS:
             return None
         speed = before.speed_through_water
         if len(speed) >= LEAST_STAMPS and not _wanders(speed):
@@ -79,19 +78,19 @@ class Slow:
         keep = record.steady.time_s < -ONSET_SD_S
         steady = record.steady
         rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
-        about, filtered = learn(
+        found, filtered = learn(
             rows,
             record.variance(rows, record.steady_weight[keep]),
             damping_1_s=2.0 / coast_s,
             inertia=1.0 + float(ship.n_r(speed_m_s)),
             r_m_s2=(1.0 + float(ship.n_r(speed_m_s))) * speed_m_s / coast_s,
         )
-        if about == CALM:
+        if found == WHITE:
             return None
         sizes = dict(record.white_sd)
         if 'speed_through_water' in sizes:
             sizes['speed_through_water'] *= math.sqrt(filtered)
-        return cls(about, sizes, coast_s, speed_m_s, record.steady_s)
+        return cls(found, sizes, coast_s, speed_m_s, record.steady_s)
 
     @property
     def note(self) -> str:
@@ -118,15 +117,15 @@ class Slow:
         for kind in inputs.used:
             part = inputs.part(kind)
             best = (weight[part] / inputs.stated[part]).max()
-            white = self.white_sd.get(KINDS[kind], 1.0 / math.sqrt(best))
+            white = self.white_sd.get(Input(kind).key, 1.0 / math.sqrt(best))
             variance[part] = white**2 / np.maximum(weight[part] / best, _LOST)
         order = np.argsort(inputs.time_s, kind='stable')
         time_s = inputs.time_s[order]
         rest_s = self.coast_s + time_s
         inertia = 1.0 + ship.n_r(self.speed_m_s * self.coast_s / rest_s)
-        noise = Noise(variance[order], self.about, 2.0 / rest_s, inertia)
+        noise = Noise(variance[order], self.noise, 2.0 / rest_s, inertia)
         table = np.take(np.vstack([rows, residual]), order, axis=1)
-        kinds = np.repeat(_KIND, inputs.count)[order]
+        kinds = np.repeat(np.arange(len(Input)), inputs.count)[order]
         whiten(Rows(time_s, kinds, residual[order]), table, noise)
         return table[:-1], table[-1]
 

@@ -14,12 +14,11 @@ the engine stop; before it the speed is v0.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.ode_fit.law import Law, shapes
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.samples import Float64, Int64
 
 # Columns of the unknowns behind the k coefficients.
@@ -27,28 +26,6 @@ V0, THRUST, THRUST_FAST, ONSET, X0, CURRENT, LOG_SCALE, LOG_LAG = range(8)
 EXTRAS = 8
 _FAST = 3.0  # of the second part of the thrust: the power of the shaft that falls fastest
 _OF_MOTION = 3  # of these, the ones that change the motion by themselves
-
-LOG, OVER_GROUND, POSITION = range(3)  # kinds of rows
-KIND_COUNT = 3
-
-
-class Rows(NamedTuple):
-    """
-    Measurements in ascending time.
-
-    Attributes
-    ----------
-    time_s : (n,)
-        After the engine stop, as far as that is known before the fit.
-    kind : (n,)
-        LOG, OVER_GROUND or POSITION.
-    value : (n,)
-        [m/s], or the distance along the track [m].
-    """
-
-    time_s: Float64
-    kind: Int64
-    value: Float64
 
 
 @compiled

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.estimation.ode_fit.coast import KIND_COUNT, Rows
+from shipdrag_ros.inference.rows import KIND_COUNT, Rows
 from shipdrag_ros.samples import Float64
 
 

@@ -15,15 +15,7 @@ import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.curve import ValidRange
-from shipdrag_ros.estimation.ode_fit.coast import (
-    CURRENT,
-    LOG,
-    LOG_LAG,
-    LOG_SCALE,
-    V0,
-    Rows,
-    predict,
-)
+from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_LAG, LOG_SCALE, V0, predict
 from shipdrag_ros.estimation.ode_fit.colour import Colour
 from shipdrag_ros.estimation.ode_fit.first_fits import (
     fit_robustly,
@@ -32,14 +24,15 @@ from shipdrag_ros.estimation.ode_fit.first_fits import (
 )
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.guess import Guess
-from shipdrag_ros.estimation.ode_fit.learning import ENGINE_HOLD, learn
 from shipdrag_ros.estimation.ode_fit.problem import Problem
-from shipdrag_ros.estimation.ode_fit.record import KINDS, Record
+from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
-from shipdrag_ros.estimation.ode_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.inference.learning import ENGINE_HOLD, learn
+from shipdrag_ros.inference.noise import GaussMarkovNoise
+from shipdrag_ros.inference.rows import CODES, LOG, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -77,11 +70,11 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess))
     if record.steady_s >= LEAST_S:
         plain = first.plainly(guess.lowest)
-        about, filtered = _learn(record, plain, run_down)
-        problem = Problem.of(record, run_down, ship, guess).disturbed(about, plain)
+        slow, filtered = _learn(record, plain, run_down)
+        problem = Problem.of(record, run_down, ship, guess).disturbed(slow, plain)
         problem = weigh_disturbed(problem, first)
         problem = problem.filtered(filtered * record.white_sd.get('speed_through_water', 0.0) ** 2)
-        notes.append(_disturbance_note(about, record.steady_s))
+        notes.append(_noise_note(slow, record.steady_s))
     else:
         record = alone
         notes.append(
@@ -106,7 +99,9 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     return _result(found, full, record, window, ship, parameters, tuple(notes))
 
 
-def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> tuple[Disturbance, float]:
+def _learn(
+    record: Record, plain: FittedMotion, run_down: RunDown
+) -> tuple[GaussMarkovNoise, float]:
     """Learn the disturbances of the steady record, damped as a plain fit has it."""
     top = plain.unknowns[plain.law.size + V0 :][:1]
     damping, inertia = plain.damping(top)
@@ -125,17 +120,17 @@ def _learn(record: Record, plain: FittedMotion, run_down: RunDown) -> tuple[Dist
     )
 
 
-def _disturbance_note(about: Disturbance, steady_s: float) -> str:
+def _noise_note(slow: GaussMarkovNoise, steady_s: float) -> str:
     found = []
-    if about.gust_m_s2:
+    if slow.gust_m_s2:
         found.append(
-            f'a force of {about.gust_m_s2:.2g} m/s² over {about.gust_s:.0f} s (the engine is '
+            f'a force of {slow.gust_m_s2:.2g} m/s² over {slow.gust_s:.0f} s (the engine is '
             f'taken to damp the speed {ENGINE_HOLD:g} times as the hull does; 1 to 2 is usual)'
         )
-    if about.water_m_s:
-        found.append(f'the log by {about.water_m_s:.2g} m/s over {about.water_s:.0f} s')
-    if about.wander_m:
-        found.append(f'positions by {about.wander_m:.2g} m over {about.wander_s:.0f} s')
+    if slow.log_m_s:
+        found.append(f'the log by {slow.log_m_s:.2g} m/s over {slow.log_s:.0f} s')
+    if slow.place_m:
+        found.append(f'positions by {slow.place_m:.2g} m over {slow.place_s:.0f} s')
     return (
         f'disturbances learnt from {steady_s:.0f} s of steady record: '
         f'{" and ".join(found) or "none but the noise of the sensors"}'
@@ -143,7 +138,7 @@ def _disturbance_note(about: Disturbance, steady_s: float) -> str:
 
 
 def _colour_notes(colours: dict[int, Colour]) -> list[str]:
-    names = {kind: name for name, kind in KINDS.items()}
+    names = {kind: name for name, kind in CODES.items()}
     return [
         f'what the fit leaves of {names[kind]} is not independent from sample to sample: its '
         f'means over {colour.block} scatter {math.sqrt(colour.inflation):.2g} times as much as '
@@ -183,7 +178,7 @@ def _result(
     valid = ValidRange.of_branch(curve)
     tracks = {}
     for name, stamps in record.stamps.items():
-        chosen = coast.kind == KINDS[name]
+        chosen = coast.kind == CODES[name]
         measured = coast.value[chosen]
         tracks[name] = Track(stamps, measured, measured - residual[0, chosen])
     last_r, last_repeatable = (
@@ -192,7 +187,7 @@ def _result(
     last_of_n_r = last_r / (1.0 + float(ship.n_r(last_speed))) * ship.added_mass.sd
     noise = {}
     for name in record.white_sd:
-        chosen = problem.rows.kind == KINDS[name]
+        chosen = problem.rows.kind == CODES[name]
         chosen[: len(record.steady.time_s)] = False
         worth = np.concatenate([record.steady_weight, record.coast_weight])[chosen]
         noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen] * worth)))

@@ -12,7 +12,7 @@ from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_SCALE
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.problem import Problem
 from shipdrag_ros.estimation.ode_fit.weighing import drop_gross, weigh
-from shipdrag_ros.estimation.ode_fit.whitening import whiten
+from shipdrag_ros.inference.noise import whiten
 
 _ROUNDS, _ROUNDS_DISTURBED = 3, 2  # of the weights
 _SCALE_SIGNIFICANT = 3.0  # standard deviations

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.estimation.ode_fit.steady import block_medians
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
 _BLOCKS = 12  # whose medians outliers do not reach

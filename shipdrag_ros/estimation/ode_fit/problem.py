@@ -12,16 +12,13 @@ from shipdrag_ros.estimation.ode_fit.averaging import average
 from shipdrag_ros.estimation.ode_fit.coast import (
     CURRENT,
     EXTRAS,
-    LOG,
     LOG_LAG,
     LOG_SCALE,
     ONSET,
-    POSITION,
     THRUST,
     THRUST_FAST,
     V0,
     X0,
-    Rows,
     predict,
 )
 from shipdrag_ros.estimation.ode_fit.colour import Colour, colour_of
@@ -30,16 +27,17 @@ from shipdrag_ros.estimation.ode_fit.families import FIRST, POWERS, Humps
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.guess import Guess
 from shipdrag_ros.estimation.ode_fit.law import Law
-from shipdrag_ros.estimation.ode_fit.learning import ENGINE_HOLD
 from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.solve import fit
-from shipdrag_ros.estimation.ode_fit.whitening import (
-    CALM,
-    Disturbance,
+from shipdrag_ros.inference.learning import ENGINE_HOLD
+from shipdrag_ros.inference.noise import (
+    WHITE,
+    GaussMarkovNoise,
     Noise,
     whiten,
 )
+from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
@@ -121,7 +119,7 @@ class Problem:
             rows,
             len(steady.time_s),
             grid,
-            Noise(variance, CALM, ones, ones),
+            Noise(variance, WHITE, ones, ones),
             run_down,
             guess,
             Law(np.array(FIRST, np.int64), v_ref, run_down.shaft_s, ship.n_r_polynomial()),
@@ -129,16 +127,16 @@ class Problem:
             tuple(extras),
         )
 
-    def disturbed(self, about: Disturbance, plain: FittedMotion) -> Problem:
+    def disturbed(self, slow: GaussMarkovNoise, plain: FittedMotion) -> Problem:
         """
-        Return the problem with slow disturbances, damped as a fit has it.
+        Return the problem with slow noise, damped as a fit has it.
         """
         _, speed = predict(
             plain.law, plain.unknowns, self.grid_s, self.rows, np.zeros(0, np.int64)
         )
         damping, inertia = plain.damping(speed)
         damping[: self.steady] *= ENGINE_HOLD
-        return replace(self, noise=Noise(self.noise.variance, about, damping, inertia))
+        return replace(self, noise=Noise(self.noise.variance, slow, damping, inertia))
 
     def weighted(self, variance: Float64) -> Problem:
         """
@@ -205,7 +203,7 @@ class Problem:
         return replace(
             self,
             rows=rows._replace(value=value),
-            noise=Noise(variance, noise.about, damping, inertia),
+            noise=Noise(variance, noise.slow, damping, inertia),
         )
 
     def start(self) -> Float64:

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.stated import stated_weight
 from shipdrag_ros.estimation.ode_fit.steady import (
@@ -19,11 +18,11 @@ from shipdrag_ros.estimation.ode_fit.steady import (
 )
 from shipdrag_ros.estimation.s1.track import along_track
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.rows import CODES, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64, Int64
 
-KINDS = {'speed_through_water': LOG, 'speed_over_ground': OVER_GROUND, 'position': POSITION}
 LEAST_STAMPS = 12  # of an input: fewer do not tell its noise
 _TRACK_ORDER = 8  # of the polynomials of a track that bends
 _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
@@ -64,10 +63,10 @@ class Record:
             If no input has enough samples.
         """
         inputs = {
-            name: series for name in KINDS if len(series := getattr(window, name)) >= LEAST_STAMPS
+            name: series for name in CODES if len(series := getattr(window, name)) >= LEAST_STAMPS
         }
         if not inputs:
-            found = ', '.join(f'{name} {len(getattr(window, name))}' for name in KINDS)
+            found = ', '.join(f'{name} {len(getattr(window, name))}' for name in CODES)
             raise EstimationError(
                 f'samples in the window: {found}; a fit of the motion needs {LEAST_STAMPS} of '
                 'one of them: give a longer window, or another `estimator`'
@@ -114,10 +113,10 @@ class Record:
                 1e-6 * float(np.ptp(value)),
                 1e-9,
             )
-            coast.append((time_s, KINDS[name], value, weight[len(before_s) :]))
+            coast.append((time_s, CODES[name], value, weight[len(before_s) :]))
             if len(before_s):
                 means = condense(before_s, before, weight[: len(before_s)], _FINE_S)
-                steady.append((means[0], KINDS[name], *means[1:]))
+                steady.append((means[0], CODES[name], *means[1:]))
         steady_rows, steady_weight = _merge(steady)
         coast_rows, coast_weight = _merge(coast)
         return cls(
@@ -145,9 +144,9 @@ class Record:
         """
         Return the variance of the white noise of rows that are worth so many samples.
         """
-        of_kind = np.zeros(len(KINDS))
+        of_kind = np.zeros(len(CODES))
         for name, sd in self.white_sd.items():
-            of_kind[KINDS[name]] = sd**2
+            of_kind[CODES[name]] = sd**2
         result: Float64 = of_kind[rows.kind] / weight
         return result
 

@@ -6,10 +6,11 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.estimation.ode_fit.coast import Rows, predict
+from shipdrag_ros.estimation.ode_fit.coast import predict
 from shipdrag_ros.estimation.ode_fit.law import Law
-from shipdrag_ros.estimation.ode_fit.whitening import Noise, whiten
 from shipdrag_ros.inference.gaussian import cholesky_solve, products_of
+from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.samples import Float64, Int64
 
 _RISES = 8  # of the damping, in one iteration

@@ -267,7 +267,9 @@ def test_auto_is_this_estimator(coast: Any, ship: Ship) -> None:
 def test_what_holds_no_coastdown_is_refused(coast: Any, ship: Ship) -> None:
     block = coast.block(500)
     few = only(coast.block(4), Channel.SPEED_THROUGH_WATER)
-    with pytest.raises(EstimationError, match='speed_through_water 4, speed_over_ground 0; 5 '):
+    with pytest.raises(
+        EstimationError, match='speed_through_water 4, speed_over_ground 0, position 0; 5 '
+    ):
         log_time.estimate(window(few), ship, Parameters())
     rng = np.random.default_rng(1)
     steady = changed(

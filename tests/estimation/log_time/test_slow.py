@@ -11,9 +11,9 @@ import numpy as np
 from shipdrag_ros.estimation import Window, log_time
 from shipdrag_ros.estimation.log_time.inputs import gather
 from shipdrag_ros.estimation.log_time.slow import Slow
-from shipdrag_ros.estimation.ode_fit.whitening import Disturbance
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Series
+from shipdrag_ros.inference.noise import GaussMarkovNoise
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -114,15 +114,15 @@ def test_whitening_is_that_of_the_dense_covariance(coast: Any, ship: Ship) -> No
     rng = np.random.default_rng(3)
     rows, residual = rng.normal(size=(5, n)), rng.normal(size=n)
     sizes = {'position': 10.0, 'speed_through_water': 0.05}
-    slow = Slow(Disturbance(0.0, 60.0, WANDER_M_S, WANDER_S), sizes, 240.0, 8.2, STEADY_S)
+    slow = Slow(GaussMarkovNoise(log_m_s=WANDER_M_S, log_s=WANDER_S), sizes, 240.0, 8.2, STEADY_S)
     weight = rng.uniform(0.1, 1.0, n)
     weight[0] = weight[first] = 1.0
     white_rows, white = slow.whitened(rows, residual, weight, inputs, ship)
 
-    sd = np.where(np.arange(n) < first, 10.0, 0.05)
+    sd = np.where(np.arange(n) < first, 0.05, 10.0)
     covariance = np.diag(sd**2 / weight)
-    log_s = inputs.time_s[first:]
-    covariance[first:, first:] += WANDER_M_S**2 * np.exp(
+    log_s = inputs.time_s[:first]
+    covariance[:first, :first] += WANDER_M_S**2 * np.exp(
         -np.abs(log_s[:, None] - log_s) / WANDER_S
     )
     precision = np.linalg.inv(covariance)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.estimation.ode_fit.averaging import average
-from shipdrag_ros.estimation.ode_fit.coast import EXTRAS, LOG, V0, Rows, predict
+from shipdrag_ros.estimation.ode_fit.coast import EXTRAS, V0, predict
 from shipdrag_ros.estimation.ode_fit.families import Priors
 from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.solve import fit
-from shipdrag_ros.estimation.ode_fit.whitening import CALM, Noise
+from shipdrag_ros.inference.noise import WHITE, Noise
+from shipdrag_ros.inference.rows import LOG, Rows
 from shipdrag_ros.samples import Float64
 
 POWERS = np.array([1, 2, 3, 4])
@@ -35,7 +36,7 @@ def averaged(
     rows: Rows, precision: list[list[float]], mean: list[list[float]] | None = None
 ) -> tuple[bool, Float64, Float64]:
     start = np.array([0.0, 0.04, 0.0, 0.0, 8.1, *np.zeros(EXTRAS - 1)])
-    calm = Noise(np.full(N, 0.05**2), CALM, np.ones(N), np.ones(N))
+    calm = Noise(np.full(N, 0.05**2), WHITE, np.ones(N), np.ones(N))
     held = np.array(precision)
     priors = Priors(np.zeros_like(held) if mean is None else np.array(mean), held)
     active = np.array([0, 1, 2, 3, len(POWERS) + V0])
@@ -50,7 +51,7 @@ LOW, HIGH = [OUT, 0.0, 0.0, OUT], [OUT, 0.0, OUT, 0.0]
 def test_one_prior_is_fitted_as_by_itself(rows: Rows) -> None:
     converged, unknowns, covariance = averaged(rows, [LOW])
     law = LAW._replace(powers=np.array([2, 3]))
-    calm = Noise(np.full(N, 0.05**2), CALM, np.ones(N), np.ones(N))
+    calm = Noise(np.full(N, 0.05**2), WHITE, np.ones(N), np.ones(N))
     start = np.array([0.04, 0.0, 8.1, *np.zeros(EXTRAS - 1)])
     active, prior = np.array([0, 1, 2]), np.zeros((2, len(start)))
     alone, _, expected, spread, _ = fit(law, start, GRID_S, rows, calm, active, prior, 30)

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION, Rows
 from shipdrag_ros.estimation.ode_fit.condensing import means
+from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 
 
 def test_means_are_weighted_and_in_ascending_time() -> None:

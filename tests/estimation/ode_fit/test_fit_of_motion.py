@@ -10,20 +10,14 @@ import pytest
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final, ode_fit
-from shipdrag_ros.estimation.ode_fit.coast import (
-    EXTRAS,
-    LOG,
-    POSITION,
-    Rows,
-    integrate,
-    predict,
-)
+from shipdrag_ros.estimation.ode_fit.coast import EXTRAS, integrate, predict
 from shipdrag_ros.estimation.ode_fit.law import Law
-from shipdrag_ros.estimation.ode_fit.learning import learn
 from shipdrag_ros.estimation.ode_fit.solve import cholesky_solve
 from shipdrag_ros.estimation.ode_fit.steady import white_sd
-from shipdrag_ros.estimation.ode_fit.whitening import CALM, Disturbance, Noise, whiten
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.inference.learning import learn
+from shipdrag_ros.inference.noise import WHITE, GaussMarkovNoise, Noise, whiten
+from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -235,7 +229,7 @@ def test_the_integration_is_of_fourth_order() -> None:
 def test_whitening_is_generalised_least_squares() -> None:
     time_s = np.array([0.0, 4.0, 9.0, 11.0, 30.0])
     rows = Rows(time_s, np.full(5, LOG), np.arange(5.0))
-    about = Disturbance(0.0, 60.0, 0.3, 20.0)
+    about = GaussMarkovNoise(log_m_s=0.3, log_s=20.0)
     variance = np.array([0.1, 0.2, 0.1, 0.3, 0.1])
     covariance = 0.09 * np.exp(-np.abs(time_s[:, None] - time_s) / 20.0) + np.diag(variance)
     table = np.vstack([rows.value, np.ones(5)])
@@ -256,7 +250,7 @@ def test_positions_that_wander_are_whitened_beside_a_log() -> None:
     both_position = np.outer(kind == POSITION, kind == POSITION)
     covariance = np.diag(variance) + both_position * 2.25 * np.exp(-apart / 50.0)
     covariance += both_log * 0.09 * np.exp(-apart / 20.0)
-    about = Disturbance(0.0, 60.0, 0.3, 20.0, 1.5, 50.0)
+    about = GaussMarkovNoise(log_m_s=0.3, log_s=20.0, place_m=1.5, place_s=50.0)
     table = np.vstack([rows.value, np.ones(6)])
     log_det = whiten(rows, table, Noise(variance, about, np.full(6, 0.01), np.ones(6)))
     full = np.vstack([rows.value, np.ones(6)])
@@ -336,9 +330,9 @@ def test_a_wandering_log_is_learnt_and_a_quiet_one_left_alone() -> None:
         quiet, _ = learn(
             Rows(time_s, kind, white), variance, damping_1_s=0.007, inertia=1.1, r_m_s2=0.025
         )
-        false += quiet != CALM
+        false += quiet != WHITE
     # log alone: the same wander may be told as a force
-    told = [item.water_m_s or item.gust_m_s2 / 1.1 / 0.0092 for item in found]
+    told = [item.log_m_s or item.gust_m_s2 / 1.1 / 0.0092 for item in found]
     assert 0.025 < np.median(told) < 0.1
     assert false <= 4
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from shipdrag_ros.estimation.ode_fit.coast import LOG, OVER_GROUND, POSITION
 from shipdrag_ros.estimation.ode_fit.weighing import drop_gross, weigh
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
 
 
 def test_variances_by_input_and_weights_by_size() -> None:

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipdrag_ros.diagnosis.noise import Colour, Damping, apply, bin_means, learn, whiten
-from shipdrag_ros.estimation.ode_fit.coast import LOG, POSITION, Rows
+from shipdrag_ros.inference.learning import most_probable
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, apply, whiten
+from shipdrag_ros.inference.rows import LOG, POSITION, Rows, bin_means
 
 TIMES_S = np.array([90.0, 600.0, 50.0, 40.0])
 
@@ -19,11 +20,16 @@ def gauss_markov(time: np.ndarray, sd: float, time_s: float) -> np.ndarray:
     return sd**2 * np.exp(-np.abs(time[:, None] - time[None, :]) / time_s)
 
 
-def whitener(rows: Rows, variance: np.ndarray, colour: Colour) -> np.ndarray:
+def slow_noise(size: np.ndarray, time_s: np.ndarray) -> GaussMarkovNoise:
+    """Return the noise of sizes and times of gust, water, log and place."""
+    return GaussMarkovNoise(*np.column_stack([size, time_s]).ravel())
+
+
+def whitener(rows: Rows, variance: np.ndarray, slow: GaussMarkovNoise) -> np.ndarray:
     """Return the matrix that whitens rows of a ship that answers slowly."""
     n = len(rows.time_s)
     table = np.eye(n)
-    whiten(rows, variance, colour, Damping(np.full(n, 2e-3), np.full(n, 1.05)), table)
+    whiten(rows, table, Noise(variance, slow, np.full(n, 2e-3), np.full(n, 1.05)))
     return table.T
 
 
@@ -34,7 +40,7 @@ def test_the_colour_of_a_sensor_is_whitened_exactly(kind: int, which: int) -> No
     size = np.zeros(4)
     size[which] = 0.7
     variance = np.full(60, 0.3)
-    found = whitener(rows, variance, Colour(size, TIMES_S))
+    found = whitener(rows, variance, slow_noise(size, TIMES_S))
     covariance = gauss_markov(time, 0.7, TIMES_S[which]) + 0.3 * np.eye(60)
     np.testing.assert_allclose(found @ covariance @ found.T, np.eye(60), rtol=0, atol=1e-10)
     assert np.all(np.triu(found, 1) == 0.0)
@@ -44,7 +50,7 @@ def test_water_that_moves_shifts_positions_by_its_integral() -> None:
     time = np.arange(0.0, 600.0, 5.0)
     n = len(time)
     rows = Rows(time, np.full(n, POSITION), np.zeros(n))
-    found = whitener(rows, np.full(n, 1.0), Colour(np.array([0.0, 0.2, 0.0, 0.0]), TIMES_S))
+    found = whitener(rows, np.full(n, 1.0), slow_noise(np.array([0.0, 0.2, 0.0, 0.0]), TIMES_S))
     # dense: the integral of a fine process
     fine = np.arange(0.0, 595.1, 1.0)
     weights = np.array([[max(min(t - f, 1.0), 0.0) for f in fine] for t in time])
@@ -77,8 +83,8 @@ def test_a_gust_moves_the_ship_and_its_position() -> None:
     rows = Rows(steps[::40], np.full(len(seen), POSITION), np.zeros(len(seen)))
     table = np.array(seen).T.copy()
     n = len(seen)
-    colour = Colour(np.array([sd, 0.0, 0.0, 0.0]), np.array([time_s, 1.0, 1.0, 1.0]))
-    whiten(rows, np.full(n, 0.25), colour, Damping(np.full(n, rate), np.full(n, inertia)), table)
+    gusts = GaussMarkovNoise(gust_m_s2=sd, gust_s=time_s)
+    whiten(rows, table, Noise(np.full(n, 0.25), gusts, np.full(n, rate), np.full(n, inertia)))
     # the first rows show whether the beginning is stationary; the chain above is only nearly so
     assert np.mean(table[:, 5:] ** 2) == pytest.approx(1.0, abs=0.05)
 
@@ -93,11 +99,11 @@ def test_sizes_are_learnt_from_a_steady_record() -> None:
         colour = np.linalg.cholesky(gauss_markov(time, 0.05, 50.0) + 1e-12 * np.eye(n))
         log = 6.0 + colour @ rng.standard_normal(n) + 0.01 * rng.standard_normal(n)
         rows = Rows(time, np.full(n, LOG), log)
-        found = learn(rows, np.full(n, 1e-4), damping_1_s=2e-3, inertia=1.05)
+        found = most_probable(rows, np.full(n, 1e-4), damping_1_s=2e-3, inertia=1.05)
         # a gust and an error of the log leave the same trace in a log alone
         n_rate = 2e-3
-        by_gust = found.size[0] / 1.05 / np.sqrt(n_rate * (n_rate + 1.0 / found.time_s[0]))
-        ratios.append(np.hypot(found.size[2], by_gust) / 0.05)
+        by_gust = found.gust_m_s2 / 1.05 / np.sqrt(n_rate * (n_rate + 1.0 / found.gust_s))
+        ratios.append(np.hypot(found.log_m_s, by_gust) / 0.05)
     assert 0.6 < np.median(ratios) < 1.6
 
 
