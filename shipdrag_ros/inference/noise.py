@@ -24,7 +24,7 @@ from shipdrag_ros.samples import Float64, Int64
 # speed through still water and distance over ground, then the four sources
 _U, _X, _GUST, _WATER, _LOG, _PLACE = range(6)
 _STATES = 6
-_LONGEST_STEP_S = 15.0  # of the prediction through a gap, in which the force acts evenly
+_LONGEST_STEP_S = 30.0  # of the prediction through a gap, in which the damping is even
 
 
 class GaussMarkovNoise(NamedTuple):
@@ -77,83 +77,133 @@ class Noise(NamedTuple):
     inertia: Float64
 
 
+# what a step does, in this order; then decay and added variance of each source
+_U_BY_U, _U_BY_GUST, _X_BY_U, _X_BY_GUST, _X_BY_WATER, _UU, _UX, _XX, _UG, _XG, _DECAYS = range(11)
+_STEP = _DECAYS + 2 * (_STATES - _GUST)
+_NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))  # of Gauss and Legendre, on 0 .. 1
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+_APART = 1e-4  # of decay rates times the step: closer ones are taken as so far apart
+
+
 @compiled
-def _transition(slow: GaussMarkovNoise, damping: float, inertia: float, dt: float) -> Float64:
-    """Return what a step does: u by u, u by force, x by u, x by force, x by water; then decays."""
-    f = np.empty(5 + 2 * (_STATES - _GUST))
+def _response(a: float, b: float, dt: float) -> tuple[float, float, float]:
+    """Return speed and distance, by the force that decays at b, after a time; and what is left."""
+    left = math.exp(-b * dt)
+    by_a, by_b = -math.expm1(-a * dt), -math.expm1(-b * dt)
+    return (by_a - by_b) / (a - b), (by_b / b - by_a / a) / (a - b), left
+
+
+@compiled
+def _fill_step(
+    slow: GaussMarkovNoise, damping: float, inertia: float, dt: float, step: Float64
+) -> None:
+    """Fill in what a step does to the states."""
     size = (slow.gust_m_s2, slow.water_m_s, slow.log_m_s, slow.place_m)
     time_s = (slow.gust_s, slow.water_s, slow.log_s, slow.place_s)
     for k in range(_STATES - _GUST):
-        decay = math.exp(-dt / time_s[k])
-        f[5 + 2 * k] = decay
-        f[6 + 2 * k] = size[k] ** 2 * (1.0 - decay * decay)
-    f[0] = math.exp(-damping * dt)
-    lag = -math.expm1(-damping * dt) / damping
-    f[1] = lag * 0.5 * (1.0 + f[5]) / inertia
-    f[2] = lag
-    f[3] = 0.5 * dt * f[1]
-    f[4] = 0.5 * dt * (1.0 + f[7])
-    return f
+        if size[k] > 0.0:
+            decay = math.exp(-dt / time_s[k])
+            step[_DECAYS + 2 * k] = decay
+            step[_DECAYS + 2 * k + 1] = size[k] ** 2 * (1.0 - decay * decay)
+    step[_U_BY_U] = math.exp(-damping * dt)
+    step[_X_BY_U] = -math.expm1(-damping * dt) / damping
+    step[_X_BY_WATER] = 0.5 * dt * (1.0 + step[_DECAYS + 2])
+    if size[0] > 0.0:
+        b = 1.0 / slow.gust_s
+        a = damping if abs(damping - b) * dt > _APART else b + _APART / dt
+        speed, way, _ = _response(a, b, dt)
+        step[_U_BY_GUST], step[_X_BY_GUST] = speed / inertia, way / inertia
+        step[_UU : _XG + 1] = 0.0
+        # what the force does that comes up within the step
+        for node, weight in zip(_NODES, _WEIGHTS):
+            speed, way, left = _response(a, b, node * dt)
+            speed, way = speed / inertia, way / inertia
+            part = weight * dt * 2.0 * b * slow.gust_m_s2**2
+            step[_UU] += part * speed * speed
+            step[_UX] += part * speed * way
+            step[_XX] += part * way * way
+            step[_UG] += part * speed * left
+            step[_XG] += part * way * left
 
 
 @compiled
-def _predict(cov: Float64, mean: Float64, f: Float64, active: Int64, moved: bool) -> None:
+def _move(lines: Float64, step: Float64, place: Int64) -> None:
+    """Carry speed and distance, lines of a matrix, over a step."""
+    u, x, gust, water = place[_U], place[_X], place[_GUST], place[_WATER]
+    for c in range(lines.shape[1]):
+        speed, force = lines[u, c], lines[gust, c]
+        lines[x, c] += (
+            step[_X_BY_U] * speed + step[_X_BY_GUST] * force + step[_X_BY_WATER] * lines[water, c]
+        )
+        lines[u, c] = step[_U_BY_U] * speed + step[_U_BY_GUST] * force
+
+
+@compiled
+def _predict(cov: Float64, mean: Float64, step: Float64, place: Int64, moved: bool) -> None:
     """Carry covariance and means over a step, F P F' + Q."""
+    off = len(cov) - 1
     if moved:
+        _move(mean, step, place)
+        _move(cov, step, place)
+        _move(cov.T, step, place)
+    for k in range(_STATES - _GUST):
+        s = place[_GUST + k]
+        if s == off:
+            continue
+        decay = step[_DECAYS + 2 * k]
         for c in range(mean.shape[1]):
-            u, g = mean[_U, c], mean[_GUST, c]
-            mean[_X, c] += f[2] * u + f[3] * g + f[4] * mean[_WATER, c]
-            mean[_U, c] = f[0] * u + f[1] * g
-        for c in active:
-            u, g = cov[_U, c], cov[_GUST, c]
-            cov[_X, c] += f[2] * u + f[3] * g + f[4] * cov[_WATER, c]
-            cov[_U, c] = f[0] * u + f[1] * g
-        for r in active:
-            u, g = cov[r, _U], cov[r, _GUST]
-            cov[r, _X] += f[2] * u + f[3] * g + f[4] * cov[r, _WATER]
-            cov[r, _U] = f[0] * u + f[1] * g
-    for s in active:
-        if s >= _GUST:
-            decay, grown = f[5 + 2 * (s - _GUST)], f[6 + 2 * (s - _GUST)]
-            for c in range(mean.shape[1]):
-                mean[s, c] *= decay
-            for other in active:
-                cov[s, other] *= decay
-                cov[other, s] *= decay
-            cov[s, s] += grown
+            mean[s, c] *= decay
+        for other in range(off):
+            cov[s, other] *= decay
+        for other in range(off):
+            cov[other, s] *= decay
+        cov[s, s] += step[_DECAYS + 2 * k + 1]
+    if place[_GUST] < off:
+        _add_force(cov, step, place)
 
 
 @compiled
-def _stationary(noise: Noise) -> Float64:
+def _add_force(cov: Float64, step: Float64, place: Int64) -> None:
+    """Add what a force that comes up within the step does to speed and distance."""
+    u, x, gust = place[_U], place[_X], place[_GUST]
+    cov[u, u] += step[_UU]
+    cov[x, x] += step[_XX]
+    cov[u, x] += step[_UX]
+    cov[u, gust] += step[_UG]
+    cov[x, gust] += step[_XG]
+    cov[x, u], cov[gust, u], cov[gust, x] = cov[u, x], cov[u, gust], cov[x, gust]
+
+
+@compiled
+def _places(slow: GaussMarkovNoise) -> tuple[Int64, int]:
+    """Number the states that are disturbed; the others share one place behind, always 0."""
+    size = (slow.gust_m_s2, slow.water_m_s, slow.log_m_s, slow.place_m)
+    moved = size[0] > 0.0 or size[1] > 0.0
+    place = np.full(_STATES, -1)
+    active = 0
+    for s in range(_STATES):
+        if moved if s < _GUST else size[s - _GUST] > 0.0:
+            place[s] = active
+            active += 1
+    place[place < 0] = active
+    return place, active
+
+
+@compiled
+def _stationary(noise: Noise, place: Int64, active: int) -> Float64:
     """Return the covariance of the states before the first row."""
     slow, damping, inertia = noise.slow, noise.damping_1_s[0], noise.inertia[0]
-    cov = np.zeros((_STATES, _STATES))
-    cov[_GUST, _GUST] = slow.gust_m_s2**2
-    cov[_WATER, _WATER] = slow.water_m_s**2
-    cov[_LOG, _LOG] = slow.log_m_s**2
-    cov[_PLACE, _PLACE] = slow.place_m**2
+    size = (slow.gust_m_s2, slow.water_m_s, slow.log_m_s, slow.place_m)
+    cov = np.zeros((active + 1, active + 1))
+    for k in range(_STATES - _GUST):
+        s = place[_GUST + k]
+        cov[s, s] = size[k] ** 2
     if slow.gust_m_s2 > 0.0:
-        cov[_U, _GUST] = cov[_GUST, _GUST] / inertia / (damping + 1.0 / slow.gust_s)
-        cov[_GUST, _U] = cov[_U, _GUST]
-        cov[_U, _U] = cov[_U, _GUST] / inertia / damping
+        u, gust = place[_U], place[_GUST]
+        cov[u, gust] = cov[gust, gust] / inertia / (damping + 1.0 / slow.gust_s)
+        cov[gust, u] = cov[u, gust]
+        cov[u, u] = cov[u, gust] / inertia / damping
     return cov
-
-
-@compiled
-def _active(slow: GaussMarkovNoise) -> tuple[Int64, bool]:
-    """Return the states that are disturbed, and whether the ship is moved."""
-    moved = slow.gust_m_s2 > 0.0 or slow.water_m_s > 0.0
-    on = np.array(
-        [
-            moved,
-            moved,
-            slow.gust_m_s2 > 0.0,
-            slow.water_m_s > 0.0,
-            slow.log_m_s > 0.0,
-            slow.place_m > 0.0,
-        ]
-    )
-    return np.flatnonzero(on), moved
 
 
 @compiled
@@ -178,8 +228,7 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
     variance, slow, damping, inertia = noise
     columns, n = table.shape
     log_det = 0.0
-    active, moved = _active(slow)
-    if len(active) == 0:
+    if slow.gust_m_s2 == slow.water_m_s == slow.log_m_s == slow.place_m == 0.0:
         weights = 1.0 / np.sqrt(variance)
         for c in range(columns):
             for i in range(n):
@@ -187,10 +236,10 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
         for i in range(n):
             log_det += np.log(variance[i])
         return log_det
-    cov = _stationary(noise)
-    mean = np.zeros((_STATES, columns))
-    gain, seen = np.zeros(_STATES), np.zeros(_STATES)
-    f = np.empty(0)
+    moved = slow.gust_m_s2 > 0.0 or slow.water_m_s > 0.0
+    place, active = _places(slow)
+    cov, mean = _stationary(noise, place, active), np.zeros((active + 1, columns))
+    gain, seen, step = np.zeros(active), np.zeros(active + 1), np.zeros(_STEP)
     last_dt, last_mid, last_inertia = -1.0, -1.0, -1.0
     for i in range(n):
         if i:
@@ -199,30 +248,30 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
                 parts = int(np.ceil(dt / _LONGEST_STEP_S)) if moved else 1
                 mid = 0.5 * (damping[i] + damping[i - 1])
                 if dt != last_dt or mid != last_mid or inertia[i] != last_inertia:
-                    f = _transition(slow, mid, inertia[i], dt / parts)
+                    _fill_step(slow, mid, inertia[i], dt / parts, step)
                     last_dt, last_mid, last_inertia = dt, mid, inertia[i]
                 for _ in range(parts):
-                    _predict(cov, mean, f, active, moved)
+                    _predict(cov, mean, step, place, moved)
         # what is measured, and the error of its input
-        first, error = _X, _PLACE
+        first, error = place[_X], place[_PLACE]
         if rows.kind[i] == LOG:
-            first, error = _U, _LOG
+            first, error = place[_U], place[_LOG]
         elif rows.kind[i] == OVER_GROUND:
-            first, error = _U, _WATER
-        for s in active:
+            first, error = place[_U], place[_WATER]
+        for s in range(active):
             seen[s] = cov[s, first] + cov[s, error]
         total = seen[first] + seen[error] + variance[i]
         weight = 1.0 / np.sqrt(total)
         log_det += np.log(total)
-        for s in active:
+        for s in range(active):
             gain[s] = seen[s] / total
         for c in range(columns):
             innovation = table[c, i] - mean[first, c] - mean[error, c]
-            for s in active:
+            for s in range(active):
                 mean[s, c] += gain[s] * innovation
             table[c, i] = innovation * weight
-        for a in active:
-            for b in active:
+        for a in range(active):
+            for b in range(active):
                 cov[a, b] -= gain[a] * seen[b]
     return log_det
 

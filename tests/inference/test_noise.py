@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.inference.learning import most_probable
@@ -107,12 +107,45 @@ def test_sizes_are_learnt_from_a_steady_record() -> None:
     assert 0.6 < np.median(ratios) < 1.6
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.integers(1, 30), st.integers(1, 5), st.integers(0, 1000))
 def test_apply_is_a_product_of_matrices(n: int, lines: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     lower = np.tril(rng.standard_normal((n, n)))
     table = rng.standard_normal((lines, n))
     np.testing.assert_allclose(apply(lower, table), table @ lower.T, rtol=1e-12, atol=1e-12)
+
+
+def test_a_gust_reaches_position_as_far_as_speed_carries_it() -> None:
+    """Speed and position that are known together: 600 records, seed 4; squares 1 +- 0.05."""
+    rng = np.random.default_rng(4)
+    step, rate, inertia, sd, time_s, apart = 0.25, 2e-2, 1.05, 1e-2, 30.0, 12.0
+    decay, runs = np.exp(-step / time_s), 600
+    gust = sd * rng.standard_normal(runs)
+    speed, path, seen = np.zeros(runs), np.zeros(runs), []
+    for i in range(round(1000.0 / step)):
+        if i == round(480.0 / step):
+            path[:] = 0.0
+        if i >= round(480.0 / step) and i % round(apart / step) == 0:
+            # both are nearly exact: what a step adds to one must be what it adds to the other
+            seen += [
+                speed + 0.01 * rng.standard_normal(runs),
+                path + 0.05 * rng.standard_normal(runs),
+            ]
+        push = 0.5 * gust / inertia
+        gust = decay * gust + sd * np.sqrt(1 - decay**2) * rng.standard_normal(runs)
+        push += 0.5 * gust / inertia
+        before = speed
+        speed = speed + step * (push - rate * speed)
+        path += 0.5 * step * (before + speed)
+    n = len(seen) // 2
+    kind, variance = np.tile([LOG, POSITION], n), np.tile([1e-4, 2.5e-3], n)
+    rows = Rows(np.repeat(apart * np.arange(n), 2), kind, np.zeros(2 * n))
+    table = np.array(seen).T.copy()
+    slow = GaussMarkovNoise(gust_m_s2=sd, gust_s=time_s)
+    whiten(rows, table, Noise(variance, slow, np.full(2 * n, rate), np.full(2 * n, inertia)))
+    assert np.mean(table[:, 4::2] ** 2) == pytest.approx(1.0, abs=0.05)
+    assert np.mean(table[:, 5::2] ** 2) == pytest.approx(1.0, abs=0.05)
 
 
 @given(st.lists(st.floats(0.0, 99.0), min_size=1, max_size=50))
