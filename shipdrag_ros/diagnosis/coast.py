@@ -26,14 +26,12 @@ from shipdrag_ros.diagnosis.coast_terms import (
     Term,
 )
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, Linear, nothing_missing
-from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
-from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs, trial_z
+from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
 from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
@@ -43,32 +41,15 @@ _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find
 
 
 @dataclass(frozen=True)
-class CoastModel:
+class CoastModel(CoastSimulation):
     """
-    The hypotheses about some runs.
-
-    Attributes
-    ----------
-    ship
-        As its file states it.
-    seen
-    reference_rad
-        Heading of the first of all runs, along which effects of the earth are
-        stated.
+    The hypotheses about some runs, and their simulation; a `Model`.
     """
 
-    ship: Ship
-    seen: tuple[Observation, ...]
-    reference_rad: float
     # each iteration is a simulation
     iterations: ClassVar[int] = 16
     converged: ClassVar[float] = 0.02
     hopeless: ClassVar[float] = 80.0
-
-    @cached_property
-    def simulated(self) -> CoastSimulation:
-        """What all share."""
-        return CoastSimulation(replace(self.ship, effects=()), self.seen, self.reference_rad)
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -83,7 +64,7 @@ class CoastModel:
                 f'ship {self.ship.name!r} has no baseline to hold a run against; '
                 'add `baseline` to its ship file, or learn one with `shipdrag baseline`'
             )
-        ship = self.simulated.ship
+        ship = self.bare
         stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
         baseline = BaselineTerm(
             ship,
@@ -138,7 +119,7 @@ class CoastModel:
         for start, word, sign, run in product(starts, words, signs, runs):
             term = EffectTerm(
                 effect,
-                self.simulated.ship,
+                self.bare,
                 start,
                 fixed=_named(choices, word),
                 signs=_named(signed, sign),
@@ -168,7 +149,7 @@ class CoastModel:
         found = replace(base, discrepancy=channel, log_prior=log_prior)
         if channel == 'force':
             top = 1.05 * max(run.speed_m_s for run in self.seen)
-            return replace(found, terms=(*base.terms, ForceTerm(self.simulated.ship, top)))
+            return replace(found, terms=(*base.terms, ForceTerm(self.bare, top)))
         errors: list[MeasurementTerm] = [
             SpeedErrorTerm(j, channel == 'log', run.speed_m_s) for j, run in enumerate(self.seen)
         ]
@@ -224,29 +205,6 @@ class CoastModel:
     def free(self) -> Float64:
         """Steady speeds of the runs [m/s]."""
         return np.array([run.speed_m_s for run in self.seen])
-
-    def linearise(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        at: Sequence[Float64],
-        near: Sequence[Linear | None] | None = None,
-    ) -> list[Linear]:
-        """
-        Return the whitened rows of each hypothesis about some unknowns.
-        """
-        return self.simulated.linearise(hypotheses, at, near)
-
-    def responses(self, base: Linear, hypotheses: Sequence[Hypothesis]) -> Float64:
-        """
-        Return the linear response to the last term of each, (hypotheses, rows).
-        """
-        terms: list[tuple[Term, list[float]]] = []
-        for hypothesis in hypotheses:
-            term = hypothesis.terms[-1]
-            first, *others = term.unknowns
-            sizes = [first.value(trial_z(first)), *(u.value(u.start) for u in others)]
-            terms.append((term, sizes))
-        return np.hstack(self.simulated.responses(base, terms))
 
 
 def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:

@@ -102,13 +102,13 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     return judged.diagnosis(
         would_decide=would_decide,
         where=place,
-        before=gap_of(model.simulated, as_stated.best),
-        after=gap_of(model.simulated, best.best) if judged.missing else None,
+        before=gap_of(model, as_stated.best),
+        after=gap_of(model, best.best) if judged.missing else None,
         held_out_before=held_out(model, None),
         held_out_after=predicted if judged.missing else None,
         baseline='stated',
         notes=notes,
-        traces=traces(model.simulated, as_stated.best, explained.best),
+        traces=traces(model, as_stated.best, explained.best),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
     )

@@ -14,7 +14,6 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, start
 from shipdrag_ros.diagnosis.observation import Measured
 from shipdrag_ros.diagnosis.result import Compared, Gap, Trace, Where
-from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.estimation.motion_fit.coast import LOG, POSITION
 from shipdrag_ros.estimation.motion_fit.record import KINDS
@@ -27,12 +26,12 @@ _ROUNDS = 3
 _ACROSS = 'position_across'
 
 
-def gap_of(simulated: CoastSimulation, linear: Linear) -> Gap:
+def gap_of(model: CoastModel, linear: Linear) -> Gap:
     """
     Return how far a fitted model is from the runs.
     """
     speeds, places = [], []
-    for seen, residual in zip(simulated.seen, linear.residuals, strict=True):
+    for seen, residual in zip(model.seen, linear.residuals, strict=True):
         n = len(seen.along)
         along, kind = residual[:n], seen.along.rows.kind
         coasting = seen.along.rows.time_s >= seen.lead_in_s
@@ -88,7 +87,7 @@ def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
             continue
         else:
             linear = predicted(model, j, found)
-        gaps.append(gap_of(alone.simulated, linear))
+        gaps.append(gap_of(alone, linear))
         rows.append(linear.rows)
     if not gaps:
         return None
@@ -176,7 +175,7 @@ def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
         first = int(np.searchsorted(share, 0.5 * (1.0 - _SHARE)))
         last = int(np.searchsorted(share, 0.5 * (1.0 + _SHARE)))
         ends = np.array([first, last + 1]) / _PARTS * seen.duration_s
-        speed = model.simulated.predict(j, as_stated.best).speed
+        speed = model.predict(j, as_stated.best).speed
         times.append(ends)
         speeds.append(np.interp(ends + seen.lead_in_s, seen.time_s, speed))
     if not times:
@@ -189,23 +188,23 @@ def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
     )
 
 
-def traces(simulated: CoastSimulation, before: Linear, after: Linear) -> tuple[Trace, ...]:
+def traces(model: CoastModel, before: Linear, after: Linear) -> tuple[Trace, ...]:
     """
     Return each run as it was measured and as two models have it.
 
     Parameters
     ----------
-    simulated
+    model
         That both were fitted to.
     before, after
         Two models at their best fit.
     """
-    return tuple(_trace(simulated, j, before, after) for j in range(len(simulated.seen)))
+    return tuple(_trace(model, j, before, after) for j in range(len(model.seen)))
 
 
-def _trace(simulated: CoastSimulation, run: int, before: Linear, after: Linear) -> Trace:
-    seen = simulated.seen[run]
-    speed = simulated.predict(run, after).speed
+def _trace(model: CoastModel, run: int, before: Linear, after: Linear) -> Trace:
+    seen = model.seen[run]
+    speed = model.predict(run, after).speed
     n = len(seen.along)
     blocks: list[tuple[str, Measured, slice]] = [(name, seen.along, slice(0, n)) for name in KINDS]
     if seen.across is not None:

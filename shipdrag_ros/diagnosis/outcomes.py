@@ -2,7 +2,7 @@
 """
 What a measurement that is yet to be made would tell apart.
 
-Each rival predicts it, as well as the runs that there are let it; outcomes are
+Each rival predicts it from the posterior given the existing runs; outcomes are
 drawn under each in turn, and the verdict on every one of them is found as it
 would be.
 """
@@ -101,7 +101,7 @@ class Rival:
 
 
 def of_another_run(
-    simulated: CoastSimulation, fits: Sequence[Fit], run: Observation
+    model: CoastSimulation, fits: Sequence[Fit], run: Observation
 ) -> list[list[PredictedOutcome]]:
     """
     Return what fitted hypotheses predict of a run that is yet to be made.
@@ -122,7 +122,7 @@ def of_another_run(
     weights: list[float] = []
     whose: list[int] = []
     for number, one in enumerate(fits):
-        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(simulated.seen)):
+        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(model.seen)):
             kept = _places(one.hypothesis, hypothesis)
             z = np.array([*(unknown.start for unknown in hypothesis.unknowns), run.speed_m_s])
             covariance = np.diag([*(float(u.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0])
@@ -137,7 +137,7 @@ def of_another_run(
             there.append(hypothesis)
             weights.append(log_weight)
             whose.append(number)
-    linear = replace(simulated, seen=(run,)).linearise(there, at)
+    linear = replace(model, seen=(run,)).linearise(there, at)
     ways: list[list[PredictedOutcome]] = [[] for _ in fits]
     for number, found, (covariance, precision), log_weight in zip(
         whose, linear, before, weights, strict=True
@@ -150,7 +150,7 @@ def of_another_run(
 
 
 def of_instrument(
-    simulated: CoastSimulation, fits: Sequence[Fit], contexts: Sequence[Context]
+    model: CoastSimulation, fits: Sequence[Fit], contexts: Sequence[Context]
 ) -> tuple[list[list[PredictedOutcome]], list[Float64]]:
     """
     Return what fitted hypotheses predict of an instrument in the runs there are.
@@ -162,30 +162,30 @@ def of_instrument(
 
     Returns
     -------
-    prospects
-        Of each hypothesis one.
-    values
-        (r,) of each, as predicted and not whitened.
+    list of list
+        The predicted outcome of each hypothesis, one.
+    list of (r,)
+        Values of each, as predicted and not whitened.
     """
     seen = tuple(
         replace(run, context=replace(context, value=np.zeros(len(context))))
-        for run, context in zip(simulated.seen, contexts, strict=True)
+        for run, context in zip(model.seen, contexts, strict=True)
     )
-    found = replace(simulated, seen=seen).linearise(
+    found = replace(model, seen=seen).linearise(
         [one.hypothesis for one in fits], [one.best.z for one in fits]
     )
-    prospects, values = [], []
+    outcomes, values = [], []
     for one, linear in zip(fits, found, strict=True):
         both = list(zip(linear.tables, linear.residuals, contexts, strict=True))
         table = np.hstack([table[:, table.shape[1] - len(c) :] for table, _, c in both])
         precision = np.asarray(np.linalg.inv(one.covariance), np.float64)
-        prospects.append([PredictedOutcome(-table[0], table[1:], one.covariance, precision)])
+        outcomes.append([PredictedOutcome(-table[0], table[1:], one.covariance, precision)])
         values.append(-np.concatenate([left[len(left) - len(c) :] for _, left, c in both]))
-    return prospects, values
+    return outcomes, values
 
 
 def with_known(
-    prospects: Sequence[Sequence[PredictedOutcome]],
+    outcomes: Sequence[Sequence[PredictedOutcome]],
     fits: Sequence[Fit],
     sd: Mapping[str, Sequence[float]],
 ) -> list[list[PredictedOutcome]]:
@@ -199,7 +199,7 @@ def with_known(
         nothing.
     """
     found = []
-    for ways, one in zip(prospects, fits, strict=True):
+    for ways, one in zip(outcomes, fits, strict=True):
         mean, slope = [], []
         for part, place in one.hypothesis.parts:
             if not isinstance(part, BaselineTerm | RunNuisance):
@@ -239,7 +239,7 @@ def probability_of_naming(
     Parameters
     ----------
     settings
-        Prospects of all rivals, for each way in which the measurement may be
+        Predicted outcomes of all rivals, for each way in which the measurement may be
         read.
     setting
         The way it is read where each rival is the truth.

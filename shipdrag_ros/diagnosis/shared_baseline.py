@@ -218,7 +218,7 @@ class SharedBaseline:
         scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.WIDE]
         shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
         shared = [*scales, *shapes]
-        speeds = [model.simulated.predict(j, fitted.best).speed for j in range(len(seen))]
+        speeds = [model.predict(j, fitted.best).speed for j in range(len(seen))]
         return cls(
             model,
             fitted,

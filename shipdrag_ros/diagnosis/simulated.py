@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, Predicted, Term
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.noise import apply
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.terms import trial_z
 from shipdrag_ros.estimation.motion_fit.coast import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -65,16 +66,17 @@ class _Plan:
 @dataclass(frozen=True)
 class CoastSimulation:
     """
-    What all hypotheses share.
+    Runs, and the simulation of hypotheses about them.
 
     Attributes
     ----------
     ship
-        Without effects: those that its file states are terms.
+        As its file states it.
     seen
         The runs.
     reference_rad
-        Heading of the first of all runs.
+        Heading of the first of all runs, along which effects of the earth are
+        stated.
     """
 
     ship: Ship
@@ -82,11 +84,16 @@ class CoastSimulation:
     reference_rad: float
 
     @cached_property
+    def bare(self) -> Ship:
+        """The ship without effects: those that its file states are terms."""
+        return replace(self.ship, effects=())
+
+    @cached_property
     def frames(self) -> tuple[Frame, ...]:
         """One a run; effects of the earth lie along the first run."""
         return tuple(
             Frame(
-                self.ship,
+                self.bare,
                 Scenario(
                     speed_m_s=run.speed_m_s,
                     lead_in_s=run.lead_in_s,
@@ -126,16 +133,11 @@ class CoastSimulation:
             for i, (hypothesis, z) in enumerate(zip(hypotheses, at, strict=True))
         ]
 
-    def responses(
-        self, base: Linear, terms: Sequence[tuple[Term, Sequence[float]]]
-    ) -> list[Float64]:
+    def responses(self, base: Linear, hypotheses: Sequence[Hypothesis]) -> Float64:
         """
-        Return what terms with given values, one at a time, would change in the whitened rows.
+        Return the linear response to the last term of each, (hypotheses, rows), whitened.
 
-        Returns
-        -------
-        list of (terms, rows)
-            Of each run; 0 where it cannot be simulated.
+        It is 0 where it cannot be simulated.
         """
         found = []
         for j, (frame, seen) in enumerate(zip(self.frames, self.seen, strict=True)):
@@ -144,8 +146,11 @@ class CoastSimulation:
             acting = self._acting(j, base.hypothesis, base.z)
             whole = sum((term.action(frame, j, values) for term, _, values in acting), Action())
             batch.add(whole, speed)
-            for term, values in terms:
-                more = term.action(frame, j, values) if term.acts_in(j) else Action()
+            for hypothesis in hypotheses:
+                term = hypothesis.terms[-1]
+                first, *others = term.unknowns
+                sizes = [first.value(trial_z(first)), *(u.value(u.start) for u in others)]
+                more = term.action(frame, j, sizes) if term.acts_in(j) else Action()
                 batch.add(whole + more, speed)
             columns = self._simulate(j, batch)
             context = seen.context.predict(columns, batch.actions)
@@ -158,7 +163,7 @@ class CoastSimulation:
             change = rows[1:] - rows[0]
             change[~np.isfinite(change).all(axis=1)] = 0.0
             found.append(self._whitened(j, change))
-        return found
+        return np.hstack(found)
 
     def predict(self, run: int, linear: Linear) -> Predicted:
         """
@@ -172,7 +177,7 @@ class CoastSimulation:
     def _simulate(self, run: int, batch: _Batch) -> Columns:
         frame = self.frames[run]
         return simulate_columns(
-            self.ship,
+            self.bare,
             frame.scenario,
             batch.actions,
             self.seen[run].time_s,
