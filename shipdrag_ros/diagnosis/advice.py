@@ -28,8 +28,8 @@ from shipdrag_ros.diagnosis.outcomes import (
     probability_of_naming,
     with_known,
 )
+from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.diagnosis.result import Advice, Candidate
-from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.estimation.motion_fit.coast import LOG
 from shipdrag_ros.estimation.motion_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
@@ -64,8 +64,17 @@ def advice(
 
     Parameters
     ----------
+    model
+        The runs, and what they are held against.
+    posterior
+        Of what was found.
     candidates
         That the runs cannot tell apart.
+
+    Returns
+    -------
+    tuple of Advice
+        Of measurements that the runs do not hold already.
 
     Notes
     -----
@@ -103,6 +112,16 @@ def advice(
 def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
     """
     Return what the effects say tells them apart, what serves most pairs first.
+
+    Parameters
+    ----------
+    candidates
+        With their probabilities, which weigh the pairs.
+
+    Returns
+    -------
+    tuple of Advice
+        Without a probability.
     """
     votes: dict[Measure, float] = {}
     for one, other in combinations(candidates, 2):
@@ -242,9 +261,7 @@ def _windows(measure: Measure, model: CoastModel, *, after: float = 0.0) -> list
         since_s = np.maximum(time_s - stop.lead_in_s, 0.0)
         readings = {
             Channel.WIND_APPARENT: np.column_stack([gusts - stop.speed_m_s, gusts]),
-            Channel.DEPTH: np.full(
-                len(time_s), _SHALLOW_DRAUGHTS * (model.ship.draught_m or math.nan)
-            ),
+            Channel.DEPTH: np.full(len(time_s), _SHALLOW_DRAUGHTS * draught_m),
             Channel.HEADING: np.full(len(time_s), stop.heading_rad),
             Channel.SHAFT: after + (1.0 - after) * np.exp(-since_s / max(run.run_down_s, 1e-3)),
         }

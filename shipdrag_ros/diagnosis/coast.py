@@ -104,6 +104,18 @@ class CoastModel(CoastSimulation):
 
         They differ in where a fit begins, in what is a choice, in signs, and in which run
         an effect of a single run was.
+
+        Parameters
+        ----------
+        base
+            Of this model.
+        effect
+            That may act on the ship.
+
+        Returns
+        -------
+        list of Hypothesis
+            The effect is their last term.
         """
         free = [q for q in effect.parameters if q.prior.shape is not Shape.CHOICE]
         choices = [q for q in effect.parameters if q.prior.shape is Shape.CHOICE]
@@ -144,6 +156,18 @@ class CoastModel(CoastSimulation):
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """
         Return a hypothesis with something smooth and unnamed besides.
+
+        Parameters
+        ----------
+        base
+            Of this model.
+        channel
+            One of `channels`.
+
+        Returns
+        -------
+        Hypothesis
+            With prior log odds of `UNNAMED_ODDS` more.
         """
         log_prior = base.log_prior + math.log(UNNAMED_ODDS)
         found = replace(base, discrepancy=channel, log_prior=log_prior)
@@ -161,9 +185,16 @@ class CoastModel(CoastSimulation):
 
         Parameters
         ----------
+        other
+            About more runs.
         runs
             Which of the others these are. What is in a single run comes last, and
             is left out where that is none of them.
+
+        Returns
+        -------
+        Hypothesis
+            Of this model.
         """
         kept: list[Term] = []
         own: list[Term] = []
@@ -189,6 +220,18 @@ class CoastModel(CoastSimulation):
     def stop_moved_s(self, fit: Fit, run: int) -> float:
         """
         Return by how much a fit moves the stop of a run.
+
+        Parameters
+        ----------
+        fit
+            Of this model.
+        run
+            Its place among the runs.
+
+        Returns
+        -------
+        float
+            Later than it was taken for [s].
         """
         for part, place in fit.hypothesis.parts:
             if isinstance(part, RunNuisance) and part.run == run:

@@ -92,8 +92,19 @@ class Context:
 
         Parameters
         ----------
+        window
+            Of the coastdown.
+        ship
+            For the draught and the run-down of the thrust.
         times : (m,)
             Of the observation [s].
+        stop
+            What the context is counted from.
+
+        Returns
+        -------
+        Context
+            Without rows of what was not measured.
         """
         edges = np.arange(0.0, times[-1] + _BIN_S, _BIN_S)
         wind_s, wind = _binned(window, 'wind_apparent', stop, edges)
@@ -131,6 +142,18 @@ class Context:
     def predict(self, columns: Columns, actions: Sequence[Action]) -> Float64:
         """
         Return what columns predict, (k, c).
+
+        Parameters
+        ----------
+        columns
+            Of one simulation.
+        actions
+            What acts in each column.
+
+        Returns
+        -------
+        (k, c)
+            A line a column, in the order of `value`.
         """
         cos, sin = math.cos(self.stop.heading_rad), math.sin(self.stop.heading_rad)
         velocity = columns.velocity_over_ground_m_s[:, self.at_wind]

@@ -95,6 +95,16 @@ class DirectModel(Model):
 def gap_of_speeds(fit: Fit) -> Gap:
     """
     Return how far rows that are speeds are from a fit.
+
+    Parameters
+    ----------
+    fit
+        Whose rows are speeds [m/s].
+
+    Returns
+    -------
+    Gap
+        Without a gap of positions.
     """
     residual = fit.best.residuals[0]
     return Gap(float(np.sqrt(np.mean(residual**2))), None, fit.chi2_per_row)

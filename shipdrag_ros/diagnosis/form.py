@@ -22,13 +22,12 @@ from scipy.linalg import block_diag
 
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.diagnosis.advice import declared
-from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.direct import DirectModel, gap_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.mean_speeds import MeanSpeeds
 from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
 from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Verdict, Where
 from shipdrag_ros.diagnosis.search import search
+from shipdrag_ros.diagnosis.speeds import CoastRun, MeanSpeeds
 from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
 from shipdrag_ros.diagnosis.verdict import Judgement, judge
 from shipdrag_ros.samples import Float64

@@ -29,6 +29,18 @@ _ACROSS = 'position_across'
 def gap_of(model: CoastModel, linear: Linear) -> Gap:
     """
     Return how far a fitted model is from the runs.
+
+    Parameters
+    ----------
+    model
+        The runs, and what they are held against.
+    linear
+        Of a hypothesis at its best fit.
+
+    Returns
+    -------
+    Gap
+        RMS over the coastdowns; chi^2 over all rows.
     """
     speeds, places = [], []
     for seen, residual in zip(model.seen, linear.residuals, strict=True):
@@ -51,6 +63,16 @@ def _rms(parts: Sequence[Float64]) -> float | None:
 def frozen(model: CoastModel) -> Fit:
     """
     Fit where and how fast the runs began, the ship being as its file states it.
+
+    Parameters
+    ----------
+    model
+        The runs, and what they are held against.
+
+    Returns
+    -------
+    Fit
+        In which the per-run nuisance parameters alone are free.
     """
     nothing = model.nothing
     places = tuple(
@@ -67,8 +89,15 @@ def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
 
     Parameters
     ----------
+    model
+        The runs, and what they are held against.
     found
         With the effect; None: the ship as its file states it.
+
+    Returns
+    -------
+    Gap or None
+        None with one run, and where all have an effect of their own.
 
     Notes
     -----
@@ -113,7 +142,24 @@ def _mean_square(values: Sequence[float | None]) -> float | None:
 
 
 def predicted(model: CoastModel, run: int, found: Fit) -> Linear:
-    """Predict a run, learning from the others what belongs to it too."""
+    """
+    Predict a run, learning from the others what belongs to it too.
+
+    Parameters
+    ----------
+    model
+        The runs, and what they are held against.
+    run
+        Its place among them.
+    found
+        Fit of all runs, whose hypothesis is taken.
+
+    Returns
+    -------
+    Linear
+        Of the run alone, at its most probable nuisance parameters. The posterior of
+        the other runs is the prior of what is shared, and counts its own prior once.
+    """
     rest = [i for i in range(len(model.seen)) if i != run]
     others = replace(model, seen=tuple(model.seen[i] for i in rest))
     alone = replace(model, seen=(model.seen[run],))
@@ -146,10 +192,17 @@ def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
 
     Parameters
     ----------
+    model
+        The runs, and what they are held against.
     as_stated
         From `frozen`.
     unnamed
         Fits with a smooth discrepancy each.
+
+    Returns
+    -------
+    Where
+        The ends hold 90 % of the excess over noise.
     """
     best = max(unnamed, key=lambda fit: fit.log_likelihood)
     channel = best.hypothesis.discrepancy
@@ -195,9 +248,14 @@ def traces(model: CoastModel, before: Linear, after: Linear) -> tuple[Trace, ...
     Parameters
     ----------
     model
-        That both were fitted to.
+        The runs, and what they are held against.
     before, after
-        Two models at their best fit.
+        Two hypotheses at their best fit.
+
+    Returns
+    -------
+    tuple of Trace
+        One a run.
     """
     return tuple(_trace(model, j, before, after) for j in range(len(model.seen)))
 

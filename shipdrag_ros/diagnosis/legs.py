@@ -115,6 +115,18 @@ class Legs:
         """
         Cut records into legs.
 
+        Parameters
+        ----------
+        records
+            Of the same vessel.
+        parameters
+            For the convention of the heading.
+
+        Returns
+        -------
+        Legs
+            Of even sailing alone.
+
         Raises
         ------
         DiagnosisError
@@ -160,6 +172,16 @@ class Legs:
     def through_water(self, current_m_s: tuple[float, float]) -> Float64:
         """
         Return the speed through water [m/s] that a current east, north leaves, (n,).
+
+        Parameters
+        ----------
+        current_m_s
+            Velocity of the water to the east and to the north [m/s].
+
+        Returns
+        -------
+        (n,)
+            Speed along the heading [m/s].
         """
         east, north = current_m_s
         cos, sin = np.cos(self.direction_rad), np.sin(self.direction_rad)
@@ -173,6 +195,16 @@ class Legs:
 def told(left_out: Mapping[Left, int]) -> str:
     """
     Return what is left out, in words.
+
+    Parameters
+    ----------
+    left_out
+        Stretches by reason.
+
+    Returns
+    -------
+    str
+        'nothing' where there are none.
     """
     return ', '.join(f'{why} {count}' for why, count in left_out.items() if count) or 'nothing'
 

@@ -284,6 +284,11 @@ def nothing_missing(effects: Sequence[Effect], *, places: int) -> float:
         That may be missing.
     places
         Number of channels in which something unnamed may be besides.
+
+    Returns
+    -------
+    float
+        Of all that may be, the probabilities add up to 1.
     """
     ones = sum(effect.odds for effect in effects)
     pairs = sum(a.odds * b.odds for a, b in combinations(effects, 2) if a.goes_with(b))

@@ -21,10 +21,11 @@ from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.observation import Measured, Observation
+from shipdrag_ros.diagnosis.posterior import Posterior, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
-from shipdrag_ros.diagnosis.verdict import Posterior, decide, prune_by_bayes_factor
+from shipdrag_ros.diagnosis.verdict import decide
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable
@@ -108,6 +109,10 @@ def of_another_run(
 
     Parameters
     ----------
+    model
+        The runs there are.
+    fits
+        Of hypotheses about them.
     run
         Values of its rows are 0.
 
@@ -157,15 +162,19 @@ def of_instrument(
 
     Parameters
     ----------
+    model
+        The runs there are.
+    fits
+        Of hypotheses about them.
     contexts
         One a run, with rows of the instrument alone.
 
     Returns
     -------
-    list of list
-        The predicted outcome of each hypothesis, one.
-    list of (r,)
-        Values of each, as predicted and not whitened.
+    outcomes : list of list
+        One of each hypothesis.
+    values : list of (r,)
+        As predicted, and not whitened.
     """
     seen = tuple(
         replace(run, context=replace(context, value=np.zeros(len(context))))
@@ -194,9 +203,18 @@ def with_known(
 
     Parameters
     ----------
+    outcomes
+        Of each hypothesis its ways.
+    fits
+        Of the hypotheses.
     sd
         By the name of an unknown of the baseline or of a run, one a run; 0: tells
         nothing.
+
+    Returns
+    -------
+    list of list
+        With one row more for each unknown that is told.
     """
     found = []
     for ways, one in zip(outcomes, fits, strict=True):
@@ -247,6 +265,11 @@ def probability_of_naming(
         Nothing among them.
     inseparable
         Effects that no record can tell apart.
+
+    Returns
+    -------
+    float
+        Averaged over the rivals by their probabilities; 300 draws of a fixed seed.
     """
     rng = np.random.default_rng(_SEED)
     log_odds = {rival.names: rival.log_odds for rival in rivals}
@@ -281,6 +304,16 @@ def _drawn(ways: Sequence[PredictedOutcome], count: int, rng: np.random.Generato
 def empty(measured: Measured) -> Measured:
     """
     Return rows whose values are 0.
+
+    Parameters
+    ----------
+    measured
+        Rows of a run.
+
+    Returns
+    -------
+    Measured
+        The same rows.
     """
     rows = measured.rows
     return replace(measured, rows=rows._replace(value=np.zeros(len(rows.value))))

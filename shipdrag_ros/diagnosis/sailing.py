@@ -25,9 +25,9 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing, start
 from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Verdict, Where
-from shipdrag_ros.diagnosis.search import search, with_pairs
+from shipdrag_ros.diagnosis.search import Found, search, with_pairs
 from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
-from shipdrag_ros.diagnosis.verdict import Found, judge
+from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -205,6 +205,16 @@ class SailingModel(DirectModel):
     def fit_of(self, effects: Sequence[Effect]) -> Fit:
         """
         Return the fit of some effects at once.
+
+        Parameters
+        ----------
+        effects
+            Of this model.
+
+        Returns
+        -------
+        Fit
+            Of all of them in one hypothesis.
         """
         hypothesis = self.nothing
         for effect in effects:

@@ -117,9 +117,18 @@ class CoastSimulation:
 
         Parameters
         ----------
+        hypotheses
+            Of this model.
+        at
+            (p,) each.
         near
             The same about unknowns near by: the derivatives by what is known
             well beforehand, the baseline, are taken from there.
+
+        Returns
+        -------
+        list of Linear
+            Not finite where it cannot be simulated.
         """
         before = near or [None] * len(hypotheses)
         runs = [self._run(j, hypotheses, at, before) for j in range(len(self.seen))]
@@ -168,6 +177,18 @@ class CoastSimulation:
     def predict(self, run: int, linear: Linear) -> Predicted:
         """
         Return what a hypothesis predicts of a run, without its row terms.
+
+        Parameters
+        ----------
+        run
+            Its place among the runs.
+        linear
+            Of a hypothesis.
+
+        Returns
+        -------
+        Predicted
+            Without measurement terms.
         """
         batch = _Batch()
         plan = self._plan(run, linear.hypothesis, linear.z, batch)

@@ -10,14 +10,9 @@ import pytest
 
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
+from shipdrag_ros.diagnosis.posterior import posterior_of, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
-from shipdrag_ros.diagnosis.verdict import (
-    decide,
-    exceeds_noise,
-    has_residual_structure,
-    posterior_of,
-    prune_by_bayes_factor,
-)
+from shipdrag_ros.diagnosis.verdict import decide, exceeds_noise, has_residual_structure
 
 TWINS = [frozenset(('added_mass', 'displacement'))]
 
