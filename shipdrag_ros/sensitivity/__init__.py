@@ -8,7 +8,7 @@ from shipdrag_ros.sensitivity.loss import (
     Responses,
     Selection,
     Simulator,
-    own_share,
+    partial_contribution,
     relative,
     vary,
 )
@@ -20,7 +20,7 @@ __all__ = [
     'Responses',
     'Selection',
     'Simulator',
-    'own_share',
+    'partial_contribution',
     'relative',
     'vary',
 ]
