@@ -124,9 +124,7 @@ class CoastModel(CoastSimulation):
         starts = list(product(*(_starts(q, first=q is free[0]) for q in free)))
         words = list(product(*((q.prior.first, q.prior.second) for q in choices)))
         runs = scope_runs(effect, len(self.seen))
-        names = tuple(sorted((*base.names, effect.name)))
-        log_odds = math.log(effect.odds)
-        log_prior = base.log_prior + log_odds - math.log(len(words) * len(signs) * len(runs))
+        ways = len(words) * len(signs) * len(runs)
         found = []
         for start, word, sign, run in product(starts, words, signs, runs):
             term = EffectTerm(
@@ -137,18 +135,12 @@ class CoastModel(CoastSimulation):
                 signs=_named(signed, sign),
                 only_run=run,
             )
-            errors = base.model_errors
-            if effect.formula_sd > 0.0:
-                errors = (*errors, ModelErrorTerm(term, effect.formula_sd))
-            terms = (*base.terms, term)
+            sd = effect.formula_sd
+            errors = (ModelErrorTerm(term, sd),) if sd > 0.0 else ()
+            log_odds = math.log(effect.odds)
             found.append(
-                replace(
-                    base,
-                    names=names,
-                    terms=terms,
-                    model_errors=errors,
-                    log_prior=log_prior,
-                    log_odds=base.log_odds + log_odds,
+                base.with_effect(
+                    effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
                 )
             )
         return found

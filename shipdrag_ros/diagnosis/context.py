@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from shipdrag_ros.diagnosis.noise import bin_means
 from shipdrag_ros.estimation.window import Series, Window
@@ -234,12 +235,6 @@ def _wind_covariance(values: Float64) -> Float64:
 
 
 def _whitener(blocks: Sequence[Float64]) -> Float64:
-    size = sum(len(block) for block in blocks)
-    whole = np.zeros((size, size))
-    place = 0
-    for block in blocks:
-        if len(block):
-            part = slice(place, place + len(block))
-            whole[part, part] = np.linalg.inv(np.linalg.cholesky(block))
-            place += len(block)
-    return whole
+    """Return the inverse Cholesky factor of a covariance of blocks."""
+    found = [np.linalg.inv(np.linalg.cholesky(block)) for block in blocks if len(block)]
+    return np.asarray(block_diag(*found, np.zeros((0, 0))), np.float64)

@@ -122,10 +122,7 @@ def of_another_run(
         Of each hypothesis the ways in which it may go on: what belongs to single
         runs is there again, or is not.
     """
-    at, before = [], []
-    there: list[Hypothesis] = []
-    weights: list[float] = []
-    whose: list[int] = []
+    tried = []
     for number, one in enumerate(fits):
         for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(model.seen)):
             kept = _places(one.hypothesis, hypothesis)
@@ -137,15 +134,12 @@ def of_another_run(
             learnt = one.covariance[np.ix_(old, old)]
             covariance[np.ix_(new, new)] = learnt
             precision[np.ix_(new, new)] = np.linalg.inv(learnt)
-            at.append(z)
-            before.append((covariance, precision))
-            there.append(hypothesis)
-            weights.append(log_weight)
-            whose.append(number)
-    linear = replace(model, seen=(run,)).linearise(there, at)
+            tried.append((number, hypothesis, z, covariance, precision, log_weight))
+    alone = replace(model, seen=(run,))
+    linear = alone.linearise([each[1] for each in tried], [each[2] for each in tried])
     ways: list[list[PredictedOutcome]] = [[] for _ in fits]
-    for number, found, (covariance, precision), log_weight in zip(
-        whose, linear, before, weights, strict=True
+    for (number, _, _, covariance, precision, log_weight), found in zip(
+        tried, linear, strict=True
     ):
         table = found.tables[0]
         ways[number].append(
