@@ -30,7 +30,7 @@ from shipdrag_ros.report import coasting_page, sensitivity_pictures, steering_pa
 from shipdrag_ros.report.cells import Table
 from shipdrag_ros.report.pictures import save
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.sensitivity import CHANGES, Losses, Norm, partial_contribution
+from shipdrag_ros.sensitivity import CHANGES, Losses, Norm, own_share
 from shipdrag_ros.sensitivity.coast import coast_from
 from shipdrag_ros.sensitivity.coasting import CoastStudy, study_coast
 from shipdrag_ros.sensitivity.steering import (
@@ -241,9 +241,7 @@ def sets_of_manoeuvres() -> Table:
     rows = []
     for manoeuvres in chosen:
         shares = [
-            partial_contribution(
-                np.hstack([ask(SHIP, one, changes=TINY).slopes() for one in manoeuvres])
-            )
+            own_share(np.hstack([ask(SHIP, one, changes=TINY).slopes() for one in manoeuvres]))
             for ask in (respond, respond_by_groups)
         ]
         name = 'all nine' if manoeuvres is DESIGN else ', '.join(one.name for one in manoeuvres)
@@ -282,10 +280,8 @@ def page(
     kept = found.selection.kept
     both = np.degrees(found.check.overshoots_rad)
     grouped = np.degrees(found.group_check.overshoots_rad[1])
-    single = shown.partial_contribution[np.arange(len(FORM)), np.argmax(shown.loss, axis=1)]
+    single = shown.own_share[np.arange(len(FORM)), np.argmax(shown.loss, axis=1)]
     circle = shown.manoeuvres.index(turn(35.0))
-    in_circle = np.median(shown.partial_contribution[:, circle])
-    together = np.median(shown.partial_contribution_together)
     heavier = next(mimic for mimic in coast.mimics if mimic.effect.name == 'displacement')
     return [
         '# Sensitivity by a loss function (S3)',
@@ -409,9 +405,9 @@ def page(
         'propeller (Y0, N0) and the linear ones of sway in the gentlest.',
         "To be seen is not to be told: the own share is what of a derivative's trace no mixture "
         f'of the other 39 makes. Where it is seen best it is {np.median(single):.1%}',
-        f'(median; {in_circle:.1g} in the 35 degree circle, which '
+        f'(median; {np.median(shown.own_share[:, circle]):.1g} in the 35 degree circle, which '
         'ends as three constants), in all nine together '
-        f'{together:.1%}. A sensitive derivative is thus not yet one '
+        f'{np.median(shown.own_share_together):.1%}. A sensitive derivative is thus not yet one '
         'that a',
         'trial identifies, as the paper hopes (after Rhee and Kim); the multiples are, for good '
         'reason, stated and not fitted.',

@@ -8,7 +8,7 @@ from shipdrag_ros.sensitivity.loss import (
     Responses,
     Selection,
     Simulator,
-    partial_contribution,
+    own_share,
     relative,
     vary,
 )
@@ -20,7 +20,7 @@ __all__ = [
     'Responses',
     'Selection',
     'Simulator',
-    'partial_contribution',
+    'own_share',
     'relative',
     'vary',
 ]

@@ -21,7 +21,7 @@ from shipdrag_ros.sensitivity.loss import (
     Responses,
     Selection,
     Simulator,
-    partial_contribution,
+    own_share,
     relative,
     vary,
 )
@@ -176,17 +176,17 @@ class Experiment:
         m of them.
     loss : (p, m)
         Of 10 per cent, root mean square.
-    partial_contribution : (p, m)
+    own_share : (p, m)
         Part of it that no mixture of the other derivatives makes.
-    partial_contribution_together : (p,)
+    own_share_together : (p,)
         The same where all manoeuvres are made.
     """
 
     names: tuple[str, ...]
     manoeuvres: tuple[Manoeuvre, ...]
     loss: Float64
-    partial_contribution: Float64
-    partial_contribution_together: Float64
+    own_share: Float64
+    own_share_together: Float64
 
     @property
     def best(self) -> tuple[Manoeuvre, ...]:
@@ -306,8 +306,8 @@ def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> E
         FORM,
         tuple(manoeuvres),
         np.column_stack([one.losses().table[:, :2].mean(axis=1) for one in responses]),
-        np.column_stack([partial_contribution(one) for one in slopes]),
-        partial_contribution(np.hstack(slopes)),
+        np.column_stack([own_share(one) for one in slopes]),
+        own_share(np.hstack(slopes)),
     )
 
 
