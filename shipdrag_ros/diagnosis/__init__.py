@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which effect is missing where model and data disagree."""
 
-from shipdrag_ros.diagnosis.diagnose import CoastRun, diagnose, with_effects
+from shipdrag_ros.diagnosis.diagnose import diagnose, with_effects
 from shipdrag_ros.diagnosis.form import diagnose_fitted
 from shipdrag_ros.diagnosis.legs import SailingRecord
 from shipdrag_ros.diagnosis.result import (
@@ -18,6 +18,7 @@ from shipdrag_ros.diagnosis.result import (
     Where,
 )
 from shipdrag_ros.diagnosis.sailing import diagnose_sailing
+from shipdrag_ros.diagnosis.speeds import CoastRun
 
 __all__ = [
     'FORCE',

@@ -28,6 +28,7 @@ from shipdrag_ros.diagnosis.outcomes import (
     probability_of_naming,
     with_known,
 )
+from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Posterior
@@ -35,7 +36,6 @@ from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.samples import Block, Channel, Float64
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Measure
 from shipdrag_ros.simulation.effects import discriminating_measurements
 
@@ -66,8 +66,17 @@ def advice(
 
     Parameters
     ----------
+    model
+        The runs, and what they are held against.
+    posterior
+        Of what was found.
     candidates
         That the runs cannot tell apart.
+
+    Returns
+    -------
+    tuple of Advice
+        Of measurements that the runs do not hold already.
 
     Notes
     -----
@@ -105,6 +114,16 @@ def advice(
 def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
     """
     Return what the effects say tells them apart, what serves most pairs first.
+
+    Parameters
+    ----------
+    candidates
+        With their probabilities, which weigh the pairs.
+
+    Returns
+    -------
+    tuple of Advice
+        Without a probability.
     """
     votes: dict[Measure, float] = {}
     for one, other in combinations(candidates, 2):
@@ -189,24 +208,24 @@ def _settings(
     measure: Measure, model: CoastModel, fits: Sequence[Fit]
 ) -> tuple[list[list[list[PredictedOutcome]]], list[int]]:
     """Return the ways in which a measurement may be read, and that of each candidate."""
-    simulated, first = model.simulated, model.seen[0]
+    first = model.seen[0]
     if measure in _RUNS:
         opposite = math.pi if measure is Measure.RECIPROCAL_RUN else 0.0
         slower = _SLOWER if measure is Measure.OTHER_SPEED else 1.0
         run = _another(first, first.heading_rad + opposite, slower * first.speed_m_s)
-        return [of_another_run(simulated, fits, run)], [0] * len(fits)
+        return [of_another_run(model, fits, run)], [0] * len(fits)
     if measure is not Measure.SHAFT:
-        windows = _windows(measure, simulated, model.ship)
-        outcomes, _ = of_instrument(simulated, fits, _contexts(windows, simulated, model.ship))
+        windows = _windows(measure, model)
+        outcomes, _ = of_instrument(model, fits, _contexts(windows, model))
         return [outcomes], [0] * len(fits)
     # whether the water turns the shaft is seen before all else, and differs by rival
     found: list[tuple[list[list[PredictedOutcome]], list[Float64]]] = []
     for after in (_TURNING, _STANDING):
-        windows = _windows(measure, simulated, model.ship, after=after)
-        contexts = _contexts(windows, simulated, model.ship)
+        windows = _windows(measure, model, after=after)
+        contexts = _contexts(windows, model)
         if any(len(context.at_shaft) == 0 for context in contexts):
             return [], []
-        outcomes, values = of_instrument(simulated, fits, contexts)
+        outcomes, values = of_instrument(model, fits, contexts)
         # the time of the stop and the run-down are read from the shaft as well
         seen = [RunDown.of(window, model.ship) for window in windows]
         sd = {
@@ -233,20 +252,18 @@ def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observ
     )
 
 
-def _windows(
-    measure: Measure, simulated: CoastSimulation, ship: Ship, *, after: float = 0.0
-) -> list[Window]:
+def _windows(measure: Measure, model: CoastModel, *, after: float = 0.0) -> list[Window]:
     """Return what an instrument may read in each run; `after` is the shaft after its fall."""
     windows = []
-    channel = _INSTRUMENTS[measure]
-    for run in simulated.seen:
+    channel, draught_m = _INSTRUMENTS[measure], model.ship.draught_m or math.nan
+    for run in model.seen:
         stop = run.context.stop
         time_s = np.arange(0.0, run.time_s[-1], _READING_S)
         gusts = 0.5 * _GUSTS_M_S * (-1.0) ** (time_s // 60.0)
         since_s = np.maximum(time_s - stop.lead_in_s, 0.0)
         readings = {
             Channel.WIND_APPARENT: np.column_stack([gusts - stop.speed_m_s, gusts]),
-            Channel.DEPTH: np.full(len(time_s), _SHALLOW_DRAUGHTS * (ship.draught_m or math.nan)),
+            Channel.DEPTH: np.full(len(time_s), _SHALLOW_DRAUGHTS * draught_m),
             Channel.HEADING: np.full(len(time_s), stop.heading_rad),
             Channel.SHAFT: after + (1.0 - after) * np.exp(-since_s / max(run.run_down_s, 1e-3)),
         }
@@ -262,9 +279,9 @@ def _windows(
     return windows
 
 
-def _contexts(windows: Sequence[Window], simulated: CoastSimulation, ship: Ship) -> list[Context]:
+def _contexts(windows: Sequence[Window], model: CoastModel) -> list[Context]:
     """Return what an instrument would add to each run."""
     return [
-        Context.of(window, ship, run.time_s, run.context.stop)
-        for window, run in zip(windows, simulated.seen, strict=True)
+        Context.of(window, model.ship, run.time_s, run.context.stop)
+        for window, run in zip(windows, model.seen, strict=True)
     ]

@@ -26,14 +26,12 @@ from shipdrag_ros.diagnosis.coast_terms import (
     Term,
 )
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, Linear, nothing_missing
-from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
-from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs, trial_z
+from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
 from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
@@ -43,32 +41,15 @@ _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find
 
 
 @dataclass(frozen=True)
-class CoastModel:
+class CoastModel(CoastSimulation):
     """
-    The hypotheses about some runs.
-
-    Attributes
-    ----------
-    ship
-        As its file states it.
-    seen
-    reference_rad
-        Heading of the first of all runs, along which effects of the earth are
-        stated.
+    The hypotheses about some runs, and their simulation; a `Model`.
     """
 
-    ship: Ship
-    seen: tuple[Observation, ...]
-    reference_rad: float
     # each iteration is a simulation
     iterations: ClassVar[int] = 16
     converged: ClassVar[float] = 0.02
     hopeless: ClassVar[float] = 80.0
-
-    @cached_property
-    def simulated(self) -> CoastSimulation:
-        """What all share."""
-        return CoastSimulation(replace(self.ship, effects=()), self.seen, self.reference_rad)
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -83,7 +64,7 @@ class CoastModel:
                 f'ship {self.ship.name!r} has no baseline to hold a run against; '
                 'add `baseline` to its ship file, or learn one with `shipdrag baseline`'
             )
-        ship = self.simulated.ship
+        ship = self.bare
         stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
         baseline = BaselineTerm(
             ship,
@@ -123,6 +104,18 @@ class CoastModel:
 
         They differ in where a fit begins, in what is a choice, in signs, and in which run
         an effect of a single run was.
+
+        Parameters
+        ----------
+        base
+            Of this model.
+        effect
+            That may act on the ship.
+
+        Returns
+        -------
+        list of Hypothesis
+            The effect is their last term.
         """
         free = [q for q in effect.parameters if q.prior.shape is not Shape.CHOICE]
         choices = [q for q in effect.parameters if q.prior.shape is Shape.CHOICE]
@@ -131,31 +124,23 @@ class CoastModel:
         starts = list(product(*(_starts(q, first=q is free[0]) for q in free)))
         words = list(product(*((q.prior.first, q.prior.second) for q in choices)))
         runs = scope_runs(effect, len(self.seen))
-        names = tuple(sorted((*base.names, effect.name)))
-        log_odds = math.log(effect.odds)
-        log_prior = base.log_prior + log_odds - math.log(len(words) * len(signs) * len(runs))
+        ways = len(words) * len(signs) * len(runs)
         found = []
         for start, word, sign, run in product(starts, words, signs, runs):
             term = EffectTerm(
                 effect,
-                self.simulated.ship,
+                self.bare,
                 start,
                 fixed=_named(choices, word),
                 signs=_named(signed, sign),
                 only_run=run,
             )
-            errors = base.model_errors
-            if effect.formula_sd > 0.0:
-                errors = (*errors, ModelErrorTerm(term, effect.formula_sd))
-            terms = (*base.terms, term)
+            sd = effect.formula_sd
+            errors = (ModelErrorTerm(term, sd),) if sd > 0.0 else ()
+            log_odds = math.log(effect.odds)
             found.append(
-                replace(
-                    base,
-                    names=names,
-                    terms=terms,
-                    model_errors=errors,
-                    log_prior=log_prior,
-                    log_odds=base.log_odds + log_odds,
+                base.with_effect(
+                    effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
                 )
             )
         return found
@@ -163,12 +148,24 @@ class CoastModel:
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """
         Return a hypothesis with something smooth and unnamed besides.
+
+        Parameters
+        ----------
+        base
+            Of this model.
+        channel
+            One of `channels`.
+
+        Returns
+        -------
+        Hypothesis
+            With prior log odds of `UNNAMED_ODDS` more.
         """
         log_prior = base.log_prior + math.log(UNNAMED_ODDS)
         found = replace(base, discrepancy=channel, log_prior=log_prior)
         if channel == 'force':
             top = 1.05 * max(run.speed_m_s for run in self.seen)
-            return replace(found, terms=(*base.terms, ForceTerm(self.simulated.ship, top)))
+            return replace(found, terms=(*base.terms, ForceTerm(self.bare, top)))
         errors: list[MeasurementTerm] = [
             SpeedErrorTerm(j, channel == 'log', run.speed_m_s) for j, run in enumerate(self.seen)
         ]
@@ -180,9 +177,16 @@ class CoastModel:
 
         Parameters
         ----------
+        other
+            About more runs.
         runs
             Which of the others these are. What is in a single run comes last, and
             is left out where that is none of them.
+
+        Returns
+        -------
+        Hypothesis
+            Of this model.
         """
         kept: list[Term] = []
         own: list[Term] = []
@@ -208,6 +212,18 @@ class CoastModel:
     def stop_moved_s(self, fit: Fit, run: int) -> float:
         """
         Return by how much a fit moves the stop of a run.
+
+        Parameters
+        ----------
+        fit
+            Of this model.
+        run
+            Its place among the runs.
+
+        Returns
+        -------
+        float
+            Later than it was taken for [s].
         """
         for part, place in fit.hypothesis.parts:
             if isinstance(part, RunNuisance) and part.run == run:
@@ -224,29 +240,6 @@ class CoastModel:
     def free(self) -> Float64:
         """Steady speeds of the runs [m/s]."""
         return np.array([run.speed_m_s for run in self.seen])
-
-    def linearise(
-        self,
-        hypotheses: Sequence[Hypothesis],
-        at: Sequence[Float64],
-        near: Sequence[Linear | None] | None = None,
-    ) -> list[Linear]:
-        """
-        Return the whitened rows of each hypothesis about some unknowns.
-        """
-        return self.simulated.linearise(hypotheses, at, near)
-
-    def responses(self, base: Linear, hypotheses: Sequence[Hypothesis]) -> Float64:
-        """
-        Return the linear response to the last term of each, (hypotheses, rows).
-        """
-        terms: list[tuple[Term, list[float]]] = []
-        for hypothesis in hypotheses:
-            term = hypothesis.terms[-1]
-            first, *others = term.unknowns
-            sizes = [first.value(trial_z(first)), *(u.value(u.start) for u in others)]
-            terms.append((term, sizes))
-        return np.hstack(self.simulated.responses(base, terms))
 
 
 def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:

@@ -121,6 +121,20 @@ def baseline_parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
     Return what each scale and shape of a baseline adds [N], (p, n).
 
     Kept, as speeds recur, hence the bytes of an array.
+
+    Parameters
+    ----------
+    ship
+        With a baseline.
+    top_m_s
+        Highest speed of the runs, over which the shapes are spread [m/s].
+    speeds
+        Bytes of an array (n,) of speeds through water [m/s].
+
+    Returns
+    -------
+    (p, n)
+        Scales first, then shapes [N].
     """
     speed_m_s = np.frombuffer(speeds)
     total = ship.resistance_n(speed_m_s)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import bin_means
@@ -92,8 +93,19 @@ class Context:
 
         Parameters
         ----------
+        window
+            Of the coastdown.
+        ship
+            For the draught and the run-down of the thrust.
         times : (m,)
             Of the observation [s].
+        stop
+            What the context is counted from.
+
+        Returns
+        -------
+        Context
+            Without rows of what was not measured.
         """
         edges = np.arange(0.0, times[-1] + _BIN_S, _BIN_S)
         wind_s, wind = _binned(window, 'wind_apparent', stop, edges)
@@ -131,6 +143,18 @@ class Context:
     def predict(self, columns: Columns, actions: Sequence[Action]) -> Float64:
         """
         Return what columns predict, (k, c).
+
+        Parameters
+        ----------
+        columns
+            Of one simulation.
+        actions
+            What acts in each column.
+
+        Returns
+        -------
+        (k, c)
+            A line a column, in the order of `value`.
         """
         cos, sin = math.cos(self.stop.heading_rad), math.sin(self.stop.heading_rad)
         velocity = columns.velocity_over_ground_m_s[:, self.at_wind]
@@ -211,12 +235,6 @@ def _wind_covariance(values: Float64) -> Float64:
 
 
 def _whitener(blocks: Sequence[Float64]) -> Float64:
-    size = sum(len(block) for block in blocks)
-    whole = np.zeros((size, size))
-    place = 0
-    for block in blocks:
-        if len(block):
-            part = slice(place, place + len(block))
-            whole[part, part] = np.linalg.inv(np.linalg.cholesky(block))
-            place += len(block)
-    return whole
+    """Return the inverse Cholesky factor of a covariance of blocks."""
+    found = [np.linalg.inv(np.linalg.cholesky(block)) for block in blocks if len(block)]
+    return np.asarray(block_diag(*found, np.zeros((0, 0))), np.float64)

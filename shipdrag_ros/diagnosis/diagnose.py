@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from shipdrag_ros.diagnosis.advice import advice
 from shipdrag_ros.diagnosis.coast import CoastModel
@@ -19,8 +19,9 @@ from shipdrag_ros.diagnosis.result import (
     Verdict,
     Where,
 )
-from shipdrag_ros.diagnosis.search import search, with_pairs
-from shipdrag_ros.diagnosis.verdict import Found, judge
+from shipdrag_ros.diagnosis.search import Found, search, with_pairs
+from shipdrag_ros.diagnosis.speeds import CoastRun
+from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import LOG
@@ -31,23 +32,6 @@ from shipdrag_ros.simulation.effects import find
 
 _NEAR_S = 4.0  # by which a stop may be moved without seeing the run anew
 _LOOKS = 3  # at a run
-
-
-@dataclass(frozen=True)
-class CoastRun:
-    """
-    A coastdown to be diagnosed.
-
-    Attributes
-    ----------
-    name
-        For the user.
-    window
-        With the steady record before it.
-    """
-
-    name: str
-    window: Window
 
 
 def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Diagnosis:
@@ -62,6 +46,11 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         With a baseline; the effects that its file states are part of the model.
     parameters
         For the noise of the sensors and the convention of the heading.
+
+    Returns
+    -------
+    Diagnosis
+        Of baseline 'stated'.
 
     Raises
     ------
@@ -123,13 +112,13 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     return judged.diagnosis(
         would_decide=would_decide,
         where=place,
-        before=gap_of(model.simulated, as_stated.best),
-        after=gap_of(model.simulated, best.best) if judged.missing else None,
+        before=gap_of(model, as_stated.best),
+        after=gap_of(model, best.best) if judged.missing else None,
         held_out_before=held_out(model, None),
         held_out_after=predicted if judged.missing else None,
         baseline='stated',
         notes=notes,
-        traces=traces(model.simulated, as_stated.best, explained.best),
+        traces=traces(model, as_stated.best, explained.best),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
     )
@@ -193,6 +182,18 @@ def _before_the_stop(seen: Sequence[Observation]) -> Where:
 def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
     """
     Return a ship with effects added to what its file states.
+
+    Parameters
+    ----------
+    ship
+        As its file states it.
+    effects
+        That a diagnosis named.
+
+    Returns
+    -------
+    Ship
+        The same with the effects in `effects`.
     """
     added = tuple(StatedEffect(effect.name, dict(effect.parameters)) for effect in effects)
     return replace(ship, effects=(*ship.effects, *added))

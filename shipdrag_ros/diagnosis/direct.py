@@ -11,16 +11,18 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
+from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Model
-from shipdrag_ros.diagnosis.result import Gap
+from shipdrag_ros.diagnosis.result import Diagnosis, Gap, Verdict, Where
 from shipdrag_ros.diagnosis.terms import trial_z
+from shipdrag_ros.diagnosis.verdict import Judgement
 from shipdrag_ros.samples import Float64
 
 _STEP_Z = 1e-3
@@ -92,10 +94,37 @@ class DirectModel(Model):
         return np.ascontiguousarray(found, np.float64)
 
 
-def gap_of_speeds(fit: Fit) -> Gap:
+def diagnosis_of_speeds(judged: Judgement, where: Where, **rest: Any) -> Diagnosis:
     """
-    Return how far rows that are speeds are from a fit.
+    Return the result of a model whose rows are speeds.
+
+    Parameters
+    ----------
+    judged
+        Of such a model.
+    where
+        Where model and data may disagree.
+    **rest
+        What else there is to be said, as in `Diagnosis`.
+
+    Returns
+    -------
+    Diagnosis
+        Whose advice is what the effects declare; nothing is held out.
     """
+    one_of = judged.verdict is Verdict.ONE_OF
+    return judged.diagnosis(
+        would_decide=declared(judged.candidates) if one_of else (),
+        where=None if judged.verdict is Verdict.NONE else where,
+        before=_gap(judged.found.nothing),
+        after=_gap(judged.found.best) if judged.missing else None,
+        held_out_before=None,
+        held_out_after=None,
+        **rest,
+    )
+
+
+def _gap(fit: Fit) -> Gap:
     residual = fit.best.residuals[0]
     return Gap(float(np.sqrt(np.mean(residual**2))), None, fit.chi2_per_row)
 

@@ -21,14 +21,12 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.diagnosis.advice import declared
-from shipdrag_ros.diagnosis.diagnose import CoastRun
-from shipdrag_ros.diagnosis.direct import DirectModel, gap_of_speeds, learn_factor
+from shipdrag_ros.diagnosis.direct import DirectModel, diagnosis_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.mean_speeds import MeanSpeeds
 from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
-from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Verdict, Where
+from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Where
 from shipdrag_ros.diagnosis.search import search
+from shipdrag_ros.diagnosis.speeds import CoastRun, MeanSpeeds
 from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
 from shipdrag_ros.diagnosis.verdict import Judgement, judge
 from shipdrag_ros.samples import Float64
@@ -176,15 +174,7 @@ class FormModel(DirectModel):
             gaussian = ((0.0, _OFFSET_SD * self._top_m_s),)
             term = EffectTerm(effect, self.ship, gaussian=gaussian)
         log_odds = math.log(_ONE / len(self.effects) / _NOTHING)
-        return [
-            replace(
-                base,
-                names=(effect.name,),
-                terms=(*base.terms, term),
-                log_prior=base.log_prior + log_odds,
-                log_odds=log_odds,
-            )
-        ]
+        return [base.with_effect(effect.name, term, log_odds=log_odds)]
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """
@@ -293,13 +283,9 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
         (float(times.min()), float(times.max())),
         (float(speeds.min()), float(speeds.max())),
     )
-    return judged.diagnosis(
-        would_decide=declared(judged.candidates) if judged.verdict is Verdict.ONE_OF else (),
-        where=None if judged.verdict is Verdict.NONE else place,
-        before=gap_of_speeds(found.nothing),
-        after=gap_of_speeds(explained) if judged.missing else None,
-        held_out_before=None,
-        held_out_after=None,
+    return diagnosis_of_speeds(
+        judged,
+        place,
         baseline='fitted_here',
         notes=tuple(_notes(model, judged, explained)),
         coastdowns_used=len(seen),

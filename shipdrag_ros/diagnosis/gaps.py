@@ -14,7 +14,6 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, start
 from shipdrag_ros.diagnosis.observation import Measured
 from shipdrag_ros.diagnosis.result import Compared, Gap, Trace, Where
-from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.samples import Float64
@@ -26,12 +25,24 @@ _ROUNDS = 3
 _ACROSS = 'position_across'
 
 
-def gap_of(simulated: CoastSimulation, linear: Linear) -> Gap:
+def gap_of(model: CoastModel, linear: Linear) -> Gap:
     """
     Return how far a fitted model is from the runs.
+
+    Parameters
+    ----------
+    model
+        The runs, and what they are held against.
+    linear
+        Of a hypothesis at its best fit.
+
+    Returns
+    -------
+    Gap
+        RMS over the coastdowns; chi^2 over all rows.
     """
     speeds, places = [], []
-    for seen, residual in zip(simulated.seen, linear.residuals, strict=True):
+    for seen, residual in zip(model.seen, linear.residuals, strict=True):
         n = len(seen.along)
         along, kind = residual[:n], seen.along.rows.kind
         coasting = seen.along.rows.time_s >= seen.lead_in_s
@@ -51,6 +62,16 @@ def _rms(parts: Sequence[Float64]) -> float | None:
 def frozen(model: CoastModel) -> Fit:
     """
     Fit where and how fast the runs began, the ship being as its file states it.
+
+    Parameters
+    ----------
+    model
+        The runs, and what they are held against.
+
+    Returns
+    -------
+    Fit
+        In which the per-run nuisance parameters alone are free.
     """
     nothing = model.nothing
     places = tuple(
@@ -67,8 +88,15 @@ def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
 
     Parameters
     ----------
+    model
+        The runs, and what they are held against.
     found
         With the effect; None: the ship as its file states it.
+
+    Returns
+    -------
+    Gap or None
+        None with one run, and where all have an effect of their own.
 
     Notes
     -----
@@ -87,7 +115,7 @@ def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
             continue
         else:
             linear = predicted(model, j, found)
-        gaps.append(gap_of(alone.simulated, linear))
+        gaps.append(gap_of(alone, linear))
         rows.append(linear.rows)
     if not gaps:
         return None
@@ -113,7 +141,24 @@ def _mean_square(values: Sequence[float | None]) -> float | None:
 
 
 def predicted(model: CoastModel, run: int, found: Fit) -> Linear:
-    """Predict a run, learning from the others what belongs to it too."""
+    """
+    Predict a run, learning from the others what belongs to it too.
+
+    Parameters
+    ----------
+    model
+        The runs, and what they are held against.
+    run
+        Its place among them.
+    found
+        Fit of all runs, whose hypothesis is taken.
+
+    Returns
+    -------
+    Linear
+        Of the run alone, at its most probable nuisance parameters. The posterior of
+        the other runs is the prior of what is shared, and counts its own prior once.
+    """
     rest = [i for i in range(len(model.seen)) if i != run]
     others = replace(model, seen=tuple(model.seen[i] for i in rest))
     alone = replace(model, seen=(model.seen[run],))
@@ -146,10 +191,17 @@ def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
 
     Parameters
     ----------
+    model
+        The runs, and what they are held against.
     as_stated
         From `frozen`.
     unnamed
         Fits with a smooth discrepancy each.
+
+    Returns
+    -------
+    Where
+        The ends hold 90 % of the excess over noise.
     """
     best = max(unnamed, key=lambda fit: fit.log_likelihood)
     channel = best.hypothesis.discrepancy
@@ -175,7 +227,7 @@ def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
         first = int(np.searchsorted(share, 0.5 * (1.0 - _SHARE)))
         last = int(np.searchsorted(share, 0.5 * (1.0 + _SHARE)))
         ends = np.array([first, last + 1]) / _PARTS * seen.duration_s
-        speed = model.simulated.predict(j, as_stated.best).speed
+        speed = model.predict(j, as_stated.best).speed
         times.append(ends)
         speeds.append(np.interp(ends + seen.lead_in_s, seen.time_s, speed))
     if not times:
@@ -188,23 +240,28 @@ def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
     )
 
 
-def traces(simulated: CoastSimulation, before: Linear, after: Linear) -> tuple[Trace, ...]:
+def traces(model: CoastModel, before: Linear, after: Linear) -> tuple[Trace, ...]:
     """
     Return each run as it was measured and as two models have it.
 
     Parameters
     ----------
-    simulated
-        That both were fitted to.
+    model
+        The runs, and what they are held against.
     before, after
-        Two models at their best fit.
+        Two hypotheses at their best fit.
+
+    Returns
+    -------
+    tuple of Trace
+        One a run.
     """
-    return tuple(_trace(simulated, j, before, after) for j in range(len(simulated.seen)))
+    return tuple(_trace(model, j, before, after) for j in range(len(model.seen)))
 
 
-def _trace(simulated: CoastSimulation, run: int, before: Linear, after: Linear) -> Trace:
-    seen = simulated.seen[run]
-    speed = simulated.predict(run, after).speed
+def _trace(model: CoastModel, run: int, before: Linear, after: Linear) -> Trace:
+    seen = model.seen[run]
+    speed = model.predict(run, after).speed
     n = len(seen.along)
     blocks: list[tuple[str, Measured, slice]] = [(name, seen.along, slice(0, n)) for name in CODES]
     if seen.across is not None:

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.shared_baseline import Factor, Shared, SharedBaseline, factor
+from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
@@ -116,6 +116,11 @@ def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters)
         heavy tails; n_r and effects are taken as the file states them.
     parameters
         For the noise of the sensors and the convention of the heading.
+
+    Returns
+    -------
+    Learnt
+        With a ship file that states the baseline, its errors and the scatter.
 
     Raises
     ------

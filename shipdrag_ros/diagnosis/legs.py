@@ -115,17 +115,32 @@ class Legs:
         """
         Cut records into legs.
 
+        Parameters
+        ----------
+        records
+            Of the same vessel.
+        parameters
+            For the convention of the heading.
+
+        Returns
+        -------
+        Legs
+            Of even sailing alone.
+
         Raises
         ------
         DiagnosisError
             If they have no log, nothing over ground, or too few even stretches.
         """
         cut = [_Cut(record, parameters) for record in records]
-        found = [leg for one in cut for leg in one.legs()]
-        left = Counter({why: sum(one.left[why] for one in cut) for why in Left})
-        usual = float(np.median([leg.ground_m_s for leg in found])) if found else 0.0
-        number = {id(leg): j for j, one in enumerate(cut) for leg in one.found}
-        moving = [leg for leg in found if min(leg.ground_m_s, leg.log_m_s) > _STOPPED * usual]
+        stretches = [(j, one.leg(float(at_s))) for j, one in enumerate(cut) for at_s in one.edges]
+        found = [(j, leg) for j, leg in stretches if isinstance(leg, _Leg)]
+        left = Counter(dict.fromkeys(Left, 0))
+        left.update(why for _, why in stretches if isinstance(why, Left))
+        usual = float(np.median([leg.ground_m_s for _, leg in found])) if found else 0.0
+        slowest = _STOPPED * usual
+        record = [j for j, leg in found if min(leg.ground_m_s, leg.log_m_s) > slowest]
+        moving = [leg for _, leg in found if min(leg.ground_m_s, leg.log_m_s) > slowest]
         left[Left.STOP] += len(found) - len(moving)
         if len(moving) < LEAST_LEGS:
             names = ', '.join(repr(record.name) for record in records)
@@ -136,7 +151,7 @@ class Legs:
             )
         known = {leg.direction for leg in moving}
         return cls(
-            np.array([number[id(leg)] for leg in moving]),
+            np.array(record),
             np.array([leg.time_s for leg in moving]),
             np.array([leg.log_m_s for leg in moving]),
             np.array([leg.ground_m_s for leg in moving]),
@@ -160,6 +175,16 @@ class Legs:
     def through_water(self, current_m_s: tuple[float, float]) -> Float64:
         """
         Return the speed through water [m/s] that a current east, north leaves, (n,).
+
+        Parameters
+        ----------
+        current_m_s
+            Velocity of the water to the east and to the north [m/s].
+
+        Returns
+        -------
+        (n,)
+            Speed along the heading [m/s].
         """
         east, north = current_m_s
         cos, sin = np.cos(self.direction_rad), np.sin(self.direction_rad)
@@ -173,6 +198,16 @@ class Legs:
 def told(left_out: Mapping[Left, int]) -> str:
     """
     Return what is left out, in words.
+
+    Parameters
+    ----------
+    left_out
+        Stretches by reason.
+
+    Returns
+    -------
+    str
+        'nothing' where there are none.
     """
     return ', '.join(f'{why} {count}' for why, count in left_out.items() if count) or 'nothing'
 
@@ -222,20 +257,9 @@ class _Cut:
         self.length_s = max(_LEG_S, span_s / _MOST_LEGS, _SAMPLES * step_s)
         self.near_s = max(_NEAR_S, 0.5 * _SAMPLES * self.ground.step_s)
         self.edges = np.arange(0.0, span_s, self.length_s)
-        self.left: Counter[Left] = Counter()
-        self.found: list[_Leg] = []
 
-    def legs(self) -> list[_Leg]:
-        """Return the legs, and count the rest."""
-        for start_s in self.edges:
-            leg = self._leg(float(start_s))
-            if isinstance(leg, Left):
-                self.left[leg] += 1
-            else:
-                self.found.append(leg)
-        return self.found
-
-    def _leg(self, start_s: float) -> _Leg | Left:
+    def leg(self, start_s: float) -> _Leg | Left:
+        """Return the leg that begins at a time, or why there is none."""
         end_s = start_s + self.length_s
         log, ground = self.log.part(start_s, end_s), self.ground.part(start_s, end_s)
         heading = self.heading.part(start_s - self.near_s, end_s + self.near_s)

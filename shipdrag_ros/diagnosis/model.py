@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from typing import Any, Protocol
@@ -67,6 +67,44 @@ class Hypothesis:
     log_prior: float = 0.0
     log_odds: float = 0.0
     discrepancy: str = ''
+
+    def with_effect(
+        self,
+        name: str,
+        term: Part,
+        *,
+        log_odds: float,
+        ways: int = 1,
+        model_errors: Sequence[Part] = (),
+    ) -> Hypothesis:
+        """
+        Return the same with an effect, as its last term.
+
+        Parameters
+        ----------
+        name
+            Of the effect.
+        term
+            What it does.
+        log_odds
+            Of the effect.
+        ways
+            Number of ways, alike before the data, in which it may be there.
+        model_errors
+            How far it may depart from its formula.
+
+        Returns
+        -------
+        Hypothesis
+        """
+        return replace(
+            self,
+            names=tuple(sorted((*self.names, name))),
+            terms=(*self.terms, term),
+            model_errors=(*self.model_errors, *model_errors),
+            log_prior=self.log_prior + log_odds - math.log(ways),
+            log_odds=self.log_odds + log_odds,
+        )
 
     @cached_property
     def parts(self) -> tuple[tuple[Any, int], ...]:
@@ -284,6 +322,11 @@ def nothing_missing(effects: Sequence[Effect], *, places: int) -> float:
         That may be missing.
     places
         Number of channels in which something unnamed may be besides.
+
+    Returns
+    -------
+    float
+        Of all that may be, the probabilities add up to 1.
     """
     ones = sum(effect.odds for effect in effects)
     pairs = sum(a.odds * b.odds for a, b in combinations(effects, 2) if a.goes_with(b))

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from scipy.optimize import least_squares
 
 from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.errors import DiagnosisError
@@ -39,9 +38,6 @@ _NEIGHBOURS = 9  # an outlier is told from the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8
-_KINK_BEFORE_S, _KINK_AFTER_S = 240.0, 240.0  # of the onset that was found
-_KINK_LEAST = 20  # samples on either side
-_FARTHEST_S = 90.0
 _KNOWN_S = 5.0  # of the time of the stop
 _DISCREPANCY_M_S = 0.15  # six times what is usual
 
@@ -139,9 +135,22 @@ class Observation:
 
         Parameters
         ----------
+        window
+            With the record before the stop.
+        ship
+            With a baseline, for how the ship answers a gust.
+        parameters
+            For the noise of the sensors and the convention of the heading.
+        name
+            For the user.
         stop_moved_s
             By how much the stop is known to be later than it is taken for; some
-            seconds, as the record is not looked through again for it.
+            seconds, as the record is not looked through again for it [s].
+
+        Returns
+        -------
+        Observation
+            With the noise of its steady part.
 
         Raises
         ------
@@ -252,56 +261,6 @@ class _Learner:
         inertia = 1.0 + self.ship.n_r(speed)
         damping = np.maximum(rise / (above - below), 0.0) / (self.ship.mass_kg * inertia)
         return np.maximum(damping, 1e-6), inertia
-
-
-def stop_time_s(time_s: Float64, speed_m_s: Float64, *, sd_m_s: float, run_down_s: float) -> float:
-    """
-    Return when the engine stopped, from the speed alone; 0 where that cannot be told.
-
-    A diagnosis moves the stop by little steps about where it was taken to be, which
-    serves for some seconds; an onset found without the shaft is off by more.
-
-    Parameters
-    ----------
-    time_s, speed_m_s : (n,)
-        Ascending; from the onset that was found.
-    sd_m_s
-        Of the noise; what is farther off counts less.
-    run_down_s
-        Of the thrust, which ends as exp(-t / run_down_s).
-
-    Returns
-    -------
-    float
-        From the onset that was found [s].
-
-    Notes
-    -----
-    Steady until the stop, then v0 / (1 + c s), the fall of a ship under a
-    resistance as the square of her speed, with s the time less what the thrust
-    gives back of it. So simple a form is off by some 2 s.
-    """
-    near = (time_s > -_KINK_BEFORE_S) & (time_s < _KINK_AFTER_S)
-    time, speed = time_s[near], speed_m_s[near]
-    if min((time < 0.0).sum(), (time >= 0.0).sum()) < _KINK_LEAST:
-        return 0.0
-    top = float(np.median(speed[time <= 0.5 * time[0]]))
-    last = float(np.median(speed[-_KINK_LEAST:]))
-    if not 0.0 < last < top:
-        return 0.0
-
-    def left(unknown: Float64) -> Float64:
-        steady, fall, stop_s = unknown
-        since = np.maximum(time - stop_s, 0.0)
-        if run_down_s > 0.0:
-            since = since - run_down_s * (1.0 - np.exp(-since / run_down_s))
-        result: Float64 = (speed - steady / (1.0 + np.maximum(fall, 0.0) * since)) / sd_m_s
-        return result
-
-    guess = np.array([top, (top / last - 1.0) / time[-1], 0.0])
-    found = least_squares(left, guess, loss='soft_l1', x_scale=[top, guess[1], 10.0])
-    stop_s = float(found.x[2])
-    return stop_s if abs(stop_s) < _FARTHEST_S else 0.0
 
 
 def _stopped(window: Window, run_down: RunDown, record: Record) -> RunDown:

@@ -2,7 +2,7 @@
 """
 What a measurement that is yet to be made would tell apart.
 
-Each rival predicts it, as well as the runs that there are let it; outcomes are
+Each rival predicts it from the posterior given the existing runs; outcomes are
 drawn under each in turn, and the verdict on every one of them is found as it
 would be.
 """
@@ -21,10 +21,11 @@ from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.observation import Measured, Observation
+from shipdrag_ros.diagnosis.posterior import Posterior, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
-from shipdrag_ros.diagnosis.verdict import Posterior, decide, prune_by_bayes_factor
+from shipdrag_ros.diagnosis.verdict import decide
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable
@@ -101,13 +102,17 @@ class Rival:
 
 
 def of_another_run(
-    simulated: CoastSimulation, fits: Sequence[Fit], run: Observation
+    model: CoastSimulation, fits: Sequence[Fit], run: Observation
 ) -> list[list[PredictedOutcome]]:
     """
     Return what fitted hypotheses predict of a run that is yet to be made.
 
     Parameters
     ----------
+    model
+        The runs there are.
+    fits
+        Of hypotheses about them.
     run
         Values of its rows are 0.
 
@@ -117,12 +122,9 @@ def of_another_run(
         Of each hypothesis the ways in which it may go on: what belongs to single
         runs is there again, or is not.
     """
-    at, before = [], []
-    there: list[Hypothesis] = []
-    weights: list[float] = []
-    whose: list[int] = []
+    tried = []
     for number, one in enumerate(fits):
-        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(simulated.seen)):
+        for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(model.seen)):
             kept = _places(one.hypothesis, hypothesis)
             z = np.array([*(unknown.start for unknown in hypothesis.unknowns), run.speed_m_s])
             covariance = np.diag([*(float(u.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0])
@@ -132,15 +134,12 @@ def of_another_run(
             learnt = one.covariance[np.ix_(old, old)]
             covariance[np.ix_(new, new)] = learnt
             precision[np.ix_(new, new)] = np.linalg.inv(learnt)
-            at.append(z)
-            before.append((covariance, precision))
-            there.append(hypothesis)
-            weights.append(log_weight)
-            whose.append(number)
-    linear = replace(simulated, seen=(run,)).linearise(there, at)
+            tried.append((number, hypothesis, z, covariance, precision, log_weight))
+    alone = replace(model, seen=(run,))
+    linear = alone.linearise([each[1] for each in tried], [each[2] for each in tried])
     ways: list[list[PredictedOutcome]] = [[] for _ in fits]
-    for number, found, (covariance, precision), log_weight in zip(
-        whose, linear, before, weights, strict=True
+    for (number, _, _, covariance, precision, log_weight), found in zip(
+        tried, linear, strict=True
     ):
         table = found.tables[0]
         ways[number].append(
@@ -150,42 +149,46 @@ def of_another_run(
 
 
 def of_instrument(
-    simulated: CoastSimulation, fits: Sequence[Fit], contexts: Sequence[Context]
+    model: CoastSimulation, fits: Sequence[Fit], contexts: Sequence[Context]
 ) -> tuple[list[list[PredictedOutcome]], list[Float64]]:
     """
     Return what fitted hypotheses predict of an instrument in the runs there are.
 
     Parameters
     ----------
+    model
+        The runs there are.
+    fits
+        Of hypotheses about them.
     contexts
         One a run, with rows of the instrument alone.
 
     Returns
     -------
-    prospects
-        Of each hypothesis one.
-    values
-        (r,) of each, as predicted and not whitened.
+    outcomes : list of list
+        One of each hypothesis.
+    values : list of (r,)
+        As predicted, and not whitened.
     """
     seen = tuple(
         replace(run, context=replace(context, value=np.zeros(len(context))))
-        for run, context in zip(simulated.seen, contexts, strict=True)
+        for run, context in zip(model.seen, contexts, strict=True)
     )
-    found = replace(simulated, seen=seen).linearise(
+    found = replace(model, seen=seen).linearise(
         [one.hypothesis for one in fits], [one.best.z for one in fits]
     )
-    prospects, values = [], []
+    outcomes, values = [], []
     for one, linear in zip(fits, found, strict=True):
         both = list(zip(linear.tables, linear.residuals, contexts, strict=True))
         table = np.hstack([table[:, table.shape[1] - len(c) :] for table, _, c in both])
         precision = np.asarray(np.linalg.inv(one.covariance), np.float64)
-        prospects.append([PredictedOutcome(-table[0], table[1:], one.covariance, precision)])
+        outcomes.append([PredictedOutcome(-table[0], table[1:], one.covariance, precision)])
         values.append(-np.concatenate([left[len(left) - len(c) :] for _, left, c in both]))
-    return prospects, values
+    return outcomes, values
 
 
 def with_known(
-    prospects: Sequence[Sequence[PredictedOutcome]],
+    outcomes: Sequence[Sequence[PredictedOutcome]],
     fits: Sequence[Fit],
     sd: Mapping[str, Sequence[float]],
 ) -> list[list[PredictedOutcome]]:
@@ -194,12 +197,21 @@ def with_known(
 
     Parameters
     ----------
+    outcomes
+        Of each hypothesis its ways.
+    fits
+        Of the hypotheses.
     sd
         By the name of an unknown of the baseline or of a run, one a run; 0: tells
         nothing.
+
+    Returns
+    -------
+    list of list
+        With one row more for each unknown that is told.
     """
     found = []
-    for ways, one in zip(prospects, fits, strict=True):
+    for ways, one in zip(outcomes, fits, strict=True):
         mean, slope = [], []
         for part, place in one.hypothesis.parts:
             if not isinstance(part, BaselineTerm | RunNuisance):
@@ -239,7 +251,7 @@ def probability_of_naming(
     Parameters
     ----------
     settings
-        Prospects of all rivals, for each way in which the measurement may be
+        Predicted outcomes of all rivals, for each way in which the measurement may be
         read.
     setting
         The way it is read where each rival is the truth.
@@ -247,6 +259,11 @@ def probability_of_naming(
         Nothing among them.
     inseparable
         Effects that no record can tell apart.
+
+    Returns
+    -------
+    float
+        Averaged over the rivals by their probabilities; 300 draws of a fixed seed.
     """
     rng = np.random.default_rng(_SEED)
     log_odds = {rival.names: rival.log_odds for rival in rivals}
@@ -281,6 +298,16 @@ def _drawn(ways: Sequence[PredictedOutcome], count: int, rng: np.random.Generato
 def empty(measured: Measured) -> Measured:
     """
     Return rows whose values are 0.
+
+    Parameters
+    ----------
+    measured
+        Rows of a run.
+
+    Returns
+    -------
+    Measured
+        The same rows.
     """
     rows = measured.rows
     return replace(measured, rows=rows._replace(value=np.zeros(len(rows.value))))

@@ -19,15 +19,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.advice import declared
-from shipdrag_ros.diagnosis.direct import DirectModel, gap_of_speeds, learn_factor
+from shipdrag_ros.diagnosis.direct import DirectModel, diagnosis_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing, start
-from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Verdict, Where
-from shipdrag_ros.diagnosis.search import search, with_pairs
+from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Where
+from shipdrag_ros.diagnosis.search import Found, search, with_pairs
 from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
-from shipdrag_ros.diagnosis.verdict import Found, judge
+from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -149,16 +148,8 @@ class SailingModel(DirectModel):
         """
         Return a hypothesis with one effect more.
         """
-        log_odds = math.log(effect.odds)
-        return [
-            replace(
-                base,
-                names=tuple(sorted((*base.names, effect.name))),
-                terms=(*base.terms, EffectTerm(effect, _ANY_SHIP)),
-                log_prior=base.log_prior + log_odds,
-                log_odds=base.log_odds + log_odds,
-            )
-        ]
+        term = EffectTerm(effect, _ANY_SHIP)
+        return [base.with_effect(effect.name, term, log_odds=math.log(effect.odds))]
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """
@@ -205,6 +196,16 @@ class SailingModel(DirectModel):
     def fit_of(self, effects: Sequence[Effect]) -> Fit:
         """
         Return the fit of some effects at once.
+
+        Parameters
+        ----------
+        effects
+            Of this model.
+
+        Returns
+        -------
+        Fit
+            Of all of them in one hypothesis.
         """
         hypothesis = self.nothing
         for effect in effects:
@@ -268,13 +269,9 @@ def diagnose_sailing(
         model = SailingModel.learnt(legs)
     found = with_pairs(search(model))
     judged = judge(found)
-    return judged.diagnosis(
-        would_decide=declared(judged.candidates) if judged.verdict is Verdict.ONE_OF else (),
-        where=None if judged.verdict is Verdict.NONE else _where(model, found.best),
-        before=gap_of_speeds(found.nothing),
-        after=gap_of_speeds(found.best) if judged.missing else None,
-        held_out_before=None,
-        held_out_after=None,
+    return diagnosis_of_speeds(
+        judged,
+        _where(model, found.best),
         baseline='none',
         notes=(
             *_about(model, int(outlier.sum())),

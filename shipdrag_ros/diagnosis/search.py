@@ -11,14 +11,15 @@ takes hundreds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
+from shipdrag_ros.diagnosis.posterior import QUIET, Posterior, mode_of, posterior_of
 from shipdrag_ros.diagnosis.terms import Tail, Unknown, trial_z
-from shipdrag_ros.diagnosis.verdict import QUIET, Found, Posterior, mode_of
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
 
@@ -26,6 +27,53 @@ _PAIRED = 4  # most probable names that pairs are tried with
 _PAIRS = 12  # that are fitted
 _STARTS = 2  # of each hypothesis that are fitted
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
+
+
+@dataclass(frozen=True)
+class Found:
+    """
+    What a search found.
+
+    Attributes
+    ----------
+    model
+    nothing
+        The fit where nothing is missing.
+    fits
+        Of everything.
+    """
+
+    model: Model
+    nothing: Fit
+    fits: tuple[Fit, ...]
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """Posterior probabilities of all."""
+        return posterior_of(self.fits)
+
+    @property
+    def smooth(self) -> tuple[Fit, ...]:
+        """Fits with something unnamed instead, one a channel."""
+        return tuple(one for one in self.fits if one.hypothesis.discrepancy)
+
+    @property
+    def best(self) -> Fit:
+        """The most probable of what has a name, or is nothing."""
+        return self.posterior.best[self.posterior.named()[0]]
+
+    @property
+    def alarm(self) -> bool:
+        """Whether something is missing, and has a name."""
+        return self.posterior.nothing < QUIET and bool(self.best.hypothesis.names)
+
+    def with_discrepancy(self) -> tuple[Fit, ...]:
+        """Return fits of something smooth besides the best, one a channel."""
+        model, best = self.model, self.best
+        if not best.hypothesis.names:
+            return self.smooth
+        more = [model.with_discrepancy(best.hypothesis, channel) for channel in model.channels]
+        return tuple(fit(model, more, [start(model, one, best.best) for one in more]))
 
 
 def search(model: Model) -> Found:
@@ -36,6 +84,11 @@ def search(model: Model) -> Found:
     ----------
     model
         With the record that it is held against.
+
+    Returns
+    -------
+    Found
+        Without pairs.
     """
     nothing = fit(model, [model.nothing], [start(model, model.nothing)])[0]
     named = [h for effect in model.effects for h in model.with_effect(model.nothing, effect)]
@@ -52,6 +105,16 @@ def with_pairs(found: Found) -> Found:
 
     Pairs are of the most probable names with all others; confounders that nothing
     tells apart are no pair.
+
+    Parameters
+    ----------
+    found
+        From `search`.
+
+    Returns
+    -------
+    Found
+        The same where nothing may be missing.
     """
     if found.posterior.nothing >= QUIET:
         return found

@@ -18,10 +18,10 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, baseline_parts
-from shipdrag_ros.diagnosis.diagnose import CoastRun
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.terms import Tail
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
@@ -52,6 +52,18 @@ class Normal:
     def without(cls, matrix: Float64, fall: Float64, kept: int) -> Normal:
         """
         Return the equations of the first unknowns, whatever the others are.
+
+        Parameters
+        ----------
+        matrix, fall : (p, p), (p,)
+            Normal equations.
+        kept
+            Number of first unknowns that are kept.
+
+        Returns
+        -------
+        Normal
+            Their Schur complement.
         """
         own = matrix[kept:, kept:]
         across = np.linalg.solve(own, np.column_stack([matrix[kept:, :kept], fall[kept:]]))
@@ -63,6 +75,16 @@ class Normal:
     def at(self, step: Float64) -> Normal:
         """
         Return the same about a point that is a step away.
+
+        Parameters
+        ----------
+        step : (q,)
+            To the new point.
+
+        Returns
+        -------
+        Normal
+            Of the same matrix.
         """
         return Normal(self.matrix, self.fall - self.matrix @ step)
 
@@ -114,13 +136,18 @@ def share(
     Parameters
     ----------
     runs
-        About the same point.
+        Normal equations about the same point.
     prior
         Of what is shared.
     along : (q,)
         What a factor of 1 + 1 on a run does to the unknowns.
     usual_scatter
         Half-Cauchy scale of the scatter before the data.
+
+    Returns
+    -------
+    Shared
+        Averaged over the posterior of the scatter.
 
     Notes
     -----
@@ -159,6 +186,20 @@ def share(
 def factor(run: Normal, others: Shared, along: Float64) -> Factor:
     """
     Hold a run against what others share.
+
+    Parameters
+    ----------
+    run
+        Normal equations of the run.
+    others
+        What the other runs share.
+    along : (q,)
+        What a factor of 1 + 1 on a run does to the unknowns.
+
+    Returns
+    -------
+    Factor
+        Of the run over the others, - 1.
     """
     known = np.linalg.inv(others.covariance)
     run = run.at(others.step)
@@ -201,7 +242,23 @@ class SharedBaseline:
 
     @classmethod
     def of(cls, runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> SharedBaseline:
-        """Fit the runs."""
+        """
+        Fit the runs.
+
+        Parameters
+        ----------
+        runs
+            Clean, each with the steady record before the stop.
+        ship
+            With a baseline.
+        parameters
+            For the noise of the sensors and the convention of the heading.
+
+        Returns
+        -------
+        SharedBaseline
+            About the fit of all runs at once.
+        """
         ship = _opened(ship)
         seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
         model = CoastModel(ship, seen, seen[0].heading_rad)
@@ -218,7 +275,7 @@ class SharedBaseline:
         scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.WIDE]
         shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
         shared = [*scales, *shapes]
-        speeds = [model.simulated.predict(j, fitted.best).speed for j in range(len(seen))]
+        speeds = [model.predict(j, fitted.best).speed for j in range(len(seen))]
         return cls(
             model,
             fitted,

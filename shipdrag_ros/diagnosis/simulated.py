@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -65,16 +65,17 @@ class _Plan:
 @dataclass(frozen=True)
 class CoastSimulation:
     """
-    What all hypotheses share.
+    Runs, and the simulation of hypotheses about them.
 
     Attributes
     ----------
     ship
-        Without effects: those that its file states are terms.
+        As its file states it.
     seen
         The runs.
     reference_rad
-        Heading of the first of all runs.
+        Heading of the first of all runs, along which effects of the earth are
+        stated.
     """
 
     ship: Ship
@@ -82,11 +83,16 @@ class CoastSimulation:
     reference_rad: float
 
     @cached_property
+    def bare(self) -> Ship:
+        """The ship without effects: those that its file states are terms."""
+        return replace(self.ship, effects=())
+
+    @cached_property
     def frames(self) -> tuple[Frame, ...]:
         """One a run; effects of the earth lie along the first run."""
         return tuple(
             Frame(
-                self.ship,
+                self.bare,
                 Scenario(
                     speed_m_s=run.speed_m_s,
                     lead_in_s=run.lead_in_s,
@@ -110,9 +116,18 @@ class CoastSimulation:
 
         Parameters
         ----------
+        hypotheses
+            Of this model.
+        at
+            (p,) each.
         near
             The same about unknowns near by: the derivatives by what is known
             well beforehand, the baseline, are taken from there.
+
+        Returns
+        -------
+        list of Linear
+            Not finite where it cannot be simulated.
         """
         before = near or [None] * len(hypotheses)
         runs = [self._run(j, hypotheses, at, before) for j in range(len(self.seen))]
@@ -126,16 +141,11 @@ class CoastSimulation:
             for i, (hypothesis, z) in enumerate(zip(hypotheses, at, strict=True))
         ]
 
-    def responses(
-        self, base: Linear, terms: Sequence[tuple[Term, Sequence[float]]]
-    ) -> list[Float64]:
+    def responses(self, base: Linear, hypotheses: Sequence[Hypothesis]) -> Float64:
         """
-        Return what terms with given values, one at a time, would change in the whitened rows.
+        Return the linear response to the last term of each, (hypotheses, rows), whitened.
 
-        Returns
-        -------
-        list of (terms, rows)
-            Of each run; 0 where it cannot be simulated.
+        It is 0 where it cannot be simulated.
         """
         found = []
         for j, (frame, seen) in enumerate(zip(self.frames, self.seen, strict=True)):
@@ -144,8 +154,11 @@ class CoastSimulation:
             acting = self._acting(j, base.hypothesis, base.z)
             whole = sum((term.action(frame, j, values) for term, _, values in acting), Action())
             batch.add(whole, speed)
-            for term, values in terms:
-                more = term.action(frame, j, values) if term.acts_in(j) else Action()
+            for hypothesis in hypotheses:
+                term = hypothesis.terms[-1]
+                first, *others = term.unknowns
+                sizes = [first.value(trial_z(first)), *(u.value(u.start) for u in others)]
+                more = term.action(frame, j, sizes) if term.acts_in(j) else Action()
                 batch.add(whole + more, speed)
             columns = self._simulate(j, batch)
             context = seen.context.predict(columns, batch.actions)
@@ -158,11 +171,23 @@ class CoastSimulation:
             change = rows[1:] - rows[0]
             change[~np.isfinite(change).all(axis=1)] = 0.0
             found.append(self._whitened(j, change))
-        return found
+        return np.hstack(found)
 
     def predict(self, run: int, linear: Linear) -> Predicted:
         """
         Return what a hypothesis predicts of a run, without its row terms.
+
+        Parameters
+        ----------
+        run
+            Its place among the runs.
+        linear
+            Of a hypothesis.
+
+        Returns
+        -------
+        Predicted
+            Without measurement terms.
         """
         batch = _Batch()
         plan = self._plan(run, linear.hypothesis, linear.z, batch)
@@ -172,7 +197,7 @@ class CoastSimulation:
     def _simulate(self, run: int, batch: _Batch) -> Columns:
         frame = self.frames[run]
         return simulate_columns(
-            self.ship,
+            self.bare,
             frame.scenario,
             batch.actions,
             self.seen[run].time_s,

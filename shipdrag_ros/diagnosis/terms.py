@@ -90,6 +90,16 @@ def _odds(z: float) -> float:
 def trial_z(unknown: Unknown) -> float:
     """
     Return z of a likely size, for one that is tried before it is fitted.
+
+    Parameters
+    ----------
+    unknown
+        The size of an effect.
+
+    Returns
+    -------
+    float
+        Where its fit begins, or 0.5 for one that begins from 0.
     """
     return unknown.start or _TRIAL_Z
 
@@ -97,6 +107,22 @@ def trial_z(unknown: Unknown) -> float:
 def scaled(name: str, sd: float, *, mean: float = 0.0, tail: Tail = Tail.NORMAL) -> Unknown:
     """
     Return an unknown that is mean + sd z.
+
+    Parameters
+    ----------
+    name
+        Of the unknown.
+    sd
+        Prior standard deviation, in its unit.
+    mean
+        Prior mean.
+    tail
+        Of the prior.
+
+    Returns
+    -------
+    Unknown
+        In its unit.
     """
     return Unknown(name, tail, lambda z: mean + sd * z, lambda z: sd)
 
@@ -107,8 +133,19 @@ def of_prior(name: str, prior: Prior, *, start: float = 0.0, sign: float = 1.0) 
 
     Parameters
     ----------
+    name
+        Of the parameter.
+    prior
+        In SI.
+    start
+        z that a fit begins from.
     sign
         Where the prior leaves it open.
+
+    Returns
+    -------
+    Unknown
+        Whose z is standard normal under the prior, or the positive half of it.
     """
     a, b = sign * prior.first, prior.second
     match prior.shape:
@@ -217,6 +254,18 @@ class EffectTerm:
 def scope_runs(effect: Effect, runs: int) -> tuple[int | None, ...]:
     """
     Return where an effect may be: in all runs (None), or in any single one.
+
+    Parameters
+    ----------
+    effect
+        Of the library.
+    runs
+        Number of runs.
+
+    Returns
+    -------
+    tuple of int or None
+        Places of single runs, for an effect of a single run.
     """
     if effect.scope is Scope.RUN and runs > 1:
         return (None, *range(runs))

@@ -11,7 +11,7 @@ import pytest
 from scipy.special import ndtr
 
 from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, Rival, probability_of_naming
-from shipdrag_ros.diagnosis.verdict import CERTAIN
+from shipdrag_ros.diagnosis.posterior import CERTAIN
 
 DRAWN = 0.06  # twice the sd of a share of 300 draws
 NOTHING = Rival((), -60.0, 0.0)

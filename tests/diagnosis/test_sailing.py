@@ -193,6 +193,13 @@ def test_two_at_once() -> None:
     assert [effect.name for effect in found.effects] == ['current', 'log_scale']
 
 
+def test_a_strong_current_across_the_first_leg_is_a_current() -> None:
+    # N = 2, seeds 0, 1: 1.1 m/s, of which 0.9 across, three prior sd
+    for seed in range(2):
+        found = found_in(Sailing(current_m_s=(0.2, 1.1), geodetic=True), seed)
+        assert [effect.name for effect in found.effects] == ['current']
+
+
 def test_an_error_that_bends_with_the_speed_has_no_name() -> None:
     found = found_in(Sailing(dip_m_s=0.5, speeds_m_s=(3.0, 4.5, 6.0, 7.0, 5.0)))
     assert found.verdict is Verdict.UNKNOWN

@@ -16,6 +16,7 @@ def test_pairs_are_of_what_can_be_there_together(model_of: Callable[..., CoastMo
     pairs = {one.hypothesis.names for one in found.fits if len(one.hypothesis.names) == 2}
     assert len(pairs) >= 3
     assert all(find(a).goes_with(find(b)) for pair in pairs for a, b in combinations(pair, 2))
+    assert not any(set(pair) in found.model.inseparable for pair in pairs)
 
 
 def test_where_nothing_is_missing_no_pair_is_fitted(model_of: Callable[..., CoastModel]) -> None:

@@ -10,14 +10,17 @@ import pytest
 
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
+from shipdrag_ros.diagnosis.posterior import posterior_of, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
+from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.diagnosis.verdict import (
     decide,
     exceeds_noise,
     has_residual_structure,
-    posterior_of,
-    prune_by_bayes_factor,
+    outside_prior,
 )
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import find
 
 TWINS = [frozenset(('added_mass', 'displacement'))]
 
@@ -104,3 +107,21 @@ def test_something_smooth_besides_takes_a_name_back() -> None:
 def test_what_is_more_than_noise_depends_on_the_number_of_rows(rows: int, limit: float) -> None:
     assert exceeds_noise(limit + 0.01, rows)
     assert not exceeds_noise(limit - 0.01, rows)
+
+
+@pytest.mark.parametrize(
+    ('name', 'parameter', 'outside'),
+    [
+        ('turning', 'duration_s', True),
+        ('turning', 'drag_area_m2', False),
+        ('current', 'cross_track_m_s', False),
+    ],
+    ids=['shape', 'size', 'component of a size'],
+)
+def test_a_shape_beyond_its_prior_is_not_what_an_effect_is_known_as(
+    name: str, parameter: str, outside: bool, cargo: Ship
+) -> None:
+    term = EffectTerm(find(name), cargo)
+    z = np.array([3.0 * (unknown.name == parameter) for unknown in term.unknowns])
+    linear = Linear(Hypothesis((name,), (term,)), z, (np.zeros((1, 9)),), (np.zeros(9),))
+    assert outside_prior(Fit(linear, np.eye(len(z)), 0.0)) is outside
