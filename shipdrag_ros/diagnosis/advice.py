@@ -30,8 +30,6 @@ from shipdrag_ros.diagnosis.outcomes import (
 )
 from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.diagnosis.result import Advice, Candidate
-from shipdrag_ros.diagnosis.simulated import CoastSimulation
-from shipdrag_ros.diagnosis.verdict import CERTAIN, UNNAMED, Posterior
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import LOG

@@ -23,7 +23,6 @@ from shipdrag_ros.diagnosis.search import Found, search, with_pairs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
-from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship, StatedEffect

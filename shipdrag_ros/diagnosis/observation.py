@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from shipdrag_ros.diagnosis.context import Context, Stop
+from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown

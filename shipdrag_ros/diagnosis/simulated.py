@@ -18,6 +18,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, Predicted, Term
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.terms import trial_z
 from shipdrag_ros.inference.noise import apply
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND
 from shipdrag_ros.samples import Float64
