@@ -30,6 +30,8 @@ import llvmlite
 import numba
 import numpy as np
 from numba.core import caching, compiler, config, serialize, sigutils
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
 
 Arguments = ParamSpec('Arguments')
 Result = TypeVar('Result')
@@ -55,6 +57,7 @@ _CHECKED = 32  # bytes of the digest before what is kept
 _FORGOTTEN_S = 90 * 86400.0  # not used for so long: its module may be gone
 _log = logging.getLogger(__name__)
 _not_kept: list[str] = []
+_waiting: set[_Waiting] = set()
 
 
 @overload
@@ -86,8 +89,8 @@ def compiled(
     Parameters
     ----------
     signature
-        Of numba, as text or type: the function is compiled on import, for this one only.
-        Without it, on the first call with arguments of a type.
+        Of numba, as text or type: the function is compiled for this one only, by `compile_all`
+        or on its first call. Without it, on the first call with arguments of a type.
     fastmath
         What LLVM may do to floating-point arithmetic.
     inline
@@ -119,12 +122,51 @@ def compiled(
             if folder is not None:
                 dispatcher._cache = _Cache(function, folder)
             if signature is not None:
-                dispatcher.compile(signature)
-                dispatcher.disable_compile()
+                _Waiting.take(dispatcher, signature)
         result: Callable[Arguments, Result] = dispatcher
         return result
 
     return decorate
+
+
+def compile_all() -> None:
+    """
+    Compile every function with a signature that is imported, so that no data wait for it.
+    """
+    while _waiting:
+        next(iter(_waiting)).compile_now()
+
+
+class _Waiting(CPUDispatcher):  # type: ignore[misc]
+    """
+    A function with a signature, before it is needed; then it is as numba makes it.
+    """
+
+    @classmethod
+    def take(cls, dispatcher: Any, signature: Any) -> None:
+        """Let a function wait."""
+        dispatcher._signature_to_come = signature
+        dispatcher.__class__ = cls
+        _waiting.add(dispatcher)
+
+    def compile_now(self) -> None:
+        """Compile it, or take what is kept; another thread may have done so."""
+        with global_compiler_lock:
+            if self in _waiting:
+                CPUDispatcher.compile(self, self._signature_to_come)
+                self.disable_compile()
+                self.__class__ = CPUDispatcher
+                _waiting.remove(self)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return what it is to compiled code that calls it."""
+        self.compile_now()
+        return self.get_call_template(args, kws)
+
+    def __call__(self, *args: Any, **kws: Any) -> Any:
+        """Call it, for the first time."""
+        self.compile_now()
+        return self(*args, **kws)
 
 
 class _Cache(caching.NullCache):  # type: ignore[misc]

@@ -34,6 +34,12 @@ PICTURE = (
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none
 )
 FLOORS = {room: number for number, floor in enumerate(PICTURE) for room in floor}
+ESTIMATING = {'coastdown', 'estimation', 'diagnosis', 'simulation'}
+NEVER = {  # files estimate nothing, and no coastdown needs a study
+    'bags': ESTIMATING | {'studies'},
+    'bags.salvage': ESTIMATING | {'studies'},
+    **{name: {'studies'} for name in ('messages', 'replay', 'importing', 'node', 'report')},
+}
 GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them
 ROS = {
     'rclpy',
@@ -91,6 +97,7 @@ def test_imports_run_downward_and_stay_at_the_edges(path: Path) -> None:
         other = room(name)
         if other in FLOORS and other != here:
             assert FLOORS[other] < FLOORS[here], f'{here} imports {other}, which is not below'
+            assert other not in NEVER.get(here, set()), f'{here} must not need {other}'
 
 
 def test_every_room_has_a_floor() -> None:

@@ -20,8 +20,6 @@ from shipdrag_ros.replay import replay
 from shipdrag_ros.replay.hulls import Ranking, rank
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import together
-from shipdrag_ros.report.page import write_report
-from shipdrag_ros.report.spreadsheet import write_curves
 from shipdrag_ros.ship import Ship
 
 _LATE_S = 10.0
@@ -105,6 +103,8 @@ def run(options: argparse.Namespace) -> int:
     else:
         replay_text.show_together(output, together(results))
     if options.report is not None:
+        from shipdrag_ros.report.page import write_report  # pictures take long to import
+
         write_report(options.report, results, ranking=ranking)
         output.log(f'report in {options.report}')
     if options.out is not None:
@@ -164,6 +164,9 @@ def write_results(
     """
     Write the page, the JSON and the curves into a directory.
     """
+    from shipdrag_ros.report.page import write_report  # pictures take long to import
+    from shipdrag_ros.report.spreadsheet import write_curves
+
     write_report(directory / REPORT, results, ranking=ranking)
     document: dict[str, Any] = replay_json.document(results, ranking=ranking)
     (directory / JSON).write_text(json_text(document), encoding='utf-8')

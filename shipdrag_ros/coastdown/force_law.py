@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import nnls
 
 from shipdrag_ros.coastdown.events import Dismissal
 from shipdrag_ros.coastdown.readings import binned
@@ -103,6 +102,8 @@ class _Law:
     """One law on a stretch of bins."""
 
     def __init__(self, time_s: Float64, speed: Float64, scale: float) -> None:
+        from scipy.optimize import nnls  # slow to import
+
         u = speed / scale
         size = np.abs(u)
         columns = [np.ones(len(u)), -np.ones(len(u))]

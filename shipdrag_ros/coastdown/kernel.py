@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+import numpy as np
 from numba import typeof, types
 
 from shipdrag_ros.coastdown.bins import SOURCES, Bins, line, mean_turning, newest_bin
@@ -34,7 +35,6 @@ from shipdrag_ros.coastdown.validate import (
     remember,
 )
 from shipdrag_ros.compiled import Signature, compiled
-from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
 
 # A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
@@ -148,7 +148,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     return 0
 
 
-_SLOPES = Slopes.of(Parameters())
+_SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all that counts
 _SIGNATURE: Signature = types.UniTuple(types.int64, 2)(
     typeof(Memory.fresh(_SLOPES, seconds=1, tally=Tally.fresh())),
     typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0)),
@@ -161,7 +161,6 @@ _SIGNATURE: Signature = types.UniTuple(types.int64, 2)(
 )
 
 
-# compiled on import, so that no coastdown waits for it
 @compiled(_SIGNATURE, uncounted=True)
 def walk(
     memory: Memory,

@@ -16,7 +16,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from shipdrag_ros.coastdown.bins import FIRST_TRACK, SOURCES, Bins, line, smoothing, speeds_kept
 from shipdrag_ros.coastdown.validate import NEVER
@@ -76,6 +75,8 @@ class Slopes(NamedTuple):
         The spread is itself an estimate, from few independent windows: the
         threshold is a quantile of Student's t, not of the normal distribution.
         """
+        from scipy.special import ndtri, stdtrit  # slow to import
+
         width = round(parameters.slope_window_s)
         stride = max(1, width // _STRIDES_PER_WINDOW)
         points = max(1, round(parameters.steady_s) // stride)
@@ -85,14 +86,14 @@ class Slopes(NamedTuple):
         windows = np.arange(points + 1) * (stride / width)
         learnt = windows >= _WINDOWS_LEARNT
         quantile = np.full((SCALES, points + 1), np.inf)
-        quantile[:, learnt] = stats.t.isf(chance, _FREEDOM_PER_WINDOW * windows[learnt])
+        quantile[:, learnt] = -stdtrit(_FREEDOM_PER_WINDOW * windows[learnt], chance)
         return cls(
             width,
             stride,
             math.ceil(width / stride),
             points,
             quantile,
-            float(stats.norm.isf(chance[0, 0])),
+            -float(ndtri(chance[0, 0])),
         )
 
 

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
@@ -141,6 +140,8 @@ def _agreement(
     def misfit(current: float) -> float:
         chi2, _ = _between(estimates, np.where(over_ground, current * along, 0.0))
         return chi2
+
+    from scipy.optimize import minimize_scalar  # slow to import
 
     found = minimize_scalar(misfit, bounds=(-bound, bound), method='bounded')
     best = float(found.x)

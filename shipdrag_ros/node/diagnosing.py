@@ -17,13 +17,16 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from enum import Enum
 from threading import Lock
+from typing import TYPE_CHECKING
 
 from shipdrag_ros.coastdown.events import Coastdown
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:  # the process that diagnoses imports it, the node need not
+    from shipdrag_ros.diagnosis import Diagnosis
 
 LIMIT_S = 900.0  # the first diagnosis of a machine compiles
 _NICE = 10  # estimates come first
@@ -66,7 +69,7 @@ class DiagnosisStatus:
 class _Task:
     """What a process is given."""
 
-    run: CoastRun
+    window: Window
     ship: Ship
     parameters: Parameters
 
@@ -114,7 +117,7 @@ class Diagnosing:
             self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason, coastdown)
             return
         self._status = DiagnosisStatus(DiagnosisState.RUNNING, coastdown=coastdown)
-        task = _Task(CoastRun('the coastdown', window), self._ship, self._parameters)
+        task = _Task(window, self._ship, self._parameters)
         self._queue.submit(self._diagnose, task, self._status)
 
     def close(self) -> None:
@@ -134,10 +137,10 @@ class Diagnosing:
         except (OSError, subprocess.SubprocessError, pickle.UnpicklingError) as error:
             self._status = replace(running, state=DiagnosisState.FAILED, reason=str(error))
             return
-        if isinstance(found, Diagnosis):
-            self._status = replace(running, state=DiagnosisState.DONE, found=found)
-        else:
+        if isinstance(found, str):
             self._status = replace(running, state=DiagnosisState.IMPOSSIBLE, reason=found)
+        else:
+            self._status = replace(running, state=DiagnosisState.DONE, found=found)
 
     def _answer(self, task: _Task) -> Diagnosis | str:
         """Return what a process says; str: why it can say nothing."""
@@ -160,8 +163,7 @@ class Diagnosing:
         if self._process.returncode != 0:
             last = complaint.decode(errors='replace').strip().rpartition('\n')[2]
             raise subprocess.SubprocessError(f'exit {self._process.returncode}: {last}')
-        found = pickle.loads(answer)
-        assert isinstance(found, Diagnosis | str)
+        found: Diagnosis | str = pickle.loads(answer)
         return found
 
 
@@ -170,10 +172,13 @@ def main() -> None:
     Diagnose what comes from stdin, and write the result, or why there is none, to stdout.
     """
     os.nice(_NICE)
+    from shipdrag_ros.diagnosis import CoastRun, diagnose
+
     task = pickle.load(sys.stdin.buffer)
     assert isinstance(task, _Task)
+    run = CoastRun('the coastdown', task.window)
     try:
-        answer: Diagnosis | str = diagnose([task.run], task.ship, task.parameters)
+        answer: Diagnosis | str = diagnose([run], task.ship, task.parameters)
     except ShipdragError as error:
         answer = str(error)
     sys.stdout.buffer.write(pickle.dumps(answer))

@@ -9,18 +9,19 @@ its unit in its key.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from shipdrag_ros.coastdown import InputHealth
-from shipdrag_ros.diagnosis import Diagnosis, Verdict
-from shipdrag_ros.diagnosis.words import advice, sentence
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
 from shipdrag_ros.samples import MOTION_INPUTS
-from shipdrag_ros.simulation.effects import LIBRARY
+
+if TYPE_CHECKING:
+    from shipdrag_ros.diagnosis import Diagnosis  # slow to import, and known once there is one
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -175,13 +176,18 @@ def diagnosis_status(status: DiagnosisStatus) -> DiagnosticStatus:
         return _status(
             'diagnosis', level, f'{text}: {status.reason}' if status.reason else text, values
         )
+    from shipdrag_ros.diagnosis import Verdict, words
+
     found = status.found
     level = OK if found.verdict is Verdict.NONE else WARN
-    return _status('diagnosis', level, sentence(found), values | _figures(found))
+    return _status('diagnosis', level, words.sentence(found), values | _figures(found))
 
 
 def _figures(found: Diagnosis) -> dict[str, object]:
     """Return the figures of a diagnosis."""
+    from shipdrag_ros.diagnosis.words import advice
+    from shipdrag_ros.simulation.effects import LIBRARY
+
     values: dict[str, object] = {
         'verdict': found.verdict.value,
         'probability that nothing is missing [1]': found.nothing,

@@ -25,6 +25,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
+from shipdrag_ros.compiled import compile_all
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.node.node import CoastdownNode
 
@@ -91,6 +92,8 @@ def _run(line: list[str]) -> int:
             try:
                 executor.add_node(node)
                 node.start()
+                # while ROS finds the topics; a message that needs a function first waits for it
+                threading.Thread(target=compile_all, name='compiling', daemon=True).start()
                 while not stop.is_set():
                     executor.spin_once()
             except ExternalShutdownException:

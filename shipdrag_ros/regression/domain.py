@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import nnls
 
 from shipdrag_ros.samples import Float64
 
@@ -109,6 +108,8 @@ class Domain:
         such mean is found by non-negative least squares (Lawson and Hanson), in
         any number of variables and where the data lie in a plane.
         """
+        from scipy.optimize import nnls  # slow to import
+
         extent = self.upper - self.lower
         extent = np.where(extent > 0.0, extent, 1.0)
         centre = self.points.mean(axis=0)

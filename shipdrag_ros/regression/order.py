@@ -15,7 +15,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtr, chdtrc, fdtrc
 
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64
@@ -97,6 +96,8 @@ class OrderTable:
     @cached_property
     def p(self) -> Float64:
         """(m,) Probability of such an F by chance; NaN at the first."""
+        from scipy.special import fdtrc  # slow to import
+
         chance = fdtrc(np.diff(self.coefficients), self.freedom[1:], self.f[1:])
         # the library answers NaN at infinity
         chance[np.isinf(self.f[1:])] = 0.0
@@ -144,6 +145,8 @@ class OrderTable:
         S1's other comparison. A plateau above the known variance, by chi^2 at
         `IMPLAUSIBLE`, is not the last one.
         """
+        from scipy.special import chdtrc  # slow to import
+
         plausible = chdtrc(self.freedom, self.sse / variance) >= IMPLAUSIBLE
         rows = np.flatnonzero(self._settled(SIGNIFICANCE) & plausible)
         return int(rows[0]) if len(rows) else None
@@ -152,6 +155,8 @@ class OrderTable:
         """
         Say whether s^2 of a fit is too small for a known variance.
         """
+        from scipy.special import chdtr  # slow to import
+
         return bool(chdtr(self.freedom[row], self.sse[row] / variance) < IMPLAUSIBLE)
 
     def _settled(self, significance: float) -> NDArray[np.bool_]:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from shipdrag_ros import __version__
+from shipdrag_ros.display import Table
 from shipdrag_ros.report.drawing import data_uri
 
 
@@ -27,6 +29,63 @@ class Picture:
         Draw a figure.
         """
         return cls(data_uri(figure), caption)
+
+
+@dataclass(frozen=True)
+class Section:
+    """
+    Part of a page: what it has of these, in this order.
+
+    Attributes
+    ----------
+    heading
+    lines
+        Points of a list.
+    pictures
+    tables
+        Each with its caption; one without column heads is a list of facts.
+    """
+
+    heading: str = ''
+    lines: Sequence[str] = ()
+    pictures: Sequence[Picture] = ()
+    tables: Sequence[tuple[str, Table]] = ()
+
+
+def write_sections(
+    path: Path,
+    sections: Sequence[Section],
+    *,
+    title: str,
+    sentence: str,
+    source: str = '',
+    foot: str = '',
+) -> None:
+    """
+    Write a page of sections below one sentence that says what was found.
+
+    Parameters
+    ----------
+    path
+        The file; an existing one is replaced.
+    sections
+        In their order.
+    title
+        Of the page.
+    sentence
+        What was found.
+    source, foot
+        Where the data come from; where the formulas do.
+    """
+    write_page(
+        path,
+        'sections.html',
+        title=title,
+        sentence=sentence,
+        source=source,
+        sections=sections,
+        foot=foot,
+    )
 
 
 def write_page(path: Path, template: str, *, title: str, **content: Any) -> None:

@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.samples import Float64
@@ -80,6 +79,8 @@ class CoefficientBaseline:
 
     @cached_property
     def _wave(self) -> Any:
+        from scipy.interpolate import PchipInterpolator  # slow to import
+
         return PchipInterpolator(self.wave_froude, self.wave_coefficient)
 
     def wave(self, froude: Float64) -> Float64:
@@ -119,6 +120,8 @@ class TableBaseline:
 
     @cached_property
     def _resistance(self) -> Any:
+        from scipy.interpolate import PchipInterpolator  # slow to import
+
         return PchipInterpolator(self.speed_m_s, self.resistance_n)
 
     def resistance(self, speed: Float64) -> Float64:

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from shipdrag_ros.display import Table
-from shipdrag_ros.report.document import Picture, write_page
+from shipdrag_ros.report.document import Picture, Section, write_sections
 from shipdrag_ros.studies.cable.drag import (
     PUBLISHED_RANGE,
     Cable,
@@ -19,6 +19,12 @@ from shipdrag_ros.studies.cable.drag import (
     tangent_range,
 )
 from shipdrag_ros.studies.cable.face import pictures as cable_pictures
+
+_FORMULAS = (
+    'Formulas: Akhmedov, Naumov, Linearization of the dependence of the cable hydrodynamic drag '
+    'force from the speed. C V is the force with the same figure C and the speed in m/s, as it is '
+    'met in textbooks.'
+)
 
 
 def sentence(cable: Cable, tangent: Tangent) -> str:
@@ -113,24 +119,29 @@ def write_cable(path: Path, cable: Cable, tangent: Tangent, *, tolerance: float)
     tolerance
         Relative error that a line may have.
     """
-    write_page(
+    coefficient = Picture.of(
+        cable_pictures.coefficient_picture(cable),
+        'Drag coefficient of cylinders along the flow, where it was measured.',
+    )
+    lines = Picture.of(
+        cable_pictures.tangent_picture(tangent, tolerance),
+        'The drag and two lines in place of it, and by how much these err; shaded: where the '
+        f'tangent errs by {100.0 * tolerance:.3g} % at most.',
+    )
+    tables = (
+        ('The cable', facts(cable, tangent, tolerance)),
+        ('Errors of the lines: each over the drag, less one', errors(tangent, tolerance)),
+    )
+    write_sections(
         path,
-        'cable.html',
+        [
+            Section(pictures=(lines,), tables=tables),
+            Section('Before it is used', lines=notes(cable)),
+            Section(pictures=(coefficient,)),
+        ],
         title='Drag of a towed cable, and a line in place of it',
-        sentence=sentence(cable, tangent),
-        line=line(tangent, tolerance),
-        facts=facts(cable, tangent, tolerance),
-        errors=errors(tangent, tolerance),
-        notes=notes(cable),
-        coefficient=Picture.of(
-            cable_pictures.coefficient_picture(cable),
-            'Drag coefficient of cylinders along the flow, where it was measured.',
-        ),
-        lines=Picture.of(
-            cable_pictures.tangent_picture(tangent, tolerance),
-            'The drag and two lines in place of it, and by how much these err; shaded: where the '
-            f'tangent errs by {100.0 * tolerance:.3g} % at most.',
-        ),
+        sentence=f'{sentence(cable, tangent)} {line(tangent, tolerance)}',
+        foot=_FORMULAS,
     )
 
 

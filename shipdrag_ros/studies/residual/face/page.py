@@ -10,11 +10,13 @@ import numpy as np
 
 from shipdrag_ros.display import Table
 from shipdrag_ros.regression import Prediction
-from shipdrag_ros.report.document import Picture, write_page
+from shipdrag_ros.report.document import Picture, Section, write_sections
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import ResidualFit, leave_hulls_out
 from shipdrag_ros.studies.surface.face import cells as fit_cells
 from shipdrag_ros.studies.surface.face import pictures as fit_pictures
+
+_NOTES = 'What these data can and cannot show'
 
 
 def sentence(found: ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
@@ -107,13 +109,14 @@ def write_residual(
                 'the leverages of the data and beyond.',
             )
         )
-    write_page(
+    shown = [
+        Section(_NOTES if found.notes else '', lines=found.notes),
+        Section(pictures=pictures, tables=tables),
+    ]
+    write_sections(
         path,
-        'fit.html',
+        shown,
         title=f'{target} by ratios of the hull',
         source=source,
         sentence=sentence(found, target, predictions),
-        notes=found.notes,
-        pictures=pictures,
-        tables=tables,
     )

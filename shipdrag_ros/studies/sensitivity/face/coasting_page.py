@@ -8,7 +8,7 @@ from pathlib import Path
 
 from shipdrag_ros.display import Table
 from shipdrag_ros.replay import words
-from shipdrag_ros.report.document import Picture, write_page
+from shipdrag_ros.report.document import Picture, Section, write_sections
 from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.face import pictures as pictures
@@ -173,14 +173,16 @@ def write_coasting(path: Path, found: CoastStudy) -> None:
             mimic_table(found),
         ),
     )
-    write_page(
+    sections = [Section(lines=notes(found))]
+    for heading, picture, caption, table in parts:
+        drawn = () if picture is None else (picture,)
+        sections.append(Section(heading, pictures=drawn, tables=((caption, table),)))
+    write_sections(
         path,
-        'sensitivity.html',
+        sections,
         title='Which particulars matter' + (f': {found.ship.name}' if found.ship.name else ''),
         source=words.ship_line(found.ship),
         sentence=sentence(found),
-        notes=notes(found),
-        parts=parts,
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from shipdrag_ros.display import Table
-from shipdrag_ros.report.document import Picture, write_page
+from shipdrag_ros.report.document import Picture, Section, write_sections
 from shipdrag_ros.studies.sensitivity.face import pictures as pictures
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
@@ -199,12 +199,14 @@ def write_steering(path: Path, found: SteeringStudy, shown: Experiment) -> None:
             design_table(shown),
         ),
     )
-    write_page(
+    sections = [Section(lines=notes(found))]
+    for heading, picture, caption, table in parts:
+        drawn = () if picture is None else (picture,)
+        sections.append(Section(heading, pictures=drawn, tables=((caption, table),)))
+    write_sections(
         path,
-        'sensitivity.html',
+        sections,
         title=f'Which derivatives matter: {found.ship.name}',
         source=found.ship.source,
         sentence=sentence(found),
-        notes=notes(found),
-        parts=parts,
     )

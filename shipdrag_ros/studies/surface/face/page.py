@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from shipdrag_ros.regression import Prediction, Surface
-from shipdrag_ros.report.document import Picture, write_page
+from shipdrag_ros.report.document import Picture, Section, write_sections
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.surface.face import cells as fit_cells
 from shipdrag_ros.studies.surface.face import pictures as fit_pictures
+
+_NOTES = 'What these data can and cannot show'
 
 
 def sentence(surface: Surface, target: str) -> str:
@@ -78,13 +80,16 @@ def write_surface(
                 'The surface; dots are the data.',
             )
         )
-    write_page(
+    shown = [
+        Section(
+            'What these data can and cannot show' if surface.notes else '', lines=surface.notes
+        ),
+        Section(pictures=pictures, tables=tables),
+    ]
+    write_sections(
         path,
-        'fit.html',
+        shown,
         title=f'Surface of {target} over {", ".join(surface.inputs)}',
         source=source,
         sentence=sentence(surface, target),
-        notes=surface.notes,
-        pictures=pictures,
-        tables=tables,
     )

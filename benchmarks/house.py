@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Count the house: how much code there is, and through how many rooms a job goes.
+
+    python benchmarks/house.py                     # this tree
+    python benchmarks/house.py --tree OLD --tree . # two trees beside each other
+
+Core code is what a coastdown may need: lines of `shipdrag_ros` without
+docstrings, blanks and comments, and without the studies S2 to S5. The walk is a
+replay of a simulated coastdown, traced: which calls cross from one room into
+another between the bytes of the bag and those of a published estimate. The
+diagnosis of the same bag tells which modules run in it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import tokenize
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = 'shipdrag_ros'
+LINES, PARAMETERS = 60, 8
+# where the studies stood before they had a room
+STUDIES = (
+    'studies/',
+    'residual/',
+    'sensitivity/',
+    'simulation/manoeuvring/',
+    'simulation/cable.py',
+    'report/cable_',
+    'report/fit_',
+    'report/residual_',
+    'report/sensitivity_',
+    'report/steering_',
+    'report/coasting_',
+    'report/surface_',
+    'cli/cable.py',
+    'cli/residual.py',
+    'cli/sensitivity.py',
+    'cli/surface.py',
+)
+WALK = """
+import json, sys
+from pathlib import Path
+sys.path.insert(0, {tree!r})
+from shipdrag_ros.cli import main
+package = str(Path({tree!r}) / 'shipdrag_ros') + '/'
+calls, modules, depth = set(), set(), [0]
+main({line!r})  # whatever is compiled once, is compiled now
+
+def place(frame):
+    name = frame.f_code.co_filename
+    return name.removeprefix(package) if name.startswith(package) else None
+
+def traced(frame, event, argument):
+    here = place(frame) if event in ('call', 'return') else None
+    if here is None:
+        return
+    if here.endswith({module!r}) and frame.f_code.co_name == {function!r}:
+        depth[0] += 1 if event == 'call' else -1
+    if event == 'return' or not depth[0]:
+        return
+    modules.add(here)
+    caller = frame.f_back
+    while caller is not None and place(caller) is None:
+        caller = caller.f_back
+    if caller is not None and place(caller).split('/')[0] != here.split('/')[0]:
+        calls.add((place(caller), caller.f_code.co_name, here, frame.f_code.co_name))
+
+sys.setprofile(traced)
+main({line!r})
+sys.setprofile(None)
+print('WALKED', json.dumps([sorted(calls), sorted(modules)]))
+"""
+
+
+class Long(NamedTuple):
+    """A function that is long, or takes much."""
+
+    place: str
+    count: int
+
+
+@dataclass
+class Count:
+    """What a tree holds."""
+
+    lines: int
+    core: int
+    modules: int
+    core_modules: int
+    long: list[Long]
+    wide: list[Long]
+
+
+def code_lines(path: Path) -> set[int]:
+    """
+    Return the lines of a file that hold code: no docstring, comment or blank.
+    """
+    text = path.read_text(encoding='utf-8')
+    held: set[int] = set()
+    skipped = {
+        tokenize.COMMENT,
+        tokenize.NL,
+        tokenize.NEWLINE,
+        tokenize.INDENT,
+        tokenize.DEDENT,
+        tokenize.ENCODING,
+        tokenize.ENDMARKER,
+    }
+    with path.open('rb') as file:
+        for token in tokenize.tokenize(file.readline):
+            if token.type not in skipped:
+                held.update(range(token.start[0], token.end[0] + 1))
+    for node in ast.walk(ast.parse(text)):
+        body = getattr(node, 'body', None)
+        for each in body if isinstance(body, list) else ():
+            value = each.value if isinstance(each, ast.Expr) else None
+            # also what stands below an attribute, which is a docstring to the reader
+            if isinstance(value, ast.Constant) and isinstance(value.value, str):
+                held -= set(range(each.lineno, (each.end_lineno or each.lineno) + 1))
+    return held
+
+
+def functions(path: Path) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionDef, bool]]:
+    """
+    Yield each function of a file, and whether it is compiled.
+    """
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            names = {ast.unparse(each).partition('(')[0] for each in node.decorator_list}
+            yield node, bool(names & {'compiled', 'numba.njit', 'njit', 'numba.guvectorize'})
+
+
+def parameters(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """
+    Return how many parameters a function has; `self` and `cls` are none.
+    """
+    given = node.args
+    named = [each.arg for each in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+    return len(named) - (bool(named) and named[0] in ('self', 'cls'))
+
+
+def is_study(path: Path, package: Path) -> bool:
+    """
+    Return whether a module belongs to a study.
+    """
+    return path.relative_to(package).as_posix().startswith(STUDIES)
+
+
+def count(tree: Path) -> Count:
+    """
+    Count the package of a tree.
+    """
+    package = tree / PACKAGE
+    found = Count(0, 0, 0, 0, [], [])
+    for path in sorted(package.rglob('*.py')):
+        held = code_lines(path)
+        core = not is_study(path, package)
+        found.lines += len(held)
+        found.modules += 1
+        found.core += len(held) * core
+        found.core_modules += core
+        for node, is_compiled in functions(path):
+            place = f'{path.relative_to(package)}:{node.name}'
+            long = len(held & set(range(node.lineno, (node.end_lineno or 0) + 1)))
+            if long > LINES and not is_compiled:
+                found.long.append(Long(place, long))
+            if parameters(node) > PARAMETERS and not is_compiled:
+                found.wide.append(Long(place, parameters(node)))
+    return found
+
+
+def walk(
+    tree: Path, line: list[str], module: str, function: str
+) -> tuple[list[list[str]], list[str]]:
+    """
+    Run a command line of a tree in a process of its own, traced below one function.
+
+    Returns
+    -------
+    calls, modules
+        Calls from one room into another, each pair of functions once; modules of
+        which a function was called. What calls within compiled code is not seen.
+    """
+    code = WALK.format(tree=str(tree), line=line, module=module, function=function)
+    environment = {**os.environ, 'PYTHONPATH': str(tree)}
+    done = subprocess.run(
+        [sys.executable, '-c', code], capture_output=True, text=True, env=environment, cwd=tree
+    )
+    told = [each for each in done.stdout.splitlines() if each.startswith('WALKED ')]
+    if not told:
+        raise SystemExit(f'{tree}: {" ".join(line)} failed:\n{done.stderr[-2000:]}')
+    calls, modules = json.loads(told[0].removeprefix('WALKED '))
+    return calls, modules
+
+
+def figures(tree: Path, folder: Path) -> dict[str, str]:
+    """
+    Return the figures of a tree, by name.
+    """
+    held = count(tree)
+    bag = folder / f'{len(list(folder.iterdir()))}.mcap'
+    simulate = ['simulate', '--ship', str(tree / 'config' / 'vitus_bering.yaml'), '-o', str(bag)]
+    simulate += ['--lead-in', '900', '--seed', '5', '--effect', 'current=0.4']
+    environment = {**os.environ, 'PYTHONPATH': str(tree)}
+    module = [sys.executable, '-m', f'{PACKAGE}.cli']
+    subprocess.run([*module, *simulate], check=True, env=environment, capture_output=True)
+    calls, _ = walk(tree, ['replay', str(bag)], 'playback.py', 'replay')
+    _, modules = walk(tree, ['diagnose', str(bag)], 'diagnosis/diagnose.py', 'diagnose')
+    return {
+        'lines of code': f'{held.lines}',
+        'lines of code, core': f'{held.core}',
+        'modules': f'{held.modules}',
+        'modules, core': f'{held.core_modules}',
+        'calls from room to room, bytes of a bag to bytes published': f'{len(calls)}',
+        'modules that run in a diagnosis': f'{len(modules)}',
+        f'functions over {LINES} lines of code': f'{len(held.long)}',
+        f'functions over {PARAMETERS} parameters': f'{len(held.wide)}',
+    }
+
+
+def main() -> None:
+    """
+    Print the table, and what is too long or too wide in the last tree.
+    """
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument(
+        '--tree', action='append', type=Path, metavar='DIR', help='default: this one'
+    )
+    options = parser.parse_args()
+    trees = [each.resolve() for each in options.tree or [ROOT]]
+    with tempfile.TemporaryDirectory() as folder:
+        columns = [figures(tree, Path(folder)) for tree in trees]
+    print('| | ' + ' | '.join(tree.name for tree in trees) + ' |')
+    print('|---|' + '---:|' * len(trees))
+    for name in columns[0]:
+        print(f'| {name} | ' + ' | '.join(each[name] for each in columns) + ' |')
+    last = count(trees[-1])
+    for each in (*last.long, *last.wide):
+        print(f'{each.place}: {each.count}')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The script that counts the house counts code, and nothing else."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope='module')
+def house() -> ModuleType:
+    spec = spec_from_file_location('house', ROOT / 'benchmarks' / 'house.py')
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules['house'] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_docstrings_comments_and_blanks_are_no_code(house: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / 'shipdrag_ros' / 'studies').mkdir(parents=True)
+    body = [
+        '"""A module."""',
+        '',
+        'LIMIT = 1  # code, with a comment',
+        '"""What it limits."""',
+        '# a comment',
+        'def wide(a, b, c, d, e, f, g, h, i):',
+        '    """',
+        '    Two lines of code.',
+        '    """',
+        '    return (a,',
+        '            b)',
+        'class Each:',
+        '    def narrow(self, a, b, c, d, e, f, g, h): ...',
+    ]
+    (tmp_path / 'shipdrag_ros' / 'a.py').write_text('\n'.join(body))
+    (tmp_path / 'shipdrag_ros' / 'studies' / 'b.py').write_text('TEXT = """two\nlines"""\n')
+    found = house.count(tmp_path)
+    assert (found.lines, found.core) == (8, 6)
+    assert (found.modules, found.core_modules) == (2, 1)
+    assert found.wide == [('a.py:wide', 9)]
+    assert found.long == []
+
+
+def test_a_long_function_is_told_unless_it_is_compiled(house: ModuleType, tmp_path: Path) -> None:
+    (tmp_path / 'shipdrag_ros').mkdir()
+    lines = ['    x += 1'] * 61
+    text = ['def slow(x):', *lines, '@compiled(SIGNATURE)', 'def fast(x):', *lines]
+    (tmp_path / 'shipdrag_ros' / 'a.py').write_text('\n'.join(text))
+    assert house.count(tmp_path).long == [('a.py:slow', 62)]
