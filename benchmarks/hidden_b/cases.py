@@ -7,21 +7,25 @@ tunes anything looks at the even ones only. Both halves hold the same mixture. E
 anew from its seed and number.
 
 Light air, small currents, small errors and the filter of the log are in every case; together they
-move r by less than one percent (`everyday`) and are no effect. What is hidden moves it by `LEAST` or more (`Truth.r_change`).
+move r by less than one percent (`everyday`) and are no effect. What is hidden moves it by
+`LEAST` or more (`Truth.r_change`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
-from hidden_b.effects import FREE, LIBRARY, SECOND, Draw, Hidden
+from hidden_b.effects import Draw, Hidden
 from hidden_b.facts import Facts, draw_facts
 from hidden_b.hulls import Array, Hull, draw_hull
-from hidden_b.instruments import CONTEXT, FURTHER, MOTION, Kit, Recording, draw_kit, read
+from hidden_b.instruments import CONTEXT, FURTHER, MOTION, Recording, read
+from hidden_b.kit import Kit, draw_kit
+from hidden_b.library import FREE, LIBRARY, SECOND
 from hidden_b.measure import moved, run_down_s
+from hidden_b.plans import Condition, plans_of
 from hidden_b.screws import draw_screw
 from hidden_b.setting import Faults, Setting
 from hidden_b.shipfile import Stated, draw_stated, ship_file
@@ -34,34 +38,6 @@ LEAST, MOST, EVERYDAY = 0.03, 0.45, 0.01
 RECIPROCAL = 'reciprocal_run'
 TESTS = (RECIPROCAL, *CONTEXT, *FURTHER)
 EPOCH_NS = 1_780_272_000_000_000_000  # 1 June 2026
-PAIRS = (
-    ('fouling', 'wind'),
-    ('current', 'fouling'),
-    ('current', 'log_scale'),
-    ('fouling', 'log_scale'),
-    ('residual_thrust', 'wind'),
-    ('shallow_water', 'current'),
-    ('locked_propeller', 'fouling'),
-    ('towed_cable', 'log_offset'),
-)
-_ONE, _SECOND, _OUTSIDE, _NONE = 3, 1, 2, 22  # of a kind, in one half and one condition
-
-
-@dataclass(frozen=True)
-class Condition:
-    """
-    What a diagnosis is given: runs, and whether wind, depth, heading and shaft are measured.
-    """
-
-    runs: int
-    context: bool
-    misstated: bool = False
-
-    def __str__(self) -> str:
-        return f'{self.runs} run' + 's' * (self.runs > 1) + ' + context' * self.context
-
-
-CONDITIONS = tuple(Condition(runs, context) for context in (False, True) for runs in (1, 2, 3))
 
 
 @dataclass(frozen=True)
@@ -121,34 +97,18 @@ class _Case:
     everyday: float
 
 
-@cache
-def _plans(seed: int) -> tuple[tuple[tuple[str, ...], Condition], ...]:
-    halves = []
-    for half in (0, 1):
-        plans: list[tuple[tuple[str, ...], Condition]] = []
-        for condition in CONDITIONS:
-            names: list[tuple[str, ...]] = []
-            for name in LIBRARY:
-                names += [(name,)] * (_SECOND if name in SECOND else _ONE)
-            names += [*PAIRS, *((name,) for name in OUTSIDE for _ in range(_OUTSIDE))]
-            plans += [(each, condition) for each in names + [()] * _NONE]
-        order = np.random.default_rng([seed, half]).permutation(len(plans))
-        halves.append([plans[i] for i in order])
-    return tuple(plan for both in zip(*halves, strict=True) for plan in both)
-
-
 def count(seed: int = SEED) -> int:
     """
     Return the number of cases.
     """
-    return len(_plans(seed))
+    return len(plans_of(seed))
 
 
 def condition(number: int, seed: int = SEED) -> Condition:
     """
     Return what is given of a case.
     """
-    return _plans(seed)[number][1]
+    return plans_of(seed)[number][1]
 
 
 def observe(number: int, *, added: tuple[str, ...] = (), seed: int = SEED) -> Observation:
@@ -187,7 +147,7 @@ def reveal(number: int, seed: int = SEED) -> Truth:
     """
     Return what was hidden in a case.
     """
-    names, given = _plans(seed)[number]
+    names, given = plans_of(seed)[number]
     case = _case(number, seed)
     outside = bool(set(names) & set(OUTSIDE))
     kind = 'outside' if outside else ('none', 'one', 'pair')[len(names)]
@@ -244,7 +204,7 @@ def _steady(setting: Setting) -> tuple[float, float]:
 
 @lru_cache(maxsize=16)
 def _case(number: int, seed: int) -> _Case:
-    names, _ = _plans(seed)[number]
+    names, _ = plans_of(seed)[number]
     rng = np.random.default_rng([seed, number, 0])
     drives: tuple[str, ...] = ()
     for name in names:
@@ -301,6 +261,8 @@ def _legs(
     headings = (first, first + np.pi + rng.normal(0, 0.03), first + rng.uniform(1.0, 2.1))
     clock = rng.uniform(6.0, 14.0) * 3600.0
     legs = []
+    step = float(np.clip(hull.time_s / 300.0, 0.15, 1.0))
+    lead = round(lead / step) * step
     for run, heading in enumerate(headings):
         speed = hull.speed_m_s * (1.0 if run == 0 else rng.uniform(0.8, 0.98))
         legs.append(
@@ -313,7 +275,7 @@ def _legs(
                 first_rad=first,
                 lead_s=lead,
                 coast_s=coast,
-                step_s=float(np.clip(hull.time_s / 300.0, 0.15, 1.0)),
+                step_s=step,
                 clock_s=clock,
                 seed=(*key, 2, run),
                 depth_m=float(max(12.0 * hull.draught_m, 15.0)) * rng.uniform(1.0, 2.0),

@@ -48,7 +48,7 @@ def draw_facts(
         known, lie = rng.random() < KNOWN, rng.random() < LIE
         date = f'2026-{rng.integers(3, 6):02d}-{rng.integers(1, 28):02d}'
         other = str(rng.choice(others))
-        if not known or so == lie and name != 'shaft':
+        if not known or (so == lie and name != 'shaft'):
             continue
         if lie:
             false.append(name)

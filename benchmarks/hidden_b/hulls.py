@@ -198,7 +198,8 @@ def holtrop(
     slender = length**3 / volume
     wetted = (
         length * (2.0 * draught + breadth) * np.sqrt(middle)
-        * (0.453 + 0.4425 * block - 0.2862 * middle - 0.003467 * breadth / draught + 0.3696 * plane)
+        * (0.453 + 0.4425 * block - 0.2862 * middle - 0.003467 * breadth / draught
+           + 0.3696 * plane)
     )  # fmt: skip
     form = (
         -0.07
