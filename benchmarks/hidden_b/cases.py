@@ -322,8 +322,8 @@ def _sized(
 ) -> tuple[Hidden, float]:
     """Return an effect that matters, and by how much it moves r."""
     make = LIBRARY[name][0] if name in LIBRARY else OUTSIDE[name]
-    size = 1.0
-    for _ in range(12):
+    size, least, most = 1.0, 0.0, np.inf
+    for _ in range(14):
         rng = np.random.default_rng([*key, place])
         drawn = Draw(rng, base.hull, base.screw, size, base.coast_s, steady)
         effect = make(drawn)
@@ -332,5 +332,7 @@ def _sized(
         moves = moved(changed, base, kit)
         if LEAST <= moves <= MOST:
             break
-        size *= 1.35 if moves < LEAST else 0.7
+        least, most = (size, most) if moves < LEAST else (least, size)
+        within = least > 0.0 and np.isfinite(most)
+        size = float(np.sqrt(least * most)) if within else size * (1.35 if least else 0.7)
     return effect, moves

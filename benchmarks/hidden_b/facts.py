@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a crew would write into the log book: mostly all of it, mostly true."""
+"""
+What a crew would write into the log book: mostly all of it, mostly true.
+
+What is so is written with the probability `KNOWN`, what is not so with `LIE`; the state of the
+shaft is wrong as often.
+"""
 
 from __future__ import annotations
 
@@ -45,10 +50,11 @@ def draw_facts(
     facts: dict[str, str | None] = {}
     false = []
     for name, so in true.items():
-        known, lie = rng.random() < KNOWN, rng.random() < LIE
+        known, wrong = rng.random() < KNOWN, rng.random() < LIE
         date = f'2026-{rng.integers(3, 6):02d}-{rng.integers(1, 28):02d}'
         other = str(rng.choice(others))
-        if not known or (so == lie and name != 'shaft'):
+        lie = wrong and (name == 'shaft' or not so)
+        if not (lie or (so and known)):
             continue
         if lie:
             false.append(name)
