@@ -39,6 +39,7 @@ from hidden import cases, scoring
 from hidden.recording import Recording
 from hidden_b import cases as cases_b
 from hidden_b import facts as facts_b
+from hidden_b import plans as plans_b
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
@@ -285,7 +286,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     done = trials(rows, options.world)
     for line in table(done):
         print(line)
+    if options.world == 'b':
+        print(f'\nnothing hidden, and named what is always there: {_always(done)}')
     _write_summary(out.with_suffix('.json'), done, hidden.SEED)
+
+
+def _always(done: Sequence[scoring.Trial]) -> scoring.Share:
+    named = [t for t in done if t.truth.kind == 'none' and t.answer.verdict == 'named']
+    return scoring.Share.over(set(trial.answer.named) <= set(plans_b.ALWAYS) for trial in named)
 
 
 def _kept(out: Path) -> dict[int, dict[str, Any]]:

@@ -51,7 +51,10 @@ def moved(changed: Setting, plain: Setting, kit: Kit) -> float:
         slope = -np.gradient(before, t)[skip]
         order = np.argsort(before[skip])
         largest = float(np.max(slope[before[skip] > 0.3 * first]))
-        use = skip & (after > 0.3 * first) & (after < 1.1 * first)
+        inside = (after > 0.3 * first) & (after < 1.1 * first)
+        # a reading that falls to nothing has no slope
+        inside[1:-1] &= inside[2:] & inside[:-2]
+        use = skip & inside
         if use.sum() > 5:
             usual = np.interp(after[use], before[skip][order], slope[order])
             gap = -np.gradient(after, t)[use] - usual

@@ -21,6 +21,16 @@ PAIRS = (
     ('locked_propeller', 'fouling'),
     ('towed_cable', 'log_offset'),
 )
+ALWAYS = (
+    'current',
+    'current_change',
+    'log_lag',
+    'log_offset',
+    'log_scale',
+    'time_offset',
+    'wind',
+)
+"""What is in every case, too small to be an effect: a name of these is an alarm, not a lie."""
 _ONE, _SECOND, _OUTSIDE, _NONE = 3, 1, 2, 22  # of a kind, in one half and one condition
 
 
