@@ -163,7 +163,7 @@ def draw_screw(
     """
     Draw a propeller and its engine for a ship that slows in `time_s`.
     """
-    quick = float(np.clip(time_s / 400.0, 0.15, 1.0))
+    quick = float(np.clip(time_s / 300.0, 0.15, 1.0))
     braked = drive == 'direct'
     return Screw(
         diameter_m=diameter_m,
@@ -174,10 +174,10 @@ def draw_screw(
         shafts=shafts,
         drive=drive,
         hold='revs' if drive == 'cpp' else str(rng.choice(['torque', 'power', 'revs'])),
-        inertia_s=rng.uniform(3.0, 14.0) * quick,
+        inertia_s=rng.uniform(6.0, 25.0) * quick,
         coulomb=rng.uniform(0.06, 0.14) if braked else rng.uniform(0.003, 0.008),
         viscous=rng.uniform(0.03, 0.08) if braked else rng.uniform(0.005, 0.02),
-        ramp_s=rng.uniform(6.0, 25.0) * quick,
+        ramp_s=rng.uniform(8.0, 30.0) * quick,
         stopped=rng.uniform(0.5, 0.75),
         stagger_s=rng.uniform(0.0, 12.0) * quick if shafts > 1 else 0.0,
     )
