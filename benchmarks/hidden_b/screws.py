@@ -5,9 +5,10 @@ Propellers and engines.
 A propeller is one blade section at 0.7 of the radius, in all quadrants: flat-plate lift and
 drag on the resultant flow. Engines hold torque, power or revs until the stop.
 
-Drives after the stop: `declutched` turns freely; `direct` is braked by the engine's friction and
-stands below a speed; `electric` ramps its torque to nothing, then turns freely; `cpp` keeps its
-revs and sets the pitch to zero; `locked` is braked to a stand; `folding` folds.
+Drives after the stop, while the bridge control takes the torque off: `declutched` turns freely;
+`direct` is braked by the engine's friction and stands below a speed; `electric` turns freely, with
+more friction; `cpp` keeps most of its revs and sets the pitch to zero; `locked` is braked to a
+stand; `folding` folds.
 """
 
 from __future__ import annotations
@@ -152,9 +153,7 @@ class Screw:
                 return steady[1] * steady[0] / max(revs, 0.3 * steady[0])
             return steady[1]
         held = self.left * exp(-since / self.left_s)
-        if self.drive == 'electric':
-            held = max(held, 1.0 - since / self.ramp_s)
-        return steady[1] * held
+        return steady[1] * max(held, 1.0 - since / self.ramp_s)
 
 
 def draw_screw(
@@ -164,7 +163,7 @@ def draw_screw(
     Draw a propeller and its engine for a ship that slows in `time_s`.
     """
     quick = float(np.clip(time_s / 300.0, 0.15, 1.0))
-    braked = drive == 'direct'
+    braked, more = drive == 'direct', 2.5 if drive == 'electric' else 1.0
     return Screw(
         diameter_m=diameter_m,
         pitch=rng.uniform(0.75, 1.1),
@@ -174,10 +173,10 @@ def draw_screw(
         shafts=shafts,
         drive=drive,
         hold='revs' if drive == 'cpp' else str(rng.choice(['torque', 'power', 'revs'])),
-        inertia_s=rng.uniform(6.0, 25.0) * quick,
-        coulomb=rng.uniform(0.06, 0.14) if braked else rng.uniform(0.003, 0.008),
+        inertia_s=rng.uniform(1.2, 4.0) * quick,
+        coulomb=rng.uniform(0.06, 0.14) if braked else rng.uniform(0.003, 0.008) * more,
         viscous=rng.uniform(0.03, 0.08) if braked else rng.uniform(0.005, 0.02),
-        ramp_s=rng.uniform(8.0, 30.0) * quick,
+        ramp_s=rng.uniform(5.0, 30.0) * quick,
         stopped=rng.uniform(0.5, 0.75),
         stagger_s=rng.uniform(0.0, 12.0) * quick if shafts > 1 else 0.0,
     )
