@@ -5,6 +5,10 @@ Scoreboard of a diagnosis, on coastdowns in which the effect is hidden.
     python benchmarks/diagnosis_score.py --by oracle --count 40
     python benchmarks/diagnosis_score.py --by command
     python benchmarks/diagnosis_score.py --by MODULE:FUNCTION --as blocks
+    python benchmarks/diagnosis_score.py --world b --half odd --count 40
+
+World a is `hidden`; world b, of another hand, is `hidden_b`: its even cases are for choosing
+methods, its odd ones for scoring.
 
 Every answer is kept in a file before the truth of its case is asked for; a run
 that was broken off goes on where it was.
@@ -33,12 +37,17 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from hidden import cases, scoring
 from hidden.recording import Recording
+from hidden_b import cases as cases_b
+from hidden_b import facts as facts_b
+from hidden_b import plans as plans_b
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 OUT = Path(__file__).parent / 'out'
+WORLDS: dict[str, Any] = {'a': cases, 'b': cases_b}
+HALVES = {'all': (0, 1), 'even': (0, 2), 'odd': (1, 2)}  # remainder, divisor
 Found = dict[str, Any]
 Diagnose = Callable[[cases.Observation], tuple[Found, float]]  # and its CPU time [s]
 
@@ -100,43 +109,59 @@ def _timed(diagnose: Callable[..., Found], *arguments: Any) -> tuple[Found, floa
     return found, time.process_time() - start
 
 
-def command(ship: Path, bags: list[Path]) -> Found:
+def command(ship: Path, bags: list[Path], told: Sequence[str] = ()) -> Found:
     """
     Diagnose with the verb `shipdrag diagnose`, in this process.
+
+    Parameters
+    ----------
+    ship, bags
+    told
+        Further arguments: the facts that a crew knows.
     """
     written = io.StringIO()
-    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(io.StringIO()) as told:
+    with contextlib.redirect_stdout(written), contextlib.redirect_stderr(io.StringIO()) as said:
         try:
-            status = cli.main(['diagnose', *map(str, bags), '--ship', str(ship), '--json'])
+            status = cli.main(['diagnose', *map(str, bags), '--ship', str(ship), '--json', *told])
         except SystemExit as ended:  # wrong usage
             status = ended.code
     if status:
-        raise RuntimeError(f'shipdrag diagnose ended with {status}: {told.getvalue()}')
+        raise RuntimeError(f'shipdrag diagnose ended with {status}: {said.getvalue()}')
     found: Found = json.loads(written.getvalue())
     return found
 
 
-def diagnosis(by: str, form: str, number: int) -> Diagnose:
+def diagnosis(
+    by: str, form: str, number: int, world: str = 'a', with_facts: bool = False
+) -> Diagnose:
     """
     Return the diagnosis that is asked for; the oracle alone is told of the noise.
     """
     if by == 'oracle':
+        if world != 'a':
+            raise ValueError('the oracle knows world a alone')
         from hidden.oracle import diagnose
 
         return lambda seen: _timed(diagnose, seen, cases.known(number))
     if by == 'command':
-        return by_bags(command)
+        told: list[str] = []
+        if with_facts:
+            told = facts_b.arguments(WORLDS[world].reveal(number).facts)
+        return by_bags(lambda ship, bags: command(ship, bags, told))
     module, _, function = by.partition(':')
     found = getattr(import_module(module), function)
     return by_blocks(found) if form == 'blocks' else by_bags(found)
 
 
-def answer(by: str, form: str, number: int) -> dict[str, Any]:
+def answer(
+    by: str, form: str, number: int, world: str = 'a', with_facts: bool = False
+) -> dict[str, Any]:
     """
     Diagnose one case, and again with what the answer recommends.
     """
-    diagnose = diagnosis(by, form, number)
-    found, cpu_s = diagnose(cases.observe(number))
+    hidden = WORLDS[world]
+    diagnose = diagnosis(by, form, number, world, with_facts)
+    found, cpu_s = diagnose(hidden.observe(number))
     row: dict[str, Any] = {
         'case': number,
         'cpu_s': cpu_s,
@@ -147,19 +172,19 @@ def answer(by: str, form: str, number: int) -> dict[str, Any]:
     if found['verdict'] == 'one_of':
         tried = scoring.parse(found).tried
         if tried is not None:
-            row['followed'], _ = diagnose(cases.observe(number, added=(tried.test,)))
-        row['everything'], _ = diagnose(cases.observe(number, added=cases.TESTS))
+            row['followed'], _ = diagnose(hidden.observe(number, added=(tried.test,)))
+        row['everything'], _ = diagnose(hidden.observe(number, added=hidden.TESTS))
     return row
 
 
-def _answer(task: tuple[str, str, int]) -> dict[str, Any]:
+def _answer(task: tuple[str, str, int, str, bool]) -> dict[str, Any]:
     try:
         return answer(*task)
     except Exception as error:
         return {'case': task[2], 'error': f'{type(error).__name__}: {error}'}
 
 
-def trials(rows: Sequence[dict[str, Any]]) -> list[scoring.Trial]:
+def trials(rows: Sequence[dict[str, Any]], world: str = 'a') -> list[scoring.Trial]:
     """
     Reveal the truth of the cases that were answered.
     """
@@ -169,7 +194,7 @@ def trials(rows: Sequence[dict[str, Any]]) -> list[scoring.Trial]:
 
     return [
         scoring.Trial(
-            cases.reveal(row['case']),
+            WORLDS[world].reveal(row['case']),
             scoring.parse(row['found']),
             row['cpu_s'],
             parsed(row['followed']),
@@ -223,16 +248,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--as', dest='form', choices=('blocks', 'bags'), default='blocks')
     parser.add_argument('--first', type=int, default=0, help='number of the first case')
     parser.add_argument('--count', type=int, help='how many cases; all of them by default')
+    parser.add_argument('--world', choices=tuple(WORLDS), default='a')
+    parser.add_argument('--half', choices=tuple(HALVES), default='all', help='by number')
+    parser.add_argument('--facts', action='store_true', help='tell what a crew knows (world b)')
     parser.add_argument('--processes', type=int, default=2)
     parser.add_argument('--out', type=Path, help='answers, one line of JSON a case')
     options = parser.parse_args(arguments)
-    last = cases.count() if options.count is None else options.first + options.count
-    numbers = range(options.first, min(last, cases.count()))
-    out = options.out or OUT / f'diagnosis_{options.by.replace(":", "_")}.jsonl'
+    if options.facts and options.world == 'a':
+        parser.error('--facts: world a has none')
+    hidden = WORLDS[options.world]
+    place, step = HALVES[options.half]
+    numbers = [n for n in range(options.first, hidden.count()) if n % step == place]
+    numbers = numbers[: options.count]
+    name = options.by.replace(':', '_') + '_b' * (options.world == 'b') + '_facts' * options.facts
+    out = options.out or OUT / f'diagnosis_{name}.jsonl'
     out.parent.mkdir(parents=True, exist_ok=True)
 
     kept = _kept(out)
-    tasks = [(options.by, options.form, number) for number in numbers if number not in kept]
+    tasks = [
+        (options.by, options.form, number, options.world, options.facts)
+        for number in numbers
+        if number not in kept
+    ]
     with ProcessPoolExecutor(options.processes) as pool, out.open('a', encoding='utf-8') as file:
         for row in pool.map(_answer, tasks):
             file.write(json.dumps(row) + '\n')
@@ -240,16 +277,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
             kept[row['case']] = row
     rows = [kept[number] for number in numbers]
 
-    print(f'{len(rows)} of {cases.count()} cases, seed {cases.SEED}, answers of {options.by}')
+    print(f'{len(rows)} of {hidden.count()} cases, seed {hidden.SEED}, answers of {options.by}')
     failed = [row for row in rows if 'error' in row]
     for row in failed[:10]:
         print(f'case {row["case"]}: {row["error"]}')
     if failed:
         print(f'{len(failed)} cases without an answer, not counted below')
-    done = trials(rows)
+    done = trials(rows, options.world)
     for line in table(done):
         print(line)
-    _write_summary(out.with_suffix('.json'), done)
+    if options.world == 'b':
+        print(f'\nnothing hidden, and named what is always there: {_always(done)}')
+    _write_summary(out.with_suffix('.json'), done, hidden.SEED)
+
+
+def _always(done: Sequence[scoring.Trial]) -> scoring.Share:
+    named = [t for t in done if t.truth.kind == 'none' and t.answer.verdict == 'named']
+    return scoring.Share.over(set(trial.answer.named) <= set(plans_b.ALWAYS) for trial in named)
 
 
 def _kept(out: Path) -> dict[int, dict[str, Any]]:
@@ -259,13 +303,13 @@ def _kept(out: Path) -> dict[int, dict[str, Any]]:
     return {row['case']: row for row in rows if 'error' not in row}
 
 
-def _write_summary(path: Path, done: Sequence[scoring.Trial]) -> None:
+def _write_summary(path: Path, done: Sequence[scoring.Trial], seed: int) -> None:
     figures = {
         name: asdict(value) if isinstance(value, scoring.Share) else value
         for name, value in scoring.scores(done).items()
     }
     summary = {
-        'seed': cases.SEED,
+        'seed': seed,
         'cases': len(done),
         'figures': figures,
         'confusion': scoring.confusion(done),
