@@ -136,6 +136,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='heading of the first run [rad], to which current, wind and waves are stated; give '
         'it to simulate another run of the same day (default: this run is the first)',
     )
+    _add_sensors(parser)
+    add_json(parser)
+
+
+def _add_sensors(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--inputs',
         type=_inputs,
@@ -166,7 +171,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='N',
         help='seed of the noise: the same seed gives the same readings',
     )
-    add_json(parser)
 
 
 def run(options: argparse.Namespace) -> int:

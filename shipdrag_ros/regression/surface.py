@@ -112,6 +112,28 @@ class Surface:
         return '\n\n'.join(functions)
 
 
+def _check(points: Float64, inputs: Sequence[str], levels: Sequence[int]) -> None:
+    """Refuse points that carry no surface; `levels` counts the values of each variable."""
+    problems = [
+        f'{name}: {count} different value(s), expected {LOWEST + 1} or more'
+        for name, count in zip(inputs, levels)
+        if count < LOWEST + 1
+    ]
+    problems += [
+        f'{name}: varies by {extent:g} alone, expected {_NARROWEST:g} or more; use another unit'
+        for name, extent in zip(inputs, np.ptp(points, axis=0))
+        if 0.0 < extent < _NARROWEST
+    ]
+    needed = len(terms_up_to(LOWEST, [LOWEST] * len(inputs))) + 1
+    if len(points) < needed:
+        problems.append(
+            f'{len(points)} row(s), expected {needed} or more for degree {LOWEST} in '
+            f'{len(inputs)} variable(s)'
+        )
+    if problems:
+        raise DataError('surface', problems)
+
+
 def fit_surface(
     points: Float64,
     values: Float64,
@@ -154,25 +176,8 @@ def fit_surface(
     '1.250'
     """
     levels = [len(np.unique(column)) for column in points.T]
+    _check(points, inputs, levels)
     most = [count - 1 for count in levels]
-    problems = [
-        f'{name}: {count} different value(s), expected {LOWEST + 1} or more'
-        for name, count in zip(inputs, levels)
-        if count < LOWEST + 1
-    ]
-    problems += [
-        f'{name}: varies by {extent:g} alone, expected {_NARROWEST:g} or more; use another unit'
-        for name, extent in zip(inputs, np.ptp(points, axis=0))
-        if 0.0 < extent < _NARROWEST
-    ]
-    needed = len(terms_up_to(LOWEST, [LOWEST] * len(inputs))) + 1
-    if len(points) < needed:
-        problems.append(
-            f'{len(points)} row(s), expected {needed} or more for degree {LOWEST} in '
-            f'{len(inputs)} variable(s)'
-        )
-    if problems:
-        raise DataError('surface', problems)
     lower, upper = points.min(axis=0), points.max(axis=0)
     centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     scaled = (points - centre) / half

@@ -210,12 +210,7 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     coefficients, covariance, share = average(
         products, start, families, np.ones(len(families)), *priors
     )
-    scaled = float(share[families[:, -2]].sum())
-    if scaled > 0.5:
-        notes.append(
-            f'the log reads {100.0 * coefficients[-2]:+.2g} % (probability {scaled:.2f} that it '
-            'is off at all): taken into account'
-        )
+    notes += _scale_note(float(coefficients[-2]), float(share[families[:, -2]].sum()))
     return _Fit(
         tc,
         coefficients,
@@ -225,6 +220,16 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
         run_down,
         (*notes, *_about_noise(inputs, weight, noise_sd, used_sd)),
     )
+
+
+def _scale_note(scale: float, probability: float) -> list[str]:
+    """Return what to say of a factor of the log."""
+    if probability <= 0.5:
+        return []
+    return [
+        f'the log reads {100.0 * scale:+.2g} % (probability {probability:.2f} that it is off at '
+        'all): taken into account'
+    ]
 
 
 def _loose(polynomials: int, distance: float, deceleration: float) -> tuple[Float64, Float64]:

@@ -176,21 +176,10 @@ def _result(
             'window in which she coasts'
         )
     valid = ValidRange.of_branch(curve)
-    tracks = {}
-    for name, stamps in record.stamps.items():
-        chosen = coast.kind == CODES[name]
-        measured = coast.value[chosen]
-        tracks[name] = Track(stamps, measured, measured - residual[0, chosen])
     last_r, last_repeatable = (
         float(value[0]) for value in found.resistance(np.array([last_speed]))
     )
     last_of_n_r = last_r / (1.0 + float(ship.n_r(last_speed))) * ship.added_mass.sd
-    noise = {}
-    for name in record.white_sd:
-        chosen = problem.rows.kind == CODES[name]
-        chosen[: len(record.steady.time_s)] = False
-        worth = np.concatenate([record.steady_weight, record.coast_weight])[chosen]
-        noise[name] = float(np.sqrt(np.min(problem.noise.variance[chosen] * worth)))
     current = found.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
     stamps = np.concatenate(list(record.stamps.values()))
     return Estimate(
@@ -200,7 +189,7 @@ def _result(
         order=None,
         orders=(),
         samples={name: len(times) for name, times in record.stamps.items()},
-        noise_sd=noise,
+        noise_sd=_noise_sd(record, problem),
         curve=curve,
         froude_valid=valid.froude,
         froude_max_by=valid.by,
@@ -210,11 +199,32 @@ def _result(
         last_speed_sigma_m_s=last_sigma,
         last_resistance_m_s2=last_r,
         last_sigma_m_s2=float(np.hypot(last_repeatable, last_of_n_r)),
-        tracks=tracks,
+        tracks=_tracks(record, residual[0]),
         current_m_s=current[0],
         current_sigma_m_s=current[1],
         notes=notes,
     )
+
+
+def _tracks(record: Record, residual: Float64) -> dict[str, Track]:
+    """Return each input of the coastdown, measured and fitted; residual (n,)."""
+    coast, found = record.coast, {}
+    for name, stamps in record.stamps.items():
+        chosen = coast.kind == CODES[name]
+        measured = coast.value[chosen]
+        found[name] = Track(stamps, measured, measured - residual[chosen])
+    return found
+
+
+def _noise_sd(record: Record, problem: Problem) -> dict[str, float]:
+    """Return the white noise of a sample of each input."""
+    found = {}
+    for name in record.white_sd:
+        chosen = problem.rows.kind == CODES[name]
+        chosen[: len(record.steady.time_s)] = False
+        worth = np.concatenate([record.steady_weight, record.coast_weight])[chosen]
+        found[name] = float(np.sqrt(np.min(problem.noise.variance[chosen] * worth)))
+    return found
 
 
 def _speed_at(found: FittedMotion, problem: Problem, time_s: float) -> tuple[float, float]:

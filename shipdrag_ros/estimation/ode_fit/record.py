@@ -71,12 +71,7 @@ class Record:
                 f'samples in the window: {found}; a fit of the motion needs {LEAST_STAMPS} of '
                 'one of them: give a longer window, or another `estimator`'
             )
-        for name, series in inputs.items():
-            bad = int((~np.isfinite(series.value)).sum())
-            if bad:
-                raise EstimationError(
-                    f'{name}: {bad} value(s) are not finite: give accepted samples only'
-                )
+        _check_finite(inputs)
         zero_ns = run_down.stop_ns
         known = {
             'speed_through_water': parameters.speed_sigma_m_s,
@@ -149,6 +144,15 @@ class Record:
             of_kind[CODES[name]] = sd**2
         result: Float64 = of_kind[rows.kind] / weight
         return result
+
+
+def _check_finite(inputs: dict[str, Series]) -> None:
+    for name, series in inputs.items():
+        bad = int((~np.isfinite(series.value)).sum())
+        if bad:
+            raise EstimationError(
+                f'{name}: {bad} value(s) are not finite: give accepted samples only'
+            )
 
 
 def _seconds(time_ns: Int64, zero_ns: int) -> Float64:
