@@ -238,7 +238,7 @@ def show(record: Record, out: Path) -> Outcome:
     noise = ', '.join(f'{name} {sd:.2g}' for name, sd in found.noise_sd.items())
     print(
         f'  {found.estimator}, {found.duration_s:.1f} s, order {found.order}, ended by '
-        f'{coastdown.ended_by.value}; noise {noise}; w {100 * found.w:.1f} %'
+        f'{coastdown.ended_by.value}; noise {noise}; w {100 * found.max_relative_sigma:.1f} %'
     )
     curve = found.valid_curve
     print(
@@ -260,7 +260,8 @@ def show(record: Record, out: Path) -> Outcome:
     print(f"  second opinion: v' = -({c0:.2g} {c1:+.2g} v {c2:+.2g} v|v|)")
     fit = f'{found.estimator.removeprefix("s1_")}, {found.order}'
     limits = f'{curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f}'
-    line = f'| {record.name} | {fit} | {limits} | {"<br>".join(cells)} | {100 * found.w:.0f} |'
+    share = f'{100 * found.max_relative_sigma:.0f}'
+    line = f'| {record.name} | {fit} | {limits} | {"<br>".join(cells)} | {share} |'
     for note in words.notes(coastdown):
         print(textwrap.fill(note, 96, initial_indent='  - ', subsequent_indent='    '))
     return Outcome(found, line)

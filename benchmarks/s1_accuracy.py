@@ -61,7 +61,7 @@ def row(
         found.append(errors(result, truth))
         orders[result.order or 0] += 1
         tops.append(result.froude_valid[1])
-        stated.append(result.w)
+        stated.append(result.max_relative_sigma)
         inflections += result.froude_max_by is FroudeMax.INFLECTION
     usual = ' '.join(f'{order}:{count}' for order, count in sorted(orders.items()))
     return [

@@ -113,7 +113,7 @@ def _coastdown(bag: str, coastdown: Coastdown) -> dict[str, Any]:
         'froude_valid': estimate.froude_valid,
         'froude_max_by': estimate.froude_max_by.value,
         'froude_max_argmax': estimate.froude_max_argmax,
-        'w': estimate.w,
+        'w': estimate.max_relative_sigma,
         'noise_sd': estimate.noise_sd,
         'current_m_s': current,
         'notes': estimate.notes,

@@ -84,4 +84,7 @@ def _with_excess(found: Estimate, excess: Float64, note: str) -> Estimate:
         notes=(*found.notes, note),
     )
     valid = wider.valid_curve
-    return replace(wider, w=float(valid.sigma_repeatable_m_s2.max() / valid.resistance_m_s2.max()))
+    return replace(
+        wider,
+        max_relative_sigma=float(valid.sigma_repeatable_m_s2.max() / valid.resistance_m_s2.max()),
+    )

@@ -205,14 +205,14 @@ class ValidRange:
         Which rule gave Fr_max.
     argmax
         argmax dr/dFr over the whole branch.
-    w
+    max_relative_sigma
         max sigma_r / max r over the range, of the repeatable sigma.
     """
 
     froude: tuple[float, float]
     by: FroudeMax
     argmax: float
-    w: float
+    max_relative_sigma: float
 
     @classmethod
     def of_branch(cls, curve: ResistanceCurve) -> ValidRange:
@@ -235,7 +235,7 @@ class ValidRange:
             froude=(float(curve.froude[0]), top),
             by=by,
             argmax=float(curve.froude[np.argmax(curve.slope)]),
-            w=float(
+            max_relative_sigma=float(
                 curve.sigma_repeatable_m_s2[inside].max() / curve.resistance_m_s2[inside].max()
             ),
         )

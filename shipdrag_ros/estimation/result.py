@@ -122,7 +122,7 @@ class Estimate:
         Which rule gave Fr_max.
     froude_max_argmax
         argmax dr/dFr over the branch, as S1 has it.
-    w
+    max_relative_sigma
         max sigma_r / max r over the valid range, S1's figure of merit; of the
         repeatable sigma, as in S1. It says nothing about bias.
     last_speed_m_s, last_speed_sigma_m_s, last_resistance_m_s2, last_sigma_m_s2
@@ -148,7 +148,7 @@ class Estimate:
     froude_valid: tuple[float, float]
     froude_max_by: FroudeMax
     froude_max_argmax: float
-    w: float
+    max_relative_sigma: float
     last_speed_m_s: float
     last_speed_sigma_m_s: float
     last_resistance_m_s2: float

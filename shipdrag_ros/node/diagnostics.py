@@ -154,7 +154,7 @@ def estimate_status(estimate: Estimate | None) -> DiagnosticStatus:
             'standard deviation of it [m/s^2]': estimate.last_sigma_m_s2,
             'valid from Froude number [1]': low,
             'valid to Froude number [1]': high,
-            'w, largest deviation over largest resistance [1]': estimate.w,
+            'w, largest deviation over largest resistance [1]': estimate.max_relative_sigma,
             **{f'samples of {name} [1]': count for name, count in estimate.samples.items()},
         },
     )

@@ -99,7 +99,7 @@ def _estimate_facts(estimate: Estimate) -> list[tuple[str, str]]:
         ('valid range', f'Fr {low:.3f} to {high:.3f}'),
         ('upper end is', words.FROUDE_MAX_BY[estimate.froude_max_by]),
         ('argmax dr/dFr, as S1 has it', f'Fr {estimate.froude_max_argmax:.3f}'),
-        ('largest sigma / largest r', f'{100.0 * estimate.w:.2g} %'),
+        ('largest sigma / largest r', f'{100.0 * estimate.max_relative_sigma:.2g} %'),
     ]
     if estimate.current_m_s is not None:
         sd = float('nan') if estimate.current_sigma_m_s is None else estimate.current_sigma_m_s

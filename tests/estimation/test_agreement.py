@@ -34,7 +34,7 @@ def test_a_second_estimate_that_is_far_off_is_in_the_band(coast, ship) -> None:
     r, sigma = wide.curve.resistance_m_s2, wide.curve.sigma_repeatable_m_s2
     np.testing.assert_array_equal(r, found.curve.resistance_m_s2)
     assert sigma[middle] == pytest.approx(r[middle], rel=0.2)
-    assert wide.w > 0.3
+    assert wide.max_relative_sigma > 0.3
     # where the other is not compared the band stays
     low = widened(found, twice, 4.0).curve
     above = found.curve.speed_m_s > 8.0

@@ -188,5 +188,7 @@ def test_valid_range_and_its_w() -> None:
     assert whole.by is FroudeMax.BRANCH_TOP
     assert cut.argmax == whole.argmax == FROUDE[np.argmax(FROUDE + 0.5 * HUMP)]
     # the wide band above the cut is not in the first one
-    np.testing.assert_allclose(cut.w, 1e-6 / r[cut.froude[1] >= FROUDE].max(), rtol=1e-14)
-    np.testing.assert_allclose(whole.w, 1.0 / r.max(), rtol=1e-14)
+    np.testing.assert_allclose(
+        cut.max_relative_sigma, 1e-6 / r[cut.froude[1] >= FROUDE].max(), rtol=1e-14
+    )
+    np.testing.assert_allclose(whole.max_relative_sigma, 1.0 / r.max(), rtol=1e-14)

@@ -57,7 +57,7 @@ def estimate() -> Estimate:
         froude_valid=(0.05, 0.15),
         froude_max_by=FroudeMax.BRANCH_TOP,
         froude_max_argmax=0.2,
-        w=0.01,
+        max_relative_sigma=0.01,
         last_speed_m_s=1.25,
         last_speed_sigma_m_s=0.5,
         last_resistance_m_s2=2e-3,

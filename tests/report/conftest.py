@@ -64,7 +64,7 @@ def estimate(ship: Ship) -> Estimate:
         froude_valid=(0.05, 0.18),
         froude_max_by=FroudeMax.INFLECTION,
         froude_max_argmax=0.2,
-        w=0.013,
+        max_relative_sigma=0.013,
         last_speed_m_s=0.5,
         last_speed_sigma_m_s=0.01,
         last_resistance_m_s2=1e-4,

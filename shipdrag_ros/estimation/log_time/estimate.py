@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import ValidRange, resistance_curve, specific_resistance
+from shipdrag_ros.estimation.assemble import AtEnd, assembled
+from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
 from shipdrag_ros.estimation.log_time.inputs import Inputs, gather
 from shipdrag_ros.estimation.log_time.model import (
     CURRENT,
@@ -133,26 +134,18 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     _check_deceleration(inputs, motion)
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
     valid = ValidRange.of_polynomial(curve)
-    end = motion[-1:]
-    r, r_sigma, _ = specific_resistance(end, ship)
     current, current_sd = fit.current
-    return Estimate(
-        estimator=NAME,
+    return assembled(
+        NAME,
+        curve,
+        valid,
+        AtEnd.of(motion, ship),
         start_ns=inputs.scale.first_ns,
         end_ns=inputs.scale.first_ns + inputs.scale.span_ns,
         order=None,
         orders=(),
         samples={Input(kind).key: int(inputs.count[kind]) for kind in inputs.used},
         noise_sd={Input(kind).key: float(fit.noise_sd[kind]) for kind in inputs.used},
-        curve=curve,
-        froude_valid=valid.froude,
-        froude_max_by=valid.by,
-        froude_max_argmax=valid.argmax,
-        w=valid.w,
-        last_speed_m_s=float(end.speed[0]),
-        last_speed_sigma_m_s=float(sigma(end.speed_error)[0]),
-        last_resistance_m_s2=float(r[0]),
-        last_sigma_m_s2=float(r_sigma[0]),
         tracks=_tracks(inputs, fit),
         current_m_s=current,
         current_sigma_m_s=current_sd,

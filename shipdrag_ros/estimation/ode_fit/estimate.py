@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.assemble import AtEnd, assembled
 from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_LAG, LOG_SCALE, V0, predict
 from shipdrag_ros.estimation.ode_fit.colour import Colour
@@ -175,30 +176,24 @@ def _result(
             f'the fitted force nowhere slows the ship from {high:.4g} to {low:.4g} m/s: give a '
             'window in which she coasts'
         )
-    valid = ValidRange.of_branch(curve)
     last_r, last_repeatable = (
         float(value[0]) for value in found.resistance(np.array([last_speed]))
     )
     last_of_n_r = last_r / (1.0 + float(ship.n_r(last_speed))) * ship.added_mass.sd
     current = found.unknown(CURRENT) if CURRENT in problem.extras else (None, None)
     stamps = np.concatenate(list(record.stamps.values()))
-    return Estimate(
-        estimator=NAME,
+    sigma = float(np.hypot(last_repeatable, last_of_n_r))
+    return assembled(
+        NAME,
+        curve,
+        ValidRange.of_branch(curve),
+        AtEnd(last_speed, last_sigma, last_r, sigma),
         start_ns=int(stamps.min()),
         end_ns=int(stamps.max()),
         order=None,
         orders=(),
         samples={name: len(times) for name, times in record.stamps.items()},
         noise_sd=_noise_sd(record, problem),
-        curve=curve,
-        froude_valid=valid.froude,
-        froude_max_by=valid.by,
-        froude_max_argmax=valid.argmax,
-        w=valid.w,
-        last_speed_m_s=last_speed,
-        last_speed_sigma_m_s=last_sigma,
-        last_resistance_m_s2=last_r,
-        last_sigma_m_s2=float(np.hypot(last_repeatable, last_of_n_r)),
         tracks=_tracks(record, residual[0]),
         current_m_s=current[0],
         current_sigma_m_s=current[1],

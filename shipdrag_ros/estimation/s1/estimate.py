@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.curve import ValidRange, resistance_curve, specific_resistance
-from shipdrag_ros.estimation.motion import sigma
+from shipdrag_ros.estimation.assemble import AtEnd, assembled
+from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.s1.problems import (
     Measured,
@@ -94,26 +94,18 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     motion = solution.fit.motion(_GRID)
     curve = resistance_curve(motion, ship, froude_min=parameters.froude_min)
     valid = ValidRange.of_polynomial(curve)
-    end = motion[-1:]
-    r, r_sigma, _ = specific_resistance(end, ship)
     scale = solution.fit.scale
-    return Estimate(
-        estimator=inputs.estimator,
+    return assembled(
+        inputs.estimator,
+        curve,
+        valid,
+        AtEnd.of(motion, ship),
         start_ns=scale.first_ns,
         end_ns=scale.first_ns + scale.span_ns,
         order=solution.order,
         orders=solution.trials,
         samples={data.name: len(data.value) for data in inputs.used},
         noise_sd=solution.noise_sd,
-        curve=curve,
-        froude_valid=valid.froude,
-        froude_max_by=valid.by,
-        froude_max_argmax=valid.argmax,
-        w=valid.w,
-        last_speed_m_s=float(end.speed[0]),
-        last_speed_sigma_m_s=float(sigma(end.speed_error)[0]),
-        last_resistance_m_s2=float(r[0]),
-        last_sigma_m_s2=float(r_sigma[0]),
         tracks=_tracks(inputs, solution),
         reorthogonalised=solution.reorthogonalised,
         notes=(*window.notes, *inputs.notes, *solution.notes, *ship.warnings),

@@ -112,7 +112,9 @@ def test_figures_are_those_of_the_window(coast: Any, ship: Ship) -> None:
     last = coast.resistance(truth, ship)
     assert abs(found.last_resistance_m_s2 - last) < 4.0 * found.last_sigma_m_s2
     curve = found.valid_curve
-    assert found.w == curve.sigma_repeatable_m_s2.max() / curve.resistance_m_s2.max()
+    assert (
+        found.max_relative_sigma == curve.sigma_repeatable_m_s2.max() / curve.resistance_m_s2.max()
+    )
     assert np.all(curve.sigma_m_s2 > curve.sigma_repeatable_m_s2)
 
 

@@ -64,7 +64,7 @@ def test_quadratic_drag_comes_back(coast: Any, ship: Ship, estimator: str, bound
         residual = track.measured - track.fitted
         np.testing.assert_allclose(residual.std(), noise[name], rtol=0.12)
     top = curve.sigma_repeatable_m_s2.max() / curve.resistance_m_s2.max()
-    assert found.w == top
+    assert found.max_relative_sigma == top
     assert found.order == found.orders[found.order - 1].order
     np.testing.assert_allclose(
         found.last_speed_m_s, coast.speed(1500.0), rtol=0.0, atol=4.0 * found.last_speed_sigma_m_s
@@ -261,7 +261,7 @@ def test_n_r_and_its_error(coast: Any) -> None:
         uncertain.sigma_m_s2**2, uncertain.sigma_repeatable_m_s2**2 + part**2, rtol=1e-13
     )
     # a trend with a fixed n_r, and S1's own figure of merit, do not suffer from it
-    assert found[1].w == found[2].w
+    assert found[1].max_relative_sigma == found[2].max_relative_sigma
 
 
 def test_a_doubtful_n_r_is_passed_on(coast: Any) -> None:
@@ -381,7 +381,9 @@ def test_a_curve_or_a_reason_and_the_epoch_changes_no_bit(case: tuple[Block, int
     assert np.all(curve.sigma_m_s2 >= curve.sigma_repeatable_m_s2)
     assert curve.froude[0] >= 0.05
     assert len(found.valid_curve) > 0
-    assert np.isfinite([found.w, found.last_speed_sigma_m_s, found.last_sigma_m_s2]).all()
+    assert np.isfinite(
+        [found.max_relative_sigma, found.last_speed_sigma_m_s, found.last_sigma_m_s2]
+    ).all()
     assert np.isfinite([found.last_speed_m_s, found.last_resistance_m_s2]).all()
     assert all(np.isfinite(value) for value in found.noise_sd.values())
     again_found = estimate(Window.from_block(moved, -(2**63), 2**63 - 1), hull, Parameters())
