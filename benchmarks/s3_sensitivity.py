@@ -44,7 +44,7 @@ from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting_page, steering_page
 from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
-from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, own_share
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, partial_contribution
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     DESIGN,
@@ -241,7 +241,9 @@ def sets_of_manoeuvres() -> Table:
     rows = []
     for manoeuvres in chosen:
         shares = [
-            own_share(np.hstack([ask(SHIP, one, changes=TINY).slopes() for one in manoeuvres]))
+            partial_contribution(
+                np.hstack([ask(SHIP, one, changes=TINY).slopes() for one in manoeuvres])
+            )
             for ask in (respond, respond_by_groups)
         ]
         name = 'all nine' if manoeuvres is DESIGN else ', '.join(one.name for one in manoeuvres)
@@ -280,7 +282,7 @@ def page(
     kept = found.selection.kept
     both = np.degrees(found.check.overshoots_rad)
     grouped = np.degrees(found.group_check.overshoots_rad[1])
-    single = shown.own_share[np.arange(len(FORM)), np.argmax(shown.loss, axis=1)]
+    single = shown.partial_contribution[np.arange(len(FORM)), np.argmax(shown.loss, axis=1)]
     circle = shown.manoeuvres.index(turn(35.0))
     heavier = next(mimic for mimic in coast.mimics if mimic.effect.name == 'displacement')
     return [
@@ -405,10 +407,10 @@ def page(
         'propeller (Y0, N0) and the linear ones of sway in the gentlest.',
         "To be seen is not to be told: the own share is what of a derivative's trace no mixture "
         f'of the other 39 makes. Where it is seen best it is {np.median(single):.1%}',
-        f'(median; {np.median(shown.own_share[:, circle]):.1g} in the 35 degree circle, which '
-        'ends as three constants), in all nine together '
-        f'{np.median(shown.own_share_together):.1%}. A sensitive derivative is thus not yet one '
-        'that a',
+        f'(median; {np.median(shown.partial_contribution[:, circle]):.1g} in the 35 degree circle, '
+        'which ends as three constants), in all nine together '
+        f'{np.median(shown.partial_contribution_together):.1%}. '
+        'A sensitive derivative is thus not yet one that a',
         'trial identifies, as the paper hopes (after Rhee and Kim); the multiples are, for good '
         'reason, stated and not fitted.',
         '',

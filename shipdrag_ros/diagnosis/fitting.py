@@ -148,14 +148,16 @@ class _State:
 
     def _step(self) -> Float64:
         assert self.best is not None
-        matrix, fall = self.best.normal
-        free = np.ones(len(fall), bool)
+        matrix, negative_gradient = self.best.normal_equations
+        free = np.ones(len(negative_gradient), bool)
         while True:
             size = np.sqrt(np.maximum(np.diag(matrix)[free], 1e-300))
             scaled = matrix[np.ix_(free, free)] / np.outer(size, size)
             scaled[np.diag_indices_from(scaled)] *= 1.0 + self.damping
-            step = np.zeros(len(fall))
-            step[free] = np.linalg.lstsq(scaled, fall[free] / size, rcond=1e-13)[0] / size
+            step = np.zeros(len(negative_gradient))
+            step[free] = (
+                np.linalg.lstsq(scaled, negative_gradient[free] / size, rcond=1e-13)[0] / size
+            )
             trial: Float64 = self.best.z + step
             # one that would leave its side at once is held where it ends
             held = free & self._half & (trial < 0.0) & (self.best.z <= 0.0)
@@ -170,8 +172,8 @@ class _State:
         failed = Fit(best, np.full((len(best.z), len(best.z)), np.nan), -math.inf)
         if not math.isfinite(best.cost):
             return failed
-        matrix, fall = best.normal
-        covariance, log_evidence = self._laplace(matrix, fall, best.cost)
+        matrix, negative_gradient = best.normal_equations
+        covariance, log_evidence = self._laplace(matrix, negative_gradient, best.cost)
         if not math.isfinite(log_evidence):
             return failed
         groups = self.hypothesis.of_one_size
@@ -184,14 +186,16 @@ class _State:
     def _if_small(self, places: list[int]) -> float:
         """Return the log evidence where some unknowns are small."""
         assert self.best is not None
-        matrix, fall = (each.copy() for each in self.best.normal)
+        matrix, negative_gradient = (each.copy() for each in self.best.normal_equations)
         z, more = self.best.z[places], _SMALL**-2 - 1.0
         matrix[places, places] += more
-        fall[places] -= more * z
+        negative_gradient[places] -= more * z
         cost = self.best.cost + more * float(z @ z)
-        return self._laplace(matrix, fall, cost)[1] - len(places) * math.log(_SMALL)
+        return self._laplace(matrix, negative_gradient, cost)[1] - len(places) * math.log(_SMALL)
 
-    def _laplace(self, matrix: Float64, fall: Float64, cost: float) -> tuple[Float64, float]:
+    def _laplace(
+        self, matrix: Float64, negative_gradient: Float64, cost: float
+    ) -> tuple[Float64, float]:
         """Return covariance and log evidence of what is as good as normal."""
         assert self.best is not None
         size = np.sqrt(np.diag(matrix))
@@ -203,8 +207,8 @@ class _State:
             return matrix, -math.inf
         covariance = np.linalg.inv(scaled) / np.outer(size, size)
         # where the fit is held at the end of a parameter, the best is beyond
-        step = covariance @ fall
-        log_evidence = -0.5 * (cost - float(fall @ step))
+        step = covariance @ negative_gradient
+        log_evidence = -0.5 * (cost - float(negative_gradient @ step))
         log_evidence -= 0.5 * float(log_det) + float(np.log(size).sum())
         for i in np.flatnonzero(self._half):
             beyond = (self.best.z[i] + step[i]) / math.sqrt(covariance[i, i])

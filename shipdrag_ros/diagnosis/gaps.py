@@ -174,13 +174,13 @@ def predicted(model: CoastModel, run: int, found: Fit) -> Linear:
     for _ in range(_ROUNDS):
         if not np.isfinite(linear.cost):
             break
-        matrix, fall = linear.normal
+        matrix, negative_gradient = linear.normal_equations
         for i, unknown in enumerate(here.unknowns[:shared]):
             matrix[i, i] -= unknown.weight(linear.z[i])
-            fall[i] += unknown.weight(linear.z[i]) * linear.z[i]
+            negative_gradient[i] += unknown.weight(linear.z[i]) * linear.z[i]
         matrix[:shared, :shared] += precision
-        fall[:shared] -= precision @ (linear.z[:shared] - mean)
-        step = np.linalg.lstsq(matrix, fall, rcond=1e-13)[0]
+        negative_gradient[:shared] -= precision @ (linear.z[:shared] - mean)
+        step = np.linalg.lstsq(matrix, negative_gradient, rcond=1e-13)[0]
         linear = alone.linearise([here], [linear.z + step])[0]
     return linear
 

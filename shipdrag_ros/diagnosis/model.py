@@ -172,17 +172,17 @@ class Linear:
         return self.chi2 + sum(u.penalty(z) for u, z in zip(self.hypothesis.unknowns, self.z))
 
     @cached_property
-    def normal(self) -> tuple[Float64, Float64]:
-        """Half the curvature of the cost, and half its fall by each unknown."""
+    def normal_equations(self) -> tuple[Float64, Float64]:
+        """Matrix (p, p) and negative gradient (p,) of half the cost."""
         weight = np.zeros(len(self.z))
         for i, (unknown, z) in enumerate(zip(self.hypothesis.unknowns, self.z)):
             weight[i] = unknown.weight(z)
         matrix = np.diag(weight)
-        fall = -weight * self.z
+        negative_gradient = -weight * self.z
         for table in self.tables:
             matrix += np.einsum('ai,bi->ab', table[1:], table[1:])
-            fall += table[1:] @ table[0]
-        return matrix, fall
+            negative_gradient += table[1:] @ table[0]
+        return matrix, negative_gradient
 
 
 class Linearised(Protocol):

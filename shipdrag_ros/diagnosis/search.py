@@ -142,14 +142,14 @@ def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -
     mean, precision = np.array([_amount(unknown) for unknown in first]).T
     responses = model.responses(base.best, hypotheses)
     tables = np.hstack(base.best.tables)
-    matrix, _ = base.best.normal
+    matrix, _ = base.best.normal_equations
     across = tables[1:] @ responses.T
     given_way = np.linalg.lstsq(matrix, across, rcond=1e-13)[0]
     own = np.einsum('ai,ai->a', responses, responses) - np.einsum('ia,ia->a', across, given_way)
     own = np.maximum(own, 0.0) + precision
     # at the best fit of the base the residual is as good as square to all that it has
-    fall = responses @ tables[0] + precision * mean
-    gain = 0.5 * (fall**2 / own - precision * mean**2) - 0.5 * np.log(own / precision)
+    negative_gradient = responses @ tables[0] + precision * mean
+    gain = 0.5 * (negative_gradient**2 / own - precision * mean**2) - 0.5 * np.log(own / precision)
     log_prior = np.array([hypothesis.log_prior for hypothesis in hypotheses])
     found: Float64 = base.log_likelihood + gain + log_prior
     return found

@@ -41,21 +41,21 @@ class Normal:
     Attributes
     ----------
     matrix : (q, q)
-    fall : (q,)
-        The step from the point that the run alone asks for is matrix^-1 fall.
+    negative_gradient : (q,)
+        The step from the point that the run alone asks for is matrix^-1 negative_gradient.
     """
 
     matrix: Float64
-    fall: Float64
+    negative_gradient: Float64
 
     @classmethod
-    def without(cls, matrix: Float64, fall: Float64, kept: int) -> Normal:
+    def without(cls, matrix: Float64, negative_gradient: Float64, kept: int) -> Normal:
         """
         Return the equations of the first unknowns, whatever the others are.
 
         Parameters
         ----------
-        matrix, fall : (p, p), (p,)
+        matrix, negative_gradient : (p, p), (p,)
             Normal equations.
         kept
             Number of first unknowns that are kept.
@@ -66,10 +66,12 @@ class Normal:
             Their Schur complement.
         """
         own = matrix[kept:, kept:]
-        across = np.linalg.solve(own, np.column_stack([matrix[kept:, :kept], fall[kept:]]))
+        across = np.linalg.solve(
+            own, np.column_stack([matrix[kept:, :kept], negative_gradient[kept:]])
+        )
         return cls(
             matrix[:kept, :kept] - matrix[:kept, kept:] @ across[:, :kept],
-            fall[:kept] - matrix[:kept, kept:] @ across[:, kept],
+            negative_gradient[:kept] - matrix[:kept, kept:] @ across[:, kept],
         )
 
     def at(self, step: Float64) -> Normal:
@@ -86,7 +88,7 @@ class Normal:
         Normal
             Of the same matrix.
         """
-        return Normal(self.matrix, self.fall - self.matrix @ step)
+        return Normal(self.matrix, self.negative_gradient - self.matrix @ step)
 
 
 @dataclass(frozen=True)
@@ -157,18 +159,18 @@ def share(
     log_weight = np.empty(len(_SCATTERS))
     steps, covariances = [], []
     for i, scatter in enumerate(_SCATTERS):
-        matrix, fall = prior.matrix.copy(), prior.fall.copy()
+        matrix, negative_gradient = prior.matrix.copy(), prior.negative_gradient.copy()
         # density of the scatter itself, on a grid of its logarithm
         log = np.log(scatter) - np.log1p((scatter / usual_scatter) ** 2)
         for run in runs:
-            pull, push = run.matrix @ along, float(along @ run.fall)
+            pull, push = run.matrix @ along, float(along @ run.negative_gradient)
             freedom = 1.0 / scatter**2 + float(along @ pull)
             matrix += run.matrix - np.outer(pull, pull) / freedom
-            fall += run.fall - pull * push / freedom
+            negative_gradient += run.negative_gradient - pull * push / freedom
             log += 0.5 * (push**2 / freedom - np.log(scatter**2 * freedom))
         covariance = np.linalg.inv(matrix)
-        step = covariance @ fall
-        log_weight[i] = log + 0.5 * (fall @ step - np.linalg.slogdet(matrix)[1])
+        step = covariance @ negative_gradient
+        log_weight[i] = log + 0.5 * (negative_gradient @ step - np.linalg.slogdet(matrix)[1])
         steps.append(step)
         covariances.append(covariance)
     weight = np.exp(log_weight - log_weight.max())
@@ -204,9 +206,9 @@ def factor(run: Normal, others: Shared, along: Float64) -> Factor:
     known = np.linalg.inv(others.covariance)
     run = run.at(others.step)
     pull = run.matrix @ along
-    through = np.linalg.solve(known + run.matrix, np.column_stack([pull, run.fall]))
+    through = np.linalg.solve(known + run.matrix, np.column_stack([pull, run.negative_gradient]))
     information = float(along @ pull - pull @ through[:, 0])
-    value = float(along @ run.fall - pull @ through[:, 1]) / information
+    value = float(along @ run.negative_gradient - pull @ through[:, 1]) / information
     variance = 1.0 / information
     return Factor(
         value, float(np.sqrt(variance)), value / float(np.sqrt(variance + others.scatter**2))
@@ -333,7 +335,7 @@ class SharedBaseline:
     def chi2_per_row(self, run: int) -> float:
         """Return what a run's own factor on the baseline leaves."""
         normal, left = self.normals[run], self.fitted.best.tables[run][0]
-        gained = float(self.along @ normal.fall) ** 2
+        gained = float(self.along @ normal.negative_gradient) ** 2
         gained /= float(self.along @ normal.matrix @ self.along)
         return (float(left @ left) - gained) / len(left)
 
@@ -361,10 +363,10 @@ def _normal(fitted: Fit, run: int, shared: list[int]) -> Normal:
         if i not in shared and np.any(table[1 + i])  # places of other runs are not in it
     ]
     rows = table[[1 + i for i in (*shared, *own)]]
-    matrix, fall = rows @ rows.T, rows @ table[0]
+    matrix, negative_gradient = rows @ rows.T, rows @ table[0]
     for place, i in enumerate(own, start=len(shared)):
         if i < len(unknowns):  # the steady speeds have no prior
             weight = unknowns[i].weight(best.z[i])
             matrix[place, place] += weight
-            fall[place] -= weight * best.z[i]
-    return Normal.without(matrix, fall, len(shared))
+            negative_gradient[place] -= weight * best.z[i]
+    return Normal.without(matrix, negative_gradient, len(shared))

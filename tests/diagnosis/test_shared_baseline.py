@@ -31,7 +31,9 @@ def test_unknowns_of_a_run_alone_are_left_out_as_least_squares_does() -> None:
     rows, measured = rng.normal(size=(9, 3)), rng.normal(size=9)
     whole = np.linalg.lstsq(rows, measured, rcond=None)[0]
     part = Normal.without(rows.T @ rows, rows.T @ measured, 2)
-    np.testing.assert_allclose(np.linalg.solve(part.matrix, part.fall), whole[:2], rtol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.solve(part.matrix, part.negative_gradient), whole[:2], rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize('scatter', [0.005, 0.02, 0.1])

@@ -226,7 +226,7 @@ def relative(names: Sequence[str], values: Float64, changes: Sequence[float] = C
     return np.multiply.outer(values, np.asarray(changes, np.float64))
 
 
-def own_share(slopes: Float64) -> Float64:
+def partial_contribution(slopes: Float64) -> Float64:
     """
     Return the part of each response that no mixture of the others makes.
 

@@ -25,7 +25,7 @@ from shipdrag_ros.studies.sensitivity.loss import (
     Responses,
     Selection,
     Simulator,
-    own_share,
+    partial_contribution,
     relative,
     vary,
 )
@@ -170,17 +170,17 @@ class Experiment:
         m of them.
     loss : (p, m)
         Of 10 per cent, root mean square.
-    own_share : (p, m)
+    partial_contribution : (p, m)
         Part of it that no mixture of the other derivatives makes.
-    own_share_together : (p,)
+    partial_contribution_together : (p,)
         The same where all manoeuvres are made.
     """
 
     names: tuple[str, ...]
     manoeuvres: tuple[Manoeuvre, ...]
     loss: Float64
-    own_share: Float64
-    own_share_together: Float64
+    partial_contribution: Float64
+    partial_contribution_together: Float64
 
     @property
     def best(self) -> tuple[Manoeuvre, ...]:
@@ -300,8 +300,8 @@ def experiment(ship: SteeredShip, manoeuvres: Sequence[Manoeuvre] = DESIGN) -> E
         FORM,
         tuple(manoeuvres),
         np.column_stack([one.losses().table[:, :2].mean(axis=1) for one in responses]),
-        np.column_stack([own_share(one) for one in slopes]),
-        own_share(np.hstack(slopes)),
+        np.column_stack([partial_contribution(one) for one in slopes]),
+        partial_contribution(np.hstack(slopes)),
     )
 
 

@@ -9,7 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.errors import SensitivityError
-from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, own_share, relative, vary
+from shipdrag_ros.studies.sensitivity.loss import (
+    CHANGES,
+    Losses,
+    Norm,
+    partial_contribution,
+    relative,
+    vary,
+)
 
 TIME = np.linspace(0.0, 2.0, 50)
 NAMES = ('size', 'rate', 'phase')
@@ -145,14 +152,16 @@ def test_slopes_are_those_of_opposite_steps():
 
 def test_own_share_of_known_vectors():
     x, y, z = np.eye(3)
-    shares = own_share(np.array([x, x + y, 5.0 * z, 0.0 * x]))
+    shares = partial_contribution(np.array([x, x + y, 5.0 * z, 0.0 * x]))
     np.testing.assert_allclose(shares, [np.sqrt(0.5), np.sqrt(0.5), 1.0, 0.0], atol=1e-11)
-    np.testing.assert_allclose(own_share(np.array([x, -2.0 * x, y])), [0.0, 0.0, 1.0], atol=1e-11)
+    np.testing.assert_allclose(
+        partial_contribution(np.array([x, -2.0 * x, y])), [0.0, 0.0, 1.0], atol=1e-11
+    )
 
     # more parameters than numbers: each is a mixture of the others
-    crowded = own_share(np.array([x[:2], y[:2], (x + y)[:2]]))
+    crowded = partial_contribution(np.array([x[:2], y[:2], (x + y)[:2]]))
     np.testing.assert_allclose(crowded, 0.0, atol=1e-11)
-    np.testing.assert_array_equal(own_share(np.zeros((2, 5))), 0.0)
+    np.testing.assert_array_equal(partial_contribution(np.zeros((2, 5))), 0.0)
 
 
 @settings(max_examples=30, deadline=None)
@@ -160,8 +169,10 @@ def test_own_share_of_known_vectors():
 def test_more_experiments_never_hide_a_parameter(seed, count):
     slopes = np.random.default_rng(seed).standard_normal((count, 30))
     size = np.linalg.norm(slopes, axis=1)
-    first = own_share(slopes[:, :15]) * np.linalg.norm(slopes[:, :15], axis=1)
-    assert np.all(own_share(slopes) * size >= first * (1 - 1e-9))
+    first = partial_contribution(slopes[:, :15]) * np.linalg.norm(slopes[:, :15], axis=1)
+    assert np.all(partial_contribution(slopes) * size >= first * (1 - 1e-9))
     # each to its unit, and the order, do not matter
     scale = np.arange(1.0, count + 1.0)[:, None]
-    np.testing.assert_allclose(own_share(slopes * scale), own_share(slopes), rtol=1e-9)
+    np.testing.assert_allclose(
+        partial_contribution(slopes * scale), partial_contribution(slopes), rtol=1e-9
+    )

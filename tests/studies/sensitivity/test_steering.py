@@ -154,9 +154,9 @@ def test_which_manoeuvre_shows_which_derivative():
     # hardest manoeuvre
     assert best['N0'] == best['Y0'] == zigzag(5.0)
     assert best['Nddd'] == best['Xdd'] == zigzag(35.0)
-    single = shown.own_share
+    single = shown.partial_contribution
     assert single.shape == (40, 3)
     assert np.all((single >= 0.0) & (single <= 1.0))
     # a steady circle is a handful of numbers, from which forty cannot be told
     assert np.median(single[:, 2]) < 1e-3 < np.median(single[:, 1])
-    assert np.median(shown.own_share_together) > np.median(single[:, 1])
+    assert np.median(shown.partial_contribution_together) > np.median(single[:, 1])

@@ -144,15 +144,15 @@ def design_table(shown: Experiment) -> Table:
                 name,
                 *(f'{1e3 * value:.2f}' for value in shown.loss[i]),
                 shown.best[i].name,
-                f'{shown.own_share[i, best]:.1%}',
-                f'{shown.own_share_together[i]:.1%}',
+                f'{shown.partial_contribution[i, best]:.1%}',
+                f'{shown.partial_contribution_together[i]:.1%}',
             )
         )
     heads = (
         '',
         *(manoeuvre.name for manoeuvre in shown.manoeuvres),
         'shown most by',
-        'own share there',
+        'partial contribution there',
         'in all together',
     )
     return Table(heads, tuple(rows))
