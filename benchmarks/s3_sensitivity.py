@@ -407,7 +407,7 @@ def page(
         'propeller (Y0, N0) and the linear ones of sway in the gentlest.',
         "To be seen is not to be told: the own share is what of a derivative's trace no mixture "
         f'of the other 39 makes. Where it is seen best it is {np.median(single):.1%}',
-        f'(median; {np.median(shown.partial_contribution[:, circle]):.1g} in the 35 degree circle, '
+        f'(median; {np.median(shown.partial_contribution[:, circle]):.1g} in a 35 degree circle, '
         'which ends as three constants), in all nine together '
         f'{np.median(shown.partial_contribution_together):.1%}. '
         'A sensitive derivative is thus not yet one that a',
