@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.replay import open_runs, replay, why_no_coastdown
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.replay import replay, why_no_coastdown
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 
