@@ -18,8 +18,9 @@ from shipdrag_ros.coastdown.driving import gone_s, idles, thrust
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.force_law import departures
-from shipdrag_ros.coastdown.instruments import astern, gaps, rudder, turns
+from shipdrag_ros.coastdown.instruments import astern, cut_of, gaps, rudder, turns
 from shipdrag_ros.coastdown.readings import binned, readings
+from shipdrag_ros.coastdown.thrust_end import thrust_end
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
@@ -36,6 +37,7 @@ _IDLING = (
     'the shaft turns on, more often a metre than when it drove the ship, and no pitch is known: '
     'the propeller is taken to idle at zero pitch'
 )
+_LATE_S = 10.0  # of the thrust after an onset that is worth a cut
 _MANY = 20  # readings that must be left by them, since fewer tell less than the turn spoils
 _SHOWN = 300  # means of the speed
 _WORDLESS = 1e-3  # of a stretch
@@ -167,6 +169,7 @@ def examine(
     cuts = [
         *gaps(window, parameters),
         *([] if idling else thrust(window, ship, steady=steady)),
+        *(_slow_stop(window, ship) if steady else []),
         *astern(window, parameters),
     ]
     top = float(np.max(np.abs(readings(window)[1]), initial=0.0))
@@ -188,6 +191,20 @@ def examine(
     if idling:
         notes = (*notes, _IDLING)
     return Examination(start_ns, end_ns, tuple(cuts), failure, notes)
+
+
+def _slow_stop(window: Window, ship: Ship) -> list[NotCoastdown]:
+    """Let the speed tell how long the thrust ran down, where no shaft does."""
+    if any(len(shaft) for shaft in window.shafts):
+        return []
+    end = thrust_end(window, 0.0 if ship.propulsion is None else ship.propulsion.run_down_s)
+    if end is None or end.ended_s < _LATE_S:
+        return []
+    text = (
+        f'the deceleration grows for {end.ended_s - end.began_s:.0f} s: the thrust runs down '
+        f'slowly, and is gone {end.ended_s:.0f} ± {end.sd_s:.0f} s after the onset'
+    )
+    return [cut_of(window, 0.0, end.ended_s, Dismissal.THRUST, text)]
 
 
 class _Part(NamedTuple):

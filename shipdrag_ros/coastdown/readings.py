@@ -71,16 +71,18 @@ def readings(window: Window) -> tuple[Float64, Float64]:
     time_s = seconds(track, window)
     count = min(_BINS, len(time_s) // 2) + 1
     edges = np.linspace(time_s[0], time_s[-1], count + 1)
-    place = [_means(time_s, track.value[:, axis], edges) for axis in (0, 1)]
-    middle = _means(time_s, time_s, edges)
+    place = [means(time_s, track.value[:, axis], edges) for axis in (0, 1)]
+    middle = means(time_s, time_s, edges)
     there = np.isfinite(middle)
     middle = middle[there]
     steps = np.hypot(np.diff(place[0][there]), np.diff(place[1][there]))
     return 0.5 * (middle[1:] + middle[:-1]), steps / np.diff(middle)
 
 
-def _means(time_s: Float64, value: Float64, edges: Float64) -> Float64:
-    """Return the mean in each bin; NaN where it is empty."""
+def means(time_s: Float64, value: Float64, edges: Float64) -> Float64:
+    """
+    Return the mean of a value between each two edges; NaN where there is none.
+    """
     number = np.clip(np.searchsorted(edges, time_s, side='right') - 1, 0, len(edges) - 2)
     count = np.bincount(number, minlength=len(edges) - 1)
     total = np.bincount(number, value, minlength=len(edges) - 1)
@@ -102,6 +104,6 @@ def binned(time_s: Float64, speed: Float64, bins: int = _BINS) -> tuple[Float64,
     # each of `count` readings in the middle of its bin
     half = 0.5 * (time_s[-1] - time_s[0]) / max(len(time_s) - 1, 1)
     edges = np.linspace(time_s[0] - half, time_s[-1] + half, count + 1)
-    t, v = _means(time_s, time_s, edges), _means(time_s, speed, edges)
+    t, v = means(time_s, time_s, edges), means(time_s, speed, edges)
     there = np.isfinite(t)
     return t[there], v[there]
