@@ -224,5 +224,7 @@ def _sums_of_squares(table: Float64, count: int) -> tuple[Float64, float]:
     left = np.full(mixed.shape, np.inf)
     left[one, two] = np.where(steepens, total - first * a - second * b, np.inf)
     np.fill_diagonal(left, total - np.maximum(along, 0.0) ** 2 / size)
-    gain = np.maximum(rounded.T @ straight, 0.0) ** 2 / np.einsum('ij,ij->j', rounded, rounded)
+    # one that would begin after the record is none
+    fit = np.maximum(np.einsum('ij,ij->j', rounded, rounded), 1e-12)
+    gain = np.maximum(rounded.T @ straight, 0.0) ** 2 / fit
     return left, float(total - gain.max())

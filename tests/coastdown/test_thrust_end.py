@@ -73,8 +73,10 @@ def track(speed: np.ndarray, seed: int) -> Block:
     return block(Channel.POSITION, place + rng.normal(0.0, 0.5, place.shape))
 
 
-def examined(*blocks: Block, onset_s: float, ship: Ship = SHIP) -> Examination:
-    start_ns, end_ns = (EPOCH_NS + round(s * 1e9) for s in (STOP_S + onset_s, LENGTH_S))
+def examined(
+    *blocks: Block, onset_s: float, ship: Ship = SHIP, end_s: float = LENGTH_S
+) -> Examination:
+    start_ns, end_ns = (EPOCH_NS + round(s * 1e9) for s in (STOP_S + onset_s, end_s))
     joined = in_arrival_order(list(blocks))
     window = Window.from_block(joined, start_ns, end_ns, before_ns=EPOCH_NS)
     return examine(window, ship, Parameters())
@@ -123,3 +125,10 @@ def test_a_shaft_dates_the_stop_itself() -> None:
     shaft = block(Channel.SHAFT, 12.0 * thrust)
     found = examined(log(sailed(thrust), 1), shaft, onset_s=20.0)
     assert not any('deceleration grows' in cut.text for cut in found.cuts)
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('length_s', [10.0, 30.0, 70.0])
+def test_too_short_a_coastdown_is_left_as_it_is(length_s: float) -> None:
+    found = examined(log(sailed(slow(60.0)), 1), onset_s=20.0, end_s=STOP_S + 20.0 + length_s)
+    assert found.cuts == ()
