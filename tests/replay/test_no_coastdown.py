@@ -19,10 +19,10 @@ STAMPS = 10**18 + np.arange(1800) * 10**9
 
 
 @pytest.mark.parametrize('from_s', [0, 600])
-def test_a_log_that_stands_still_is_told(write_bag: Callable[..., Path], from_s: int) -> None:
+def test_a_log_that_stands_still_is_told(write_run: Callable[..., Path], from_s: int) -> None:
     speed = 4.0 + 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed[from_s:] = 4.017
-    path = write_bag('a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
+    path = write_run(tmp_path / 'a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
     (run,) = open_runs([path])
     why = why_no_coastdown(replay(run, ship=BOAT))
     minutes = (1799 - from_s) / 60.0
@@ -31,10 +31,10 @@ def test_a_log_that_stands_still_is_told(write_bag: Callable[..., Path], from_s:
 
 @pytest.mark.parametrize('steady', [0.0, 4.0])
 def test_a_log_at_work_and_a_ship_at_rest_do_not_stand_still(
-    write_bag: Callable[..., Path], steady: float
+    write_run: Callable[..., Path], tmp_path: Path, steady: float
 ) -> None:
     noise = 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed = steady + noise if steady else np.zeros(len(STAMPS))
-    path = write_bag('a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
+    path = write_run(tmp_path / 'a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
     (run,) = open_runs([path])
     assert 'stood still' not in why_no_coastdown(replay(run, ship=BOAT))
