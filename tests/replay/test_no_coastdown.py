@@ -19,7 +19,9 @@ STAMPS = 10**18 + np.arange(1800) * 10**9
 
 
 @pytest.mark.parametrize('from_s', [0, 600])
-def test_a_log_that_stands_still_is_told(write_run: Callable[..., Path], from_s: int) -> None:
+def test_a_log_that_stands_still_is_told(
+    write_run: Callable[..., Path], tmp_path: Path, from_s: int
+) -> None:
     speed = 4.0 + 0.01 * np.random.default_rng(1).standard_normal(len(STAMPS))
     speed[from_s:] = 4.017
     path = write_run(tmp_path / 'a.mcap', Block.of(Channel.SPEED_THROUGH_WATER, STAMPS, speed))
