@@ -227,7 +227,7 @@ def page() -> str:
 
 I. M. Akhmedov, V. A. Naumov: *Linearization of the dependence of the cable hydrodynamic drag
 force from the speed*. Written by `benchmarks/s2_cable.py --write`; the code is
-`shipdrag_ros/simulation/cable.py`, the verb `shipdrag cable`.
+`shipdrag_ros/studies/cable/drag.py`, the verb `shipdrag cable`.
 
     shipdrag cable --length 50 --diameter 0.1 --speed 3 --report cable.html
 

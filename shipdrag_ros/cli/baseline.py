@@ -12,7 +12,7 @@ import numpy as np
 from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
 from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import HELP, open_windowed, refuse_overlaps, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, Learnt, learn_baseline
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
@@ -64,6 +64,7 @@ def run(options: argparse.Namespace) -> int:
             'write to another file'
         )
     runs = open_windowed(options.bags, remap=dict(options.remap))
+    refuse_overlaps(runs)
     coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship))
     found = learn_baseline(coasts, ship, parameters)
     options.out.write_text(found.ship.to_yaml(), encoding='utf-8')

@@ -11,7 +11,14 @@ from pathlib import Path
 from shipdrag_ros.cli import diagnose_json
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, Span, WindowedRun, open_windowed, windowed_bag
+from shipdrag_ros.cli.windowed import (
+    HELP,
+    Span,
+    WindowedRun,
+    open_windowed,
+    refuse_overlaps,
+    windowed_bag,
+)
 from shipdrag_ros.diagnosis import (
     CoastRun,
     Diagnosis,
@@ -91,6 +98,7 @@ def run(options: argparse.Namespace) -> int:
     given = None if options.ship is None else Ship.load(options.ship)
     window = None if options.window is None else tuple(options.window)
     runs = open_windowed(options.bags, remap=dict(options.remap), window=window)
+    refuse_overlaps(runs)
     found, ship = _diagnosed(output, runs, given)
     if ship is None and options.write is not None:
         raise DiagnosisError(

@@ -9,7 +9,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.agreement import widened
 from shipdrag_ros.estimation.choice import check_size, estimate
 from shipdrag_ros.estimation.coverage import coverage_notes
-from shipdrag_ros.estimation.estimators import AFTER, named
+from shipdrag_ros.estimation.estimators import AFTER, DURING, named
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Series, Window
@@ -66,14 +66,17 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
 
 
 def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
-    if parameters.estimator != 'auto':
+    asked = parameters.estimator
+    if asked != 'auto' and named(asked) is not named(AFTER):
         return estimate(window, ship, parameters)
     try:
         found = _fitted(window, ship, parameters)
     except EstimationError as error:
+        if asked != 'auto':
+            raise
         return _instead(window, ship, parameters, error)
     try:
-        other = estimate(window, ship, parameters)
+        other = named(DURING).estimate(window, ship, parameters)
     except EstimationError as error:
         note = f'not compared with the estimate during the coastdown, which failed: {error}'
         return replace(found, notes=(*found.notes, note))

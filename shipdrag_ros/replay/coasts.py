@@ -127,14 +127,13 @@ def _start(coastdown: Coastdown, ship: Ship) -> tuple[int, bool]:
     """
     Return the start of a coastdown, and whether what comes before it may be steady sailing.
 
-    The run-down of the thrust is cut from a window that was given, but it follows the stop:
-    with it, the record before is as good as before any other.
+    The run-down of the thrust is cut, but it follows the stop: with it, the record before is as
+    good as before any other. What was cut before that, the engine drove: it may be steady.
     """
     if not coastdown.cut_at_start:
         return coastdown.start_ns, True
     cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
     first_ns = min(cut.start_ns for cut in cuts)
-    short = coastdown.start_ns - first_ns < round(gone_s(ship) * _SECOND_NS)
-    if short and all(cut.reason is Dismissal.THRUST for cut in cuts):
-        return first_ns, True
+    if all(cut.reason is Dismissal.THRUST for cut in cuts):
+        return max(first_ns, coastdown.start_ns - round(gone_s(ship) * _SECOND_NS)), True
     return coastdown.start_ns, False

@@ -42,7 +42,24 @@ def together(runs: Sequence[RunResult]) -> Together:
         return Together(None)
     if len({run.ship for run in runs}) > 1:
         return Together(None, 'the bags are of different ships, so nothing is combined')
+    twice = _twice(runs)
+    if twice:
+        return Together(None, f'windows of {twice!r} overlap, and what they share is one run')
     try:
         return Together(combine([part[0] for part in found], [part[1] for part in found]))
     except EstimationError as error:
         return Together(None, str(error))
+
+
+def _twice(runs: Sequence[RunResult]) -> str:
+    """Return a bag of which two windows share a part; '' for none."""
+    seen: list[tuple[str, int, int]] = []
+    for run in runs:
+        for each in run.coastdowns:
+            if each.estimate is None:
+                continue
+            for bag, start_ns, end_ns in seen:
+                if bag == run.bag and each.start_ns < end_ns and start_ns < each.end_ns:
+                    return bag
+            seen.append((run.bag, each.start_ns, each.end_ns))
+    return ''

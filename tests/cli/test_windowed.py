@@ -14,6 +14,8 @@ import pytest
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
 
+ROOT = Path(__file__).resolve().parents[2]
+
 
 def test_a_bag_may_carry_its_window(tmp_path: Path) -> None:
     assert windowed_bag('a.mcap') == WindowedBag(Path('a.mcap'), None)
@@ -68,6 +70,41 @@ def test_replay_takes_each_window(coastdown_bag: Path, capsys: pytest.CaptureFix
     first, second = ((each['end_ns'] - each['start_ns']) * 1e-9 for each in found)
     assert (first, second) == (pytest.approx(470.0), pytest.approx(700.0))
     assert {each['ended_by'] for each in found} == {'given'}
+
+
+@pytest.mark.parametrize('verb', ['diagnose', 'baseline'])
+def test_a_part_that_is_given_twice_is_no_second_run(
+    verb: str, coastdown_bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [f'{coastdown_bag}@430:900', f'{coastdown_bag}@500:1200']
+    if verb == 'baseline':
+        ship = str(ROOT / 'config' / 'vitus_bering.yaml')
+        words += ['--ship', ship, '-o', str(tmp_path / 'learnt.yaml')]
+    assert main([verb, *words]) == 1
+    told = ' '.join(capsys.readouterr().err.split())
+    assert 'given twice, 430 to 900 s and 500 to 1200 s: they share a part' in told
+
+
+def test_overlapping_windows_are_shown_and_not_combined(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bags = [f'{coastdown_bag}@430:900', f'{coastdown_bag}@500:1200']
+    found = replayed(capsys, *bags)
+    assert len(found['coastdowns']) == 2
+    assert found['combined'] is None
+    assert main(['replay', *bags]) == 0
+    assert 'Not combined: windows of' in capsys.readouterr().out
+
+
+def test_a_window_may_hold_the_steady_lead(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ship = str(ROOT / 'config' / 'vitus_bering.yaml')
+    lead = tmp_path / 'lead.mcap'
+    assert main(['simulate', '--ship', ship, '-o', str(lead), '--lead-in', '900']) == 0
+    capsys.readouterr()
+    assert main(['diagnose', f'{lead}@0:2400', '--ship', ship, '--json']) == 0
+    assert json.loads(capsys.readouterr().out)['coastdowns_used'] == 1
 
 
 def test_a_window_outside_of_the_bag_is_an_error(
