@@ -165,8 +165,9 @@ def _tried(
     outcome = 'survived'
     try:
         for tests in _tests(copy, module, options.whole):
-            if _failed(copy, tests, options.limit_s):
-                outcome = 'caught'
+            failed = _failed(copy, tests, options.limit_s)
+            if failed or failed is None:
+                outcome = 'caught' if failed else 'timed out'
                 break
     finally:
         path.write_text(source)
@@ -185,8 +186,8 @@ def _tests(copy: Path, module: str, whole: bool) -> list[list[str]]:
     return [*stages, ['tests']] if whole or not stages else stages
 
 
-def _failed(copy: Path, tests: list[str], limit_s: float) -> bool:
-    """Run tests; say whether one fails, or they do not end."""
+def _failed(copy: Path, tests: list[str], limit_s: float) -> bool | None:
+    """Run tests; say whether one fails, None where they do not end."""
     command = [sys.executable, '-m', 'pytest', '-q', '-x', '-n', '2', *tests]
     if shutil.which('unshare') and os.geteuid() == 0:
         inner = 'ip link set lo up; exec "$@"'
@@ -209,7 +210,7 @@ def _failed(copy: Path, tests: list[str], limit_s: float) -> bool:
             return ran.wait(limit_s) not in (0, 5)
         except subprocess.TimeoutExpired:
             os.killpg(ran.pid, 9)
-            return True
+            return None
 
 
 def _print(done: list[dict[str, object]]) -> None:
