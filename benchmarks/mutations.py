@@ -46,6 +46,9 @@ OPERATORS = (
     'ZeroIterationForLoop',
 )
 
+# what the modules below all rooms are tried on
+GROUND_FLOOR = ['tests/ship', 'tests/messages', 'tests/coastdown', 'tests/test_compiled.py']
+
 # both are run by the interpreter that has cosmic-ray
 _DRAW = """
 import json, random, sys
@@ -181,7 +184,9 @@ def _tests(copy: Path, module: str, whole: bool) -> list[list[str]]:
     near = room / f'test_{inside.stem}.py'
     stages = [[str(near)]] if (copy / near).exists() else []
     top = Path('tests') / inside.parts[0]
-    if len(inside.parts) > 1 and (copy / top).exists():
+    if len(inside.parts) == 1:
+        stages.append(GROUND_FLOOR)
+    elif (copy / top).exists():
         stages.append([str(top)])
     return [*stages, ['tests']] if whole or not stages else stages
 
