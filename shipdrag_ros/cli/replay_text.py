@@ -21,7 +21,9 @@ def show_run(output: Output, run: RunResult) -> None:
     for warning in run.warnings:
         output.say(f'Warning: {warning}')
     if not run.coastdowns:
-        output.say(words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns)))
+        output.say(
+            words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns), run.why_none)
+        )
     for number, coastdown in enumerate(run.coastdowns, start=1):
         output.heading(f'Coastdown {number}')
         for line in cut_lines(coastdown, run.span_ns):

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
+from shipdrag_ros.replay.no_coastdown import why_no_coastdown
 from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Ship
+
+_READ_AGAIN = 2_000_000  # messages: all their samples are held at once
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,9 @@ class RunResult:
         What was nearly a coastdown, and what was cut, with why.
     steady_lead_s
         The longest that the ship was steady; None where no coastdown was looked for.
+    why_none
+        What the speed did where nothing was even nearly a coastdown; '' where there is
+        something, or the record is too long to be read again.
     """
 
     bag: str
@@ -52,6 +58,7 @@ class RunResult:
     span_ns: tuple[int, int] | None = None
     not_coastdowns: tuple[NotCoastdown, ...] = ()
     steady_lead_s: float | None = None
+    why_none: str = ''
 
     @property
     def dismissed(self) -> tuple[NotCoastdown, ...]:
@@ -82,4 +89,13 @@ class RunResult:
             span_ns=run.span_ns,
             not_coastdowns=result.not_coastdowns,
             steady_lead_s=result.steady_lead_s,
+            why_none=_why_none(result),
         )
+
+
+def _why_none(result: ReplayResult) -> str:
+    """Say what the speed did, where that is not told by anything else."""
+    messages = sum(counts.messages for counts in result.inputs.values())
+    if result.coastdowns or result.not_coastdowns or messages > _READ_AGAIN:
+        return ''
+    return why_no_coastdown(result)

@@ -97,7 +97,7 @@ def recorded_sentence(recorded: Recorded) -> str:
     )
 
 
-def no_coastdown_sentence(steady_lead_s: float | None, dismissed: int) -> str:
+def no_coastdown_sentence(steady_lead_s: float | None, dismissed: int, why: str = '') -> str:
     """
     Say that no coastdown was found, and what was looked at.
 
@@ -107,13 +107,15 @@ def no_coastdown_sentence(steady_lead_s: float | None, dismissed: int) -> str:
         The longest that the ship was steady [s]; None where that was not looked for.
     dismissed
         How many stretches were looked at and dismissed.
+    why
+        What the speed did instead, where nothing was dismissed.
     """
     known = [] if steady_lead_s is None else [f'longest steady sailing {duration(steady_lead_s)}']
     if dismissed:
         stretches = 'one stretch was' if dismissed == 1 else f'{dismissed} stretches were'
         known.append(f'{stretches} looked at and dismissed, see below')
     else:
-        known.append('nothing in it looked like one')
+        known.append(why or 'nothing in it looked like one')
     return f'No coastdown found: {"; ".join(known)}.'
 
 

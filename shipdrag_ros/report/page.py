@@ -88,7 +88,7 @@ def _run(run: RunResult) -> _Run:
         ),
         none_found=''
         if run.coastdowns
-        else words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns)),
+        else words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns), run.why_none),
         not_coastdowns=cells.not_coastdowns_table(run.dismissed) if run.dismissed else None,
         inputs=cells.inputs_table(run.inputs),
         recorded=words.recorded_sentence(run.recorded),
