@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros import display
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.estimation.result import FroudeMax
 from shipdrag_ros.replay import Recorded, words
@@ -18,32 +17,6 @@ from shipdrag_ros.ship import Ship
 def test_every_end_and_every_rule_has_words() -> None:
     assert set(words.ENDED_BY) == set(EndedBy)
     assert set(words.FROUDE_MAX_BY) == set(FroudeMax)
-
-
-@pytest.mark.parametrize(
-    ('value', 'spread', 'text'),
-    [
-        (0.0158734, 0.00083, '0.01587 ± 0.00083'),
-        (328.64, 17.3, '329 ± 17'),
-        (32864.0, 1730.0, '32900 ± 1700'),
-        (-0.4, 0.031, '-0.400 ± 0.031'),
-        (1.5, 0.0, '1.5 ± 0'),
-        (1.5, float('nan'), '1.5 ± nan'),
-    ],
-)
-def test_a_spread_sets_the_digits(value: float, spread: float, text: str) -> None:
-    assert display.plus_minus(value, spread) == text
-
-
-def test_times_of_a_real_clock_are_dates_and_others_are_seconds() -> None:
-    assert display.utc(1_700_000_000_000_000_000) == '2023-11-14 22:13:20 UTC'
-    assert display.utc(153_200_000_000) == '153 s'
-    assert display.utc(2**62) == '2116-02-20 23:53:38 UTC'
-
-
-def test_a_long_time_is_also_given_in_minutes() -> None:
-    assert display.duration(40.0) == '40 s'
-    assert display.duration(1500.0) == '1500 s (25 min)'
 
 
 def test_the_sentence_gives_range_figure_and_force(coastdown: Coastdown, ship: Ship) -> None:
