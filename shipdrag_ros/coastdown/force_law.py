@@ -95,6 +95,8 @@ class Change:
 class Cut:
     """
     A part that is no coasting [s], at the end or the beginning of a stretch.
+
+    `quickened` is the deceleration after the change over that before it.
     """
 
     start_s: float
@@ -102,6 +104,7 @@ class Cut:
     at_end: bool
     reason: Dismissal
     text: str
+    quickened: float = 0.0
 
 
 class _Law:
@@ -284,7 +287,8 @@ def _departure(
         return Cut(float(t[0]), change.at_s, False, Dismissal.LEAD_IN, text)
     if change.quickens:
         text = f'{then}, more than water can do: something stops her'
-        return Cut(change.at_s, float(t[-1]), True, Dismissal.BRAKE, text)
+        quickened = change.after_at_once / max(change.before, 1e-12)
+        return Cut(change.at_s, float(t[-1]), True, Dismissal.BRAKE, text, quickened)
     # noise makes what follows at once uncertain where little follows
     if here > _HELD and any(_DRIVEN < each < _USUAL for each in (there, change.after / usual)):
         text = f'{then}: something but the water slows her at first'

@@ -297,6 +297,16 @@ class TestSpeedAlone:
         assert kept_s(found) == (0.0, pytest.approx(77.0, abs=8.0))
 
 
+@pytest.mark.parametrize(('rate', 'reason'), [(0.0, Dismissal.BRAKE), (0.004, Dismissal.TURN)])
+def test_what_slows_her_while_the_heading_swings_is_a_turn(rate: float, reason: Dismissal) -> None:
+    speed = glide(TIME_S)
+    speed[240:] = speed[240] - 0.006 * np.arange(60.0)
+    heading = 1.0 + rate * np.maximum(TIME_S - 240.0, 0.0)
+    found = examined(block(LOG, noisy(speed)), block(HEADING, heading))
+    assert reasons(found) == {reason}
+    assert kept_s(found) == (0.0, pytest.approx(240.0, abs=12.0))
+
+
 def held_at_first(until_s: float, length_s: float, *, start: float = 6.0) -> np.ndarray:
     """Return the speed of a ship of 150 m that something slows until a time."""
     speed = [start]
