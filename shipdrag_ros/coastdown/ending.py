@@ -204,12 +204,6 @@ def _forced(
 ) -> Doubt | None:
     """Say that a constant force acted beside the water all the time."""
     width = tuning.slopes.width
-    stands = 0.5 * parameters.shaft_stopped_fraction
-    # where the shafts are seen to do nothing, a constant force is the wind
-    seen = Seen(coasted.source, coasted.start, coasted.spread)
-    told = propulsion(bins, coasted.drive, seen, end.last, width=width, stands=stands).thrust
-    if told in (Thrust.STANDS, Thrust.WINDMILLS):
-        return None
     first = coasted.start + round(0.1 * parameters.confirm_s)
     faster = line(bins, coasted.source, coasted.start - 1, width)[1]
     if math.isnan(faster):
@@ -228,14 +222,20 @@ def _forced(
         )
 
     within = force(end.last)
-    if within is not None and within.low > _THRUST_MIN:
-        return _driven(within)
     if within is not None and within.high < -_BRAKE_MIN:
         return Doubt(
             Dismissal.BRAKE,
             f'a force of {-within.fraction:.2f} times the first resistance held the ship back '
             'however slow she was: a brake, or a propeller astern',
         )
+    # where the shafts are seen to do nothing, what drives her is the wind
+    seen = Seen(coasted.source, coasted.start, coasted.spread)
+    stands = 0.5 * parameters.shaft_stopped_fraction
+    told = propulsion(bins, coasted.drive, seen, end.last, width=width, stands=stands).thrust
+    if told in (Thrust.STANDS, Thrust.WINDMILLS):
+        return None
+    if within is not None and within.low > _THRUST_MIN:
+        return _driven(within)
     if end.ended_by is not EndedBy.ENGINE:
         return None
     # with what came after: an engine that is engaged again leaves a corner, one that was never

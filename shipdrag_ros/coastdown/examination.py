@@ -8,6 +8,7 @@ longest clean part is kept, or the stretch is refused with the reason.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -18,7 +19,7 @@ from shipdrag_ros.coastdown.driving import gone_s, idles, thrust
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.force_law import departures
-from shipdrag_ros.coastdown.instruments import astern, cut_of, gaps, rudder, turns
+from shipdrag_ros.coastdown.instruments import astern, cut_of, gaps, rudder, swing, turns
 from shipdrag_ros.coastdown.readings import binned, readings
 from shipdrag_ros.coastdown.thrust_end import thrust_end
 from shipdrag_ros.errors import EstimationError
@@ -38,6 +39,8 @@ _IDLING = (
     'the propeller is taken to idle at zero pitch'
 )
 _LATE_S = 10.0  # of the thrust after an onset that is worth a cut
+_TURNS = 0.25  # of turn_rad, by which the heading swings where it is a turn that stops her
+_TURN_MOST = 4.0  # times the deceleration before: no turn slows her by more
 _MANY = 20  # readings that must be left by them, since fewer tell less than the turn spoils
 _SHOWN = 300  # means of the speed
 _WORDLESS = 1e-3  # of a stretch
@@ -232,7 +235,7 @@ def _examine_part(
     steady: bool,
 ) -> _Part:
     kept, cuts, notes = _steered(window.part(*span), ship, parameters)
-    by_speed = _by_speed(window, kept, ship, steady=steady)
+    by_speed = _by_speed(window, kept, ship, parameters, steady=steady)
     kept = max(_left(kept, by_speed), key=_length, default=(kept[0], kept[0]))
     first, last, _ = _ends(window.part(*kept))
     fall = 1.0 - last / first if first > 0.0 else 0.0
@@ -284,7 +287,9 @@ def _steered(
     return max(_left(span, cuts), key=_length, default=span), cuts, notes
 
 
-def _by_speed(window: Window, kept: _SPAN, ship: Ship, *, steady: bool) -> list[NotCoastdown]:
+def _by_speed(
+    window: Window, kept: _SPAN, ship: Ship, parameters: Parameters, *, steady: bool
+) -> list[NotCoastdown]:
     """Let the speed tell where it is not that of a ship that coasts."""
     part = window.part(*kept)
     time_s, speed = readings(part)
@@ -303,12 +308,18 @@ def _by_speed(window: Window, kept: _SPAN, ship: Ship, *, steady: bool) -> list[
         end_ns = kept[0] + round(cut.end_s * SECOND_NS)
         at_start = cut.start_s <= float(time_s[settled][0])
         at_end = cut.end_s >= float(time_s[-1])
+        reason, text = cut.reason, cut.text
+        if at_end and reason is Dismissal.BRAKE and cut.quickened < _TURN_MOST:
+            turned = swing(part, cut.start_s)
+            if turned > _TURNS * parameters.turn_rad:
+                reason = Dismissal.TURN
+                text = f'{text}, and the heading swings by {math.degrees(turned):.0f} degrees'
         cuts.append(
             NotCoastdown(
                 kept[0] if at_start else start_ns,
                 kept[1] if at_end else end_ns,
-                cut.reason,
-                cut.text,
+                reason,
+                text,
             )
         )
     return cuts

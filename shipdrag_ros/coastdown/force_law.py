@@ -60,8 +60,8 @@ class Change:
     before, after_at_once, after
         Deceleration up to it by the law before it, just after it, and of all
         that follows [m/s^2].
-    gentlest
-        What the mean deceleration after it is at least by the law before it [m/s^2].
+    gentlest_at_once, gentlest
+        What the two decelerations after it are at least by the law before it [m/s^2].
     gain
         By how much two laws fit better than one, in variances of what they leave.
     """
@@ -71,6 +71,7 @@ class Change:
     before: float
     after_at_once: float
     after: float
+    gentlest_at_once: float
     gentlest: float
     gain: float
 
@@ -84,11 +85,18 @@ class Change:
         """Whether she all but ceases to slow down."""
         return self.before > 0.0 and self.after < _GENTLER * self.gentlest
 
+    @property
+    def eases(self) -> bool:
+        """Whether she slows down far less at once, as where a brake is let go."""
+        return self.before > 0.0 and self.after_at_once < _GENTLER * self.gentlest_at_once
+
 
 @dataclass(frozen=True)
 class Cut:
     """
     A part that is no coasting [s], at the end or the beginning of a stretch.
+
+    `quickened` is the deceleration after the change over that before it.
     """
 
     start_s: float
@@ -96,6 +104,7 @@ class Cut:
     at_end: bool
     reason: Dismissal
     text: str
+    quickened: float = 0.0
 
 
 class _Law:
@@ -153,7 +162,7 @@ def change_point(time_s: Float64, speed: Float64) -> Change | None:
             least, left = total, both
         if total < best:
             change = _change(time_s, speed, at, float(first.deceleration[-1]))
-            if change.quickens or change.ceases:
+            if change.quickens or change.ceases or change.eases:
                 best, found = total, change
     if found is None:
         return None
@@ -172,6 +181,7 @@ def _change(time_s: Float64, speed: Float64, at: int, before: float) -> Change:
         before=before,
         after_at_once=-_slope(time_s[near], speed[near]),
         after=-_slope(time_s[at:], speed[at:]),
+        gentlest_at_once=before * float(np.mean(slower[:_NEAR])),
         gentlest=before * float(np.mean(slower)),
         gain=np.nan,
     )
@@ -218,6 +228,8 @@ def departures(time_s: Float64, speed: Float64, expected: Callable[[float], floa
         else:
             cut = replace(cut, start_s=first)
             first = cut.end_s
+            # no law held across what is cut now: what that made of the end is judged anew
+            cuts, last = [each for each in cuts if not each.at_end], float(time_s[-1])
         if cuts and (cut.reason, cut.at_end) == (cuts[-1].reason, cuts[-1].at_end):
             before = cuts.pop()
             start_s, end_s = min(cut.start_s, before.start_s), max(cut.end_s, before.end_s)
@@ -275,10 +287,14 @@ def _departure(
         return Cut(float(t[0]), change.at_s, False, Dismissal.LEAD_IN, text)
     if change.quickens:
         text = f'{then}, more than water can do: something stops her'
-        return Cut(change.at_s, float(t[-1]), True, Dismissal.BRAKE, text)
-    if here > _HELD and _DRIVEN < there < _USUAL:
+        quickened = change.after_at_once / max(change.before, 1e-12)
+        return Cut(change.at_s, float(t[-1]), True, Dismissal.BRAKE, text, quickened)
+    # noise makes what follows at once uncertain where little follows
+    if here > _HELD and any(_DRIVEN < each < _USUAL for each in (there, change.after / usual)):
         text = f'{then}: something but the water slows her at first'
         return Cut(float(t[0]), change.at_s, False, Dismissal.BRAKE, text)
+    if not change.ceases:
+        return None
     text = (
         f'at {change.speed:.3g} m/s she slows by {_shown(change.after)} m/s² on average, where '
         f'coasting on leaves at least {_shown(change.gentlest)} m/s²: she no longer slows down'

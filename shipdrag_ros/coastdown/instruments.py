@@ -78,6 +78,23 @@ def turns(window: Window, parameters: Parameters) -> list[NotCoastdown]:
     return found
 
 
+def swing(window: Window, start_s: float) -> float:
+    """
+    Return how far beyond the headings before a time it swings after it [rad].
+
+    0 where nothing tells the heading.
+    """
+    if not len(window.heading):
+        return 0.0
+    time_s, angle = binned(
+        seconds(window.heading, window), np.unwrap(window.heading.value), _HEADINGS
+    )
+    before, after = angle[time_s < start_s], angle[time_s >= start_s]
+    if not len(before) or not len(after):
+        return 0.0
+    return float(max(after.max() - before.max(), before.min() - after.min(), 0.0))
+
+
 def _direction(window: Window, parameters: Parameters) -> tuple[Float64, Float64, float]:
     """Return time [s], heading or course without jumps [rad], and how far noise swings it."""
     if len(window.heading):

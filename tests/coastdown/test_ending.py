@@ -220,6 +220,19 @@ def test_what_stops_a_ship_on_a_straight_course_is_a_brake(
     assert 380.0 <= end_s(coastdown) <= 405.0
 
 
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('with_shaft', [False, True])
+def test_a_brake_from_the_stop_on_is_no_coastdown(
+    watch, record, sensors, *, with_shaft: bool, seed: int
+) -> None:
+    told = (sensors['log'], *([sensors['shaft']] if with_shaft else []))
+    brake = EngineOrder(0.0, shaft=0.0, thrust=-4.0)
+    let_go = EngineOrder(90.0, shaft=0.0, thrust=0.0)
+    events = watch(record(sensors=told, orders=(brake, let_go), seed=seed))
+    assert all(event.withdrawn for event in events if isinstance(event, Coastdown))
+    assert any(isinstance(event, NotCoastdown) for event in events)
+
+
 def test_several_coastdowns_in_one_record(watch, record) -> None:
     full = EngineOrder(700.0, shaft=1.0, thrust=1.0)
     orders = (STOP, full, EngineOrder(2000.0, shaft=0.0, thrust=0.0))

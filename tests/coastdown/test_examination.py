@@ -297,6 +297,47 @@ class TestSpeedAlone:
         assert kept_s(found) == (0.0, pytest.approx(77.0, abs=8.0))
 
 
+@pytest.mark.parametrize(('rate', 'reason'), [(0.0, Dismissal.BRAKE), (0.004, Dismissal.TURN)])
+def test_what_slows_her_while_the_heading_swings_is_a_turn(rate: float, reason: Dismissal) -> None:
+    speed = glide(TIME_S)
+    speed[240:] = speed[240] - 0.006 * np.arange(60.0)
+    heading = 1.0 + rate * np.maximum(TIME_S - 240.0, 0.0)
+    found = examined(block(LOG, noisy(speed)), block(HEADING, heading))
+    assert reasons(found) == {reason}
+    assert kept_s(found) == (0.0, pytest.approx(240.0, abs=12.0))
+
+
+def held_at_first(until_s: float, length_s: float, *, start: float = 6.0) -> np.ndarray:
+    """Return the speed of a ship of 150 m that something slows until a time."""
+    speed = [start]
+    for time_s in np.arange(1.0, length_s):
+        water = 5e-4 + 2.7e-4 * speed[-1] ** 2
+        speed.append(speed[-1] - water - (0.015 if time_s < until_s else 0.0))
+    return np.array(speed)
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_a_brake_that_is_let_go_is_cut_and_nothing_else(seed: int) -> None:
+    ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
+    speed = held_at_first(120.0, 780.0)
+    noise = np.random.default_rng(900 + seed).normal(0.0, 0.03, len(speed))
+    log = block(LOG, speed + noise, np.arange(780.0))
+    found = examine(window(log, end_s=780.0), ship, Parameters(), steady=False)
+    assert [cut.reason for cut in found.cuts] == [Dismissal.BRAKE]
+    assert kept_s(found) == (pytest.approx(120.0, abs=10.0), 780.0)
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_a_brake_that_is_let_go_late_leaves_no_coastdown_before_it(seed: int) -> None:
+    ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
+    speed = held_at_first(75.0, 102.0, start=4.87)
+    noise = np.random.default_rng(900 + seed).normal(0.0, 0.03, len(speed))
+    log = block(LOG, speed + noise, np.arange(102.0))
+    found = examine(window(log, end_s=102.0), ship, Parameters(), steady=False)
+    assert {cut.reason for cut in found.cuts} == {Dismissal.BRAKE}
+    assert found.failure is not None or kept_s(found)[0] > 68.0
+
+
 def test_spikes_are_no_change_of_the_force() -> None:
     speed = noisy(glide(TIME_S))
     rng = np.random.default_rng(8)
