@@ -37,7 +37,9 @@ def windowed_bag(text: str) -> WindowedBag:
     """
     path = bag(text)
     name, at, window = text.rpartition('@')
-    if not at or ':' not in window or path.exists():
+    # what stands behind the sign is a window if it looks like one, or what is before it is there
+    meant = bool(at) and (':' in window or (bool(name) and bag(name).exists()))
+    if not meant or path.exists():
         return WindowedBag(path, None)
     start, _, end = window.partition(':')
     try:

@@ -46,6 +46,14 @@ def test_a_wrong_window_is_named(text: str, said: str) -> None:
     assert said in str(error.value)
 
 
+@pytest.mark.parametrize('window', ['', '10', 'START'])
+def test_a_window_without_an_end_is_named(window: str, tmp_path: Path) -> None:
+    there = tmp_path / 'a.mcap'
+    there.touch()
+    with pytest.raises(argparse.ArgumentTypeError, match='is not START:END in s'):
+        windowed_bag(f'{there}@{window}')
+
+
 def test_runs_come_in_the_order_given(coastdown_bag: Path, tmp_path: Path) -> None:
     other = tmp_path / 'other.mcap'
     shutil.copy(coastdown_bag, other)
