@@ -98,7 +98,7 @@ def _stood_still(result: ReplayResult) -> str:
         if not len(stamp_ns):
             continue
         value = np.concatenate([block.value[:, 0] for block in read])
-        edges = np.concatenate([[0], np.flatnonzero(np.diff(value)) + 1, [len(value)]])
+        edges = np.concatenate([[0], np.flatnonzero(value[1:] != value[:-1]) + 1, [len(value)]])
         for first, after in pairwise(edges.tolist()):
             lasts_s = float(stamp_ns[after - 1] - stamp_ns[first]) * 1e-9
             # a ship may well lie still
