@@ -65,6 +65,7 @@ RECORDS: dict[str, dict[str, Float64]] = {
     'far': {'position': np.column_stack([1e7 + TIME * 1e3, 0.0 * TIME])},
     'zeros': {'speed_through_water': np.where(TIME % 7 == 0, 0.0, glide(TIME))},
     'gaps': {'speed_through_water': np.where(TIME % 100 < 40, np.nan, glide(TIME))},
+    'infinite': {'speed_through_water': np.where(TIME % 3 == 0, np.inf, np.inf * (-1.0) ** TIME)},
 }
 
 
