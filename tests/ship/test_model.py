@@ -146,6 +146,7 @@ def test_a_table_baseline_includes_the_air_and_ends_where_it_ends(cargo):
     speeds = [2.0, 4.0, 6.0, 9.0]
     forces = [20e3, 75e3, 170e3, 420e3]
     ship = replace(cargo, baseline=TableBaseline(tuple(speeds), tuple(forces), 0.02))
+    assert ship.baseline_range_m_s == (2.0, 9.0)
     np.testing.assert_allclose(ship.resistance_n(speeds), forces, rtol=1e-14)
     np.testing.assert_allclose(ship.resistance_n(-4.0), -75e3, rtol=1e-14)
     for outside in (1.99, 9.01, 0.0, np.nan):
