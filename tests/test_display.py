@@ -32,3 +32,8 @@ def test_times_of_a_real_clock_are_dates_and_others_are_seconds() -> None:
 def test_a_long_time_is_also_given_in_minutes() -> None:
     assert display.duration(40.0) == '40 s'
     assert display.duration(1500.0) == '1500 s (25 min)'
+
+
+def test_a_slow_ship_is_told_to_the_millimetre() -> None:
+    assert display.speed_text(4.5678, highest_m_s=8.0) == '4.57'
+    assert display.speed_text(0.5678, highest_m_s=0.9) == '0.568'
