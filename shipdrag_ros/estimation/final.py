@@ -32,10 +32,11 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
     ship
         For n_r, the Froude number and the run-down of the thrust.
     parameters
-        `estimator`: `auto` stands for the fit of the equation of motion here;
-        any other is used as during the coastdown. Where the fit fails, the
-        estimate during the coastdown is kept, or that of one input alone, and a
-        note says why. Where both disagree, the band is widened.
+        `estimator`: `auto` and `ode_fit` stand for the fit of the equation of
+        motion, held against the estimate during the coastdown: where both
+        disagree, the band is widened. Where the fit fails, `auto` keeps that
+        estimate, or that of one input alone, and a note says why. Any other is
+        used as during the coastdown.
 
     Raises
     ------

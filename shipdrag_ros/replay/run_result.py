@@ -45,7 +45,7 @@ class RunResult:
         The longest that the ship was steady; None where no coastdown was looked for.
     why_none
         What the speed did where nothing was even nearly a coastdown; '' where there is
-        something, or the record is too long to be read again.
+        something.
     """
 
     bag: str
@@ -96,6 +96,11 @@ class RunResult:
 def _why_none(result: ReplayResult) -> str:
     """Say what the speed did, where that is not told by anything else."""
     messages = sum(counts.messages for counts in result.inputs.values())
-    if result.coastdowns or result.not_coastdowns or messages > _READ_AGAIN:
+    if result.coastdowns or result.not_coastdowns:
         return ''
+    if messages > _READ_AGAIN:
+        return (
+            f'nothing in it looked like one; what the speed did was not looked at, as {messages} '
+            'messages are too many to be read twice: give a part of it, BAG@START:END'
+        )
     return why_no_coastdown(result)
