@@ -21,6 +21,10 @@ DEVELOPMENT = [
     'types-PyYAML',
     'ruff',
     'psutil',  # memory and CPU in the benchmarks
+    'playwright',  # drives the browser that opens the pages
+    'axe-playwright-python',  # accessibility of the pages
+    'httpx',  # an independent client of the page's server
+    'moto[server]',  # an object store on this machine
     'mcap-ros2-support',  # an independent reader to check our bags against
     'colcon-core',  # the same tree builds as an ament_python package
     'colcon-ros',
@@ -54,12 +58,22 @@ setup(
         'scipy',  # PCHIP tables, ODE integration, statistical tests
         'numba',  # compiled per-sample kernels: validation, onset
         'PyYAML',  # ship and parameter files
+        'ruamel.yaml',  # the same, YAML 1.2
         'mcap',  # bags in and out
         'rosbags',  # message definitions and CDR without ROS; rosbag2 directories
         'pynmeagps',  # NMEA 0183 sentences, checksums
         'rich',  # tables and progress bars in the terminal
         'matplotlib',  # pictures of a report
         'Jinja2',  # the report's page, with escaping
+        'starlette',  # the page on the bridge: routes, server-sent events
+        'uvicorn',  # its server
+        'pyserial',  # NMEA 0183 from a serial line
+        'dask',  # the fleet: a graph of bags
+        'distributed',  # its workers, here or elsewhere
+        'pyarrow',  # the fleet's store: Parquet
+        'duckdb',  # questions to the store
+        'fsspec',  # folders and object stores alike
+        's3fs',  # of those, S3
     ],
     extras_require={'ros': ROS, 'dev': DEVELOPMENT},
     entry_points={
