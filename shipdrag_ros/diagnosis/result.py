@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.sections import Uncertain
 
 FORCE = 'force'  # on the ship, against her baseline
 LOG_TRACK = 'log_track'  # the log against the way over ground
@@ -24,7 +24,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Named:
+class EffectEstimate:
     """
     An effect with its size.
 
@@ -39,7 +39,7 @@ class Named:
 
     name: str
     probability: float
-    parameters: Mapping[str, Uncertain]
+    parameters: Mapping[str, Parameter]
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ class Diagnosis:
     """
 
     verdict: Verdict
-    effects: tuple[Named, ...]
+    effects: tuple[EffectEstimate, ...]
     candidates: tuple[Candidate, ...]
     nothing: float
     unnamed: float
@@ -204,7 +204,7 @@ class Diagnosis:
     held_out_before: Gap | None
     held_out_after: Gap | None
     baseline: str
-    best: tuple[Named, ...] = ()
+    best: tuple[EffectEstimate, ...] = ()
     notes: tuple[str, ...] = ()
     traces: tuple[Trace, ...] = ()
     coastdowns_used: int = 0

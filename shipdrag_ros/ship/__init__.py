@@ -9,14 +9,7 @@ from shipdrag_ros.ship.added_mass import (
 )
 from shipdrag_ros.ship.baseline import Baseline, CoefficientBaseline, CoefficientSd, TableBaseline
 from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3, GRAVITY_M_S2, Ship
-from shipdrag_ros.ship.sections import (
-    Air,
-    Propeller,
-    Propulsion,
-    StatedEffect,
-    Uncertain,
-    Water,
-)
+from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
 
 __all__ = [
     'AIR_DENSITY_KG_M3',
@@ -34,6 +27,5 @@ __all__ = [
     'StatedEffect',
     'TableAddedMass',
     'TableBaseline',
-    'Uncertain',
     'Water',
 ]

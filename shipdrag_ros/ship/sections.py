@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.ship.fields import choice, declare, named, number, section, text
+from shipdrag_ros.fields import choice, declare, named, number, section, text
+from shipdrag_ros.parameter import Parameter
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,6 @@ class StatedEffect:
     """
 
     name: str = declare(text(), 'which effect')
-    parameters: Mapping[str, Uncertain] = declare(
-        named(section(Uncertain)), 'its parameters', hashed=False
+    parameters: Mapping[str, Parameter] = declare(
+        named(section(Parameter, required=('value', 'sd'))), 'its parameters', hashed=False
     )

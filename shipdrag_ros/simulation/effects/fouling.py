@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.hydrodynamics import friction_n
 
 
@@ -20,7 +21,7 @@ EFFECT = Effect(
     name='fouling',
     scope=Scope.HULL,
     parameters=(
-        Quantity(
+        Parameter(
             name='friction_factor',
             unit='',
             meaning='fraction added to C_F (1 + k)',
