@@ -353,7 +353,7 @@ def plain(value: Any) -> Any:
     if is_dataclass(value):
         return {
             name: plain(getattr(value, name))
-            for name in keys_of(type(value))
+            for name in keys_of(type(value)) or [item.name for item in fields(value)]
             if getattr(value, name) is not None
         }
     if isinstance(value, tuple):

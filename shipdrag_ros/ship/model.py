@@ -34,6 +34,7 @@ from shipdrag_ros.ship.consistency import (
     inconsistencies,
     slenderness,
 )
+from shipdrag_ros.ship.facts import Fact, fact_list
 from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
 
 GRAVITY_M_S2 = 9.81
@@ -71,6 +72,7 @@ class Ship:
     effects: tuple[StatedEffect, ...] = declare(
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
     )
+    facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Ship:

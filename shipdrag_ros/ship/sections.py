@@ -55,16 +55,6 @@ class Propulsion:
 
 
 @dataclass(frozen=True)
-class Uncertain:
-    """
-    A value with its standard deviation.
-    """
-
-    value: float = declare(number(-1e12, 1e12), 'value')
-    sd: float = declare(number(0.0, 1e12), 'standard deviation')
-
-
-@dataclass(frozen=True)
 class StatedEffect:
     """
     An effect added to the baseline, as a diagnosis writes it.

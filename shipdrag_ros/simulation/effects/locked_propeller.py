@@ -8,7 +8,7 @@ from math import inf
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Said, Scope
 from shipdrag_ros.simulation.hydrodynamics import disc_area_m2, drag_n
 
 
@@ -47,4 +47,5 @@ EFFECT = Effect(
         'displacement': (Measure.DRAUGHT, Measure.SHAFT),
     },
     needs=('propeller',),
+    facts={'shaft': Said(('locked',))},
 )

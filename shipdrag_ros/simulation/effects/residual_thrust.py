@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Said, Scope
 
 
 def _act(frame: Frame, decay_s: float, fraction: float) -> Action:
@@ -46,4 +46,5 @@ EFFECT = Effect(
         'time_offset': (Measure.SHAFT,),
         'added_mass': (Measure.SHAFT, Measure.ANOTHER_RUN),
     },
+    facts={'shaft': Said(('driven',))},
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import AREAS, Effect, Frame, Measure, Scope
+from shipdrag_ros.simulation.effect import AREAS, DENIES, Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.hydrodynamics import ROPES, QuadraticDrag
 
 
@@ -37,4 +37,5 @@ EFFECT = Effect(
         'added_mass': (Measure.WITHOUT_CABLE,),
         'displacement': (Measure.DRAUGHT, Measure.WITHOUT_CABLE),
     },
+    facts={'no_towed_cable': DENIES},
 )

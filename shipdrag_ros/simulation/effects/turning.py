@@ -7,7 +7,7 @@ from math import copysign
 
 from shipdrag_ros.parameter import Parameter, either_sign, log_normal, uniform
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import AREAS, Effect, Frame, Measure, Scope
+from shipdrag_ros.simulation.effect import AREAS, DENIES, Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.scenario import Turn
 
 _RUDDER_RAD = 0.17  # 10 degrees, to the side she turns to
@@ -89,4 +89,5 @@ EFFECT = Effect(
         'windmilling_propeller': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
         'current_change': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
     },
+    facts={'helm_amidships': DENIES},
 )

@@ -8,7 +8,15 @@ from math import pi, sqrt
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal
 from shipdrag_ros.ship import GRAVITY_M_S2
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import WEIGHTS, Effect, Frame, Measure, Scope, WithoutBaseline
+from shipdrag_ros.simulation.effect import (
+    DENIES,
+    WEIGHTS,
+    Effect,
+    Frame,
+    Measure,
+    Scope,
+    WithoutBaseline,
+)
 
 _LENGTHS = 0.5  # of a wave, in lengths of the ship: shorter ones than those that heave her
 
@@ -58,4 +66,5 @@ EFFECT = Effect(
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.SHAFT),
     },
     without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
+    facts={'no_waves': DENIES, 'calm': DENIES},
 )

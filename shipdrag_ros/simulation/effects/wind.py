@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
+from shipdrag_ros.simulation.effect import DENIES, Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, head_m_s: float, cross_m_s: float) -> Action:
@@ -48,4 +48,5 @@ EFFECT = Effect(
     },
     needs=('air',),
     without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
+    facts={'calm': DENIES},
 )
