@@ -19,6 +19,7 @@ Int64 = NDArray[np.int64]
 UInt8 = NDArray[np.uint8]
 Float64 = NDArray[np.float64]
 
+SECOND_NS = 1_000_000_000
 FUTURE_NS = 2_000_000_000  # a stamp this far after its arrival is not a measurement
 BACKWARD_JUMP_NS = 10_000_000_000  # a stamp this far back means that the clock was set
 ABSURD_SPEED_M_S = 40.0  # faster than any displacement ship

@@ -24,7 +24,8 @@ from typing import IO, NamedTuple, cast
 from pynmeagps.nmeahelpers import calc_checksum, get_parts
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.bag import LIMIT_NS, SECOND_NS, Rejected
+from shipdrag_ros.importing.bag import LIMIT_NS, Rejected
+from shipdrag_ros.samples import SECOND_NS
 
 _GZIP = b'\x1f\x8b'
 _UTF_16 = (b'\xff\xfe', b'\xfe\xff')
