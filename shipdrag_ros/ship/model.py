@@ -24,7 +24,7 @@ from shipdrag_ros.ship.consistency import (
     slenderness,
 )
 from shipdrag_ros.ship.fields import declare, list_of, number, plain, read_keys, section, text
-from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
+from shipdrag_ros.ship.sections import Air, Economics, Propeller, Propulsion, StatedEffect, Water
 
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.225
@@ -60,6 +60,9 @@ class Ship:
     baseline: Baseline | None = declare(baseline(), 'expected resistance', default=None)
     effects: tuple[StatedEffect, ...] = declare(
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
+    )
+    economics: Economics | None = declare(
+        section(Economics), 'prices, for a trend over months', default=None
     )
 
     @classmethod

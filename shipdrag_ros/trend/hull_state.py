@@ -1,0 +1,315 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The state of one hull against time: a Gaussian process with steps.
+
+The added resistance x(t) of a hull, a fraction of the clean hull's, is modelled as
+
+    x(t) = level + growth t + wander(t) + sum of steps and changes of growth at events
+    y_i  = x(t_i) + covariates b + scatter + error of the run,
+
+wander an integrated Brownian motion (growth that changes slowly), scatter and wander of
+unknown size. All of it is Gaussian once the two sizes are given; these are averaged over
+a grid by their posterior weight. A run far off is an outlier with a small prior
+probability and is given less weight, not removed. Steps at unknown times are found by
+their Bayes factors (`change_points`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shipdrag_ros.inference.gaussian import cholesky, substitute
+from shipdrag_ros.samples import Float64
+
+LEVEL_SD = 0.4  # a hull when its first run is seen: from clean to heavily fouled
+GROWTH_PER_YEAR = (0.10, 0.12)  # merchant hulls: 5 to 20 % a year between cleanings
+STEP_SD = 0.10  # a cleaning, a docking, a sudden growth in port
+GROWTH_CHANGE_SD = 0.10  # per year, after a step: new paint, another trade
+COVARIATE_SD = 1.0  # relative resistance for a relative change of displacement
+SCATTER = np.array([0.004, 0.008, 0.014, 0.022, 0.035, 0.06, 0.11])
+_SCATTER_MEDIAN, _SCATTER_LOG_SD = 0.03, 0.8
+WANDER = np.array([0.0, 0.04, 0.1, 0.2])  # growth per year, per square root of a year
+_WANDER_PRIOR = np.array([0.25, 0.25, 0.3, 0.2])
+_OUTLIER_PROBABILITY, _OUTLIER_SCALE = 0.02, 6.0
+_ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class Runs:
+    """
+    The runs of one ship, in the order of time.
+
+    Attributes
+    ----------
+    years : (n,)
+        Time since the first run [years of 365.25 days].
+    added, sd : (n,)
+        Added resistance over the clean hull's, and its repeatable standard deviation.
+    covariates : (n, k)
+        What else moves the resistance, each about 0 on average.
+    """
+
+    years: Float64
+    added: Float64
+    sd: Float64
+    covariates: Float64
+
+    def __len__(self) -> int:
+        return len(self.years)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Prior of the growth of added resistance per year: mean and standard deviation."""
+
+    mean: float = GROWTH_PER_YEAR[0]
+    sd: float = GROWTH_PER_YEAR[1]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """
+    Times at which the state of the hull may have jumped.
+
+    Attributes
+    ----------
+    years : (m,)
+        When; a run at that very time is after the step.
+    """
+
+    years: Float64 = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.years)
+
+    def without(self, place: int) -> Steps:
+        """Return all steps but one."""
+        return Steps(np.delete(self.years, place))
+
+    def also(self, year: float) -> Steps:
+        """Return the steps and one more, in the order of time."""
+        return Steps(np.sort(np.append(self.years, year)))
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Mean and standard deviation of a quantity, averaged over the sizes of the noise."""
+
+    value: Float64
+    sd: Float64
+
+
+class HullState:
+    """
+    The posterior of a hull's state, given the times of its steps.
+
+    Parameters
+    ----------
+    runs
+        At least one.
+    steps
+        When the state may have jumped.
+    growth
+        Prior of the growth.
+
+    Attributes
+    ----------
+    weights : (g,)
+        Posterior weight of each setting of scatter and wander; they sum to 1.
+    log_evidence
+        Of the runs, the sizes integrated out.
+    outlier : (n,)
+        Posterior probability that a run is an outlier.
+    scatter
+        Posterior mean of the scatter from run to run.
+    """
+
+    def __init__(self, runs: Runs, steps: Steps, growth: Growth) -> None:
+        self.runs, self.steps, self.growth = runs, steps, growth
+        self.outlier = np.zeros(len(runs))
+        self._settings = [(float(s), float(q)) for s in SCATTER for q in WANDER]
+        for _ in range(_ROUNDS):
+            before = self.outlier
+            self._solve()
+            self.outlier = self._outliers()
+            if float(np.abs(self.outlier - before).max()) < 0.02:
+                break
+        self._solve()
+        self.scatter = float(self.weights @ np.array([s for s, _ in self._settings]))
+
+    def _solve(self) -> None:
+        """Solve for every setting under the present probabilities of outliers."""
+        runs = self.runs
+        mean, basis_cov = self._prior(runs.years, runs.covariates)
+        self._residual = runs.added - mean
+        self._precision: list[Float64] = []
+        self._noise: list[Float64] = []
+        log_posterior = np.empty(len(self._settings))
+        for number, (scatter, wander) in enumerate(self._settings):
+            plain = runs.sd**2 + scatter**2
+            weight = 1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2
+            noise = plain / weight
+            covariance = basis_cov + wander**2 * _wander(runs.years, runs.years)
+            covariance[np.diag_indices(len(runs))] += noise
+            positive, lower, scale = cholesky(covariance, 0.0)
+            assert positive, 'noise is never 0'
+            precision = substitute(lower, scale, np.eye(len(runs)))
+            self._precision.append(precision)
+            self._noise.append(plain)
+            log_posterior[number] = (
+                -0.5 * self._residual @ precision @ self._residual
+                - (np.log(np.diag(lower)) - np.log(scale)).sum()
+                # the weight stands for a wider normal: its own size is no evidence for it
+                - 0.5 * np.log(weight).sum()
+                - 0.5 * (np.log(scatter / _SCATTER_MEDIAN) / _SCATTER_LOG_SD) ** 2
+                + np.log(_WANDER_PRIOR[number % len(WANDER)])
+            )
+        top = log_posterior.max()
+        raw = np.exp(log_posterior - top)
+        self.log_evidence = float(top + np.log(raw.sum()))
+        self.weights = raw / raw.sum()
+
+    def _outliers(self) -> Float64:
+        """Return how probable each run is an outlier, from what the others predict."""
+        found = np.zeros(len(self.runs))
+        for weight, precision, plain in zip(self.weights, self._precision, self._noise):
+            diagonal = np.diag(precision)
+            residual = (precision @ self._residual) / diagonal
+            used = plain / (1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2)
+            others = np.maximum(1.0 / diagonal - used, 0.0)
+            prior = _OUTLIER_PROBABILITY / (1.0 - _OUTLIER_PROBABILITY)
+            odds = prior * _normal(residual, others + plain * _OUTLIER_SCALE**2)
+            found += weight * odds / (odds + _normal(residual, others + plain))
+        return found
+
+    def _columns(self, years: Float64) -> Float64:
+        """Return level, growth, and of each step the jump and the change of growth."""
+        after = years[:, None] >= self.steps.years[None, :]
+        later = np.maximum(years[:, None] - self.steps.years[None, :], 0.0)
+        return np.hstack([np.ones((len(years), 1)), years[:, None], after, later])
+
+    def _sd(self) -> Float64:
+        """Return the prior standard deviations of the columns."""
+        many = len(self.steps)
+        return np.array([LEVEL_SD, self.growth.sd] + [STEP_SD] * many + [GROWTH_CHANGE_SD] * many)
+
+    def _prior(self, years: Float64, covariates: Float64) -> tuple[Float64, Float64]:
+        """Return the prior mean of the runs and their covariance without noise and wander."""
+        scaled = self._columns(years) * self._sd()
+        mean = self.growth.mean * years
+        return mean, scaled @ scaled.T + COVARIATE_SD**2 * covariates @ covariates.T
+
+    def _functional(self, columns: Float64, years: Float64, own: Float64) -> Mixture:
+        """
+        Return the posterior of linear functionals: columns and wander at years.
+
+        Parameters
+        ----------
+        columns : (m, p)
+            Weights of the columns.
+        years : (m,)
+            Where the wander counts; NaN: not at all.
+        own : (m,)
+            Divides the wander.
+        """
+        runs, sd = self.runs, self._sd()
+        prior_mean = columns[:, 1] * self.growth.mean
+        cross = (columns * sd**2) @ self._columns(runs.years).T
+        own_variance = ((columns * sd) ** 2).sum(axis=1)
+        wandering = np.isfinite(years)
+        at = np.where(wandering, years, 0.0)
+        wander_cross = np.where(wandering[:, None], _wander(at, runs.years), 0.0) / own[:, None]
+        wander_own = np.where(wandering, at**3 / 3.0, 0.0) / own**2
+        mean = np.zeros(len(columns))
+        second = np.zeros(len(columns))
+        for weight, (_, wander), precision in zip(self.weights, self._settings, self._precision):
+            if weight < 1e-6:
+                continue
+            gain = (cross + wander**2 * wander_cross) @ precision
+            value = prior_mean + gain @ self._residual
+            variance = (
+                own_variance
+                + wander**2 * wander_own
+                - np.einsum('ij,ij->i', gain, cross + wander**2 * wander_cross)
+            )
+            mean += weight * value
+            second += weight * (value**2 + np.maximum(variance, 0.0))
+        return Mixture(mean, np.sqrt(np.maximum(second - mean**2, 0.0)))
+
+    def level(self, years: Float64) -> Mixture:
+        """
+        Return the added resistance at some times, covariates at their mean.
+
+        Parameters
+        ----------
+        years : (m,)
+            Since the first run, 0 or later.
+        """
+        return self._functional(self._columns(years), years, np.ones(len(years)))
+
+    def growth_per_year(self) -> Mixture:
+        """
+        Return the mean growth between cleanings: the rise less the steps, over the time.
+        """
+        end = max(float(self.runs.years[-1]), 1e-9)
+        columns = self._columns(np.array([end])) - self._columns(np.zeros(1))
+        many = len(self.steps)
+        columns[:, 2 : 2 + many] = 0.0
+        return self._functional(columns / end, np.array([end]), np.array([end]))
+
+    def growth_since_last_step(self) -> Mixture:
+        """
+        Return the growth now, by the law since the last step.
+        """
+        columns = np.zeros((1, 2 + 2 * len(self.steps)))
+        columns[0, 1] = 1.0
+        columns[0, 2 + len(self.steps) :] = 1.0
+        return self._functional(columns, np.array([np.nan]), np.ones(1))
+
+    def changes(self) -> Mixture:
+        """
+        Return the jump at each step.
+        """
+        many = len(self.steps)
+        columns = np.zeros((many, 2 + 2 * many))
+        columns[np.arange(many), 2 + np.arange(many)] = 1.0
+        return self._functional(columns, np.full(many, np.nan), np.ones(many))
+
+    def log_bayes_factors(self, after: Float64) -> Float64:
+        """
+        Return the log Bayes factor of one more step, for each of some step functions.
+
+        Parameters
+        ----------
+        after : (n, m)
+            1 where a run is after the step.
+
+        Returns
+        -------
+        (m,)
+            Under the settings' posterior weights without the step.
+        """
+        total = np.full(after.shape[1], -np.inf)
+        for weight, precision in zip(self.weights, self._precision):
+            # no setting is too improbable: what the step explains was scatter without it
+            solved = precision @ after
+            a = STEP_SD**2 * np.einsum('ij,ij->j', after, solved)
+            b = STEP_SD * (self._residual @ solved)
+            one = -0.5 * np.log1p(a) + 0.5 * b**2 / (1.0 + a)
+            total = np.logaddexp(total, np.log(max(weight, 1e-300)) + one)
+        return total
+
+
+def _wander(one: Float64, other: Float64) -> Float64:
+    """Return the covariance of integrated Brownian motion of unit strength."""
+    first = np.minimum(one[:, None], other[None, :])
+    apart = np.abs(one[:, None] - other[None, :])
+    return first**3 / 3.0 + 0.5 * apart * first**2
+
+
+def _normal(residual: Float64, variance: Float64) -> Float64:
+    """Return the normal density, far tails kept above zero."""
+    exponent = np.minimum(0.5 * residual**2 / variance, 600.0)
+    return np.asarray(np.exp(-exponent) / np.sqrt(variance))
