@@ -11,9 +11,7 @@ from shipdrag_ros.trend import ShipTrend
 from shipdrag_ros.trend.ship_trend import Value
 
 
-def document(
-    trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]]
-) -> dict[str, Any]:
+def document(trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]]) -> dict[str, Any]:
     """
     Return the document.
 

@@ -65,11 +65,13 @@ def search(runs: Runs, known: Steps, growth: Growth) -> tuple[HullState, list[Fo
         if probability.sum() < PROBABLE:
             break
         taken.append(float(years[int(probability.argmax())]))
-        state = HullState(runs, Steps(np.sort(np.append(known.years, taken))), growth)
+        steps = Steps(np.sort(np.append(known.years, taken)))
+        state = HullState(runs, steps, growth, outlier=state.outlier)
     found = []
     for year in sorted(taken):
         others = [each for each in taken if each != year]
-        without = HullState(runs, Steps(np.sort(np.append(known.years, others))), growth)
+        steps = Steps(np.sort(np.append(known.years, others)))
+        without = HullState(runs, steps, growth, outlier=state.outlier)
         years, probability = _one_more(without)
         near = np.abs(years - year) <= _NEAR_YEARS
         found.append(FoundStep(year, float(probability[near].sum())))

@@ -19,8 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.linalg import lapack
 
-from shipdrag_ros.inference.gaussian import cholesky, substitute
 from shipdrag_ros.samples import Float64
 
 LEVEL_SD = 0.4  # a hull when its first run is seen: from clean to heavily fouled
@@ -34,6 +34,7 @@ WANDER = np.array([0.0, 0.04, 0.1, 0.2])  # growth per year, per square root of 
 _WANDER_PRIOR = np.array([0.25, 0.25, 0.3, 0.2])
 _OUTLIER_PROBABILITY, _OUTLIER_SCALE = 0.02, 6.0
 _ROUNDS = 4
+_NEGLIGIBLE = 1e-4  # weight of a setting
 
 
 @dataclass(frozen=True)
@@ -84,22 +85,6 @@ class Steps:
     def __len__(self) -> int:
         return len(self.years)
 
-    def without(self, place: int) -> Steps:
-        """Return all steps but one."""
-        return Steps(np.delete(self.years, place))
-
-    def also(self, year: float) -> Steps:
-        """Return the steps and one more, in the order of time."""
-        return Steps(np.sort(np.append(self.years, year)))
-
-
-@dataclass(frozen=True)
-class Mixture:
-    """Mean and standard deviation of a quantity, averaged over the sizes of the noise."""
-
-    value: Float64
-    sd: Float64
-
 
 class HullState:
     """
@@ -113,6 +98,8 @@ class HullState:
         When the state may have jumped.
     growth
         Prior of the growth.
+    outlier : (n,)
+        Where to begin the search for outliers.
 
     Attributes
     ----------
@@ -126,46 +113,57 @@ class HullState:
         Posterior mean of the scatter from run to run.
     """
 
-    def __init__(self, runs: Runs, steps: Steps, growth: Growth) -> None:
+    def __init__(
+        self, runs: Runs, steps: Steps, growth: Growth, *, outlier: Float64 | None = None
+    ) -> None:
         self.runs, self.steps, self.growth = runs, steps, growth
-        self.outlier = np.zeros(len(runs))
+        self.outlier = np.zeros(len(runs)) if outlier is None else outlier
         self._settings = [(float(s), float(q)) for s in SCATTER for q in WANDER]
+        mean, self._basis = self._prior(runs.years, runs.covariates)
+        self._residual = runs.added - mean
+        self._noise = [runs.sd**2 + scatter**2 for scatter, _ in self._settings]
+        self._precision = [np.zeros((0, 0))] * len(self._settings)
+        log_posterior = np.full(len(self._settings), -np.inf)
+        solved = range(len(self._settings))
         for _ in range(_ROUNDS):
-            before = self.outlier
-            self._solve()
-            self.outlier = self._outliers()
+            for number in solved:
+                log_posterior[number] = self._solve(number)
+            self._weigh(log_posterior)
+            before, self.outlier = self.outlier, self._outliers()
             if float(np.abs(self.outlier - before).max()) < 0.02:
                 break
-        self._solve()
+            # what weighs nothing says nothing of outliers
+            solved = np.flatnonzero(self.weights > _NEGLIGIBLE).tolist()
+        for number in range(len(self._settings)):
+            log_posterior[number] = self._solve(number)
+        self._weigh(log_posterior)
         self.scatter = float(self.weights @ np.array([s for s, _ in self._settings]))
 
-    def _solve(self) -> None:
-        """Solve for every setting under the present probabilities of outliers."""
-        runs = self.runs
-        mean, basis_cov = self._prior(runs.years, runs.covariates)
-        self._residual = runs.added - mean
-        self._precision: list[Float64] = []
-        self._noise: list[Float64] = []
-        log_posterior = np.empty(len(self._settings))
-        for number, (scatter, wander) in enumerate(self._settings):
-            plain = runs.sd**2 + scatter**2
-            weight = 1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2
-            noise = plain / weight
-            covariance = basis_cov + wander**2 * _wander(runs.years, runs.years)
-            covariance[np.diag_indices(len(runs))] += noise
-            positive, lower, scale = cholesky(covariance, 0.0)
-            assert positive, 'noise is never 0'
-            precision = substitute(lower, scale, np.eye(len(runs)))
-            self._precision.append(precision)
-            self._noise.append(plain)
-            log_posterior[number] = (
-                -0.5 * self._residual @ precision @ self._residual
-                - (np.log(np.diag(lower)) - np.log(scale)).sum()
-                # the weight stands for a wider normal: its own size is no evidence for it
-                - 0.5 * np.log(weight).sum()
-                - 0.5 * (np.log(scatter / _SCATTER_MEDIAN) / _SCATTER_LOG_SD) ** 2
-                + np.log(_WANDER_PRIOR[number % len(WANDER)])
-            )
+    def _solve(self, number: int) -> float:
+        """Solve for a setting under the present probabilities of outliers; return its log
+        posterior, but for a constant.
+        """
+        runs, (scatter, wander) = self.runs, self._settings[number]
+        weight = 1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2
+        covariance = self._basis + wander**2 * _wander(runs.years, runs.years)
+        covariance[np.diag_indices(len(runs))] += self._noise[number] / weight
+        # hundreds of runs: LAPACK's; `inference.gaussian` is for the few unknowns of a fit
+        factor, failed = lapack.dpotrf(covariance, lower=True)
+        assert not failed, 'noise is never 0'
+        half, _ = lapack.dpotri(factor, lower=True)
+        precision = np.tril(half) + np.tril(half, -1).T
+        self._precision[number] = precision
+        return float(
+            -0.5 * self._residual @ precision @ self._residual
+            - np.log(np.diag(factor)).sum()
+            # the weight stands for a wider normal: its own size is no evidence for it
+            - 0.5 * np.log(weight).sum()
+            - 0.5 * (np.log(scatter / _SCATTER_MEDIAN) / _SCATTER_LOG_SD) ** 2
+            + np.log(_WANDER_PRIOR[number % len(WANDER)])
+        )
+
+    def _weigh(self, log_posterior: Float64) -> None:
+        """Set the weights of the settings, and the evidence."""
         top = log_posterior.max()
         raw = np.exp(log_posterior - top)
         self.log_evidence = float(top + np.log(raw.sum()))
@@ -175,6 +173,8 @@ class HullState:
         """Return how probable each run is an outlier, from what the others predict."""
         found = np.zeros(len(self.runs))
         for weight, precision, plain in zip(self.weights, self._precision, self._noise):
+            if weight < _NEGLIGIBLE:
+                continue
             diagonal = np.diag(precision)
             residual = (precision @ self._residual) / diagonal
             used = plain / (1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2)
@@ -225,7 +225,7 @@ class HullState:
         mean = np.zeros(len(columns))
         second = np.zeros(len(columns))
         for weight, (_, wander), precision in zip(self.weights, self._settings, self._precision):
-            if weight < 1e-6:
+            if weight < _NEGLIGIBLE:
                 continue
             gain = (cross + wander**2 * wander_cross) @ precision
             value = prior_mean + gain @ self._residual

@@ -9,12 +9,12 @@ from itertools import groupby
 
 import numpy as np
 
+from shipdrag_ros.fleet.events import HullEvent
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend.change_points import FoundStep, search
 from shipdrag_ros.trend.hull_state import Growth, HullState, Mixture, Runs, Steps
-from shipdrag_ros.trend.log_book import KnownEvent, read_events
 from shipdrag_ros.trend.money import CleaningDate, cleaning_date, fuel_t_per_day, usd_per_year
 from shipdrag_ros.trend.series import Point, Row, Series, series_of
 
@@ -146,7 +146,7 @@ class ShipTrend:
 
 
 def fleet_trends(
-    rows: Sequence[Row], ships: Mapping[str, Ship], log_books: Mapping[str, str]
+    rows: Sequence[Row], ships: Mapping[str, Ship], events: Mapping[str, Sequence[HullEvent]]
 ) -> list[ShipTrend]:
     """
     Return the trend of every ship, the hull to be cleaned first in front.
@@ -157,33 +157,28 @@ def fleet_trends(
         Rows of the store's `coastdowns`.
     ships
         Ship files by name; prices are taken from them.
-    log_books
-        Text of `events.csv` by name of the ship.
+    events
+        What is known to have been done to each hull, by name of the ship.
     """
     by_name = sorted(rows, key=lambda row: row['ship'])
-    trends = []
+    known = []
     for name, own in groupby(by_name, key=lambda row: row['ship']):
-        ship = ships.get(name)
-        economics = None if ship is None else ship.economics
+        economics = None if name not in ships else ships[name].economics
         speed = None if economics is None else economics.service_speed_m_s
         series = series_of(name, list(own), service_speed_m_s=speed)
-        trends.append((series, economics, *read_events(log_books.get(name, ''))))
-    alone = [ship_trend(series, economics, known) for series, economics, known, _ in trends]
+        known.append((series, economics, events.get(name, ())))
+    alone = [ship_trend(*each) for each in known]
     found = []
-    for place, (series, economics, known, problems) in enumerate(trends):
+    for place, each in enumerate(known):
         growth = _from_sisters(alone, place)
-        result = alone[place]
-        if growth is not None:
-            result = ship_trend(series, economics, known, growth=growth)
-        problems = [f'events.csv, {problem}' for problem in problems]
-        found.append(replace(result, notes=(*result.notes, *problems)))
+        found.append(alone[place] if growth is None else ship_trend(*each, growth=growth))
     return _ranked(found)
 
 
 def ship_trend(
     series: Series,
     economics: Economics | None = None,
-    known: Sequence[KnownEvent] = (),
+    known: Sequence[HullEvent] = (),
     *,
     growth: Growth | None = None,
 ) -> ShipTrend:
@@ -250,7 +245,7 @@ def _shared_sd(used: Sequence[Point]) -> float:
 
 
 def _events(
-    state: HullState, known: Sequence[KnownEvent], found: Sequence[FoundStep], first_ns: int
+    state: HullState, known: Sequence[HullEvent], found: Sequence[FoundStep], first_ns: int
 ) -> tuple[TrendEvent, ...]:
     """Return known and found steps with their changes, in the order of time."""
     changes = state.changes()
@@ -267,7 +262,7 @@ def _events(
     return tuple(events)
 
 
-def _outside(known: Sequence[KnownEvent], inside: Sequence[KnownEvent]) -> tuple[str, ...]:
+def _outside(known: Sequence[HullEvent], inside: Sequence[HullEvent]) -> tuple[str, ...]:
     """Say which events of the log book no run can show."""
     left = [event for event in known if event not in inside]
     if not left:
