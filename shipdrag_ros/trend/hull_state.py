@@ -86,6 +86,14 @@ class Steps:
         return len(self.years)
 
 
+@dataclass(frozen=True)
+class Mixture:
+    """Mean and standard deviation of quantities, averaged over the sizes of the noise."""
+
+    value: Float64
+    sd: Float64
+
+
 class HullState:
     """
     The posterior of a hull's state, given the times of its steps.
