@@ -25,6 +25,7 @@ from shipdrag_ros.diagnosis.coast_terms import (
     SpeedErrorTerm,
     Term,
 )
+from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
@@ -44,7 +45,14 @@ _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find
 class CoastModel(CoastSimulation):
     """
     The hypotheses about some runs, and their simulation; a `Model`.
+
+    Attributes
+    ----------
+    facts
+        Of the log book; None: none are told.
     """
+
+    facts: Facts | None = None
 
     # each iteration is a simulation
     iterations: ClassVar[int] = 16
@@ -91,12 +99,13 @@ class CoastModel(CoastSimulation):
             )
             for effect in self.ship.effects
         ]
-        return Hypothesis(
-            (),
-            (baseline, *given),
-            places,
-            log_prior=math.log(nothing_missing(self.effects, places=len(DISCREPANCIES))),
-        )
+        log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES)))
+        found = Hypothesis((), (baseline, *given), places, log_prior=log_prior)
+        return replace(found, log_prior=log_prior + self._log_facts(found))
+
+    def _log_facts(self, hypothesis: Hypothesis) -> float:
+        """Return the log probability that the facts are told; they are evidence, no prior."""
+        return 0.0 if self.facts is None else self.facts.log_likelihood(hypothesis)
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
         """
@@ -138,11 +147,11 @@ class CoastModel(CoastSimulation):
             sd = effect.formula_sd
             errors = (ModelErrorTerm(term, sd),) if sd > 0.0 else ()
             log_odds = math.log(effect.odds)
-            found.append(
-                base.with_effect(
-                    effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
-                )
+            more = base.with_effect(
+                effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
             )
+            told = self._log_facts(more) - self._log_facts(base)
+            found.append(replace(more, log_prior=more.log_prior + told))
         return found
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:

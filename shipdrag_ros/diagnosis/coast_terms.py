@@ -104,14 +104,14 @@ class BaselineTerm:
             if sd.friction > 0.0:
                 scales[1] += rho * sd.wave / sd.friction * scales[0]
         return Action(
-            resistance=(lambda speed: self._departure(speed, scales),),
+            resistance=(lambda speed: self._departure(frame.ship, speed, scales),),
             n_r_change=n_r,
             run_down_change_s=self.run_down_change_s[run] + run_down_s,
             free_shaft=free_shaft,
         )
 
-    def _departure(self, speed_m_s: Float64, scales: Float64) -> Float64:
-        result: Float64 = scales @ baseline_parts(self.ship, self.top_m_s, speed_m_s.tobytes())
+    def _departure(self, ship: Ship, speed_m_s: Float64, scales: Float64) -> Float64:
+        result: Float64 = scales @ baseline_parts(ship, self.top_m_s, speed_m_s.tobytes())
         return result
 
 

@@ -93,7 +93,7 @@ class CoastSimulation:
         """One a run; effects of the earth lie along the first run."""
         return tuple(
             Frame(
-                self.bare,
+                run.ship,
                 Scenario(
                     speed_m_s=run.speed_m_s,
                     lead_in_s=run.lead_in_s,
@@ -198,7 +198,7 @@ class CoastSimulation:
     def _simulate(self, run: int, batch: _Batch) -> Columns:
         frame = self.frames[run]
         return simulate_columns(
-            self.bare,
+            frame.ship,
             frame.scenario,
             batch.actions,
             self.seen[run].time_s,

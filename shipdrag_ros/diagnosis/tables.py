@@ -30,16 +30,51 @@ def parameters(effects: Sequence[Named]) -> Table:
     Show how large effects are; the names are those of `simulate --effect`.
     """
     rows = [
-        (
-            effect.name,
-            quantity.name,
-            *_figures(quantity, effect.parameters[quantity.name]),
-            quantity.meaning,
-        )
+        (effect.name, *_parameter(quantity, effect))
         for effect in effects
         for quantity in LIBRARY[effect.name].parameters
     ]
     return Table(('effect', 'parameter', 'value', 'sd', 'meaning'), tuple(rows))
+
+
+def sizes(found: Diagnosis) -> Table:
+    """
+    Show how large each candidate would be, were it the one.
+    """
+    rows = [
+        (
+            words.names_text(each.names),
+            words.probability(each.probability),
+            *_parameter(quantity, effect),
+        )
+        for each in found.candidates
+        for effect in each.effects
+        for quantity in LIBRARY[effect.name].parameters
+    ]
+    heads = ('candidate', 'probability', 'parameter', 'value', 'sd', 'meaning')
+    return Table(heads, tuple(rows))
+
+
+def _parameter(quantity: Quantity, effect: Named) -> tuple[str, ...]:
+    """Return name, value, sd and meaning of a parameter."""
+    value, sd = _figures(quantity, effect.parameters[quantity.name])
+    return quantity.name, value, sd, quantity.meaning
+
+
+def facts(found: Diagnosis) -> Table:
+    """
+    Show the facts that were told, and how probable it is that each is wrong.
+    """
+    rows = [
+        (
+            str(each.fact),
+            each.run or 'all',
+            f'{each.fact.words}',
+            '-' if each.wrong is None else words.probability(each.wrong),
+        )
+        for each in found.facts
+    ]
+    return Table(('fact', 'of run', 'says', 'wrong with probability'), tuple(rows))
 
 
 def gaps(found: Diagnosis) -> Table:

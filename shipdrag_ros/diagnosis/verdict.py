@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -58,18 +58,7 @@ class Judgement:
     def best(self) -> tuple[Named, ...]:
         """Effects of the most probable hypothesis, with their parameters."""
         fit = self.found.best
-        probability = self.posterior.probability[fit.hypothesis.names]
-        found = []
-        for part, place in fit.hypothesis.parts:
-            if not isinstance(part, EffectTerm) or part.stated:
-                continue
-            values = {name: Uncertain(value, 0.0) for name, value in part.fixed}
-            for i, unknown in enumerate(part.unknowns, place):
-                z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
-                values[unknown.name] = Uncertain(unknown.value(z), abs(unknown.slope(z)) * sd)
-            ordered = {q.name: values[q.name] for q in part.effect.parameters}
-            found.append(Named(part.effect.name, probability, ordered))
-        return tuple(sorted(found, key=lambda effect: effect.name))
+        return sized(fit, self.posterior.probability[fit.hypothesis.names])
 
     def diagnosis(self, **rest: Any) -> Diagnosis:
         """
@@ -122,7 +111,41 @@ def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False
     if doubted:
         posterior = posterior.doubted()
     verdict, candidates = decide(posterior, lacking=doubted, inseparable=found.model.inseparable)
-    return Judgement(found, posterior, verdict, candidates)
+    fits = posterior.best
+    with_sizes = tuple(
+        replace(each, effects=sized(fits[each.names], each.probability)) for each in candidates
+    )
+    return Judgement(found, posterior, verdict, with_sizes)
+
+
+def sized(fit: Fit, probability: float) -> tuple[Named, ...]:
+    """
+    Return the effects of a hypothesis with their sizes, by name.
+
+    Parameters
+    ----------
+    fit
+        Of the hypothesis.
+    probability
+        Of its names.
+
+    Returns
+    -------
+    tuple of Named
+        Of the effects that have parameters of their own; not those that the ship
+        file states.
+    """
+    found = []
+    for part, place in fit.hypothesis.parts:
+        if not isinstance(part, EffectTerm) or part.stated:
+            continue
+        values = {name: Uncertain(value, 0.0) for name, value in part.fixed}
+        for i, unknown in enumerate(part.unknowns, place):
+            z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
+            values[unknown.name] = Uncertain(unknown.value(z), abs(unknown.slope(z)) * sd)
+        ordered = {q.name: values[q.name] for q in part.effect.parameters}
+        found.append(Named(part.effect.name, probability, ordered))
+    return tuple(sorted(found, key=lambda effect: effect.name))
 
 
 def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:

@@ -85,14 +85,39 @@ def examined(found: Diagnosis) -> str:
     return f'{said}; not examined: {" and ".join(unseen)}.' if unseen else f'{said}.'
 
 
+def facts(found: Diagnosis) -> list[str]:
+    """
+    Say which facts the data contradict, and which say nothing here, a line each.
+    """
+    told = []
+    for each in found.facts:
+        where = f' ({each.run})' if each.run else ''
+        if each.contradicted and each.wrong is not None:
+            instead = f', most probably {names_text(each.against)}' if each.against else ''
+            told.append(
+                f'The data contradict the fact `{each.fact}`{where}: {each.fact.words}. It is '
+                f'wrong with probability {probability(each.wrong)}{instead}; look at it again.'
+            )
+        elif each.wrong is None:
+            told.append(
+                f'The fact `{each.fact}`{where} is not used: it says nothing of the log against '
+                'the way over ground.'
+            )
+    return told
+
+
 def advice(found: Diagnosis) -> list[str]:
     """
     Return what would decide, a line each.
     """
     return [
         each.measure
-        if each.probability is None
-        else f'{each.measure}; decides with probability {probability(each.probability)}'
+        + (f'; costs {each.cost}' if each.cost else '')
+        + (
+            ''
+            if each.probability is None
+            else f'; decides with probability {probability(each.probability)}'
+        )
         for each in found.would_decide
     ]
 

@@ -23,6 +23,7 @@ from shipdrag_ros.ship.consistency import (
     inconsistencies,
     slenderness,
 )
+from shipdrag_ros.ship.facts import Fact, fact_list
 from shipdrag_ros.ship.fields import declare, list_of, number, plain, read_keys, section, text
 from shipdrag_ros.ship.sections import Air, Economics, Propeller, Propulsion, StatedEffect, Water
 
@@ -64,6 +65,7 @@ class Ship:
     economics: Economics | None = declare(
         section(Economics), 'prices, for a trend over months', default=None
     )
+    facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Ship:

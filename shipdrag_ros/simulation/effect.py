@@ -17,6 +17,7 @@ import numpy as np
 
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation.action import Action, Vector
+from shipdrag_ros.simulation.measures import Measure as Measure
 from shipdrag_ros.simulation.scenario import Scenario
 
 
@@ -27,28 +28,6 @@ class Scope(StrEnum):
     HULL = 'hull'
     RUN = 'run'
     SENSOR = 'sensor'
-
-
-class Measure(StrEnum):
-    """What can be done to tell two effects apart, as it is advised."""
-
-    RECIPROCAL_RUN = 'a run on the reciprocal heading'
-    OTHER_SPEED = 'a run that begins or ends at another speed'
-    ANOTHER_RUN = 'another run of the same ship'
-    RADAR = 'radar or GNSS positions'
-    LOG = 'a speed log'
-    WIND = 'an anemometer (wind_apparent)'
-    DEPTH = 'an echo sounder (depth)'
-    DEEP_WATER = 'a run in deep water'
-    HEADING = 'a compass (heading)'
-    SHAFT = 'the shaft speed (shaft)'
-    RUDDER = 'the rudder angle (rudder)'
-    THIRD_SPEED = 'a third source of speed, GNSS beside log and radar'
-    WITHOUT_CABLE = 'a run without the cable'
-    FREE_PROPELLER = 'a run with the propeller turning freely'
-    CLEAN_HULL = 'a run after the hull is cleaned'
-    DRAUGHT = 'the draughts, read on both sides fore and aft'
-    FAST_CHANGE = 'a quick change of speed at a known time'
 
 
 class WithoutBaseline(StrEnum):
@@ -311,6 +290,28 @@ class Frame:
         return along * cos - to_port * sin, along * sin + to_port * cos
 
 
+@dataclass(frozen=True)
+class Said:
+    """
+    What a fact of the log book says of an effect.
+
+    Attributes
+    ----------
+    values
+        Of the fact, with which the effect goes together; none: the fact denies the
+        effect.
+    fades_s
+        Where the fact has a date: the time after it in which the effect may have
+        come again, to 1 - 1/e.
+    """
+
+    values: tuple[str, ...] = ()
+    fades_s: float = math.inf
+
+
+DENIES = Said()
+
+
 @dataclass(frozen=True, kw_only=True)
 class Effect:
     """
@@ -346,6 +347,8 @@ class Effect:
         ('': nothing to add).
     in_geodetic
         Whether it can be where positions are latitude and longitude.
+    facts
+        What facts of the log book say of it, by name of the fact.
     """
 
     name: str
@@ -363,6 +366,7 @@ class Effect:
     errs_in: tuple[str, ...] = ()
     without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)
     in_geodetic: bool = True
+    facts: Mapping[str, Said] = field(default_factory=dict)
 
     def goes_with(self, other: Effect) -> bool:
         """

@@ -4,7 +4,14 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import (
+    DENIES,
+    Effect,
+    Frame,
+    Quantity,
+    Scope,
+    normal,
+)
 
 
 def _act(frame: Frame, fraction: float) -> Action:
@@ -29,4 +36,5 @@ EFFECT = Effect(
     formula_sd=0.05,
     odds=0.01,
     act=_act,
+    facts={'draughts_read': DENIES},
 )

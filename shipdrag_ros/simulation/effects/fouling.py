@@ -5,8 +5,18 @@ from __future__ import annotations
 
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Said,
+    Scope,
+    log_normal,
+)
 from shipdrag_ros.simulation.hydrodynamics import friction_n
+
+_FOULS_S = 2.0 * 365.25 * 86400.0  # until a clean hull is fouled, mostly
 
 
 def _act(frame: Frame, friction_factor: float) -> Action:
@@ -40,4 +50,5 @@ EFFECT = Effect(
         'added_mass': (Measure.CLEAN_HULL,),
         'displacement': (Measure.DRAUGHT, Measure.CLEAN_HULL),
     },
+    facts={'hull_cleaned': Said(fades_s=_FOULS_S)},
 )

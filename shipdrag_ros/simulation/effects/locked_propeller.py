@@ -7,7 +7,15 @@ from math import inf
 
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Said,
+    Scope,
+    log_normal,
+)
 from shipdrag_ros.simulation.hydrodynamics import disc_area_m2, drag_n
 
 
@@ -46,4 +54,5 @@ EFFECT = Effect(
         'displacement': (Measure.DRAUGHT, Measure.SHAFT),
     },
     needs=('propeller',),
+    facts={'shaft': Said(('locked',))},
 )

@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Said,
+    Scope,
+    log_normal,
+)
 
 
 def _act(frame: Frame, decay_s: float, fraction: float) -> Action:
@@ -45,4 +53,5 @@ EFFECT = Effect(
         'time_offset': (Measure.SHAFT,),
         'added_mass': (Measure.SHAFT, Measure.ANOTHER_RUN),
     },
+    facts={'shaft': Said(('driven',))},
 )

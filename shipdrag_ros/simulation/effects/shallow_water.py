@@ -11,6 +11,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
+    DENIES,
     DRAUGHTS,
     Effect,
     Frame,
@@ -102,4 +103,5 @@ EFFECT = Effect(
         'towed_cable': (Measure.DEPTH, Measure.DEEP_WATER, Measure.WITHOUT_CABLE),
     },
     needs=('breadth_m', 'draught_m'),
+    facts={'deep_water': DENIES},
 )

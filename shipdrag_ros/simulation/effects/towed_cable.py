@@ -6,6 +6,7 @@ from __future__ import annotations
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
     AREAS,
+    DENIES,
     Effect,
     Frame,
     Measure,
@@ -44,4 +45,5 @@ EFFECT = Effect(
         'added_mass': (Measure.WITHOUT_CABLE,),
         'displacement': (Measure.DRAUGHT, Measure.WITHOUT_CABLE),
     },
+    facts={'no_towed_cable': DENIES},
 )

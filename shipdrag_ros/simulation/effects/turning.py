@@ -8,6 +8,7 @@ from math import copysign
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
     AREAS,
+    DENIES,
     Effect,
     Frame,
     Measure,
@@ -98,4 +99,5 @@ EFFECT = Effect(
         'windmilling_propeller': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
         'current_change': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
     },
+    facts={'helm_amidships': DENIES},
 )

@@ -8,6 +8,7 @@ from math import pi, sqrt
 from shipdrag_ros.ship import GRAVITY_M_S2
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
+    DENIES,
     WEIGHTS,
     Effect,
     Frame,
@@ -68,4 +69,5 @@ EFFECT = Effect(
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.SHAFT),
     },
     without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
+    facts={'no_waves': DENIES, 'calm': DENIES},
 )

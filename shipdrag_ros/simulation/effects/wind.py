@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
+    DENIES,
     Effect,
     Frame,
     Measure,
@@ -55,4 +56,5 @@ EFFECT = Effect(
     },
     needs=('air',),
     without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
+    facts={'calm': DENIES},
 )

@@ -13,6 +13,7 @@ from shipdrag_ros.simulation.effect import (
     Frame,
     Measure,
     Quantity,
+    Said,
     Scope,
     log_normal,
 )
@@ -70,4 +71,5 @@ EFFECT = Effect(
     struck_out_by=('shaft',),
     confounders={'towed_cable': (Measure.WITHOUT_CABLE, Measure.SHAFT)},
     needs=('propeller',),
+    facts={'shaft': Said(('free',))},
 )
