@@ -7,8 +7,9 @@ The added resistance x(t) of a hull, a fraction of the clean hull's, is modelled
     x(t) = level + growth t + wander(t) + sum of steps and changes of growth at events
     y_i  = x(t_i) + covariates b + scatter + error of the run,
 
-wander an integrated Brownian motion (growth that changes slowly), scatter and wander of
-unknown size. All of it is Gaussian once the two sizes are given; these are averaged over
+wander an integrated Brownian motion (growth that changes slowly) and a plain one (growth in
+bursts, in port for instance), scatter and wander of unknown size. All of it is Gaussian once
+the three sizes are given; these are averaged over
 a grid by their posterior weight. A run far off is an outlier with a small prior
 probability and is given less weight, not removed. Steps at unknown times are found by
 their Bayes factors (`change_points`).
@@ -16,6 +17,8 @@ their Bayes factors (`change_points`).
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,8 +33,10 @@ GROWTH_CHANGE_SD = 0.10  # per year, after a step: new paint, another trade
 COVARIATE_SD = 1.0  # relative resistance for a relative change of displacement
 SCATTER = np.array([0.004, 0.008, 0.014, 0.022, 0.035, 0.06, 0.11])
 _SCATTER_MEDIAN, _SCATTER_LOG_SD = 0.03, 0.8
-WANDER = np.array([0.0, 0.04, 0.1, 0.2])  # growth per year, per square root of a year
-_WANDER_PRIOR = np.array([0.25, 0.25, 0.3, 0.2])
+WANDER = np.array([0.0, 0.06, 0.18])  # growth per year, per square root of a year
+_WANDER_PRIOR = np.array([0.4, 0.35, 0.25])
+WALK = np.array([0.0, 0.02, 0.05])  # of the level, per square root of a year: growth in bursts
+_WALK_PRIOR = np.array([0.6, 0.25, 0.15])
 _OUTLIER_PROBABILITY, _OUTLIER_SCALE = 0.02, 6.0
 _ROUNDS = 4
 _NEGLIGIBLE = 1e-4  # weight of a setting
@@ -126,10 +131,13 @@ class HullState:
     ) -> None:
         self.runs, self.steps, self.growth = runs, steps, growth
         self.outlier = np.zeros(len(runs)) if outlier is None else outlier
-        self._settings = [(float(s), float(q)) for s in SCATTER for q in WANDER]
+        grid = itertools.product(SCATTER.tolist(), WANDER.tolist(), WALK.tolist())
+        self._settings = list(grid)
+        prior = itertools.product(_scatter_prior(), _WANDER_PRIOR.tolist(), _WALK_PRIOR.tolist())
+        self._log_prior = np.log([math.prod(each) for each in prior])
         mean, self._basis = self._prior(runs.years, runs.covariates)
         self._residual = runs.added - mean
-        self._noise = [runs.sd**2 + scatter**2 for scatter, _ in self._settings]
+        self._noise = [runs.sd**2 + scatter**2 for scatter, _, _ in self._settings]
         self._precision = [np.zeros((0, 0))] * len(self._settings)
         log_posterior = np.full(len(self._settings), -np.inf)
         solved = range(len(self._settings))
@@ -145,15 +153,17 @@ class HullState:
         for number in range(len(self._settings)):
             log_posterior[number] = self._solve(number)
         self._weigh(log_posterior)
-        self.scatter = float(self.weights @ np.array([s for s, _ in self._settings]))
+        self.scatter = float(
+            self.weights @ np.array([scatter for scatter, _, _ in self._settings])
+        )
 
     def _solve(self, number: int) -> float:
         """Solve for a setting under the present probabilities of outliers; return its log
         posterior, but for a constant.
         """
-        runs, (scatter, wander) = self.runs, self._settings[number]
+        runs, (_, *sizes) = self.runs, self._settings[number]
         weight = 1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2
-        covariance = self._basis + wander**2 * _wander(runs.years, runs.years)
+        covariance = self._basis + _wander(runs.years, runs.years, *sizes)
         covariance[np.diag_indices(len(runs))] += self._noise[number] / weight
         # hundreds of runs: LAPACK's; `inference.gaussian` is for the few unknowns of a fit
         factor, failed = lapack.dpotrf(covariance, lower=True)
@@ -166,8 +176,7 @@ class HullState:
             - np.log(np.diag(factor)).sum()
             # the weight stands for a wider normal: its own size is no evidence for it
             - 0.5 * np.log(weight).sum()
-            - 0.5 * (np.log(scatter / _SCATTER_MEDIAN) / _SCATTER_LOG_SD) ** 2
-            + np.log(_WANDER_PRIOR[number % len(WANDER)])
+            + self._log_prior[number]
         )
 
     def _weigh(self, log_posterior: Float64) -> None:
@@ -227,20 +236,19 @@ class HullState:
         cross = (columns * sd**2) @ self._columns(runs.years).T
         own_variance = ((columns * sd) ** 2).sum(axis=1)
         wandering = np.isfinite(years)
-        at = np.where(wandering, years, 0.0)
-        wander_cross = np.where(wandering[:, None], _wander(at, runs.years), 0.0) / own[:, None]
-        wander_own = np.where(wandering, at**3 / 3.0, 0.0) / own**2
+        at = np.where(wandering, years, 0.0)  # where it began it is 0
         mean = np.zeros(len(columns))
         second = np.zeros(len(columns))
-        for weight, (_, wander), precision in zip(self.weights, self._settings, self._precision):
+        for weight, (_, *sizes), precision in zip(self.weights, self._settings, self._precision):
             if weight < _NEGLIGIBLE:
                 continue
-            gain = (cross + wander**2 * wander_cross) @ precision
+            all_cross = cross + _wander(at, runs.years, *sizes) / own[:, None]
+            gain = all_cross @ precision
             value = prior_mean + gain @ self._residual
             variance = (
                 own_variance
-                + wander**2 * wander_own
-                - np.einsum('ij,ij->i', gain, cross + wander**2 * wander_cross)
+                + np.diag(_wander(at, at, *sizes)) / own**2
+                - np.einsum('ij,ij->i', gain, all_cross)
             )
             mean += weight * value
             second += weight * (value**2 + np.maximum(variance, 0.0))
@@ -259,12 +267,15 @@ class HullState:
 
     def growth_per_year(self) -> Mixture:
         """
-        Return the mean growth between cleanings: the rise less the steps, over the time.
+        Return the mean growth between cleanings: the rise less what steps took away, over time.
+
+        A step upwards is growth too: fouling in port, for instance.
         """
         end = max(float(self.runs.years[-1]), 1e-9)
         columns = self._columns(np.array([end])) - self._columns(np.zeros(1))
         many = len(self.steps)
-        columns[:, 2 : 2 + many] = 0.0
+        if many:
+            columns[:, 2 : 2 + many] *= self.changes().value > 0.0
         return self._functional(columns / end, np.array([end]), np.array([end]))
 
     def growth_since_last_step(self) -> Mixture:
@@ -310,11 +321,18 @@ class HullState:
         return total
 
 
-def _wander(one: Float64, other: Float64) -> Float64:
-    """Return the covariance of integrated Brownian motion of unit strength."""
+def _scatter_prior() -> list[float]:
+    """Return the prior weight of each size of the scatter."""
+    apart = np.log(SCATTER / _SCATTER_MEDIAN) / _SCATTER_LOG_SD
+    return list(np.exp(-0.5 * apart**2))
+
+
+def _wander(one: Float64, other: Float64, wander: float, walk: float) -> Float64:
+    """Return the covariance of integrated and of plain Brownian motion of these strengths."""
     first = np.minimum(one[:, None], other[None, :])
     apart = np.abs(one[:, None] - other[None, :])
-    return first**3 / 3.0 + 0.5 * apart * first**2
+    integrated = first**3 / 3.0 + 0.5 * apart * first**2
+    return np.asarray(wander**2 * integrated + walk**2 * first)
 
 
 def _normal(residual: Float64, variance: Float64) -> Float64:

@@ -35,13 +35,14 @@ def test_evidence_is_that_of_the_joint_normal():
     years = np.array([0.0, 0.3, 0.9])
     state = HullState(runs(years, [0.02, 0.05, 0.11], sd=0.02), Steps(), Growth())
     number = int(np.argmax(state.weights))
-    scatter, wander = state._settings[number]
+    scatter, wander, walk = state._settings[number]
     first = np.minimum(years[:, None], years[None, :])
     apart = np.abs(years[:, None] - years[None, :])
     covariance = (
         LEVEL_SD**2
         + GROWTH_PER_YEAR[1] ** 2 * np.outer(years, years)
         + wander**2 * (first**3 / 3.0 + apart * first**2 / 2.0)
+        + walk**2 * first
         + np.diag(0.02**2 + scatter**2 + np.zeros(3))
     )
     np.testing.assert_allclose(np.linalg.inv(state._precision[number]), covariance, rtol=1e-3)
