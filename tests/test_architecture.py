@@ -29,6 +29,7 @@ PICTURE = (
     ('bags.salvage',),
     ('node', 'replay', 'importing'),
     ('fleet',),
+    ('trend',),
     ('report',),
     ('live',),
     ('cli',),
@@ -41,7 +42,7 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags.salvage': ESTIMATING | {'studies'},
     **{
         name: {'studies'}
-        for name in ('messages', 'replay', 'importing', 'node', 'fleet', 'report')
+        for name in ('messages', 'replay', 'importing', 'node', 'fleet', 'trend', 'report')
     },
 }
 GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them

@@ -101,9 +101,7 @@ def _show(output: Output, store: Path, report: Report) -> None:
         output.table(Table(('ship', 'bags', 'coastdowns'), rows))
     without = sum(done.coastdowns == 0 for done in read)
     if without:
-        output.say(
-            f'{without} bag(s) hold no coastdown; the warnings of each in bags/ say why'
-        )
+        output.say(f'{without} bag(s) hold no coastdown; the warnings of each in bags/ say why')
     if report.removed:
         output.say(f'{report.removed} bag(s) have changed; their former rows are removed.')
     for twin in report.twins[:_SHOWN]:

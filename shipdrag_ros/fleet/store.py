@@ -91,7 +91,15 @@ class Store:
         FleetError
             If a file of the store cannot be read.
         """
-        columns = ['content_hash', 'root', 'bag', 'software_version', 'ship', 'coastdowns', 'error']
+        columns = [
+            'content_hash',
+            'root',
+            'bag',
+            'software_version',
+            'ship',
+            'coastdowns',
+            'error',
+        ]
         rows = read_bags(self.path).select(columns).to_pylist()
         return {row.pop('content_hash'): Done(**row) for row in rows}
 

@@ -348,8 +348,8 @@ def _scaled(ship: Ship, scale: float, name: str) -> Ship:
         breadth_m=by(ship.breadth_m, 1),
         draught_m=by(ship.draught_m, 1),
         wetted_surface_m2=by(ship.wetted_surface_m2, 2),
-        air=None if ship.air is None else replace(
-            ship.air, frontal_area_m2=round(ship.air.frontal_area_m2 * scale**2, 1)
-        ),
+        air=None
+        if ship.air is None
+        else replace(ship.air, frontal_area_m2=round(ship.air.frontal_area_m2 * scale**2, 1)),
         effects=(),
     )

@@ -65,9 +65,7 @@ def test_the_hull_that_costs_most_comes_first(priced):
     assert [trend.rank for trend in trends] == [1, 2]
     first = trends[0]
     assert first.now.value == pytest.approx(0.15 * 705 / 365.25, abs=3.0 * first.now.sd)
-    assert first.growth_per_year.value == pytest.approx(
-        0.15, abs=3.0 * first.growth_per_year.sd
-    )
+    assert first.growth_per_year.value == pytest.approx(0.15, abs=3.0 * first.growth_per_year.sd)
     force_n = 1e-3 * 36.0 * 1.025e6 * first.now.value
     assert first.power_kw.value == pytest.approx(force_n * 6.0 / 1000.0, rel=0.01)
     assert first.costs.usd_per_year > trends[1].costs.usd_per_year > 0.0
@@ -78,9 +76,7 @@ def test_the_hull_that_costs_most_comes_first(priced):
 def test_known_and_unknown_steps(priced):
     cleaning = HullEvent(START_NS + 400 * DAY_NS, 'cleaning', 'divers')
     seen = rows('Known', 0.15, cleaned=400.0) + rows('Unknown', 0.15, cleaned=400.0, seed=2)
-    trends = {
-        trend.series.name: trend for trend in fleet_trends(seen, {}, {'Known': [cleaning]})
-    }
+    trends = {trend.series.name: trend for trend in fleet_trends(seen, {}, {'Known': [cleaning]})}
     [known], [found] = trends['Known'].events, trends['Unknown'].events
     assert (known.kind, known.known, known.probability) == ('cleaning', True, 1.0)
     assert known.time_ns == cleaning.time_ns
