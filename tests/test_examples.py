@@ -20,6 +20,7 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import VERBS, main
+from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.samples import INPUTS, Block, concatenate
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -11,6 +11,7 @@ from shipdrag_ros.trend import fleet_trends
 START_NS = 1_700_000_000_000_000_000
 DAY_NS = 86_400_000_000_000
 SPEED = np.linspace(1.0, 10.0, 46)
+EVERY_TWO_WEEKS = np.arange(0.0, 720.0, 15.0)
 CLEAN = 1e-3 * SPEED**2
 PRICES = """
 length_m: 80.0
@@ -26,7 +27,7 @@ economics:
 """
 
 
-def rows(ship, growth, *, days=np.arange(0.0, 720.0, 15.0), seed=1, cleaned=None, length=80.0):
+def rows(ship, growth, *, days=EVERY_TWO_WEEKS, seed=1, cleaned=None, length=80.0):
     rng = np.random.default_rng(seed)
     found = []
     for day in days:
