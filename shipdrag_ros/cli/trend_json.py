@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from shipdrag_ros import display
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.trend import ShipTrend
-from shipdrag_ros.trend.ship_trend import Value
 
 
 def document(trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]]) -> dict[str, Any]:
@@ -69,5 +69,5 @@ def _ship(trend: ShipTrend) -> dict[str, Any]:
     }
 
 
-def _value(found: Value | None) -> dict[str, Any] | None:
+def _value(found: Parameter | None) -> dict[str, Any] | None:
     return None if found is None else {'value': found.value, 'sd': found.sd}

@@ -10,6 +10,7 @@ from itertools import groupby
 import numpy as np
 
 from shipdrag_ros.fleet.events import HullEvent
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.sections import Economics
@@ -26,14 +27,6 @@ _CURVE_POINTS = 200
 _LEAST_RUNS = 3  # two runs are a difference, no trend
 _CLEANING = ('cleaning', 'docking', 'coating')
 UNKNOWN_KIND = 'unknown'
-
-
-@dataclass(frozen=True)
-class Value:
-    """A value and its standard deviation."""
-
-    value: float
-    sd: float
 
 
 @dataclass(frozen=True)
@@ -57,7 +50,7 @@ class TrendEvent:
     kind: str
     known: bool
     probability: float
-    change: Value
+    change: Parameter
 
 
 @dataclass(frozen=True)
@@ -119,9 +112,9 @@ class ShipTrend:
 
     series: Series
     events: tuple[TrendEvent, ...] = ()
-    growth_per_year: Value | None = None
-    now: Value | None = None
-    power_kw: Value | None = None
+    growth_per_year: Parameter | None = None
+    now: Parameter | None = None
+    power_kw: Parameter | None = None
     curve: LevelCurve | None = None
     outlier: tuple[float, ...] = ()
     scatter: float | None = None
@@ -208,7 +201,7 @@ def ship_trend(
     shared = _shared_sd(used)
     end = np.array([runs.years[-1]])
     level = state.level(end)
-    now = Value(float(level.value[0]), float(np.hypot(level.sd[0], shared)))
+    now = Parameter(float(level.value[0]), float(np.hypot(level.sd[0], shared)))
     kw = series.clean_force_n * series.reference_speed_m_s / 1000.0
     years = np.linspace(0.0, runs.years[-1], _CURVE_POINTS)
     curve = state.level(years)
@@ -216,9 +209,9 @@ def ship_trend(
     result = ShipTrend(
         series,
         _events(state, inside, found, first_ns),
-        Value(float(slope.value[0]), float(slope.sd[0])),
+        Parameter(float(slope.value[0]), float(slope.sd[0])),
         now,
-        Value(now.value * kw, now.sd * kw),
+        Parameter(now.value * kw, now.sd * kw),
         LevelCurve((first_ns + years * YEAR_NS).astype(np.int64), curve.value, curve.sd),
         tuple(state.outlier.tolist()),
         state.scatter,
@@ -252,7 +245,7 @@ def _events(
     events = []
     for year, value, sd in zip(state.steps.years, changes.value, changes.sd):
         time_ns = first_ns + round(float(year) * YEAR_NS)
-        change = Value(float(value), float(sd))
+        change = Parameter(float(value), float(sd))
         book = [event for event in known if abs(event.time_ns - time_ns) < 1_000_000_000]
         if book:
             events.append(TrendEvent(book[0].time_ns, book[0].kind, True, 1.0, change))

@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shipdrag_ros.display import M_S_PER_KNOT, Table, day
-from shipdrag_ros.trend.ship_trend import YEAR_NS, ShipTrend, Value
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.trend.ship_trend import YEAR_NS, ShipTrend
 
 _CLEAN = {
     'ship file': 'the clean hull of the ship file',
@@ -100,14 +101,14 @@ def event_table(trend: ShipTrend) -> Table:
     )
 
 
-def percent(found: Value | None) -> str:
+def percent(found: Parameter | None) -> str:
     """
     Return a share and its standard deviation in percent; '-' where not known.
     """
     return '-' if found is None else _plus_minus(found, 100.0)
 
 
-def _plus_minus(found: Value, unit: float) -> str:
+def _plus_minus(found: Parameter, unit: float) -> str:
     return f'{found.value * unit:.1f} ± {found.sd * unit:.1f}'
 
 
