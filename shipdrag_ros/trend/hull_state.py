@@ -140,7 +140,7 @@ class HullState:
         self._noise = [runs.sd**2 + scatter**2 for scatter, _, _ in self._settings]
         self._precision = [np.zeros((0, 0))] * len(self._settings)
         log_posterior = np.full(len(self._settings), -np.inf)
-        solved = range(len(self._settings))
+        solved = list(range(len(self._settings)))
         for _ in range(_ROUNDS):
             for number in solved:
                 log_posterior[number] = self._solve(number)
