@@ -278,8 +278,8 @@ def _run(
     fate: Fate,
 ) -> PlannedRun:
     temperature_c = round(15.0 - 8.0 * math.cos(2.0 * math.pi * day / _DAYS_PER_YEAR), 1)
-    loaded = _loaded(ship, rng.uniform(0.90, 1.0), temperature_c)
-    speed_m_s = rng.uniform(0.72, 0.8) * float(loaded.baseline_range_m_s[1])
+    loaded = _loaded(ship, rng.uniform(0.94, 1.06), temperature_c)
+    speed_m_s = rng.uniform(0.74, 0.8) * float(loaded.baseline_range_m_s[1])
     gust_n = 0.01 * float(loaded.resistance_n(speed_m_s))
     scenario = Scenario(
         speed_m_s=speed_m_s,
@@ -314,8 +314,8 @@ def _loaded(ship: Ship, fraction: float, temperature_c: float) -> Ship:
         ship,
         draught_m=round(fraction * ship.draught_m, 3),
         displaced_volume_m3=round(fraction * ship.displaced_volume_m3, 1),
-        # bottom and ends stay wet
-        wetted_surface_m2=(1.0 - 0.6 * (1.0 - fraction)) * ship.wetted_surface_m2,
+        # the bottom is wet at any draught
+        wetted_surface_m2=(0.4 + 0.6 * fraction) * ship.wetted_surface_m2,
         water=replace(ship.water, kinematic_viscosity_m2_s=viscosity),
     )
 
@@ -348,8 +348,8 @@ def _scaled(ship: Ship, scale: float, name: str) -> Ship:
         breadth_m=by(ship.breadth_m, 1),
         draught_m=by(ship.draught_m, 1),
         wetted_surface_m2=by(ship.wetted_surface_m2, 2),
-        air=None if ship.air is None else replace(
-            ship.air, frontal_area_m2=round(ship.air.frontal_area_m2 * scale**2, 1)
-        ),
+        air=None
+        if ship.air is None
+        else replace(ship.air, frontal_area_m2=round(ship.air.frontal_area_m2 * scale**2, 1)),
         effects=(),
     )
