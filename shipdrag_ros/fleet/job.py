@@ -133,9 +133,7 @@ def _coastdowns(job: Job, hull: _Hull, result: ReplayResult) -> tuple[list[Row],
         if why:
             told.append(f'the coastdown at {coastdown.start_ns} ns is not diagnosed: {why}')
         rows.append(
-            coastdown_row(
-                coastdown, hull.ship, diagnosis=diagnosis, context=context, flags=shared
-            )
+            coastdown_row(coastdown, hull.ship, diagnosis=diagnosis, context=context, flags=shared)
         )
     for event in result.events:
         if isinstance(event, Coastdown) and event.withdrawn:
@@ -147,9 +145,7 @@ def _coastdowns(job: Job, hull: _Hull, result: ReplayResult) -> tuple[list[Row],
     return sorted(rows, key=lambda row: int(row['time_ns'])), told
 
 
-def _diagnosis(
-    result: ReplayResult, hull: _Hull, window: Window
-) -> tuple[Diagnosis | None, str]:
+def _diagnosis(result: ReplayResult, hull: _Hull, window: Window) -> tuple[Diagnosis | None, str]:
     """Diagnose one coastdown, or say why that cannot be."""
     runs = [CoastRun(Path(result.run.name).name, window, hull.facts)]
     try:

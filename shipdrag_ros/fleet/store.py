@@ -79,7 +79,7 @@ class Store:
                     left.unlink()  # of a run that was killed
         except OSError as error:
             raise FleetError(
-                f'{str(path)!r} cannot be made: {error.strerror}; give a folder that may be written'
+                f'{str(path)!r} cannot be made: {error.strerror}; give one that may be written'
             ) from error
 
     def done(self) -> dict[str, Done]:
@@ -91,7 +91,15 @@ class Store:
         FleetError
             If a file of the store cannot be read.
         """
-        columns = ['content_hash', 'root', 'bag', 'software_version', 'ship', 'coastdowns', 'error']
+        columns = [
+            'content_hash',
+            'root',
+            'bag',
+            'software_version',
+            'ship',
+            'coastdowns',
+            'error',
+        ]
         rows = read_bags(self.path).select(columns).to_pylist()
         return {row.pop('content_hash'): Done(**row) for row in rows}
 

@@ -216,7 +216,7 @@ def _file_system(place: str) -> tuple[AbstractFileSystem, str]:
     return fs, str(path).rstrip('/')
 
 
-class _reached:  # noqa: N801
+class _reached:
     """Turn whatever a file system raises into an error that a user can mend."""
 
     def __init__(self, place: str) -> None:

@@ -95,7 +95,7 @@ class HullHistory:
     growth_per_year: float
     changes: tuple[HullChange, ...] = ()
 
-    def fouling(self, day: float) -> float:
+    def added_friction(self, day: float) -> float:
         """
         Return the added friction on a day, a fraction of C_F (1 + k).
         """
@@ -120,7 +120,7 @@ class PlannedRun:
         When it begins, truly.
     ship
         Clean, as she was loaded that day, in the water of that day.
-    fouling
+    added_friction
         Added friction, a fraction of C_F (1 + k).
     scatter
         Factor on the resistance that nothing explains.
@@ -138,7 +138,7 @@ class PlannedRun:
 
     start_ns: int
     ship: Ship
-    fouling: float
+    added_friction: float
     scatter: float
     temperature_c: float
     log_factor: float
@@ -157,7 +157,7 @@ class PlannedRun:
         """
         base = self.ship.baseline
         assert isinstance(base, CoefficientBaseline)
-        friction = (1.0 + base.form_factor) * (1.0 + self.fouling) * self.scatter
+        friction = (1.0 + base.form_factor) * (1.0 + self.added_friction) * self.scatter
         wave = tuple(self.scatter * value for value in base.wave_coefficient)
         fouled = replace(base, form_factor=friction - 1.0, wave_coefficient=wave)
         return replace(self.ship, baseline=fouled)
@@ -294,7 +294,7 @@ def _run(
     return PlannedRun(
         start_ns=FLEET_START_NS + round(day * 86_400.0) * 1_000_000_000,
         ship=loaded,
-        fouling=history.fouling(day),
+        added_friction=history.added_friction(day),
         scatter=float(np.exp(rng.normal(0.0, SCATTER))),
         temperature_c=temperature_c,
         log_factor=log_factor,

@@ -17,7 +17,14 @@ from shipdrag_ros.cli import main
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.fleet.engine import Engine, Lost
 from shipdrag_ros.fleet.find import find
-from shipdrag_ros.fleet.store import BAGS, COASTDOWNS, Store, read_bags, read_coastdowns, ship_texts
+from shipdrag_ros.fleet.store import (
+    BAGS,
+    COASTDOWNS,
+    Store,
+    read_bags,
+    read_coastdowns,
+    ship_texts,
+)
 from shipdrag_ros.fleet.update import update
 
 cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import tests

@@ -11,7 +11,9 @@ DAY_NS = 86_400_000_000_000
 
 
 def test_events_are_read_in_the_order_of_time_each_once() -> None:
-    text = 'date,kind,note\n1970-01-03,Docking\n# a comment\n\n1970-01-02,cleaning,Lisbon, divers\n'
+    text = (
+        'date,kind,note\n1970-01-03,Docking\n# a comment\n\n1970-01-02,cleaning,Lisbon, divers\n'
+    )
     events, problems = read_events(text + text)
     assert events == (
         HullEvent(DAY_NS, 'cleaning', 'Lisbon,divers'),

@@ -105,7 +105,9 @@ def test_the_run_file_of_each_bag(tmp_path: Path) -> None:
 
 
 def test_the_store_is_not_searched(tmp_path: Path) -> None:
-    touch(tmp_path / 'a.mcap', tmp_path / 'store' / 'deep' / 'b.mcap', tmp_path / 'store2' / 'c.mcap')
+    touch(
+        tmp_path / 'a.mcap', tmp_path / 'store' / 'deep' / 'b.mcap', tmp_path / 'store2' / 'c.mcap'
+    )
     assert names(tmp_path, tmp_path / 'store') == ['a.mcap', 'store2/c.mcap']
 
 

@@ -102,9 +102,9 @@ def test_a_ship_file_beside_speaks_for_its_own_ship_alone(
 
 def test_a_log_and_a_table_are_read_without_options(tmp_path: Path) -> None:
     shutil.copy(SHIP, tmp_path / 'ship.yaml')
-    seconds = np.arange(900)
-    speed = np.where(seconds < 400, 7.0, 7.0 / (1.0 + np.maximum(seconds - 400, 0) / 700.0))
-    speed += np.random.default_rng(1).normal(0.0, 0.03, 900)
+    seconds = np.arange(750)
+    speed = np.where(seconds < 250, 7.0, 7.0 / (1.0 + np.maximum(seconds - 250, 0) / 700.0))
+    speed += np.random.default_rng(1).normal(0.0, 0.03, 750)
     rows = [f'{t + 1.8e9:.1f},{v:.4f}' for t, v in zip(seconds, speed, strict=True)]
     (tmp_path / 'log.csv').write_text('\n'.join(['time,speed_through_water', *rows]))
     lines = []
@@ -119,7 +119,7 @@ def test_a_log_and_a_table_are_read_without_options(tmp_path: Path) -> None:
     for name in ('log.csv', 'day.nmea'):
         result = done(tmp_path / name)
         assert result.bag['error'] is None
-        assert result.bag['messages'] == 900
+        assert result.bag['messages'] == 750
         (row,) = result.coastdowns
         assert row['bag'] == name
         assert row['estimator'] is not None

@@ -38,7 +38,9 @@ def bucket(bags: list[Path], monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     client.upload_file(str(SHIP), 'fleet', 'all/bering/ship.yaml')
     for number in (1, 2):
         client.upload_file(str(bags[number]), 'fleet', f'all/bering/2026/{number} +%.mcap')
-    client.put_object(Bucket='fleet', Key='all/bering/2026/2 +%.mcap.run.yaml', Body=b'draught_m: 8')
+    client.put_object(
+        Bucket='fleet', Key='all/bering/2026/2 +%.mcap.run.yaml', Body=b'draught_m: 8'
+    )
     client.put_object(Bucket='fleet', Key='all/empty.mcap', Body=b'')
     yield 's3://fleet/all'
     server.stop()

@@ -127,5 +127,5 @@ def test_no_store_and_a_broken_one_are_told(tmp_path: Path) -> None:
     with pytest.raises(FleetError, match='remove it and run `shipdrag fleet` again'):
         read_bags(tmp_path)
     (tmp_path / 'file').touch()
-    with pytest.raises(FleetError, match='give a folder that may be written'):
+    with pytest.raises(FleetError, match='give one that may be written'):
         Store(tmp_path / 'file')
