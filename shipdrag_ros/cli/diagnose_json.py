@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import Diagnosis, Gap, Named, Verdict
+from shipdrag_ros.diagnosis import Diagnosis, EffectEstimate, Gap, Verdict
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def document(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _sized(effect: Named) -> dict[str, Any]:
+def _sized(effect: EffectEstimate) -> dict[str, Any]:
     return {
         'name': effect.name,
         'probability': effect.probability,
