@@ -16,6 +16,7 @@ from shipdrag_ros import display
 from shipdrag_ros.cli.arguments import add_json
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
+from shipdrag_ros.errors import FleetError
 
 if TYPE_CHECKING:  # help must come at once
     from shipdrag_ros.fleet.update import Progress, Report
@@ -74,12 +75,19 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     store = Store(options.out)
     found = find(options.folders, without=options.out)
+    if not (found.sources or found.skipped):
+        raise FleetError(
+            f'no bag lies below {", ".join(map(repr, options.folders))}: no .mcap file, directory '
+            'of rosbag2, .nmea log or .csv table'
+        )
     output.log(
         f'{len(found.sources)} bag(s) found; {found.left_alone} other file(s) left alone; '
         'starting workers'
     )
     with (
-        Engine(workers=options.workers, scheduler=options.scheduler) as engine,
+        Engine(
+            workers=options.workers, scheduler=options.scheduler, at_most=len(found.sources)
+        ) as engine,
         _progress(output) as progress,
     ):
         report = update(found, store, engine, progress)

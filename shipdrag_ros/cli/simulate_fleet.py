@@ -32,7 +32,7 @@ from shipdrag_ros.simulation.voyages import (
 
 TRUTH = 'truth'
 _PATTERN = 'vitus_bering.yaml'
-_REFERENCE = 0.72  # of the highest speed of the baseline, where the truth is stated
+_REFERENCE = 0.65  # of the highest speed of the baseline, where the truth is stated
 _CUT = 0.6  # of a file that is cut off
 
 
@@ -159,7 +159,7 @@ def _truth_row(folder: str, planned: PlannedShip, each: PlannedRun) -> dict[str,
         'time_ns': each.start_ns,
         'stamped_ns': each.stamped_ns,
         'file': each.fate.value,
-        'fouling': round(each.fouling, 6),
+        'added_friction': round(each.added_friction, 6),
         'added_resistance': round(_added(each, speed_m_s), 6),
         'added_with_scatter': round(scattered / clean - 1.0, 6),
         'speed_m_s': round(speed_m_s, 4),
@@ -187,7 +187,7 @@ def _write_truth(
     ships = [
         {
             'name': each.ship.name,
-            'fouling_at_start': each.history.at_start,
+            'friction_at_start': each.history.at_start,
             'growth_per_year': each.history.growth_per_year,
             'changes': [
                 {

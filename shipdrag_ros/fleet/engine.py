@@ -45,9 +45,11 @@ class Engine:
     Parameters
     ----------
     workers
-        How many, on this machine.
+        How many, on this machine; one a core by default.
     scheduler
         Address of a cluster to use instead, `tcp://host:8786`.
+    at_most
+        More workers than this have nothing to do, and are not started.
 
     Raises
     ------
@@ -55,14 +57,22 @@ class Engine:
         If the cluster cannot be reached, or runs another version of this program.
     """
 
-    def __init__(self, *, workers: int | None = None, scheduler: str | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        at_most: int | None = None,
+    ) -> None:
         self._workers = workers
+        self._at_most = at_most
         self._scheduler = scheduler
         self._open = ExitStack()
         self._client: Client | None = None
 
     def __enter__(self) -> Self:
         import dask
+        import distributed  # noqa: F401  # its own defaults first, or they are lost again
 
         # only what this process starts is set here; a scheduler elsewhere has its own
         self._open.enter_context(
@@ -70,7 +80,6 @@ class Engine:
                 {
                     'distributed.scheduler.allowed-failures': DEATHS - 1,
                     'distributed.comm.timeouts.connect': f'{_CONNECT_S:g}s',
-                    'distributed.logging.distributed': 'critical',
                 }
             )
         )
@@ -89,6 +98,12 @@ class Engine:
         traceback: TracebackType | None,
     ) -> None:
         self._open.close()
+
+    @property
+    def address(self) -> str:
+        """Of the scheduler, for other programs."""
+        assert self._client is not None
+        return str(self._client.scheduler_info()['address'])
 
     def pids(self) -> dict[str, int]:
         """
@@ -144,6 +159,7 @@ class Engine:
         return self._client.submit(function, item, key=name, pure=False)
 
     def _connected(self) -> Client:
+        from dask.system import CPU_COUNT
         from distributed import Client, LocalCluster
 
         if self._scheduler is not None:
@@ -156,14 +172,17 @@ class Engine:
                 ) from error
             return self._open.enter_context(client)
         folder = self._open.enter_context(TemporaryDirectory(prefix='shipdrag-dask-'))
+        workers = self._workers or CPU_COUNT
+        if self._at_most is not None:
+            workers = max(1, min(workers, self._at_most))
         cluster = self._open.enter_context(
             LocalCluster(
-                n_workers=self._workers,
+                n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
                 host='127.0.0.1',
-                dashboard_address=None,
-                worker_dashboard_address=None,
+                dashboard_address='127.0.0.1:0',
+                worker_dashboard_address='127.0.0.1:0',
                 local_directory=folder,
                 silence_logs=50,  # what becomes of each bag is said here
             )

@@ -79,7 +79,7 @@ class Store:
                     left.unlink()  # of a run that was killed
         except OSError as error:
             raise FleetError(
-                f'{str(path)!r} cannot be made: {error.strerror}; give a folder that may be written'
+                f'{str(path)!r} cannot be made: {error.strerror}; give one that may be written'
             ) from error
 
     def done(self) -> dict[str, Done]:

@@ -95,7 +95,7 @@ class HullHistory:
     growth_per_year: float
     changes: tuple[HullChange, ...] = ()
 
-    def fouling(self, day: float) -> float:
+    def added_friction(self, day: float) -> float:
         """
         Return the added friction on a day, a fraction of C_F (1 + k).
         """
@@ -120,7 +120,7 @@ class PlannedRun:
         When it begins, truly.
     ship
         Clean, as she was loaded that day, in the water of that day.
-    fouling
+    added_friction
         Added friction, a fraction of C_F (1 + k).
     scatter
         Factor on the resistance that nothing explains.
@@ -138,7 +138,7 @@ class PlannedRun:
 
     start_ns: int
     ship: Ship
-    fouling: float
+    added_friction: float
     scatter: float
     temperature_c: float
     log_factor: float
@@ -157,7 +157,7 @@ class PlannedRun:
         """
         base = self.ship.baseline
         assert isinstance(base, CoefficientBaseline)
-        friction = (1.0 + base.form_factor) * (1.0 + self.fouling) * self.scatter
+        friction = (1.0 + base.form_factor) * (1.0 + self.added_friction) * self.scatter
         wave = tuple(self.scatter * value for value in base.wave_coefficient)
         fouled = replace(base, form_factor=friction - 1.0, wave_coefficient=wave)
         return replace(self.ship, baseline=fouled)
@@ -278,8 +278,8 @@ def _run(
     fate: Fate,
 ) -> PlannedRun:
     temperature_c = round(15.0 - 8.0 * math.cos(2.0 * math.pi * day / _DAYS_PER_YEAR), 1)
-    loaded = _loaded(ship, rng.uniform(0.90, 1.0), temperature_c)
-    speed_m_s = rng.uniform(0.72, 0.8) * float(loaded.baseline_range_m_s[1])
+    loaded = _loaded(ship, rng.uniform(0.94, 1.06), temperature_c)
+    speed_m_s = rng.uniform(0.74, 0.8) * float(loaded.baseline_range_m_s[1])
     gust_n = 0.01 * float(loaded.resistance_n(speed_m_s))
     scenario = Scenario(
         speed_m_s=speed_m_s,
@@ -294,7 +294,7 @@ def _run(
     return PlannedRun(
         start_ns=FLEET_START_NS + round(day * 86_400.0) * 1_000_000_000,
         ship=loaded,
-        fouling=history.fouling(day),
+        added_friction=history.added_friction(day),
         scatter=float(np.exp(rng.normal(0.0, SCATTER))),
         temperature_c=temperature_c,
         log_factor=log_factor,
@@ -314,8 +314,8 @@ def _loaded(ship: Ship, fraction: float, temperature_c: float) -> Ship:
         ship,
         draught_m=round(fraction * ship.draught_m, 3),
         displaced_volume_m3=round(fraction * ship.displaced_volume_m3, 1),
-        # bottom and ends stay wet
-        wetted_surface_m2=(1.0 - 0.6 * (1.0 - fraction)) * ship.wetted_surface_m2,
+        # the bottom is wet at any draught
+        wetted_surface_m2=(0.4 + 0.6 * fraction) * ship.wetted_surface_m2,
         water=replace(ship.water, kinematic_viscosity_m2_s=viscosity),
     )
 
