@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from shipdrag_ros.display import Table
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.sections import Uncertain
 
@@ -190,6 +192,8 @@ class Diagnosis:
         speaks of these alone.
     no_coastdown
         Where none is used: that none was found and why, a sentence.
+    estimates
+        r(v) of the coastdowns as measured, where they were estimated.
     """
 
     verdict: Verdict
@@ -210,3 +214,27 @@ class Diagnosis:
     coastdowns_used: int = 0
     examined: tuple[str, ...] = ()
     no_coastdown: str = ''
+    estimates: tuple[Estimate, ...] = ()
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what was found: the verdict, what was examined, where, and what the record shows.
+
+        Returns
+        -------
+        tuple of str
+            A paragraph each, the verdict first.
+        """
+        from shipdrag_ros.diagnosis import words  # it tells what this module holds
+
+        where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
+        told = (words.sentence(self), self.no_coastdown, words.examined(self), where)
+        return (*filter(None, told), *self.notes)
+
+    def table(self) -> Table:
+        """
+        Show how probable each answer is.
+        """
+        from shipdrag_ros.diagnosis import tables
+
+        return tables.probabilities(self)
