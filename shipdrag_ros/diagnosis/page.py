@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from shipdrag_ros.diagnosis import Diagnosis, Verdict, pictures, tables, words
+from shipdrag_ros.diagnosis import Diagnosis, pictures, tables, words
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.display import LIGHT_KG, TRACK_LABELS, Picture, Section, Table, utc
 from shipdrag_ros.estimation import tables as estimate_tables
@@ -74,6 +74,9 @@ def _verdict(found: Diagnosis, ship: Ship | None) -> Iterator[Section]:
             )
         ],
     )
+    if found.facts:
+        caption = 'Facts of the log book; each may be wrong'
+        yield Section('Facts that were told', tables=[(caption, tables.facts(found))])
     if found.would_decide:
         yield Section('What would decide', lines=words.advice(found))
 
@@ -114,15 +117,16 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
 
 def _sizes(found: Diagnosis) -> Iterator[Section]:
     """Tell how large the effects are, in the units of the ship file."""
-    shown = () if found.verdict is Verdict.UNKNOWN else found.best
+    shown = found.effects or tuple(each for one in found.candidates for each in one.effects)
     if not shown:
         return
-    declared = [LIBRARY[effect.name] for effect in shown]
+    declared = [LIBRARY[name] for name in dict.fromkeys(each.name for each in shown)]
+    sizes = tables.parameters(shown) if found.effects else tables.sizes(found)
     yield Section(
         'How large it is',
-        text=() if found.effects else ('Of the most probable candidate, were it the one:',),
-        tables=[('In SI; sd is one standard deviation', tables.parameters(shown))],
+        text=() if found.effects else ('Of each candidate, were it the one:',),
         lines=[f'{each.name}: {each.formula}. Source: {each.source}.' for each in declared],
+        tables=[('In SI; sd is one standard deviation', sizes)],
     )
 
 
