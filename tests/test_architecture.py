@@ -21,7 +21,7 @@ PICTURE = (
     ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
     ('fields',),
     ('parameter',),
-    ('parameters', 'ship'),
+    ('parameters', 'ship', 'report'),
     ('inference',),
     ('regression',),
     ('estimation', 'simulation'),
@@ -32,7 +32,6 @@ PICTURE = (
     ('node', 'replay', 'importing'),
     ('fleet',),
     ('trend',),
-    ('report',),
     ('live',),
     ('cli',),
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none
