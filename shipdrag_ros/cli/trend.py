@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     trends = fleet_trends(rows, ships, events)
     _show(output, trends, skipped)
     if options.report is not None:
-        from shipdrag_ros.report.trend_page import write_trends  # pictures take long to import
+        from shipdrag_ros.trend.page import write_trends  # pictures take long to import
 
         write_trends(options.report, trends, skipped)
         output.log(f'report in {options.report}')

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
-from shipdrag_ros.diagnosis.result import Diagnosis, Named
+from shipdrag_ros.diagnosis.result import Diagnosis, EffectEstimate
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -172,7 +172,7 @@ def _error(coastdown: Coastdown) -> str | None:
     return None
 
 
-def _named(effects: Sequence[Named]) -> list[Row]:
+def _named(effects: Sequence[EffectEstimate]) -> list[Row]:
     return [
         {
             'name': effect.name,

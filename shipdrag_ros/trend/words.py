@@ -83,6 +83,19 @@ def lines(trend: ShipTrend) -> list[str]:
     return found + [f'{note[0].upper()}{note[1:]}.' for note in trend.notes]
 
 
+def speed_loss(trend: ShipTrend) -> str:
+    """
+    Return the speed loss at equal effective power, as a clause; '' where not known.
+
+    Power goes about as the cube of the speed; it is not the measure of ISO 19030, which needs
+    shaft power.
+    """
+    if trend.now is None or trend.now.value <= -0.9:
+        return ''
+    loss = 1.0 - (1.0 + trend.now.value) ** (-1.0 / 3.0)
+    return f', about {loss:.1%} of speed lost at equal effective power'
+
+
 def event_table(trend: ShipTrend) -> Table:
     """
     Return the steps of one ship, in the order of time.
