@@ -3,15 +3,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from shipdrag_ros.display import Picture
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION, picture
-from shipdrag_ros.samples import Int64
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.trend.ship_trend import ShipTrend
 
 _SIZE = (9.0, 3.6)
@@ -52,7 +50,7 @@ def added_resistance(trend: ShipTrend) -> Picture:
                     label=label,
                 )
         for event in trend.events:
-            day = _days(np.array([event.time_ns]))[0]
+            day = float(_days(np.array([event.time_ns]))[0])
             axes.axvline(day, color=ORANGE, ls='-' if event.known else '--', lw=1.2)
             text = event.kind.replace('_', ' ') if event.known else 'step found'
             axes.annotate(
@@ -76,5 +74,6 @@ def added_resistance(trend: ShipTrend) -> Picture:
     )
 
 
-def _days(time_ns: Int64) -> list[datetime]:
-    return [datetime.fromtimestamp(int(each) * 1e-9, UTC) for each in time_ns]
+def _days(time_ns: Int64) -> Float64:
+    """Return days since 1970, in which matplotlib counts dates."""
+    return np.asarray(time_ns / 86_400e9)
