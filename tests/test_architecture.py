@@ -21,7 +21,7 @@ PICTURE = (
     ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
     ('fields',),
     ('parameter',),
-    ('parameters', 'ship'),
+    ('parameters', 'ship', 'report'),
     ('inference',),
     ('regression',),
     ('estimation', 'simulation'),
@@ -30,7 +30,6 @@ PICTURE = (
     ('bags',),
     ('bags.salvage',),
     ('node', 'replay', 'importing', 'fleet'),
-    ('report',),
     ('live',),
     ('cli',),
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none

@@ -13,6 +13,7 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.display import LIGHT_KG
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.fields import (
     declare,
@@ -146,6 +147,17 @@ class Ship:
     def slenderness(self) -> float:
         """L / V^(1/3)."""
         return slenderness(self.length_m, self.displaced_volume_m3)
+
+    def summary(self) -> str:
+        """
+        Return the ship in one line: name, length, displacement, mass.
+        """
+        light = self.mass_kg < LIGHT_KG
+        mass = f'{self.mass_kg:.4g} kg' if light else f'{self.mass_kg * 1e-3:,.0f} t'
+        return (
+            f'{self.name or "a ship without a name"}: length {self.length_m:g} m, displacement '
+            f'{self.displaced_volume_m3:g} m³ ({mass})'
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
