@@ -87,13 +87,11 @@ def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
             campaigns.append([each])
     if len(campaigns) < 2:
         return ''
-    speed = float(
-        np.clip(
-            usual_speed_m_s(usable),
-            max(each.valid_curve.speed_m_s[0] for each in usable),
-            min(each.valid_curve.speed_m_s[-1] for each in usable),
-        )
-    )
+    low = max(each.valid_curve.speed_m_s[0] for each in usable)
+    high = min(each.valid_curve.speed_m_s[-1] for each in usable)
+    if low > high:
+        return ''  # no speed in common: `combine` says so
+    speed = float(np.clip(usual_speed_m_s(usable), low, high))
     means = [_mean(campaign, speed) for campaign in campaigns]
     far = max(
         abs(one[0] - other[0]) / np.hypot(one[1], other[1])
