@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
-from shipdrag_ros.diagnosis.result import Diagnosis, EffectEstimate
+from shipdrag_ros.diagnosis.result import Diagnosis, EffectEstimate, Verdict
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -187,12 +187,18 @@ def _named(effects: Sequence[EffectEstimate]) -> list[Row]:
 
 
 def _candidates(diagnosis: Diagnosis) -> str:
-    return _json(
-        [
-            {'names': list(each.names), 'probability': each.probability}
-            for each in diagnosis.candidates
-        ]
-    )
+    found: list[Row] = [
+        {
+            'names': list(each.names) or ['none'],
+            'probability': each.probability,
+            'effects': _named(each.effects),
+        }
+        for each in diagnosis.candidates
+    ]
+    if diagnosis.verdict is Verdict.UNKNOWN:
+        unnamed = {'names': ['unknown'], 'probability': diagnosis.unnamed, 'effects': []}
+        found.insert(0, unnamed)
+    return _json(found)
 
 
 def _json(value: object) -> str:
