@@ -11,6 +11,7 @@ from shipdrag_ros.report.document import write_page
 from shipdrag_ros.trend import pictures, words
 from shipdrag_ros.trend.ship_trend import ShipTrend
 
+_RANKED = 'Each ship at her reference speed, the one to be cleaned first on top'
 _HOW = Section(
     'How to read it',
     lines=(
@@ -40,7 +41,7 @@ def write_trends(
     skipped
         Bag and reason of what the fleet could not use.
     """
-    sections = [Section('Which hull first', tables=(('', words.ranking(trends)),))]
+    sections = [Section('Which hull first', tables=((_RANKED, words.ranking(trends)),))]
     for trend in trends:
         drawn = () if trend.curve is None else (pictures.added_resistance(trend),)
         steps = (('Steps in the state of the hull', words.event_table(trend)),)
@@ -56,7 +57,12 @@ def write_trends(
         )
     if skipped:
         table = Table(('bag', 'reason'), tuple(skipped))
-        sections.append(Section('Bags that could not be used', tables=(('', table),)))
+        sections.append(
+            Section(
+                'Bags that could not be used',
+                tables=(('What the fleet could not use, and why', table),),
+            )
+        )
     sections.append(_HOW)
     write_page(path, 'Trend of the fleet', sections, sentence=_sentence(trends))
 

@@ -3,61 +3,14 @@
 
 import json
 
-import pytest
-
 from shipdrag_ros.cli import main
-from shipdrag_ros.fleet.rows import FROUDE, BagResult
-from shipdrag_ros.fleet.store import Store, bag_schema, coastdown_schema
-
-DAY_NS = 86_400_000_000_000
-START_NS = 1_700_000_000_000_000_000
+from shipdrag_ros.fleet.store import Store
 
 
-def result(number, added, *, error=None):
-    """A bag of one coastdown, as the fleet writes it."""
-    speed = FROUDE * 28.0
-    clean = 1e-3 * speed**2
-    common = {'content_hash': f'{number:064x}', 'bag': f'{number}.mcap'}
-    row = dict.fromkeys(coastdown_schema().names) | {
-        **common,
-        'time_ns': START_NS + number * 15 * DAY_NS,
-        'froude': FROUDE,
-        'speed_m_s': speed,
-        'resistance_m_s2': (1.0 + added) * clean,
-        'sigma_m_s2': 0.03 * clean,
-        'sigma_repeatable_m_s2': 0.01 * clean,
-        'clean_m_s2': clean,
-        'speed_at_stop_m_s': 8.0,
-        'length_m': 80.0,
-        'displaced_volume_m3': 1000.0,
-        'water_density_kg_m3': 1025.0,
-        'software_version': '1',
-    }
-    bag = dict.fromkeys(bag_schema().names) | {
-        **common,
-        'root': 'r',
-        'ship': None if error else 'Test <b>ship</b>',
-        'software_version': '1',
-        'coastdowns': 0 if error else 1,
-        'messages': 1,
-        'warnings': [],
-        'error': error,
-    }
-    return BagResult(bag, () if error else (row,))
-
-
-@pytest.fixture
-def store(tmp_path):
-    made = Store(tmp_path / 'store')
-    for number in range(12):
-        made.write(result(number, 0.01 * number))
-    made.write(result(99, 0.0, error='no bag: 3 bytes of text'))
-    made.keep_ship('Test <b>ship</b>', {'events.csv': 'date,kind\n2024-02-01,cleaning\n'})
-    return made.path
-
-
-def test_json_is_the_contracts(store, tmp_path, capsys):
-    assert main(['trend', str(store), '--json', '--report', str(tmp_path / 'page.html')]) == 0
+def test_json_is_the_contracts(fleet_store, tmp_path, capsys):
+    assert (
+        main(['trend', str(fleet_store), '--json', '--report', str(tmp_path / 'page.html')]) == 0
+    )
     found = json.loads(capsys.readouterr().out)
     [ship] = found['ships']
     assert ship['name'] == 'Test <b>ship</b>'
@@ -82,14 +35,14 @@ def test_json_is_the_contracts(store, tmp_path, capsys):
     assert 'data:image/svg+xml' in page
 
 
-def test_questions_in_sql_read_the_store_and_no_file(store, tmp_path, capsys):
+def test_questions_in_sql_read_the_store_and_no_file(fleet_store, tmp_path, capsys):
     question = 'select ship, count(*) as n from coastdowns group by ship'
-    assert main(['trend', str(store), '--sql', question, '--json']) == 0
+    assert main(['trend', str(fleet_store), '--sql', question, '--json']) == 0
     assert json.loads(capsys.readouterr().out)['rows'] == [['Test <b>ship</b>', 12]]
     secret = tmp_path / 'secret.csv'
     secret.write_text('a\n1\n')
-    assert main(['trend', str(store), '--sql', f"select * from '{secret}'"]) == 1
-    assert main(['trend', str(store), '--sql', 'selec']) == 1
+    assert main(['trend', str(fleet_store), '--sql', f"select * from '{secret}'"]) == 1
+    assert main(['trend', str(fleet_store), '--sql', 'selec']) == 1
     assert 'the tables are coastdowns and bags' in capsys.readouterr().err
 
 
