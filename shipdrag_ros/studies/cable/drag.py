@@ -73,35 +73,6 @@ def drag_coefficient(slenderness: ArrayLike, surface: Surface) -> Float64:
     return 0.25 * math.pi * zeta0 / np.asarray(slenderness, np.float64)
 
 
-def body_axes(
-    along: ArrayLike, across: ArrayLike, angle_rad: ArrayLike
-) -> tuple[Float64, Float64]:
-    """
-    Turn forces on an element, or their coefficients, into its own axes.
-
-    Parameters
-    ----------
-    along
-        Along the flow: drag R_x or C_x.
-    across
-        Across it, in the plane of flow and element: lift R_y or C_y.
-    angle_rad
-        From the flow to the element.
-
-    Returns
-    -------
-    normal, tangential
-        Across the element and along it.
-
-    Notes
-    -----
-    S2 (6).
-    """
-    x, y = np.asarray(along, np.float64), np.asarray(across, np.float64)
-    sin, cos = np.sin(angle_rad), np.cos(angle_rad)
-    return x * sin + y * cos, x * cos - y * sin
-
-
 @dataclass(frozen=True)
 class Cable:
     """
