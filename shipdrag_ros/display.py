@@ -100,6 +100,13 @@ def utc(time_ns: int) -> str:
     return moment.strftime('%Y-%m-%d %H:%M:%S UTC')
 
 
+def day(time_ns: int) -> str:
+    """
+    Return the day of a time, UTC, in ISO 8601.
+    """
+    return datetime.fromtimestamp(time_ns // 1_000_000_000, UTC).strftime('%Y-%m-%d')
+
+
 def duration(seconds: float) -> str:
     """
     Return a length of time in s, and in min where that reads better.

@@ -36,7 +36,7 @@ from shipdrag_ros.ship.consistency import (
     slenderness,
 )
 from shipdrag_ros.ship.facts import Fact, fact_list
-from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
+from shipdrag_ros.ship.sections import Air, Economics, Propeller, Propulsion, StatedEffect, Water
 
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.225
@@ -72,6 +72,9 @@ class Ship:
     baseline: Baseline | None = declare(baseline(), 'expected resistance', default=None)
     effects: tuple[StatedEffect, ...] = declare(
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
+    )
+    economics: Economics | None = declare(
+        section(Economics), 'prices, for a trend over months', default=None
     )
     facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
 
