@@ -39,10 +39,13 @@ class Picture:
         The picture, as `data:`.
     caption
         What it shows, and what a reader should see in it.
+    wide
+        Whether it needs the whole width of a page; on a phone it scrolls in its box.
     """
 
     uri: str
     caption: str
+    wide: bool = False
 
 
 @dataclass(frozen=True)

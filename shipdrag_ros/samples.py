@@ -193,6 +193,20 @@ class Block:
         variance : scalar, (n,) or (n, 2)
             Variance of the value; NaN where unknown.
 
+        Returns
+        -------
+        Block
+            Of n samples, in the order given.
+
+        Raises
+        ------
+        ValueError
+            If the sizes differ.
+
+        Notes
+        -----
+        Source: docs/architecture.md, one sequence of samples in arrival order.
+
         Examples
         --------
         >>> from shipdrag_ros.samples import Block, Channel

@@ -73,6 +73,9 @@ class Monitor:
 
     Notes
     -----
+    Source: docs/architecture.md, the main job. It raises nothing: what is wrong with a sample
+    is a counted rejection.
+
     Memory is bounded: `history_ns` of samples, at most `ring.CAPACITY` of them.
 
     Examples

@@ -69,6 +69,9 @@ def diagnose(
 
     Notes
     -----
+    Source: Bayesian comparison of models by their evidence, MacKay (2003), *Information Theory,
+    Inference, and Learning Algorithms*, chapter 28.
+
     A run that has too little of either is left out, and a note says so.
 
     Examples

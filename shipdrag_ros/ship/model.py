@@ -83,10 +83,24 @@ class Ship:
         """
         Read a ship file.
 
+        Parameters
+        ----------
+        path
+            Of a YAML file in UTF-8, in SI units.
+
+        Returns
+        -------
+        Ship
+            Checked: every value in its range, and all consistent.
+
         Raises
         ------
         ShipFileError
             Naming every problem of the file at once.
+
+        Notes
+        -----
+        Source: the keys and their units are those that `declare` states in this package.
 
         Examples
         --------
@@ -106,10 +120,26 @@ class Ship:
         """
         Read the text of a ship file; `subject` names it in errors.
 
+        Parameters
+        ----------
+        content
+            YAML, in SI units.
+        subject
+            Names the text in errors, a path for instance.
+
+        Returns
+        -------
+        Ship
+            Checked: every value in its range, and all consistent.
+
         Raises
         ------
         ShipFileError
             Naming every problem of the text at once.
+
+        Notes
+        -----
+        Source: the keys and their units are those that `declare` states in this package.
 
         Examples
         --------
