@@ -105,14 +105,12 @@ class Engine:
         assert self._client is not None
         return str(self._client.scheduler_info()['address'])
 
-    def pids(self) -> dict[str, int]:
+    def on_each(self, function: Callable[[], Result]) -> dict[str, Result]:
         """
-        Return the process of each worker, by its address.
+        Call a function on each worker; return what it gives, by the worker's address.
         """
-        import os
-
         assert self._client is not None
-        found: dict[str, int] = self._client.run(os.getpid)
+        found: dict[str, Result] = self._client.run(function)
         return found
 
     def map(
@@ -199,7 +197,7 @@ class Engine:
                 f'{self._scheduler} --nthreads 1`'
             )
         try:
-            found: dict[str, str] = self._client.run(_version)
+            found = self.on_each(_version)
         except Exception as error:  # whatever a worker without this package says
             raise FleetError(
                 f'the workers of {self._scheduler!r} cannot run this program: {error}; install '

@@ -91,7 +91,7 @@ def test_the_verb_from_bags_to_rows_and_again(
 
     def kill(text: str, done: int, total: int) -> None:
         if text.startswith('replaying') and done < total and len(killed) < 2:
-            killed.extend(list(engine.pids().values())[:1])
+            killed.extend(list(engine.on_each(os.getpid).values())[:1])
             os.kill(killed[-1], signal.SIGKILL)
 
     again = Store(tmp_path / 'again')
