@@ -21,7 +21,7 @@ PICTURE = (
     ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
     ('fields',),
     ('parameter',),
-    ('parameters', 'ship'),
+    ('parameters', 'ship', 'report'),
     ('inference',),
     ('regression',),
     ('estimation', 'simulation'),
@@ -31,7 +31,7 @@ PICTURE = (
     ('bags.salvage',),
     ('node', 'replay', 'importing'),
     ('fleet',),
-    ('report',),
+    ('trend',),
     ('live',),
     ('cli',),
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none
@@ -43,7 +43,7 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags.salvage': ESTIMATING | {'studies'},
     **{
         name: {'studies'}
-        for name in ('messages', 'replay', 'importing', 'node', 'fleet', 'report')
+        for name in ('messages', 'replay', 'importing', 'node', 'fleet', 'trend', 'report')
     },
 }
 GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them

@@ -51,6 +51,7 @@ VERBS = (
         'where model and data disagree, and which effect is missing',
     ),
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
+    Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
     Verb('import', '.import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
     Verb('info', '.info', 'what is in a bag'),
     Verb('check', '.check', 'is a bag sound'),

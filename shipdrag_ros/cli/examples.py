@@ -28,6 +28,10 @@ EXAMPLES = {
         'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
     ),
     'fleet': ('shipdrag fleet records -o store --workers 1',),
+    'trend': (
+        'shipdrag trend store --json trend.json',
+        "shipdrag trend store --sql 'select ship, count(*) from coastdowns group by ship'",
+    ),
     'import': (
         'shipdrag import LOG.nmea.gz -o log.mcap --ship ship.yaml',
         'shipdrag import log.csv -o plane.mcap --time t:ms --map speed_through_water=u:kn '
