@@ -108,9 +108,11 @@ class Engine:
     def on_each(self, function: Callable[[], Result]) -> dict[str, Result]:
         """
         Call a function on each worker; return what it gives, by the worker's address.
+
+        A worker that dies meanwhile is left out.
         """
         assert self._client is not None
-        found: dict[str, Result] = self._client.run(function)
+        found: dict[str, Result] = self._client.run(function, on_error='ignore')
         return found
 
     def map(
@@ -197,7 +199,7 @@ class Engine:
                 f'{self._scheduler} --nthreads 1`'
             )
         try:
-            found = self.on_each(_version)
+            found: dict[str, str] = self._client.run(_version)
         except Exception as error:  # whatever a worker without this package says
             raise FleetError(
                 f'the workers of {self._scheduler!r} cannot run this program: {error}; install '
