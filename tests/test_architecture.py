@@ -18,14 +18,14 @@ PACKAGE = ROOT / 'shipdrag_ros'
 
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
-    ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
+    ('errors', 'samples', 'display', 'compiled', 'strict_yaml', 'plain_file'),
     ('parameters', 'ship'),
     ('inference',),
     ('regression',),
     ('estimation', 'simulation'),
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
-    ('bags',),
+    ('bags', 'nmea'),
     ('bags.salvage',),
     ('node', 'replay', 'importing', 'fleet'),
     ('report',),
@@ -38,9 +38,11 @@ ESTIMATING = {'coastdown', 'estimation', 'diagnosis', 'simulation'}
 NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags': ESTIMATING | {'studies'},
     'bags.salvage': ESTIMATING | {'studies'},
-    **{name: {'studies'} for name in ('messages', 'replay', 'importing', 'node', 'report')},
+    **{
+        name: {'studies'} for name in ('messages', 'nmea', 'replay', 'importing', 'node', 'report')
+    },
 }
-GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them
+GROUND = {'errors', 'compiled', 'strict_yaml', 'plain_file'}  # known by the modules that need them
 ROS = {
     'rclpy',
     'lifecycle_msgs',

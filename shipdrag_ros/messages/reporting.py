@@ -61,11 +61,17 @@ class EventKind(Enum):
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
+    FILES = 'files'  # recordings removed
 
     @property
     def is_warning(self) -> bool:
         """Whether an operator should look at it."""
-        return self in (EventKind.NO_ESTIMATE, EventKind.RESET, EventKind.CLOCK_JUMP)
+        return self in (
+            EventKind.NO_ESTIMATE,
+            EventKind.RESET,
+            EventKind.CLOCK_JUMP,
+            EventKind.FILES,
+        )
 
 
 @dataclass(frozen=True)

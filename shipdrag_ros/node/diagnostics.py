@@ -92,6 +92,10 @@ def input_status(topic: InputTopic, health: InputHealth | None) -> DiagnosticSta
 
 
 def _input_health(topic: InputTopic) -> tuple[bytes, str]:
+    if topic.fed_by and topic.age_s is not None:
+        if topic.age_s > SILENT_S:
+            return STALE, f'no data from {topic.fed_by} for {topic.age_s:.0f} s'
+        return OK, f'receiving from {topic.fed_by}'
     others = ', '.join(topic.other_types)
     if topic.type is None and others:
         accepted = ', '.join(topic.accepted)
@@ -107,6 +111,15 @@ def _input_health(topic: InputTopic) -> tuple[bytes, str]:
     if topic.age_s > SILENT_S:
         return STALE, f'no data for {topic.age_s:.0f} s'
     return OK, 'receiving'
+
+
+def nmea_status(
+    address: str, level: bytes, message: str, values: Mapping[str, object]
+) -> DiagnosticStatus:
+    """
+    Say how one source of NMEA 0183 is doing.
+    """
+    return _status(f'nmea {address}', level, message, values)
 
 
 def recording_status(status: RecordingStatus) -> DiagnosticStatus:

@@ -69,6 +69,8 @@ class InputTopic:
         Messages heard; heard while not active or without a clock.
     unreadable
         Messages that gave no sample, by reason, and joints that have no place.
+    fed_by
+        What feeds the input instead of its topic, '' if nothing does.
     rate_hz
         Messages a second of steady time, before the last `tick`.
     """
@@ -91,6 +93,7 @@ class InputTopic:
         self.received = 0
         self.unused = 0
         self.unreadable: Counter[str] = Counter()
+        self.fed_by = ''
         self.rate_hz = 0.0
         if fixed:
             self._subscribe(fixed)
@@ -115,6 +118,14 @@ class InputTopic:
     def age_s(self) -> float | None:
         """Time since the last message [s, steady clock], None before the first."""
         return None if self._last_s is None else time.monotonic() - self._last_s
+
+    def feed(self, by: str) -> None:
+        """
+        Note a message that came another way than by the topic.
+        """
+        self.fed_by = by
+        self.received += 1
+        self._last_s = time.monotonic()
 
     def count(self, decoded: Decoded) -> None:
         """

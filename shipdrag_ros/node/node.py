@@ -23,6 +23,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from shipdrag_ros.bags.durable import PartLimits
+from shipdrag_ros.bags.retention import Keep
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.messages import (
@@ -38,7 +39,9 @@ from shipdrag_ros.messages.topics import EVENTS
 from shipdrag_ros.node import diagnostics
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.inputs import InputTopic, message_class
+from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
+from shipdrag_ros.node.rate_limit import limit_services
 from shipdrag_ros.node.recorder import Recorder, RecordingState
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
@@ -80,6 +83,7 @@ class CoastdownNode(LifecycleNode):
         self._diagnosing: Diagnosing | None = None
         self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
+        self._nmea: NmeaFeed | None = None
         self._outputs: dict[str, Publisher] = {}
         self._survive_illegal_transitions()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -92,6 +96,8 @@ class CoastdownNode(LifecycleNode):
             ('reset', self._reset),
         ):
             self.create_service(Trigger, f'~/{name}', action)
+        services = (*self.services, self._service_change_state)
+        limit_services(services, self.get_logger().warning)
 
     def start(self) -> None:
         """
@@ -115,6 +121,7 @@ class CoastdownNode(LifecycleNode):
         """
         self._deactivate('the process ends')
         self._end_diagnosing()
+        self._end_nmea()
         self.destroy_node()
 
     # lifecycle
@@ -175,8 +182,10 @@ class CoastdownNode(LifecycleNode):
         settings = self._node_parameters.settings()
         if not settings.ship_file:
             raise ShipFileError('ship_file', ["is '', expected the path of a ship file"])
+        _, directory = settings.paths()
         self._ship = Ship.load(settings.ship_file)
         self._settings = settings
+        self.get_logger().info(f'recordings are written to {directory}')
         self._diagnosing = Diagnosing(self._ship, settings.parameters, enabled=settings.diagnose)
         self._outputs = {
             topic.under(self.get_fully_qualified_name()): self._publisher(topic)
@@ -192,6 +201,8 @@ class CoastdownNode(LifecycleNode):
             )
             for name, accepted in TOPICS.items()
         ]
+        self._nmea = NmeaFeed(self, settings.nmea, session=lambda: self._session)
+        self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
         effective = ', '.join(f'{name}={value!r}' for name, value in settings.to_mapping().items())
         self.get_logger().info(f'configured: {effective}')
@@ -200,6 +211,8 @@ class CoastdownNode(LifecycleNode):
         assert self._ship is not None
         assert self._settings is not None
         assert self._diagnosing is not None
+        assert self._nmea is not None
+        self._nmea.renew()
         monitor = Monitor(self._ship, self._settings.parameters)
         self._recorder = Recorder(
             Path(self._settings.output_directory),
@@ -208,6 +221,7 @@ class CoastdownNode(LifecycleNode):
             parameters=self._settings.parameters,
             history_ns=monitor.history_ns,
             limits=PartLimits(self._settings.part_size_bytes, self._settings.part_duration_s),
+            keep=Keep(self._settings.keep_days, self._settings.keep_bytes),
         )
         self._session = Session(
             monitor,
@@ -235,9 +249,15 @@ class CoastdownNode(LifecycleNode):
             self._diagnosing.close()
             self._diagnosing = None
 
+    def _end_nmea(self) -> None:
+        if self._nmea is not None:
+            self._nmea.close()
+            self._nmea = None
+
     def _release(self) -> None:
         self._deactivate('released')
         self._end_diagnosing()
+        self._end_nmea()
         for topic in self._input_topics:
             topic.close()
         for publisher in self._outputs.values():
@@ -275,6 +295,8 @@ class CoastdownNode(LifecycleNode):
         if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
             topic.unused += 1
             return
+        if self._nmea is not None and not self._nmea.admits(topic):
+            return
         assert topic.type is not None
         topic.count(self._session.receive(Source(topic.name, topic.type), payload, now_ns))
 
@@ -290,6 +312,9 @@ class CoastdownNode(LifecycleNode):
         now_ns = self._now_ns()
         if self._session is not None and now_ns:
             self._session.watch_clock(now_ns)  # also while nothing arrives
+            for part in self._session.recorder.removed():
+                self.get_logger().warning(part.text)
+                self._session.note_files(part.text, now_ns)
         message = DiagnosticArray()
         message.header.stamp = self.get_clock().now().to_msg()
         message.status = [
@@ -305,6 +330,8 @@ class CoastdownNode(LifecycleNode):
                 for topic in self._input_topics
             ),
         ]
+        if self._nmea is not None:
+            message.status += self._nmea.statuses()
         if self._recorder is not None:
             message.status.append(diagnostics.recording_status(self._recorder.status()))
             self._log_recording(message.status[-1])

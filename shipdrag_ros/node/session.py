@@ -84,6 +84,13 @@ class Session:
         self._report(self.monitor.update(decoded.block))
         return decoded
 
+    def keep(self, source: Source, payload: bytes, now_ns: int) -> None:
+        """
+        Record one message that feeds no input by itself.
+        """
+        arrival_ns = self.watch_clock(now_ns)
+        self.recorder.input(RawMessage(source.input, source.type, payload, arrival_ns, arrival_ns))
+
     def watch_clock(self, now_ns: int) -> int:
         """
         Return the time of arrival [ns], which never falls within a recording.
@@ -112,6 +119,13 @@ class Session:
         """
         self.watch_clock(now_ns)
         self._note(EventKind.LIFECYCLE, text)
+
+    def note_files(self, text: str, now_ns: int) -> None:
+        """
+        Publish and record that recordings were removed.
+        """
+        self.watch_clock(now_ns)
+        self._note(EventKind.FILES, text)
 
     def finish(self) -> None:
         """

@@ -7,7 +7,6 @@ import math
 from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
@@ -15,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ShipdragError, ShipFileError
+from shipdrag_ros.plain_file import read_small_text
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.added_mass import AddedMass, MerchantAddedMass, added_mass, n_r_polynomial
 from shipdrag_ros.ship.baseline import Baseline, TableBaseline, baseline
@@ -83,7 +83,7 @@ class Ship:
         '0.077'
         """
         try:
-            content = Path(path).read_text(encoding='utf-8-sig')
+            content = read_small_text(path)
         except OSError as error:
             problem = f'cannot be read: {error.strerror or error}; give the path of a ship file'
             raise ShipFileError(str(path), [problem]) from error
@@ -115,6 +115,11 @@ class Ship:
             data, problems = strict_yaml.load(content)
         except ValueError as error:
             raise ShipFileError(subject, [f'not YAML: {error}']) from error
+        keys = set(data) if isinstance(data, dict) else set()
+        if data and not keys & {item.name for item in fields(cls)}:
+            # nothing of it is repeated: it may be any file, and messages go to everybody
+            needed = 'a ship file has length_m and displaced_volume_m3'
+            raise ShipFileError(subject, [f'is no ship file, none of its keys is known; {needed}'])
         accepted = read_keys(cls, data, '', problems)
         # a section that was refused is not checked as if it were the default
         given = data if isinstance(data, dict) else {}

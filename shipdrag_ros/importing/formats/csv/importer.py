@@ -18,6 +18,7 @@ from pathlib import Path
 
 import yaml
 
+from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import (
     ATTACHMENT,
@@ -28,7 +29,7 @@ from shipdrag_ros.importing.bag import (
     new_bag,
 )
 from shipdrag_ros.importing.formats.csv.columns import InputColumns, TimeColumn
-from shipdrag_ros.importing.table import NUMBER, Row, Table
+from shipdrag_ros.importing.table import Row, Table
 from shipdrag_ros.samples import Block
 
 BASE_NS = 946_684_800 * SECOND_NS

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How often a peer may ask the node for something."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from time import monotonic
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.service import Service
+
+CHANGES_A_SECOND, CHANGES_AT_ONCE = 2.0, 20.0
+READS_A_SECOND, READS_AT_ONCE = 50.0, 200.0
+REFUSED = 'refused: asked too often; ask again in some seconds'
+_CHANGING = ('Trigger', 'ChangeState', 'SetParameters', 'SetParametersAtomically')
+
+
+class RateLimit:
+    """
+    Allows a burst, and then so many a second.
+
+    Parameters
+    ----------
+    per_second
+        Allowed in the long run [1/s].
+    at_once
+        Allowed after a pause.
+    clock
+        Steady time [s].
+    """
+
+    def __init__(
+        self, per_second: float, at_once: float, *, clock: Callable[[], float] = monotonic
+    ) -> None:
+        self._per_second = per_second
+        self._at_once = at_once
+        self._clock = clock
+        self._left = at_once
+        self._asked_s = clock()
+
+    def allows(self) -> bool:
+        """
+        Say whether one more is allowed now.
+        """
+        now_s = self._clock()
+        self._left += (now_s - self._asked_s) * self._per_second
+        self._left = min(self._left, self._at_once)
+        self._asked_s = now_s
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
+    """
+    Let each service refuse what is asked too often.
+
+    Parameters
+    ----------
+    services
+        Of the node; those that change something have the narrower limit.
+    warn
+        Told once a burst which service refuses.
+    """
+    for service in services:
+        changing = service.srv_type.__name__ in _CHANGING
+        limit = (
+            RateLimit(CHANGES_A_SECOND, CHANGES_AT_ONCE)
+            if changing
+            else RateLimit(READS_A_SECOND, READS_AT_ONCE)
+        )
+        service.callback = _limited(service.callback, limit, service.srv_name, warn)
+
+
+def _limited(
+    answer: Callable[[Any, Any], Any],
+    limit: RateLimit,
+    name: str,
+    warn: Callable[[str], object],
+) -> Callable[[Any, Any], Any]:
+    refusing = False
+
+    def limited(request: Any, response: Any) -> Any:
+        nonlocal refusing
+        if limit.allows():
+            refusing = False
+            return answer(request, response)
+        if not refusing:
+            refusing = True
+            warn(f'{name}: asked too often, requests are refused')
+        return _refuse(request, response)
+
+    return limited
+
+
+def _refuse(request: Any, response: Any) -> Any:
+    """Say no in the words of the service; what only reads gives nothing."""
+    refusal = SetParametersResult(successful=False, reason=REFUSED)
+    if hasattr(response, 'success'):
+        response.success = False
+    if hasattr(response, 'message'):
+        response.message = REFUSED
+    if hasattr(response, 'results'):
+        response.results = [refusal for _ in request.parameters]
+    if hasattr(response, 'result') and not hasattr(response, 'results'):
+        response.result = refusal
+    return response
