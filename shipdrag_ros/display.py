@@ -30,6 +30,16 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
+def spreadsheet_text(text: str) -> str:
+    """
+    Return a text that no spreadsheet takes for a formula.
+
+    A file name may begin with `=`; a quote before it makes it text. Numbers are
+    written as numbers and need none.
+    """
+    return f"'{text}" if text.startswith(('=', '+', '-', '@', '\t', '\r')) else text
+
+
 def utc(time_ns: int) -> str:
     """
     Return a time in a form to read, in whole seconds of UTC.
