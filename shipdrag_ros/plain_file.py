@@ -7,18 +7,17 @@ import os
 import stat
 from os import PathLike
 
-SMALL_BYTES = 1 << 20
-"""A ship file has some kilobytes; one with many learnt effects has fewer than this."""
 
-
-def read_small_text(path: str | PathLike[str]) -> str:
+def read_small_text(path: str | PathLike[str], *, most_bytes: int) -> str:
     """
-    Return the text of a regular file of at most `SMALL_BYTES`.
+    Return the text of a regular file.
 
     Parameters
     ----------
     path
         The file; a link to one is followed.
+    most_bytes
+        Largest file that is read [bytes].
 
     Raises
     ------
@@ -34,9 +33,9 @@ def read_small_text(path: str | PathLike[str]) -> str:
         if stat.S_ISDIR(about.st_mode):
             raise IsADirectoryError(0, 'Is a directory')
         if not stat.S_ISREG(about.st_mode):
-            raise OSError(0, 'it is no regular file')
+            raise OSError(0, 'no regular file')
         # one more than allowed: files of /proc say 0 and go on
-        content = file.read(SMALL_BYTES + 1)
-    if len(content) > SMALL_BYTES:
-        raise OSError(0, f'it is larger than {SMALL_BYTES} bytes')
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        raise OSError(0, f'more than {most_bytes} bytes, too many')
     return content.decode('utf-8-sig')

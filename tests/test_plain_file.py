@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.errors import ShipFileError
-from shipdrag_ros.plain_file import SMALL_BYTES, read_small_text
+from shipdrag_ros.plain_file import read_small_text
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.strict_yaml import LARGEST
 
 
 @pytest.fixture
@@ -23,20 +24,20 @@ def fifo(tmp_path: Path) -> Path:
 def test_text_is_read_with_or_without_a_mark(tmp_path: Path) -> None:
     path = tmp_path / 'text'
     path.write_bytes('\ufeffä'.encode())
-    assert read_small_text(path) == 'ä'
-    path.write_bytes(b'x' * SMALL_BYTES)
-    assert len(read_small_text(path)) == SMALL_BYTES
+    assert read_small_text(path, most_bytes=5) == 'ä'
+    with pytest.raises(OSError, match='more than 4 bytes'):
+        read_small_text(path, most_bytes=4)
 
 
 def test_what_is_no_small_regular_file_is_refused(tmp_path: Path, fifo: Path) -> None:
     large = tmp_path / 'large'
-    large.write_bytes(b'x' * (SMALL_BYTES + 1))
+    large.write_bytes(b'x' * (LARGEST + 1))
     endless = tmp_path / 'endless'
     endless.symlink_to('/dev/zero')
     for path, said in (
         (fifo, 'no regular file'),
         (endless, 'no regular file'),
-        (large, 'larger than 1048576 bytes'),
+        (large, 'more than 1000000 bytes'),
         (tmp_path, 'Is a directory'),
         (tmp_path / 'none', 'No such file'),
     ):

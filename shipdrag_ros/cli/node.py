@@ -9,8 +9,7 @@ from collections.abc import Iterator, MutableMapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-import yaml
-
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.cli.arguments import number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ShipdragError
@@ -184,8 +183,8 @@ def _parameters(tree: object) -> Iterator[tuple[str, object]]:
 
 def _yaml(text: str) -> object:
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError:
+        return strict_yaml.load(text)
+    except ValueError:
         return None
 
 

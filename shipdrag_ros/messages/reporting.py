@@ -62,6 +62,7 @@ class EventKind(Enum):
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
     FILES = 'files'  # recordings removed
+    MESSAGE_LOST = 'message_lost'  # sent, and not heard
 
     @property
     def is_warning(self) -> bool:
@@ -71,6 +72,7 @@ class EventKind(Enum):
             EventKind.RESET,
             EventKind.CLOCK_JUMP,
             EventKind.FILES,
+            EventKind.MESSAGE_LOST,
         )
 
 

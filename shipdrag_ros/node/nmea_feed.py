@@ -22,8 +22,9 @@ from shipdrag_ros.nmea.address import Address, parse_addresses
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.listener import SourceCounts
 from shipdrag_ros.nmea.live import LiveNmea
-from shipdrag_ros.node.diagnostics import ERROR, OK, SILENT_S, STALE, WARN, nmea_status
+from shipdrag_ros.node.diagnostics import ERROR, OK, STALE, WARN, nmea_status
 from shipdrag_ros.node.inputs import InputTopic
+from shipdrag_ros.node.judging import SILENT_S
 from shipdrag_ros.node.session import Session
 
 AT_ONCE = 200  # lines between two turns of everything else

@@ -16,7 +16,7 @@ from rcl_interfaces.srv import (
 )
 from std_srvs.srv import Trigger
 
-from shipdrag_ros.node.rate_limit import CHANGES_AT_ONCE, RateLimit, limit_services
+from shipdrag_ros.node.service_guard import CHANGES_AT_ONCE, RateLimit, limit_services
 
 
 def test_a_burst_and_then_so_many_a_second() -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How often a peer may ask the node for something."""
+"""What a peer may ask of the node: no illegal transition ends it, no flood holds it up."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from time import monotonic
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
 CHANGES_A_SECOND, CHANGES_AT_ONCE = 2.0, 20.0
@@ -51,6 +52,40 @@ class RateLimit:
             return False
         self._left -= 1.0
         return True
+
+
+def guard_services(
+    services: Iterable[Service], change_state: Service, warn: Callable[[str], object]
+) -> None:
+    """
+    Guard all services of a managed node.
+
+    Parameters
+    ----------
+    services
+        Of the node.
+    change_state
+        The one that is asked for transitions, which rclpy does not list among them.
+    warn
+        Told what is refused.
+    """
+    _refuse_illegal(change_state, warn)
+    limit_services((*services, change_state), warn)
+
+
+def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
+    """Refuse transitions that are not there; rclpy would raise out of the executor."""
+    change = change_state.callback
+
+    def refuse_or_change(request: Any, response: Any) -> Any:
+        try:
+            return change(request, response)
+        except rclpy_implementation.RCLError as error:
+            warn(f'transition refused: {error}')
+            response.success = False
+            return response
+
+    change_state.callback = refuse_or_change
 
 
 def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
