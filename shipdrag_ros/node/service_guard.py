@@ -8,13 +8,20 @@ from time import monotonic
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.service import Service
 
-CHANGES_A_SECOND, CHANGES_AT_ONCE = 2.0, 20.0
-READS_A_SECOND, READS_AT_ONCE = 50.0, 200.0
+CHANGES = (2.0, 20.0)  # a second in the long run, and at once
+TRIGGERS = (0.2, 10.0)  # each may make a file, or drop an hour of memory
+READS = (50.0, 200.0)
 REFUSED = 'refused: asked too often; ask again in some seconds'
-_CHANGING = ('Trigger', 'ChangeState', 'SetParameters', 'SetParametersAtomically')
+_LIMITS = {
+    'Trigger': TRIGGERS,
+    'ChangeState': CHANGES,
+    'SetParameters': CHANGES,
+    'SetParametersAtomically': CHANGES,
+}
 
 
 class RateLimit:
@@ -100,12 +107,7 @@ def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -
         Told once a burst which service refuses.
     """
     for service in services:
-        changing = service.srv_type.__name__ in _CHANGING
-        limit = (
-            RateLimit(CHANGES_A_SECOND, CHANGES_AT_ONCE)
-            if changing
-            else RateLimit(READS_A_SECOND, READS_AT_ONCE)
-        )
+        limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))
         service.callback = _limited(service.callback, limit, service.srv_name, warn)
 
 
@@ -137,8 +139,8 @@ def _refuse(request: Any, response: Any) -> Any:
         response.success = False
     if hasattr(response, 'message'):
         response.message = REFUSED
-    if hasattr(response, 'results'):
+    if isinstance(response, SetParameters.Response):
         response.results = [refusal for _ in request.parameters]
-    if hasattr(response, 'result') and not hasattr(response, 'results'):
+    elif isinstance(response, SetParametersAtomically.Response):
         response.result = refusal
     return response

@@ -11,12 +11,13 @@ from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter
 from rcl_interfaces.srv import (
     GetParameters,
+    ListParameters,
     SetParameters,
     SetParametersAtomically,
 )
 from std_srvs.srv import Trigger
 
-from shipdrag_ros.node.service_guard import CHANGES_AT_ONCE, RateLimit, limit_services
+from shipdrag_ros.node.service_guard import CHANGES, TRIGGERS, RateLimit, limit_services
 
 
 def test_a_burst_and_then_so_many_a_second() -> None:
@@ -51,7 +52,8 @@ def test_each_service_refuses_in_its_own_words(kind: type) -> None:
     if hasattr(request, 'parameters'):
         request.parameters = [Parameter(name='a'), Parameter(name='b')]
     responses = [service.callback(request, kind.Response()) for _ in range(500)]
-    assert service.answered in (int(CHANGES_AT_ONCE), int(CHANGES_AT_ONCE) + 1)
+    _, at_once = TRIGGERS if kind is Trigger else CHANGES
+    assert service.answered in (int(at_once), int(at_once) + 1)
     assert len(warned) == 1
     last = responses[-1]
     if kind is SetParameters:
@@ -63,8 +65,12 @@ def test_each_service_refuses_in_its_own_words(kind: type) -> None:
 
 
 def test_what_only_reads_may_be_asked_more_often() -> None:
-    service = Served(GetParameters)
-    limit_services([service], print)
-    for _ in range(150):
-        service.callback(GetParameters.Request(), GetParameters.Response())
-    assert service.answered == 150
+    for kind in (GetParameters, ListParameters):
+        service = Served(kind)
+        limit_services([service], print)
+        for _ in range(150):
+            service.callback(kind.Request(), kind.Response())
+        assert service.answered == 150
+        refused = [service.callback(kind.Request(), kind.Response()) for _ in range(500)]
+        assert service.answered < 300
+        assert refused[-1] == kind.Response()  # nothing, which can be sent
