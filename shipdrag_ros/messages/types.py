@@ -31,6 +31,7 @@ POSE = 'geometry_msgs/msg/PoseStamped'
 POSE_WITH_COVARIANCE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 QUATERNION = 'geometry_msgs/msg/QuaternionStamped'
 RANGE = 'sensor_msgs/msg/Range'
+STRING = 'std_msgs/msg/String'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 TWIST_WITH_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 

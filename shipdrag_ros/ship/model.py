@@ -152,6 +152,10 @@ class Ship:
         data = parse(content, subject=subject, error=ShipFileError)
         problems: list[str] = []
         keys = keys_of(cls)
+        if data and not (isinstance(data, dict) and keys.keys() & data.keys()):
+            # nothing of it is repeated: it may be any file, and messages go to everybody
+            needed = 'a ship file has length_m and displaced_volume_m3'
+            raise ShipFileError(subject, [f'is no ship file, none of its keys is known; {needed}'])
         accepted = read_keys(keys, data, '', problems)
         # a section that was refused is not checked as if it were the default
         given = data if isinstance(data, dict) else {}

@@ -14,7 +14,7 @@ import re
 from datetime import date
 
 from shipdrag_ros.importing.bag import LIMIT_NS
-from shipdrag_ros.importing.formats.nmea.sentences import Fields, NoValue, has_fix
+from shipdrag_ros.nmea.sentences import Fields, NoValue, has_fix
 from shipdrag_ros.samples import SECOND_NS
 
 DAY_NS = 86_400 * SECOND_NS
