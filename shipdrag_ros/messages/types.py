@@ -31,6 +31,7 @@ QUATERNION = 'geometry_msgs/msg/QuaternionStamped'
 RANGE = 'sensor_msgs/msg/Range'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 TWIST_WITH_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+VELOCITY = 'geometry_msgs/msg/VelocityStamped'
 
 ENCAPSULATION_BYTES = 4
 _BIG_ENDIAN = b'\x00\x00'

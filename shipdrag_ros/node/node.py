@@ -36,6 +36,7 @@ from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder, RecordingState
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
+from shipdrag_ros.node.watching import Watching
 from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 
@@ -77,7 +78,7 @@ class CoastdownNode(LifecycleNode):
         self._input_topics: list[InputTopic] = []
         self._input_states = InputStates()
         self._mailbox = Mailbox((), ahead=False)
-        self._lost: dict[str, int] = {}
+        self._watching: Watching | None = None
         self._outputs: dict[str, Publisher] = {}
         self._survive_illegal_transitions()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -192,7 +193,6 @@ class CoastdownNode(LifecycleNode):
         ]
         self._input_states = InputStates()
         self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
-        self._lost = {}
         self._node_parameters.fixed = True
         effective = ', '.join(f'{name}={value!r}' for name, value in settings.to_mapping().items())
         self.get_logger().info(f'configured: {effective}')
@@ -217,6 +217,9 @@ class CoastdownNode(LifecycleNode):
             node=self.get_fully_qualified_name(),
             ended=self._diagnosing.begin,
             told=self._announcer.event,
+        )
+        self._watching = Watching(
+            self._input_topics, self._settings.parameters, simulated=self._simulated
         )
         if self._settings.record:
             self._recorder.start()
@@ -275,13 +278,16 @@ class CoastdownNode(LifecycleNode):
 
     def _hear(self) -> None:
         """Take what has come on all topics, in its order."""
-        for topic, data, _ in self._mailbox.take():
+        for topic, data, received_ns in self._mailbox.take():
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
                 topic.unused += 1
                 continue
             assert topic.type is not None
-            topic.count(self._session.receive(Source(topic.name, topic.type), data, now_ns))
+            assert self._watching is not None
+            self._watching.watch_clock(self._session, now_ns)
+            decoded = self._session.receive(Source(topic.name, topic.type), data, now_ns)
+            topic.count(decoded, 0 if self._simulated else received_ns)
 
     def _look(self) -> None:
         for topic in self._input_topics:
@@ -293,12 +299,13 @@ class CoastdownNode(LifecycleNode):
     def _publish_diagnostics(self) -> None:
         now_ns = self._now_ns()
         session = self._session
-        if session is not None and now_ns:
-            session.watch_clock(now_ns)  # also while nothing arrives
+        health = {} if session is None else session.monitor.health()
+        if session is not None and self._watching is not None:
+            self._watching.tick(session, health, now_ns)
         states = self._input_states.tick(
             self._input_topics,
-            {} if session is None else session.monitor.health(),
-            direction='' if session is None else session.monitor.heading_doubt(),
+            health,
+            doubts=self._doubts(),
             simulated=self._simulated,
         )
         standing = self._standing(now_ns)
@@ -311,7 +318,6 @@ class CoastdownNode(LifecycleNode):
             statuses.append(diagnostics.estimate_status(session.latest, session.why_none))
             self._announcer.inputs(states)
             self._announcer.silence(states, standing.candidates)
-            self._note_lost(session, now_ns)
         if self._diagnosing is not None:
             found = self._diagnosing.status
             statuses.append(diagnostics.diagnosis_status(found))
@@ -326,6 +332,13 @@ class CoastdownNode(LifecycleNode):
             hardware_id='' if self._ship is None else self._ship.name,
         )
         self._diagnostics.publish(message)
+
+    def _doubts(self) -> dict[str, str]:
+        """Say what is odd about inputs besides what became of their readings."""
+        if self._session is None or self._watching is None:
+            return {}
+        heading = self._session.monitor.heading_doubt()
+        return {'heading': heading} | self._watching.doubts()
 
     def _standing(self, now_ns: int) -> diagnostics.Standing:
         session, states = self._session, self._input_states.seen
@@ -353,18 +366,6 @@ class CoastdownNode(LifecycleNode):
             if self._settings is None
             else self._settings.parameters.slope_window_s,
         )
-
-    def _note_lost(self, session: Session, now_ns: int) -> None:
-        """Keep in the recording how many messages were lost on their way."""
-        for topic in self._input_topics:
-            before = self._lost.get(topic.name, 0)
-            if topic.lost > before and now_ns:
-                self._lost[topic.name] = topic.lost
-                text = (
-                    f'{topic.name}: {topic.lost - before} messages were sent and not heard, '
-                    f'{topic.lost} so far'
-                )
-                session.note_lost(text, now_ns)
 
     # services
 
