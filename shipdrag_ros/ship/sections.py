@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.ship.fields import choice, declare, named, number, section, text
+from shipdrag_ros.fields import choice, declare, named, number, section, text
+from shipdrag_ros.parameter import Parameter
 
 
 @dataclass(frozen=True)
@@ -54,22 +55,30 @@ class Propulsion:
 
 
 @dataclass(frozen=True)
-class Uncertain:
-    """
-    A value with its standard deviation.
-    """
-
-    value: float = declare(number(-1e12, 1e12), 'value')
-    sd: float = declare(number(0.0, 1e12), 'standard deviation')
-
-
-@dataclass(frozen=True)
 class StatedEffect:
     """
     An effect added to the baseline, as a diagnosis writes it.
     """
 
     name: str = declare(text(), 'which effect')
-    parameters: Mapping[str, Uncertain] = declare(
-        named(section(Uncertain)), 'its parameters', hashed=False
+    parameters: Mapping[str, Parameter] = declare(
+        named(section(Parameter, required=('value', 'sd'))), 'its parameters', hashed=False
+    )
+
+
+@dataclass(frozen=True)
+class Economics:
+    """
+    Prices and efficiencies, by which a trend says what fouling costs and when cleaning pays.
+    """
+
+    fuel_usd_per_t: float = declare(number(1.0, 1e5, 'USD/t'), 'price of the fuel')
+    sfoc_g_per_kwh: float = declare(number(50.0, 1000.0, 'g/kWh'), 'fuel for a brake kWh')
+    propulsive_efficiency: float = declare(number(0.05, 1.0), 'effective power over brake power')
+    days_at_sea_per_year: float = declare(number(0.0, 366.0, 'd'), 'days under way in a year')
+    cleaning_usd: float = declare(
+        number(0.0, 1e8, 'USD'), 'price of a cleaning, off-hire included'
+    )
+    service_speed_m_s: float | None = declare(
+        number(0.1, 40.0, 'm/s'), 'speed at which runs are compared', default=None
     )

@@ -1,0 +1,377 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The one way to check a mapping: keys, each with what it may hold.
+
+Ship files, parameters and the node's settings are read here. A section is a
+dataclass whose fields are declared with a reader; reading a mapping collects
+every problem in it, with its dotted path, before giving up.
+"""
+
+from __future__ import annotations
+
+import difflib
+import reprlib
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from shipdrag_ros import strict_yaml
+from shipdrag_ros.errors import ProblemsError
+
+Problems = list[str]
+Reader = Callable[[object, str, Problems], Any]
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
+_SHORT.maxlevel = 2  # lists that hold themselves would fill pages
+
+
+class _Invalid:
+    """What a reader returns for a value it has reported."""
+
+
+INVALID = _Invalid()
+
+
+@dataclass(frozen=True)
+class Kind:
+    """
+    A reader and what it expects.
+
+    Attributes
+    ----------
+    read
+        From value, path and the list that problems are added to.
+    expectation
+        In words.
+    unit, low, high
+        Of numbers; '' for a pure one.
+    choices
+        Of words.
+    """
+
+    read: Reader
+    expectation: str
+    unit: str = ''
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Key:
+    """
+    A key of a mapping.
+
+    Attributes
+    ----------
+    kind
+    text
+        What it means.
+    default
+        Where it is not given; MISSING: it must be.
+    """
+
+    kind: Kind
+    text: str
+    default: Any = MISSING
+
+
+def declare(kind: Kind, text: str, *, default: Any = MISSING, hashed: bool = True) -> Any:
+    """
+    Declare a dataclass field that is read from a mapping.
+    """
+    metadata = {'key': Key(kind, text, default)}
+    return field(default=default, metadata=metadata, hash=None if hashed else False)
+
+
+def keys_of(cls: type[Any]) -> dict[str, Key]:
+    """
+    Return the declared fields of a dataclass, by name.
+    """
+    return {item.name: item.metadata['key'] for item in fields(cls) if 'key' in item.metadata}
+
+
+def number(low: float, high: float, unit: str = '') -> Kind:
+    """
+    Expect a finite number in low..high.
+    """
+    expectation = f'{low:g}..{high:g} {unit}'.rstrip()
+
+    def read(value: object, path: str, problems: Problems) -> float | _Invalid:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            hint = ' without quotes or unit' if isinstance(value, str) else ''
+            problems.append(f'{path}: {show(value)}, expected a number{hint}, {expectation}')
+            return INVALID
+        # an integer may be too large for a float; comparing it is safe
+        if not (low <= value <= high):
+            problems.append(f'{path}: {show(value)}, expected {expectation}')
+            return INVALID
+        return float(value)
+
+    return Kind(read, expectation, unit, low, high)
+
+
+def whole_number(low: int, high: int, unit: str = '') -> Kind:
+    """
+    Expect a whole number in low..high.
+    """
+    expectation = f'a whole number, {low:g}..{high:g} {unit}'.rstrip()
+
+    def read(value: object, path: str, problems: Problems) -> int | _Invalid:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            problems.append(f'{path}: {show(value)}, expected {expectation}')
+            return INVALID
+        return value
+
+    return Kind(read, expectation, unit, low, high)
+
+
+def flag() -> Kind:
+    """
+    Expect true or false.
+    """
+
+    def read(value: object, path: str, problems: Problems) -> bool | _Invalid:
+        if isinstance(value, bool):
+            return value
+        problems.append(f'{path}: {show(value)}, expected true or false')
+        return INVALID
+
+    return Kind(read, 'true or false')
+
+
+def numbers(
+    low: float, high: float, unit: str = '', *, ascending: bool = False, minimum: int = 2
+) -> Kind:
+    """
+    Expect a list of finite numbers in low..high.
+    """
+    one = number(low, high, unit)
+    order = 'ascending ' if ascending else ''
+    expectation = f'a list of {minimum} or more {order}numbers, {one.expectation}'
+
+    def read(value: object, path: str, problems: Problems) -> tuple[float, ...] | _Invalid:
+        if not isinstance(value, list) or len(value) < minimum:
+            problems.append(f'{path}: {show(value)}, expected {expectation}')
+            return INVALID
+        row = [one.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]
+        if any(item is INVALID for item in row):
+            return INVALID
+        for i in range(1, len(row)):
+            if ascending and not row[i] > row[i - 1]:
+                problems.append(
+                    f'{path}[{i}]: {row[i]!r} after {row[i - 1]!r}, expected ascending values'
+                )
+                return INVALID
+        return tuple(row)
+
+    return Kind(read, expectation)
+
+
+def text() -> Kind:
+    """
+    Expect a string.
+    """
+
+    def read(value: object, path: str, problems: Problems) -> str | _Invalid:
+        if isinstance(value, str):
+            return value
+        problems.append(f'{path}: {show(value)}, expected text; put it in quotes')
+        return INVALID
+
+    return Kind(read, 'text')
+
+
+def choice(*values: str) -> Kind:
+    """
+    Expect one of some words.
+    """
+    expectation = f'one of {", ".join(value for value in values if value)}'
+
+    def read(value: object, path: str, problems: Problems) -> str | _Invalid:
+        if isinstance(value, str) and value in values:
+            return value
+        problems.append(f'{path}: {show(value)}, expected {expectation}')
+        return INVALID
+
+    return Kind(read, expectation, choices=values)
+
+
+def section(cls: type[Any], *, required: Collection[str] = ()) -> Kind:
+    """
+    Expect the keys of a dataclass; those required even where it has a default.
+    """
+    keys = {
+        name: replace(key, default=MISSING) if name in required else key
+        for name, key in keys_of(cls).items()
+    }
+    expectation = f'the keys {", ".join(keys)}'
+
+    def read(value: object, path: str, problems: Problems) -> Any:
+        before = len(problems)
+        accepted = read_keys(keys, value, path, problems)
+        return INVALID if len(problems) > before else cls(**accepted)
+
+    return Kind(read, expectation)
+
+
+def list_of(kind: Kind, *, minimum: int = 0) -> Kind:
+    """
+    Expect a list of one kind.
+    """
+    expectation = f'a list, each with {kind.expectation}'
+
+    def read(value: object, path: str, problems: Problems) -> tuple[Any, ...] | _Invalid:
+        if not isinstance(value, list) or len(value) < minimum:
+            problems.append(f'{path}: {show(value)}, expected {expectation}')
+            return INVALID
+        items = tuple(kind.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value))
+        return INVALID if any(item is INVALID for item in items) else items
+
+    return Kind(read, expectation)
+
+
+def named(kind: Kind) -> Kind:
+    """
+    Expect names, each with one kind.
+    """
+    expectation = f'names, each with {kind.expectation}'
+
+    def read(value: object, path: str, problems: Problems) -> dict[str, Any] | _Invalid:
+        if not isinstance(value, dict) or not all(isinstance(name, str) for name in value):
+            problems.append(f'{path}: {show(value)}, expected {expectation}')
+            return INVALID
+        items = {
+            name: kind.read(item, dotted(path, name), problems) for name, item in value.items()
+        }
+        return INVALID if any(item is INVALID for item in items.values()) else items
+
+    return Kind(read, expectation)
+
+
+def read_keys(
+    known: Mapping[str, Key], value: object, path: str, problems: Problems
+) -> dict[str, Any]:
+    """
+    Check a mapping against the keys that are known; return what is given and valid.
+
+    Parameters
+    ----------
+    known
+        All keys, by name.
+    value
+        What should be a mapping.
+    path
+        Of the mapping in its file, '' for the file itself.
+    problems
+        Each finding is added, with the key it is about.
+
+    Returns
+    -------
+    dict
+        What is not given is left out, default or not.
+    """
+    if not isinstance(value, dict):
+        found = 'empty' if value is None else show(value)
+        problems.append(f'{path or "the file"}: {found}, expected the keys {", ".join(known)}')
+        return {}
+    for key in value:
+        if key not in known:
+            near = difflib.get_close_matches(str(key), known, n=1)
+            hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
+            problems.append(f'{dotted(path, str(key))}: unknown key; {hint}')
+    accepted = {}
+    for name, key in known.items():
+        if name in value:
+            result = key.kind.read(value[name], dotted(path, name), problems)
+            if result is not INVALID:
+                accepted[name] = result
+        elif key.default is MISSING:
+            problems.append(
+                f'{dotted(path, name)}: missing, expected {key.kind.expectation} ({key.text})'
+            )
+    return accepted
+
+
+def parse(text: str, *, subject: str, error: type[ProblemsError]) -> Any:
+    """
+    Return the data of a YAML text.
+
+    Raises
+    ------
+    ProblemsError
+        Of the kind given, if it cannot be read.
+    """
+    try:
+        return strict_yaml.load(text)
+    except ValueError as wrong:
+        raise error(subject, [str(wrong)]) from wrong
+
+
+def text_of(path: str | PathLike[str], *, what: str, error: type[ProblemsError]) -> str:
+    """
+    Return the text of a file that a user has written.
+
+    Parameters
+    ----------
+    path
+    what
+        It should be, for the message.
+    error
+        To be raised.
+
+    Raises
+    ------
+    ProblemsError
+        Of the kind given, if it is no regular file of text, or too large.
+    """
+    file = Path(path)
+    try:
+        about = file.stat()
+        if not (file.is_file() or file.is_dir()):  # a device or a pipe would never end
+            raise error(str(path), [f'cannot be read: no regular file; give the path of {what}'])
+        if about.st_size > strict_yaml.LARGEST:
+            raise error(
+                str(path),
+                [f'has {about.st_size} bytes, too many for {what} ({strict_yaml.LARGEST})'],
+            )
+        return file.read_text(encoding='utf-8-sig')
+    except OSError as wrong:
+        problem = f'cannot be read: {wrong.strerror or wrong}; give the path of {what}'
+        raise error(str(path), [problem]) from wrong
+    except ValueError as wrong:
+        raise error(str(path), [f'is not a text file: {wrong}; save it as UTF-8']) from wrong
+
+
+def plain(value: Any) -> Any:
+    """
+    Return a section as the mapping it is read from; what is None is left out.
+    """
+    if is_dataclass(value):
+        return {
+            name: plain(getattr(value, name))
+            for name in keys_of(type(value)) or [item.name for item in fields(value)]
+            if getattr(value, name) is not None
+        }
+    if isinstance(value, tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, Mapping):
+        return {name: plain(item) for name, item in value.items()}
+    return value
+
+
+def dotted(path: str, name: str) -> str:
+    """
+    Join a path and a key.
+    """
+    return f'{path}.{name}' if path else name
+
+
+def show(value: object) -> str:
+    """
+    Return a value for a message, however large it is.
+    """
+    return _SHORT.repr(value)
