@@ -368,7 +368,8 @@ class Monitor:
             found = self._estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             return NoEstimate(stamp_ns, str(error))
-        if not self._estimated:
+        # an estimator that is given may return what it likes
+        if not self._estimated and isinstance(found, Estimate):
             self._estimated = not (why := _too_vague(found, self._parameters))
             if why:
                 return NoEstimate(stamp_ns, why)
