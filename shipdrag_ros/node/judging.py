@@ -271,8 +271,8 @@ _ADVICE = {
 
 def _of_time(facts: InputFacts) -> Iterator[Finding]:
     offset_s = facts.offset_s
-    if facts.recent.unstamped or not facts.stamped:
-        return
+    if facts.recent.unstamped or not facts.stamped or 'future' in facts.recent.rejected:
+        return  # said with the readings
     if offset_s is not None and (offset_s > BEHIND_S or offset_s < -AHEAD_S):
         text = f'its clock is {_offset(offset_s)}: set either'
         yield Finding(Level.WARN, text)
