@@ -51,6 +51,7 @@ Estimator = Callable[[Window, Ship, Parameters], Estimate]
 
 _CUT_SHORT = {
     EndedBy.DATA_STOP: 'the speed fell silent',
+    EndedBy.SILENCE: 'all sources of speed fell silent',
     EndedBy.RESET: 'the memory was reset',
     EndedBy.RECORD_END: 'the record ended',
 }
@@ -127,6 +128,7 @@ class Monitor:
         self._candidate: Candidate | None = None
         self._onset: Onset | None = None
         self._heading_rad: float | None = None
+        self._estimated = False
         self._dismissals = Dismissals(self._steady_ns)
 
     @property
@@ -231,6 +233,14 @@ class Monitor:
         events += self._dismissals.flush()
         self._memory = self._fresh(self._memory.tally)
         return [*events, Reset(receive_ns, reason)]
+
+    def fall_silent(self) -> list[Event]:
+        """
+        End a coastdown, or a candidate, at the last sample of its speed source.
+
+        For whoever has a clock and knows that all sources are silent; the memory stays.
+        """
+        return self._stop_at_last_sample(EndedBy.SILENCE)
 
     def finish(self) -> list[Event]:
         """
@@ -337,6 +347,7 @@ class Monitor:
 
     def _begin(self, candidate: Candidate, number: int) -> Onset:
         onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)
+        self._estimated = False
         self._onset = onset
         self._memory.watch.update_ns[0] = self._grid_ns(onset.detected_ns)
         heading = mean_heading(self._memory.bins, candidate.start - 1, HEADING_BEFORE_S)
@@ -357,9 +368,15 @@ class Monitor:
         watch.update_ns[0] = self._grid_ns(next_stamp_ns)
         try:
             window = self._window(stamp_ns, before_ns=self._steady_ns)
-            return Update(stamp_ns, self._estimator(window, self._ship, self._parameters))
+            found = self._estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             return NoEstimate(stamp_ns, str(error))
+        # an estimator that is given may return what it likes
+        if not self._estimated and isinstance(found, Estimate):
+            self._estimated = not (why := _too_vague(found, self._parameters))
+            if why:
+                return NoEstimate(stamp_ns, why)
+        return Update(stamp_ns, found)
 
     def _window(self, end_ns: int, *, before_ns: int) -> Window:
         """Cut the coastdown so far, with the record before it where all of it is there."""
@@ -467,3 +484,16 @@ class Monitor:
             return f'{Channel(channel).input}: the stamp went back by {back * 1e-9:.3f} s'
         back = int(guard.arrival_ns[0]) - receive_ns
         return f'the time of arrival went back by {back * 1e-9:.3f} s'
+
+
+def _too_vague(found: Estimate, parameters: Parameters) -> str:
+    """Say why the first estimate of a coastdown is not given yet; '' if it is."""
+    sigma, resistance = found.last_sigma_m_s2, found.last_resistance_m_s2
+    share = parameters.first_relative_sigma
+    if sigma < share * resistance:
+        return ''
+    known = f'{sigma / resistance:.0%} of it' if resistance > 0.0 else 'more than all of it'
+    return (
+        f'the resistance at {found.last_speed_m_s:.2f} m/s is uncertain by {known} so far; '
+        f'the first figure waits until that is below {share:.0%}'
+    )

@@ -38,6 +38,7 @@ from shipdrag_ros.node.recorder import Recorder, RecordingState
 from shipdrag_ros.node.service_guard import guard_services
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
+from shipdrag_ros.node.watching import Watching
 from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 
@@ -80,7 +81,7 @@ class CoastdownNode(LifecycleNode):
         self._nmea: NmeaFeed | None = None
         self._input_states = InputStates()
         self._mailbox = Mailbox((), ahead=False)
-        self._lost: dict[str, int] = {}
+        self._watching: Watching | None = None
         self._outputs: dict[str, Publisher] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
@@ -182,7 +183,6 @@ class CoastdownNode(LifecycleNode):
         ]
         self._input_states = InputStates()
         self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
-        self._lost = {}
         self._nmea = NmeaFeed(self, settings.nmea, session=lambda: self._session)
         self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
@@ -212,6 +212,9 @@ class CoastdownNode(LifecycleNode):
             node=self.get_fully_qualified_name(),
             ended=self._diagnosing.begin,
             told=self._announcer.event,
+        )
+        self._watching = Watching(
+            self._input_topics, self._settings.parameters, simulated=self._simulated
         )
         if self._settings.record:
             self._recorder.start()
@@ -272,7 +275,7 @@ class CoastdownNode(LifecycleNode):
 
     def _hear(self) -> None:
         """Take what has come on all topics, in its order."""
-        for topic, data, _ in self._mailbox.take():
+        for topic, data, received_ns in self._mailbox.take():
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
                 topic.unused += 1
@@ -280,7 +283,10 @@ class CoastdownNode(LifecycleNode):
             if self._nmea is not None and not self._nmea.admits(topic):
                 continue
             assert topic.type is not None
-            topic.count(self._session.receive(Source(topic.name, topic.type), data, now_ns))
+            assert self._watching is not None
+            self._watching.watch_clock(self._session, now_ns)
+            decoded = self._session.receive(Source(topic.name, topic.type), data, now_ns)
+            topic.count(decoded, 0 if self._simulated else received_ns)
 
     def _look(self) -> None:
         for topic in self._input_topics:
@@ -292,13 +298,14 @@ class CoastdownNode(LifecycleNode):
     def _publish_diagnostics(self) -> None:
         now_ns = self._now_ns()
         session = self._session
-        if session is not None and now_ns:
-            session.watch_clock(now_ns)  # also while nothing arrives
+        health = {} if session is None else session.monitor.health()
+        if session is not None and self._watching is not None:
+            self._watching.tick(session, health, now_ns)
             session.note_removed(now_ns, self.get_logger().warning)
         states = self._input_states.tick(
             self._input_topics,
-            {} if session is None else session.monitor.health(),
-            direction='' if session is None else session.monitor.heading_doubt(),
+            health,
+            doubts=self._doubts(),
             simulated=self._simulated,
         )
         standing = self._standing(now_ns)
@@ -313,7 +320,6 @@ class CoastdownNode(LifecycleNode):
             statuses.append(diagnostics.estimate_status(session.latest, session.why_none))
             self._announcer.inputs(states)
             self._announcer.silence(states, standing.candidates)
-            self._note_lost(session, now_ns)
         if self._diagnosing is not None:
             found = self._diagnosing.status
             statuses.append(diagnostics.diagnosis_status(found))
@@ -328,6 +334,13 @@ class CoastdownNode(LifecycleNode):
             hardware_id='' if self._ship is None else self._ship.name,
         )
         self._diagnostics.publish(message)
+
+    def _doubts(self) -> dict[str, str]:
+        """Say what is odd about inputs besides what became of their readings."""
+        if self._session is None or self._watching is None:
+            return {}
+        heading = self._session.monitor.heading_doubt()
+        return {'heading': heading} | self._watching.doubts()
 
     def _standing(self, now_ns: int) -> diagnostics.Standing:
         session, states = self._session, self._input_states.seen
@@ -355,18 +368,6 @@ class CoastdownNode(LifecycleNode):
             if self._settings is None
             else self._settings.parameters.slope_window_s,
         )
-
-    def _note_lost(self, session: Session, now_ns: int) -> None:
-        """Keep in the recording how many messages were lost on their way."""
-        for topic in self._input_topics:
-            before = self._lost.get(topic.name, 0)
-            if topic.lost > before and now_ns:
-                self._lost[topic.name] = topic.lost
-                text = (
-                    f'{topic.name}: {topic.lost - before} messages were sent and not heard, '
-                    f'{topic.lost} so far'
-                )
-                session.note_lost(text, now_ns)
 
     # services
 
