@@ -22,6 +22,7 @@ from shipdrag_ros.diagnosis.result import (
 )
 from shipdrag_ros.diagnosis.search import Found, search, with_pairs
 from shipdrag_ros.diagnosis.speeds import CoastRun
+from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.rows import LOG
@@ -176,7 +177,8 @@ def _observed(
     if not seen:
         name, reason = next(iter(refused.items()))
         raise type(reason)(f'{name}: {reason}')
-    notes = [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes = [f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))]
+    notes += [f'left out: {name}: {why}' for name, why in refused.items()]
     notes += [
         f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
         'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '

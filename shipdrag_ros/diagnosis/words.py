@@ -130,7 +130,7 @@ def place(found: Diagnosis) -> str:
         return 'nowhere'
     where = found.where
     first, last = where.time_s
-    since = 'of the record' if found.baseline == 'none' else 'after the stop'
+    since = 'of the record' if of_log_track(found) else 'after the stop'
     if last <= 0.0:
         first, last, since = -first, -last, 'before the stop'
     return (
@@ -144,12 +144,21 @@ def model(found: Diagnosis) -> str:
     Say what the runs were held against.
     """
     match found.baseline:
-        case 'none':
+        case _ if of_log_track(found):
             return 'log as it is'
         case 'fitted_here':
             return 'a form fitted to these runs'
         case _:
             return 'model as stated'
+
+
+def of_log_track(found: Diagnosis) -> bool:
+    """
+    Tell whether the answer rests on the log against the way over ground alone.
+    """
+    if found.baseline == 'fitted_here':
+        return found.where is not None and found.where.channel != FORCE
+    return found.baseline == 'none'
 
 
 def added(found: Diagnosis) -> str:

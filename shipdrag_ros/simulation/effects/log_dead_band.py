@@ -4,7 +4,15 @@
 from __future__ import annotations
 
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import (
+    Effect,
+    Frame,
+    Measure,
+    Quantity,
+    Scope,
+    WithoutBaseline,
+    log_normal,
+)
 
 
 def _act(frame: Frame, speed_m_s: float) -> Action:
@@ -33,4 +41,5 @@ EFFECT = Effect(
         'windmilling_propeller': (Measure.RADAR, Measure.SHAFT),
     },
     errs_in=('speed_through_water',),
+    without_baseline={WithoutBaseline.ZEROS: 'a wheel stands still below some speed'},
 )
