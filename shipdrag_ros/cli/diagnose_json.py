@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import Diagnosis, Gap, Named, Verdict
+from shipdrag_ros.diagnosis import Diagnosis, EffectEstimate, Gap, Verdict
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -58,11 +58,13 @@ def document(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _sized(effect: Named) -> dict[str, Any]:
+def _sized(effect: EffectEstimate) -> dict[str, Any]:
     return {
         'name': effect.name,
         'probability': effect.probability,
-        'parameters': {name: asdict(value) for name, value in effect.parameters.items()},
+        'parameters': {
+            name: {'value': size.value, 'sd': size.sd} for name, size in effect.parameters.items()
+        },
     }
 
 

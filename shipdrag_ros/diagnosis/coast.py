@@ -32,8 +32,9 @@ from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
+from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
 DISCREPANCIES = ('force', 'log', 'radar')
@@ -92,7 +93,7 @@ class CoastModel(CoastSimulation):
                 gaussian=tuple(
                     (effect.parameters[q.name].value, effect.parameters[q.name].sd)
                     if q.name in effect.parameters
-                    else (q.of(ship).default or 0.0, 0.0)
+                    else (np.nan_to_num(q.of(ship).value), 0.0)
                     for q in find(effect.name).parameters
                 ),
                 stated=True,
@@ -237,7 +238,7 @@ class CoastModel(CoastSimulation):
         for part, place in fit.hypothesis.parts:
             if isinstance(part, RunNuisance) and part.run == run:
                 at = part.place_of_stop
-                return part.unknowns[at].value(float(fit.best.z[place + at]))
+                return part.unknowns[at].prior.at(float(fit.best.z[place + at]))
         raise AssertionError(f'run {run} has no place')
 
     @property
@@ -251,7 +252,7 @@ class CoastModel(CoastSimulation):
         return np.array([run.speed_m_s for run in self.seen])
 
 
-def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:
+def _starts(quantity: Parameter, *, first: bool) -> tuple[float, ...]:
     shape = quantity.prior.shape
     if first:
         return {Shape.HALF_NORMAL: (0.3,), Shape.LOG_NORMAL: _APART}.get(shape, (0.0,))
@@ -261,6 +262,6 @@ def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:
 
 
 def _named(
-    choices: Sequence[Quantity], values: tuple[float, ...]
+    choices: Sequence[Parameter], values: tuple[float, ...]
 ) -> tuple[tuple[str, float], ...]:
     return tuple((q.name, value) for q, value in zip(choices, values, strict=True))

@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
     Advice,
     Diagnosis,
-    Named,
+    EffectEstimate,
     Verdict,
     Where,
 )
@@ -80,10 +80,11 @@ def diagnose(
     >>> from shipdrag_ros.diagnosis import CoastRun, diagnose
     >>> from shipdrag_ros.estimation import Window
     >>> from shipdrag_ros.parameters import Parameters
-    >>> from shipdrag_ros.ship import StatedEffect, Uncertain
+    >>> from shipdrag_ros.parameter import Parameter
+    >>> from shipdrag_ros.ship import StatedEffect
     >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
     >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
-    >>> scale = StatedEffect('log_scale', {'factor': Uncertain(0.1, 0.0)})
+    >>> scale = StatedEffect('log_scale', {'factor': Parameter(0.1, 0.0)})
     >>> truth = simulate(ship, scenario, effects=[scale])
     >>> block = sense(truth, standard_sensors(), seed=1)
     >>> stop_ns = START_NS + round(scenario.lead_in_s * 1e9)
@@ -203,7 +204,7 @@ def _before_the_stop(seen: Sequence[Observation]) -> Where:
     return Where('log_radar', (-lead_in_s, 0.0), (min(speeds), max(speeds)))
 
 
-def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
+def with_effects(ship: Ship, effects: Sequence[EffectEstimate]) -> Ship:
     """
     Return a ship with effects added to what its file states.
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.facts import Fact
-from shipdrag_ros.ship.sections import Uncertain
 
 FORCE = 'force'  # on the ship, against her baseline
 LOG_TRACK = 'log_track'  # the log against the way over ground
@@ -26,7 +26,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Named:
+class EffectEstimate:
     """
     An effect with its size.
 
@@ -41,7 +41,7 @@ class Named:
 
     name: str
     probability: float
-    parameters: Mapping[str, Uncertain]
+    parameters: Mapping[str, Parameter]
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Candidate:
 
     names: tuple[str, ...]
     probability: float
-    effects: tuple[Named, ...] = ()
+    effects: tuple[EffectEstimate, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -246,7 +246,7 @@ class Diagnosis:
     """
 
     verdict: Verdict
-    effects: tuple[Named, ...]
+    effects: tuple[EffectEstimate, ...]
     candidates: tuple[Candidate, ...]
     nothing: float
     unnamed: float
@@ -257,7 +257,7 @@ class Diagnosis:
     held_out_before: Gap | None
     held_out_after: Gap | None
     baseline: str
-    best: tuple[Named, ...] = ()
+    best: tuple[EffectEstimate, ...] = ()
     notes: tuple[str, ...] = ()
     traces: tuple[Trace, ...] = ()
     coastdowns_used: int = 0

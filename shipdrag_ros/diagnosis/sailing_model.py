@@ -21,7 +21,8 @@ from shipdrag_ros.diagnosis.direct import DirectModel, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing, start
-from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
+from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
+from shipdrag_ros.parameter import Parameter, free, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.simulation import Action, Frame, Scenario
@@ -59,9 +60,9 @@ class LogErrorTerm:
     one_size: ClassVar[Sequence[int]] = ()
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Sizes about some speeds [m/s]."""
-        return tuple(scaled(f'log {k}', self.sd_m_s) for k in range(_SPLINES))
+        return tuple(free(f'log {k}', normal(self.sd_m_s)) for k in range(_SPLINES))
 
 
 @dataclass(frozen=True)
@@ -185,7 +186,7 @@ class SailingModel(DirectModel):
         found = Action()
         for part, place in hypothesis.parts:
             if isinstance(part, EffectTerm):
-                values = [u.value(float(z[place + i])) for i, u in enumerate(part.unknowns)]
+                values = [u.prior.at(float(z[place + i])) for i, u in enumerate(part.unknowns)]
                 found += part.action(self._frame, 0, values)
         return found
 
@@ -193,7 +194,7 @@ class SailingModel(DirectModel):
         action, extra = self.action(hypothesis, z), np.zeros(len(self.legs))
         for part, place in hypothesis.parts:
             if isinstance(part, LogErrorTerm):
-                values = [u.value(float(z[place + i])) for i, u in enumerate(part.unknowns)]
+                values = [u.prior.at(float(z[place + i])) for i, u in enumerate(part.unknowns)]
                 extra += np.array(values) @ self._splines
         # distances that are too long by a factor: the current is by the same
         radar = 1.0 + action.radar_factor

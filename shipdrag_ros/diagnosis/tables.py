@@ -8,11 +8,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipdrag_ros.diagnosis import Compared, Diagnosis, Named, Trace
+from shipdrag_ros.diagnosis import Compared, Diagnosis, EffectEstimate, Trace
 from shipdrag_ros.diagnosis import words as words
 from shipdrag_ros.display import TRACK_LABELS, Table, plus_minus
-from shipdrag_ros.ship import Uncertain
-from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.simulation.effects import LIBRARY
 
 
@@ -26,7 +25,7 @@ def probabilities(found: Diagnosis) -> Table:
     return Table(('what is missing', 'probability'), rows)
 
 
-def parameters(effects: Sequence[Named]) -> Table:
+def parameters(effects: Sequence[EffectEstimate]) -> Table:
     """
     Show how large effects are; the names are those of `simulate --effect`.
     """
@@ -56,7 +55,7 @@ def sizes(found: Diagnosis) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _parameter(quantity: Quantity, effect: Named) -> tuple[str, ...]:
+def _parameter(quantity: Parameter, effect: EffectEstimate) -> tuple[str, ...]:
     """Return name, value, sd and meaning of a parameter."""
     value, sd = _figures(quantity, effect.parameters[quantity.name])
     return quantity.name, value, sd, quantity.meaning
@@ -120,7 +119,7 @@ def noise(traces: Sequence[Trace]) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _figures(quantity: Quantity, found: Uncertain) -> tuple[str, str]:
+def _figures(quantity: Parameter, found: Parameter) -> tuple[str, str]:
     """Return value and sd, as the sd deserves; what was a choice has none."""
     if found.sd == 0.0:
         return words.size(quantity, found), '-'

@@ -17,10 +17,10 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
-from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, Gap, Named, Verdict
+from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.search import Found
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.ship import Uncertain
+from shipdrag_ros.parameter import Parameter
 
 _SET = 0.99  # of the candidates
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
@@ -55,7 +55,7 @@ class Judgement:
         return self.verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(names)
 
     @property
-    def best(self) -> tuple[Named, ...]:
+    def best(self) -> tuple[EffectEstimate, ...]:
         """Effects of the most probable hypothesis, with their parameters."""
         fit = self.found.best
         return sized(fit, self.posterior.probability[fit.hypothesis.names])
@@ -118,7 +118,7 @@ def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False
     return Judgement(found, posterior, verdict, with_sizes)
 
 
-def sized(fit: Fit, probability: float) -> tuple[Named, ...]:
+def sized(fit: Fit, probability: float) -> tuple[EffectEstimate, ...]:
     """
     Return the effects of a hypothesis with their sizes, by name.
 
@@ -131,7 +131,7 @@ def sized(fit: Fit, probability: float) -> tuple[Named, ...]:
 
     Returns
     -------
-    tuple of Named
+    tuple of EffectEstimate
         Of the effects that have parameters of their own; not those that the ship
         file states.
     """
@@ -139,12 +139,13 @@ def sized(fit: Fit, probability: float) -> tuple[Named, ...]:
     for part, place in fit.hypothesis.parts:
         if not isinstance(part, EffectTerm) or part.stated:
             continue
-        values = {name: Uncertain(value, 0.0) for name, value in part.fixed}
+        values = {name: Parameter(value, 0.0) for name, value in part.fixed}
         for i, unknown in enumerate(part.unknowns, place):
             z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
-            values[unknown.name] = Uncertain(unknown.value(z), abs(unknown.slope(z)) * sd)
+            prior = unknown.prior
+            values[unknown.name] = Parameter(prior.at(z), abs(prior.slope(z)) * sd)
         ordered = {q.name: values[q.name] for q in part.effect.parameters}
-        found.append(Named(part.effect.name, probability, ordered))
+        found.append(EffectEstimate(part.effect.name, probability, ordered))
     return tuple(sorted(found, key=lambda effect: effect.name))
 
 

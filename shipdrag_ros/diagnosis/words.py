@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, Named, Verdict
+from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, EffectEstimate, Verdict
 from shipdrag_ros.display import plus_minus
-from shipdrag_ros.ship import CoefficientBaseline, Ship, Uncertain
-from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 
 _CHANNELS = {
@@ -233,7 +233,7 @@ def baseline(found: Diagnosis, ship: Ship | None) -> str:
     return f'{given.source or "of unstated source"}; {known} (two standard deviations, as stated)'
 
 
-def size(quantity: Quantity, found: Uncertain) -> str:
+def size(quantity: Parameter, found: Parameter) -> str:
     """
     Return a value with two standard deviations; what was a choice has none.
     """
@@ -246,7 +246,7 @@ def size(quantity: Quantity, found: Uncertain) -> str:
     return f'({text}) {quantity.unit}' if quantity.unit else text
 
 
-def quantity_text(quantity: Quantity) -> str:
+def quantity_text(quantity: Parameter) -> str:
     """
     Name a parameter without its unit.
     """
@@ -255,7 +255,7 @@ def quantity_text(quantity: Quantity) -> str:
     return name.replace('_', ' ')
 
 
-def _sized(effect: Named) -> str:
+def _sized(effect: EffectEstimate) -> str:
     """Return an effect with its sizes."""
     sizes = ', '.join(
         f'{quantity_text(quantity)} {size(quantity, effect.parameters[quantity.name])}'

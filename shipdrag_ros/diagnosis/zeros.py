@@ -21,14 +21,14 @@ from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
     Candidate,
     Diagnosis,
+    EffectEstimate,
     Gap,
-    Named,
     Verdict,
     Where,
 )
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Uncertain
 from shipdrag_ros.simulation.effect import Effect, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -62,7 +62,7 @@ class StandsStill:
         Of the longest record.
     """
 
-    effect: Named
+    effect: EffectEstimate
     stretches: int
     share: float
     slowest_m_s: float
@@ -113,7 +113,8 @@ def stands_still(records: Sequence[SailingRecord], parameters: Parameters) -> St
     below = speed < value
     if probability < 0.5 or not below.any():
         return None
-    named = Named(effect.name, probability, {effect.parameters[0].name: Uncertain(value, sd)})
+    sizes = {effect.parameters[0].name: Parameter(value, sd)}
+    named = EffectEstimate(effect.name, probability, sizes)
     at_zero = speed[zero]
     return StandsStill(
         named,

@@ -11,14 +11,7 @@ from shipdrag_ros.ship.baseline import Baseline, CoefficientBaseline, Coefficien
 from shipdrag_ros.ship.facts import Fact, parse_fact
 from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3, GRAVITY_M_S2, Ship
 from shipdrag_ros.ship.run_sheet import RunSheet
-from shipdrag_ros.ship.sections import (
-    Air,
-    Propeller,
-    Propulsion,
-    StatedEffect,
-    Uncertain,
-    Water,
-)
+from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
 
 __all__ = [
     'AIR_DENSITY_KG_M3',
@@ -38,7 +31,6 @@ __all__ = [
     'StatedEffect',
     'TableAddedMass',
     'TableBaseline',
-    'Uncertain',
     'Water',
     'parse_fact',
 ]

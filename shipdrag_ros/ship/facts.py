@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import UTC, date, datetime
 
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.ship.fields import INVALID, Kind, Problems, number, show
+from shipdrag_ros.fields import INVALID, Kind, Problems, number, show
 
 RATE = 0.02  # how often a fact that is told is wrong, unless stated
 LEAST_RATE, MOST_RATE = 1e-4, 0.5

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ShipFileError
+from shipdrag_ros.fields import declare, keys_of, number, parse, read_keys, section, text_of
 from shipdrag_ros.ship.consistency import inconsistencies
 from shipdrag_ros.ship.facts import Fact, fact_list
-from shipdrag_ros.ship.fields import declare, number, read_keys, section
 from shipdrag_ros.ship.model import Ship
 
 NAME = 'run.yaml'
@@ -59,13 +58,8 @@ class RunSheet:
         ShipFileError
             Naming every problem of the file at once.
         """
-        try:
-            return cls.from_yaml(path.read_text(encoding='utf-8-sig'), subject=str(path))
-        except OSError as error:
-            raise ShipFileError(str(path), [f'cannot be read: {error.strerror}']) from error
-        except UnicodeDecodeError as error:
-            problem = f'is not a text file: {error}; save it as UTF-8'
-            raise ShipFileError(str(path), [problem]) from error
+        content = text_of(path, what='a run file', error=ShipFileError)
+        return cls.from_yaml(content, subject=str(path))
 
     @classmethod
     def from_yaml(cls, content: str, *, subject: str) -> RunSheet:
@@ -77,11 +71,9 @@ class RunSheet:
         ShipFileError
             Naming every problem of the text at once.
         """
-        try:
-            data, problems = strict_yaml.load(content)
-        except ValueError as error:
-            raise ShipFileError(subject, [f'not YAML: {error}']) from error
-        accepted = read_keys(cls, data, '', problems)
+        data = parse(content, subject=subject, error=ShipFileError)
+        problems: list[str] = []
+        accepted = read_keys(keys_of(cls), data, '', problems)
         water = accepted.get('water')
         if water and water.density is not None and water.density_kg_m3 is not None:
             problems.append('water: density and density_kg_m3 are the same; keep one')

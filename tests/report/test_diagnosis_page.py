@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis import (
     Candidate,
     CoastRun,
     Diagnosis,
-    Named,
+    EffectEstimate,
     Verdict,
     diagnose,
 )
@@ -24,10 +24,11 @@ from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.result import ToldFact
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report import diagnosis_pictures
 from shipdrag_ros.report.diagnosis_page import write_diagnosis
-from shipdrag_ros.ship import Fact, Ship, Uncertain
+from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse
 
@@ -92,7 +93,7 @@ def test_the_score_of_the_method_stands_on_the_page(
 
 
 def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., Any]) -> None:
-    offset = Named('log_offset', 0.395, {'offset_m_s': Uncertain(0.4321, 0.02)})
+    offset = EffectEstimate('log_offset', 0.395, {'offset_m_s': Parameter(0.4321, 0.02)})
     candidates = (
         Candidate(('current',), 0.6, found.effects),
         Candidate(('log_offset',), 0.395, (offset,)),
