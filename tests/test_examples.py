@@ -20,6 +20,7 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import VERBS, main
+from shipdrag_ros.fleet.store import Store
 from shipdrag_ros.samples import INPUTS, Block, concatenate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -68,6 +69,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ('NEW.csv', 'new_hulls.csv'):
         (folder / name).write_text('L_B,B_T,C_B,lcb,Fr\n8.2,4.0,0.85,0.005,0.12\n')
     (folder / 'records').mkdir()
+    Store(folder / 'store')
     for seed, name in enumerate(('run', 'out', 'back', 'clean_1', 'clean_2', 'records/1')):
         line = ['simulate', '--ship', str(ship), '-o', str(folder / f'{name}.mcap')]
         course = ('--heading', '3.1416', '--first-heading', '0') if name == 'back' else ()

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from shipdrag_ros.diagnosis.advice import advice
 from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
 from shipdrag_ros.diagnosis.facts import Facts, told_of
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
@@ -104,7 +105,7 @@ def diagnose(
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
             break
         moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
-    found = with_pairs(found)
+    found = with_pairs(with_differing(found, model))
     best = found.best
     predicted = held_out(model, best) if found.alarm else None
     # an instrument that errs before the stop has taught the noise what it should have shown
@@ -117,9 +118,12 @@ def diagnose(
     explained = best if judged.missing else found.nothing
     if judged.verdict is Verdict.UNKNOWN:
         explained = max(found.smooth, key=lambda one: one.log_likelihood)
+    differ = runs_differ(found) if judged.missing else ()
     place: Where | None = None
     if judged.verdict is not Verdict.NONE:
         place = _before_the_stop(seen) if distrusted else where(model, as_stated, found.smooth)
+    if place is not None and differ:  # a smooth error alike in all runs would pass for the log's
+        place = replace(place, channel=FORCE)
     return judged.diagnosis(
         would_decide=would_decide,
         where=place,
@@ -133,6 +137,7 @@ def diagnose(
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
         facts=told.weighed(judged.posterior, [run.name for run in seen]),
+        runs_differ=differ,
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, EffectEstimate, Verdict
-from shipdrag_ros.display import plus_minus
+from shipdrag_ros.display import M_S_PER_KNOT, plus_minus
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -22,6 +22,7 @@ NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
 _LEAST = 0.001  # probability that is told
 _WORTH_A_WORD = 0.01
+_LARGE_N = 1e4  # from here on a force is told in kN
 
 
 def sentence(found: Diagnosis) -> str:
@@ -53,6 +54,12 @@ def sentence(found: Diagnosis) -> str:
                 'baseline that is further off than stated would explain these runs as well '
                 f'({probability(found.nothing)}).'
             )
+        case Verdict.NAMED if found.runs_differ:
+            names = names_text([effect.name for effect in found.effects])
+            return (
+                f'Missing in the model, and not alike in these runs: {names}; probability '
+                f'{probability(found.effects[0].probability)}.'
+            )
         case Verdict.NAMED:
             sizes = ' and '.join(_sized(effect) for effect in found.effects)
             return (
@@ -72,6 +79,24 @@ def sentence(found: Diagnosis) -> str:
             if first.names and found.unnamed < first.probability:
                 why = f' The likeliest of them, {names_text(first.names)}, leaves more than noise.'
             return f'Something is missing that is none of the known effects, {place(found)}.{why}'
+
+
+def differing(found: Diagnosis) -> str:
+    """
+    Say how the runs differ; '' where one state of the hull fits all.
+    """
+    if not found.runs_differ:
+        return ''
+    effects = names_text(list(dict.fromkeys(each.effect for each in found.runs_differ)))
+    sizes = '; '.join(
+        f'{each.run}: {plus_minus(each.size.value, 2.0 * each.size.sd)}'
+        for each in found.runs_differ
+    )
+    name = found.runs_differ[0].parameter.replace('_', ' ')
+    return (
+        f'These runs differ: no one state of the hull fits all. {effects}, {name}: {sizes} (two '
+        'standard deviations). Sizes elsewhere are those of the last run.'
+    )
 
 
 def examined(found: Diagnosis) -> str:
@@ -129,13 +154,14 @@ def place(found: Diagnosis) -> str:
     if found.where is None:
         return 'nowhere'
     where = found.where
-    first, last = where.time_s
+    (first, last), (slow, fast) = where.time_s, where.speed_m_s
     since = 'of the record' if of_log_track(found) else 'after the stop'
     if last <= 0.0:
         first, last, since = -first, -last, 'before the stop'
     return (
         f'{_CHANNELS[where.channel]}, {first:.0f} to {last:.0f} s {since}, '
-        f'at {where.speed_m_s[0]:.1f} to {where.speed_m_s[1]:.1f} m/s'
+        f'at {slow / M_S_PER_KNOT:.1f} to {fast / M_S_PER_KNOT:.1f} knots ({slow:.1f} to '
+        f'{fast:.1f} m/s)'
     )
 
 
@@ -258,10 +284,23 @@ def quantity_text(quantity: Parameter) -> str:
 def _sized(effect: EffectEstimate) -> str:
     """Return an effect with its sizes."""
     sizes = ', '.join(
-        f'{quantity_text(quantity)} {size(quantity, effect.parameters[quantity.name])}'
+        f'{quantity_text(quantity)} {_on_board(quantity, effect.parameters[quantity.name])}'
         for quantity in LIBRARY[effect.name].parameters
     )
     return f'{names_text([effect.name])} ({sizes})'
+
+
+def _on_board(quantity: Parameter, found: Parameter) -> str:
+    """Return a size as it is read on board: speeds in knots, large forces in kN."""
+    told = size(quantity, found)
+    if found.sd == 0.0:
+        return told
+    if quantity.unit == 'm/s':
+        knots = plus_minus(found.value / M_S_PER_KNOT, 2.0 * found.sd / M_S_PER_KNOT)
+        return f'({knots}) knots = {told}'
+    if quantity.unit == 'N' and abs(found.value) >= _LARGE_N:
+        return f'({plus_minus(1e-3 * found.value, 2e-3 * found.sd)}) kN'
+    return told
 
 
 def _listed(candidates: Sequence[Candidate]) -> str:
