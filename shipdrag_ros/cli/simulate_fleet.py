@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import csv
 from collections import Counter
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +20,7 @@ from shipdrag_ros.cli.arguments import add_json, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.simulation.voyages import (
     DAY_NS,
     FLEET_START_NS,
@@ -33,6 +35,13 @@ from shipdrag_ros.simulation.voyages import (
 TRUTH = 'truth'
 _PATTERN = 'vitus_bering.yaml'
 _REFERENCE = 0.65  # of the highest speed of the baseline, where the truth is stated
+_PRICES = Economics(
+    fuel_usd_per_t=600.0,
+    sfoc_g_per_kwh=180.0,
+    propulsive_efficiency=0.65,
+    days_at_sea_per_year=240.0,
+    cleaning_usd=40_000.0,
+)
 _CUT = 0.6  # of a file that is cut off
 
 
@@ -91,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         raise SimulationError(f'{str(out)!r} is not empty; give a new folder')
     text = files('shipdrag_ros').joinpath('data', _PATTERN).read_text(encoding='utf-8')
     plan = plan_fleet(
-        Ship.from_yaml(text, subject=_PATTERN),
+        replace(Ship.from_yaml(text, subject=_PATTERN), economics=_PRICES),
         ships=options.ships,
         months=options.months,
         every_days=options.every,
@@ -175,8 +184,6 @@ def _truth_row(folder: str, planned: PlannedShip, each: PlannedRun) -> dict[str,
 
 def _added(each: PlannedRun, speed_m_s: float) -> float:
     """Return the added resistance of the hull alone, a fraction of the clean one's."""
-    from dataclasses import replace
-
     fouled = replace(each, scatter=1.0).fouled().resistance_n(speed_m_s)
     return float(np.asarray(fouled / each.ship.resistance_n(speed_m_s))) - 1.0
 

@@ -9,10 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from shipdrag_ros.display import day
 from shipdrag_ros.samples import Float64
 
 SPEED_SHARE = 0.75  # of the speed at the stop: inside what nearly every run covers
 FIRST_MONTHS_NS = 90 * 86_400_000_000_000
+YEAR_NS = 365.25 * 86_400e9
+_ALONE_NS = YEAR_NS
+_MANY_RUNS = 5  # of fewer each may stand alone
 _EARLIEST_NS = 631_152_000_000_000_000  # 1990: before it a clock was not set
 _MOST_SHARED = 0.5  # a reference speed must lie inside the range of at least this many runs
 _NOMINAL_TEMPERATURE_C = 15.0
@@ -105,6 +109,7 @@ def series_of(name: str, rows: Sequence[Row], *, service_speed_m_s: float | None
     with_baseline = [_at(row['clean_m_s2'], row, speed) for row in rows]
     baseline = any(np.isfinite(value) for value in with_baseline)
     points = [_point(row, speed, clean, baseline) for row, clean in zip(rows, with_baseline)]
+    points = _dated(points)
     masses = [row['displaced_volume_m3'] * row['water_density_kg_m3'] for row in rows]
     mass = float(np.median(masses)) if masses else np.nan
     if baseline:
@@ -183,6 +188,24 @@ def _point(row: Row, speed: float, clean: float, baseline: bool) -> Point:
     return replace(
         plain, value=r / unit - (1.0 if baseline else 0.0), sd=sd, sd_repeatable=repeatable
     )
+
+
+def _dated(points: list[Point]) -> list[Point]:
+    """Leave out a run that stands alone, years from all others: its clock was wrong."""
+    times = np.array([point.time_ns for point in points if point.used])
+    if len(times) < _MANY_RUNS:
+        return points
+    found = []
+    for point in points:
+        apart_ns = np.sort(np.abs(times - point.time_ns))[1]  # the first is its own
+        if point.used and apart_ns > _ALONE_NS:
+            reason = (
+                f'its date, {day(point.time_ns)}, is {apart_ns / YEAR_NS:.1f} years from every '
+                'other run: a wrong clock'
+            )
+            point = replace(point, reason=reason)
+        found.append(point)
+    return found
 
 
 def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:

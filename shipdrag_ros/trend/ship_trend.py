@@ -17,9 +17,8 @@ from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend.change_points import FoundStep, search
 from shipdrag_ros.trend.hull_state import Growth, HullState, Mixture, Runs, Steps
 from shipdrag_ros.trend.money import CleaningDate, cleaning_date, fuel_t_per_day, usd_per_year
-from shipdrag_ros.trend.series import Point, Row, Series, series_of
+from shipdrag_ros.trend.series import YEAR_NS, Point, Row, Series, series_of
 
-YEAR_NS = 365.25 * 86_400e9
 _OUTLIER = 0.5
 _SISTER_SD = 0.05  # of growth per year, between ships of one drawing
 _SISTER_TOLERANCE = 0.01

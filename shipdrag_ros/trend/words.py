@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from shipdrag_ros.display import M_S_PER_KNOT, Table, day
 from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.trend.ship_trend import YEAR_NS, ShipTrend
+from shipdrag_ros.trend.series import YEAR_NS
+from shipdrag_ros.trend.ship_trend import ShipTrend
 
 _CLEAN = {
     'ship file': 'the clean hull of the ship file',

@@ -64,6 +64,17 @@ def test_what_is_not_used_says_why(changes, reason):
     assert left.reason == reason
 
 
+def test_a_run_years_from_all_others_has_a_wrong_clock():
+    rows = [row(15.0 * number) for number in range(6)]
+    assert all(point.used for point in series_of('Test', rows).points)
+    first, *others = series_of('Test', [row(-4000.0), *rows]).points
+    assert 'years from every other run: a wrong clock' in first.reason
+    assert all(point.used for point in others)
+    # a second season is no wrong clock
+    later = [row(900.0 + 15.0 * number) for number in range(3)]
+    assert all(point.used for point in series_of('Test', rows + later).points)
+
+
 def test_without_a_baseline_the_first_months_are_the_clean_hull():
     rows = [row(day, added, clean_m_s2=None) for day, added in ((0, 0.1), (10, 0.1), (300, 0.32))]
     series = series_of('Test', rows)
