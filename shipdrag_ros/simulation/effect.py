@@ -38,12 +38,15 @@ class WithoutBaseline(StrEnum):
     LOG_TRACK
         The log held against the track over ground, on many courses and at many
         speeds. Such an effect acts alike on all ships.
+    ZEROS
+        Readings of exactly 0 while the ship moves, and right ones when she is faster.
     CONSTANT_FORCE
         A constant part of the deceleration beside a form of the resistance
         that is fitted to the coastdown itself.
     """
 
     LOG_TRACK = 'log_track'
+    ZEROS = 'zeros'
     CONSTANT_FORCE = 'constant_force'
 
 
