@@ -38,7 +38,9 @@ ESTIMATING = {'coastdown', 'estimation', 'diagnosis', 'simulation'}
 NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags': ESTIMATING | {'studies'},
     'bags.salvage': ESTIMATING | {'studies'},
-    **{name: {'studies'} for name in ('messages', 'replay', 'importing', 'node', 'report')},
+    **{
+        name: {'studies'} for name in ('messages', 'replay', 'importing', 'node', 'report', 'live')
+    },
 }
 GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them
 ROS = {

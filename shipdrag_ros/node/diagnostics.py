@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from shipdrag_ros.coastdown import InputHealth
+from shipdrag_ros.coastdown.health import Progress
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
 from shipdrag_ros.node.inputs import InputTopic
@@ -67,6 +68,13 @@ def state_status(
         names = ', '.join(topic.name for topic in motion)
         return _status('state', ERROR, f'no data: nothing on any of {names}', values)
     return _status('state', OK, monitor, values)
+
+
+def progress_values(progress: Progress) -> list[KeyValue]:
+    """
+    Say how far the monitor is, for the status of the state.
+    """
+    return [KeyValue(key=key, value=text) for key, text in progress.values.items()]
 
 
 def input_status(topic: InputTopic, health: InputHealth | None) -> DiagnosticStatus:

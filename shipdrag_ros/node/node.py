@@ -20,6 +20,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from shipdrag_ros.bags.durable import PartLimits
@@ -48,6 +49,9 @@ NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 INACTIVE = 'the node is not active'
+RELIABLE = ReliabilityPolicy.RELIABLE
+# who joins late still gets the last message
+LATCHED = QoSProfile(depth=1, reliability=RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class CoastdownNode(LifecycleNode):
@@ -58,6 +62,11 @@ class CoastdownNode(LifecycleNode):
     ----------
     arguments
         Command line, to check its parameter files.
+
+    Attributes
+    ----------
+    shown
+        Called with each message of /diagnostics, for a terminal; None: nobody looks.
 
     Raises
     ------
@@ -81,6 +90,8 @@ class CoastdownNode(LifecycleNode):
         self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
         self._outputs: dict[str, Publisher] = {}
+        self._ship_topic: Publisher | None = None
+        self.shown: Callable[[DiagnosticArray], None] | None = None
         self._survive_illegal_transitions()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
@@ -182,6 +193,8 @@ class CoastdownNode(LifecycleNode):
             topic.under(self.get_fully_qualified_name()): self._publisher(topic)
             for topic in OUTPUT_TOPICS
         }
+        self._ship_topic = self.create_publisher(String, '~/ship', LATCHED)
+        self._ship_topic.publish(String(data=self._ship.to_yaml()))
         self._input_topics = [
             InputTopic(
                 self,
@@ -242,21 +255,16 @@ class CoastdownNode(LifecycleNode):
             topic.close()
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
-        self._input_topics, self._outputs = [], {}
+        if self._ship_topic is not None:
+            self.destroy_publisher(self._ship_topic)
+        self._input_topics, self._outputs, self._ship_topic = [], {}, None
         self._ship = self._settings = self._recorder = None
         self._node_parameters.fixed = False
 
     # traffic
 
     def _publisher(self, topic: OutputTopic) -> Publisher:
-        if topic.latched:  # who joins late still gets the last curve
-            qos = QoSProfile(
-                depth=1,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            )
-        else:
-            qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+        qos = LATCHED if topic.latched else QoSProfile(depth=10, reliability=RELIABLE)
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:
@@ -305,6 +313,8 @@ class CoastdownNode(LifecycleNode):
                 for topic in self._input_topics
             ),
         ]
+        if monitor is not None:
+            message.status[0].values += diagnostics.progress_values(monitor.progress)
         if self._recorder is not None:
             message.status.append(diagnostics.recording_status(self._recorder.status()))
             self._log_recording(message.status[-1])
@@ -317,6 +327,8 @@ class CoastdownNode(LifecycleNode):
                 self._diagnosed = found
                 self.get_logger().info(f'diagnosis: {message.status[-1].message}')
         self._diagnostics.publish(message)
+        if self.shown is not None:
+            self.shown(message)
 
     def _log_recording(self, status: DiagnosticStatus) -> None:
         """Keep a trace of when a disk failed, and of when it was back."""
