@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number(0.0, FASTEST, above=True),
         default=10.0,
         metavar='X',
-        help='seconds of a bag in a second',
+        help='seconds of a bag in a second [-]',
     )
     parser.add_argument(
         '--ship',
