@@ -19,6 +19,8 @@ PACKAGE = ROOT / 'shipdrag_ros'
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
     ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
+    ('fields',),
+    ('parameter',),
     ('parameters', 'ship'),
     ('inference',),
     ('regression',),

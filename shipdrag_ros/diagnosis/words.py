@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, Named, Verdict
+from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, EffectEstimate, Verdict
 from shipdrag_ros.display import plus_minus
-from shipdrag_ros.ship import CoefficientBaseline, Ship, Uncertain
-from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 
 _CHANNELS = {
@@ -85,14 +85,39 @@ def examined(found: Diagnosis) -> str:
     return f'{said}; not examined: {" and ".join(unseen)}.' if unseen else f'{said}.'
 
 
+def facts(found: Diagnosis) -> list[str]:
+    """
+    Say which facts the data contradict, and which say nothing here, a line each.
+    """
+    told = []
+    for each in found.facts:
+        where = f' ({each.run})' if each.run else ''
+        if each.contradicted and each.wrong is not None:
+            instead = f', most probably {names_text(each.against)}' if each.against else ''
+            told.append(
+                f'The data contradict the fact `{each.fact}`{where}: {each.fact.words}. It is '
+                f'wrong with probability {probability(each.wrong)}{instead}; look at it again.'
+            )
+        elif each.wrong is None:
+            told.append(
+                f'The fact `{each.fact}`{where} is not used: it says nothing of the log against '
+                'the way over ground.'
+            )
+    return told
+
+
 def advice(found: Diagnosis) -> list[str]:
     """
     Return what would decide, a line each.
     """
     return [
         each.measure
-        if each.probability is None
-        else f'{each.measure}; decides with probability {probability(each.probability)}'
+        + (f'; costs {each.cost}' if each.cost else '')
+        + (
+            ''
+            if each.probability is None
+            else f'; decides with probability {probability(each.probability)}'
+        )
         for each in found.would_decide
     ]
 
@@ -199,7 +224,7 @@ def baseline(found: Diagnosis, ship: Ship | None) -> str:
     return f'{given.source or "of unstated source"}; {known} (two standard deviations, as stated)'
 
 
-def size(quantity: Quantity, found: Uncertain) -> str:
+def size(quantity: Parameter, found: Parameter) -> str:
     """
     Return a value with two standard deviations; what was a choice has none.
     """
@@ -212,7 +237,7 @@ def size(quantity: Quantity, found: Uncertain) -> str:
     return f'({text}) {quantity.unit}' if quantity.unit else text
 
 
-def quantity_text(quantity: Quantity) -> str:
+def quantity_text(quantity: Parameter) -> str:
     """
     Name a parameter without its unit.
     """
@@ -221,7 +246,7 @@ def quantity_text(quantity: Quantity) -> str:
     return name.replace('_', ' ')
 
 
-def _sized(effect: Named) -> str:
+def _sized(effect: EffectEstimate) -> str:
     """Return an effect with its sizes."""
     sizes = ', '.join(
         f'{quantity_text(quantity)} {size(quantity, effect.parameters[quantity.name])}'

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.diagnosis import Diagnosis, Trace, Verdict
+from shipdrag_ros.diagnosis import Diagnosis, Trace
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis import words as told
 from shipdrag_ros.diagnosis.score import Score
@@ -35,7 +35,8 @@ def write_diagnosis(
         Of coastdowns held against a stated baseline, on hidden data; None: not scored.
     """
     after = told.added(found)
-    shown = () if found.verdict is Verdict.UNKNOWN else found.best
+    shown = found.effects or tuple(each for one in found.candidates for each in one.effects)
+    sizes = diagnosis_cells.parameters(shown) if found.effects else diagnosis_cells.sizes(found)
     write_page(
         path,
         'diagnosis.html',
@@ -49,8 +50,10 @@ def write_diagnosis(
             diagnosis_pictures.probability_picture(told.answers(found)),
             'How probable each answer is.',
         ),
-        effects=tuple(LIBRARY[effect.name] for effect in shown),
-        parameters=diagnosis_cells.parameters(shown),
+        effects=tuple(LIBRARY[name] for name in dict.fromkeys(each.name for each in shown)),
+        parameters=sizes,
+        facts=diagnosis_cells.facts(found),
+        contradicted=told.facts(found),
         named=bool(found.effects),
         where=None if found.where is None else told.place(found),
         gaps=diagnosis_cells.gaps(found),

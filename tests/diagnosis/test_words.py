@@ -5,13 +5,15 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.diagnosis import Candidate, Diagnosis, Gap, Named, Verdict, Where
+from shipdrag_ros.diagnosis import Candidate, Diagnosis, EffectEstimate, Gap, Verdict, Where
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.words import answers, probability, sentence
-from shipdrag_ros.ship import Uncertain
+from shipdrag_ros.parameter import Parameter
 
-FOULING = Named('fouling', 0.9995, {'friction_factor': Uncertain(0.4013, 0.0121)})
-WAVES = Named('waves', 0.95, {'force_n': Uncertain(51234.0, 3000.0), 'from': Uncertain(-1.0, 0.0)})
+FOULING = EffectEstimate('fouling', 0.9995, {'friction_factor': Parameter(0.4013, 0.0121)})
+WAVES = EffectEstimate(
+    'waves', 0.95, {'force_n': Parameter(51234.0, 3000.0), 'from': Parameter(-1.0, 0.0)}
+)
 
 
 def diagnosis(
@@ -19,7 +21,7 @@ def diagnosis(
     *candidates: tuple[tuple[str, ...], float],
     nothing: float = 0.0,
     unnamed: float = 0.0,
-    effects: tuple[Named, ...] = (),
+    effects: tuple[EffectEstimate, ...] = (),
 ) -> Diagnosis:
     return Diagnosis(
         verdict=verdict,

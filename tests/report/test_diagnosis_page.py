@@ -11,14 +11,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import Advice, Candidate, CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.diagnosis import (
+    Advice,
+    Candidate,
+    CoastRun,
+    Diagnosis,
+    EffectEstimate,
+    Verdict,
+    diagnose,
+)
 from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.result import ToldFact
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.report import diagnosis_pictures
 from shipdrag_ros.report.diagnosis_page import write_diagnosis
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse
 
@@ -83,7 +93,11 @@ def test_the_score_of_the_method_stands_on_the_page(
 
 
 def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., Any]) -> None:
-    candidates = (Candidate(('current',), 0.6), Candidate(('log_offset',), 0.395))
+    offset = EffectEstimate('log_offset', 0.395, {'offset_m_s': Parameter(0.4321, 0.02)})
+    candidates = (
+        Candidate(('current',), 0.6, found.effects),
+        Candidate(('log_offset',), 0.395, (offset,)),
+    )
     decide = (Advice('a run on the reciprocal heading', 0.93), Advice('a speed log', None))
     page = written(
         replace(
@@ -96,13 +110,31 @@ def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., A
     )
     assert 'Missing is one of these: current (60.0 %), log offset (39.5 %).' in page.text
     assert 'a run on the reciprocal heading; decides with probability 93.0 %' in page.text
-    assert 'Of the most probable candidate' in page.text
+    assert 'Of each candidate, were it the one' in page.text
+    assert 'log offset 39.5 % offset_m_s 0.432 0.020' in page.text
+    assert 'u + offset' in page.text
 
 
-def test_what_is_unknown_has_no_size(found: Diagnosis, written: Callable[..., Any]) -> None:
+def test_what_is_unknown_is_none_of_the_candidates(
+    found: Diagnosis, written: Callable[..., Any]
+) -> None:
     page = written(replace(found, verdict=Verdict.UNKNOWN, effects=()))
-    assert 'How large it is' not in page.text
+    assert 'Of each candidate, were it the one' in page.text
     assert 'none of the known effects' in page.text
+
+
+def test_a_fact_that_the_data_contradict_stands_on_the_page(
+    found: Diagnosis, written: Callable[..., Any]
+) -> None:
+    told = (
+        ToldFact(Fact('deep_water'), '', 0.97, ('shallow_water',)),
+        ToldFact(Fact('shaft', 'free'), 'out', 0.01),
+    )
+    page = written(replace(found, facts=told))
+    assert 'The data contradict the fact `deep_water`' in page.text
+    assert 'wrong with probability 97.0 %, most probably shallow water' in page.text
+    assert 'contradict the fact `shaft' not in page.text
+    assert 'shaft=free out after the stop the shaft was free 1.0 %' in page.text
 
 
 def test_a_record_without_coastdown_has_a_page_without_traces(
