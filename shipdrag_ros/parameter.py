@@ -276,7 +276,11 @@ class Scale:
     of: Callable[[Any], float]
 
 
-ABSOLUTE = Scale('', lambda ship: 1.0)
+def _one(ship: Any) -> float:
+    return 1.0
+
+
+ABSOLUTE = Scale('', _one)  # no lambda: results are sent from process to process
 
 
 @dataclass(frozen=True)

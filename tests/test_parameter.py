@@ -3,12 +3,17 @@
 
 from __future__ import annotations
 
+import math
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
 
 from shipdrag_ros.parameter import (
+    Parameter,
     Prior,
     Shape,
     either_sign,
@@ -70,3 +75,23 @@ def test_a_baseline_that_is_far_off_costs_less_than_a_normal_one() -> None:
     assert stated.penalty(0.5) == pytest.approx(normal_one.penalty(0.5), abs=0.1)
     # twenty standard deviations off is no accident
     assert stated.penalty(20.0) > 40.0
+
+
+def test_a_parameter_can_be_sent_to_another_process() -> None:
+    one = Parameter(0.35, 0.02, name='friction_factor', prior=normal(0.2))
+    assert pickle.loads(pickle.dumps(one)) == one
+
+
+def test_a_heavy_tailed_density_is_a_mixture_that_adds_up_to_one() -> None:
+    prior = heavy_tailed(0.5)
+    assert quad(lambda x: math.exp(prior.log_density(x)), -20.0, 20.0)[0] == pytest.approx(1.0)
+    drawn = [prior.draw(np.random.default_rng(seed)) for seed in range(2000)]
+    # one in ten three times wider; N = 2000, seeds 0 to 1999: within four standard errors
+    assert np.std(drawn) == pytest.approx(0.5 * math.sqrt(0.9 + 0.1 * 9.0), rel=0.12)
+
+
+def test_a_flat_prior_cannot_be_drawn_from_and_a_choice_cannot_be_fitted() -> None:
+    with pytest.raises(ValueError, match='flat'):
+        flat().draw(np.random.default_rng(1))
+    with pytest.raises(ValueError, match='choice'):
+        Prior(Shape.CHOICE, 1.0, -1.0).at(0.0)

@@ -62,7 +62,9 @@ def _sized(effect: EffectEstimate) -> dict[str, Any]:
     return {
         'name': effect.name,
         'probability': effect.probability,
-        'parameters': {name: asdict(value) for name, value in effect.parameters.items()},
+        'parameters': {
+            name: {'value': size.value, 'sd': size.sd} for name, size in effect.parameters.items()
+        },
     }
 
 
