@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
 from starlette.requests import Request
@@ -123,8 +124,8 @@ class LivePage:
             return RedirectResponse('/', 303)
         if request.method == 'GET':
             return FileResponse(PAGE / 'login.html')
-        given = (await _body(request)).decode(errors='replace')
-        if not same(given.removeprefix('token=').strip(), self._token):
+        form = parse_qs((await _body(request)).decode(errors='replace'))
+        if not same(form.get('token', [''])[0].strip(), self._token):
             await asyncio.sleep(_WRONG_TOKEN_S)
             return FileResponse(PAGE / 'login.html', status_code=403)
         answer = RedirectResponse('/', 303)

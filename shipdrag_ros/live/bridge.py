@@ -76,6 +76,7 @@ class Bridge:
             case Samples(block):
                 self.trace.add(block)
                 self._recent.add(block)
+                self._note_course()
             case Health():
                 self._heard_s = now_s
                 self._take_health(heard)
@@ -136,11 +137,21 @@ class Bridge:
         """The latest r [m/s^2]."""
         return self._resistance
 
+    def _note_course(self) -> None:
+        second, course = self._now_s, self._recent.direction(self._now_s)
+        if course is not None and (not self._courses or self._courses[-1][0] != second):
+            self._courses.append((second, course))
+            while self._courses[0][0] < second - _COURSE_S:
+                self._courses.popleft()
+
     def _take_health(self, health: Health) -> None:
         self._health = health
         state = health.of('state')
         since = None if state is None else state.number('coastdown since')
         coasting = state is not None and state.values.get('monitor') == 'coastdown'
+        lead_s = None if state is None else state.number('steady lead')
+        if lead_s and not coasting:
+            self._lead_at_stop = lead_s
         if coasting and self._coast_ns is None and since:
             self._begin(int(since))  # heard from the middle on
         elif not coasting:
@@ -225,8 +236,6 @@ class Bridge:
         if state is not None and state.level >= ERROR and values.get('monitor') != 'coastdown':
             trouble = state.message
         lead_s = None if state is None else state.number('steady lead')
-        if coast_s is None and lead_s:
-            self._lead_at_stop = lead_s
         return Situation(
             silent_s=None if self._heard_s is None else now_s - self._heard_s,
             lifecycle=values.get('lifecycle', ''),
@@ -243,9 +252,10 @@ class Bridge:
         )
 
     def _ended(self) -> Ended | None:
-        if not self.past or not self._now_s:
+        own = [run for run in self.past if run.bag == self._bag]
+        if not own or not self._now_s:
             return None
-        last = self.past[-1]
+        last = own[-1]
         return Ended(
             by=last.ended_by,
             ago_s=self._now_s - last.end_ns * 1e-9,
@@ -326,10 +336,6 @@ class Bridge:
         second, coasting = self._now_s, now.coast_s is not None
         of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
         course = self._recent.direction(second)
-        if course is not None and (not self._courses or self._courses[-1][0] != second):
-            self._courses.append((second, course))
-            while self._courses[0][0] < second - _COURSE_S:
-                self._courses.popleft()
         before = self._course_at_stop if coasting else None
         if before is None and self._courses:
             before = self._courses[0][1]

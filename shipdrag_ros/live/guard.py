@@ -93,9 +93,7 @@ class Guard:
         return PlainTextResponse('A token is needed: open the page and give it there.\n', 401)
 
     def _is_known(self, host: str) -> bool:
-        name = urlsplit(f'//{host}').hostname if host else None
-        if name is None:
-            return False
+        name = _name_of(f'//{host}')
         try:
             ipaddress.ip_address(name)
         except ValueError:
@@ -125,10 +123,17 @@ def same(given: str, expected: str) -> bool:
     return hmac.compare_digest(given.encode(), expected.encode())
 
 
+def _name_of(address: str) -> str:
+    try:
+        return urlsplit(address).hostname or ''
+    except ValueError:  # half a bracket
+        return ''
+
+
 def _is_same_origin(headers: Headers) -> bool:
     origin = headers.get('origin')
     if origin is not None:
-        return urlsplit(origin).netloc == headers.get('host')
+        return origin.partition('://')[2] == headers.get('host')
     return headers.get('sec-fetch-site', 'same-origin') in ('same-origin', 'none')
 
 

@@ -55,7 +55,7 @@ class Timeline:
     Attributes
     ----------
     start_ns, end_ns
-        First and last time of arrival in the bag.
+        First time of arrival in the bag, and just after the last.
     done
         Whether all of it has been read.
     problem
@@ -65,7 +65,8 @@ class Timeline:
     def __init__(
         self, run: Run, ship: Ship, parameters: Parameters, *, ended: Ended | None = None
     ) -> None:
-        self.start_ns, self.end_ns = run.span_ns or (0, 0)
+        self.start_ns, last_ns = run.span_ns or (0, 0)
+        self.end_ns = last_ns + 1  # after the last message: what ends with the record
         self.done = False
         self.problem = ''
         self._run = run

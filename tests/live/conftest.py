@@ -88,7 +88,7 @@ class Viewer:
     def text(self, selector: str) -> str:
         return str(self.page.inner_text(selector))
 
-    def wait_for(self, selector: str, text: str, *, within_s: float = 60.0) -> str:
+    def wait_for(self, selector: str, text: str, *, within_s: float = 120.0) -> str:
         """Return what stands there once it has a text."""
         end_s = time.monotonic() + within_s
         while text not in (found := self.text(selector)):
@@ -193,7 +193,7 @@ def _serving(page: LivePage) -> Iterator[str]:
             thread.join()
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def serving() -> Callable[[LivePage], Any]:
     """A context that serves a page, and gives its address."""
     return _serving

@@ -98,7 +98,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     # the page's process is gone and comes again; the node does not notice
     port = url.rstrip('/').rpartition(':')[2]
     watch.kill()
-    viewer.wait_for('#lost', 'NO CONNECTION', within_s=20.0)
+    viewer.wait_for('#lost', 'NO CONNECTION', within_s=60.0)
     again = start('shipdrag_ros.cli', 'watch', '--port', port)
     again.wait_for('the page')
     viewer.page.wait_for_selector('#lost', state='hidden')
@@ -106,7 +106,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     viewer.wait_for('#curve-say', 'clean hull')
 
     assert node.stop() == 0
-    viewer.wait_for('#headline', 'NODE SILENT', within_s=20.0)
+    viewer.wait_for('#headline', 'NODE SILENT', within_s=60.0)
     assert again.stop() == 0
 
 
