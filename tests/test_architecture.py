@@ -21,7 +21,7 @@ PICTURE = (
     ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
     ('fields',),
     ('parameter',),
-    ('parameters', 'ship'),
+    ('parameters', 'ship', 'report'),
     ('inference',),
     ('regression',),
     ('estimation', 'simulation'),
@@ -29,8 +29,9 @@ PICTURE = (
     ('messages',),
     ('bags',),
     ('bags.salvage',),
-    ('node', 'replay', 'importing', 'fleet'),
-    ('report',),
+    ('node', 'replay', 'importing'),
+    ('fleet',),
+    ('trend',),
     ('live',),
     ('cli',),
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none
@@ -41,7 +42,8 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags': ESTIMATING | {'studies'},
     'bags.salvage': ESTIMATING | {'studies'},
     **{
-        name: {'studies'} for name in ('messages', 'replay', 'importing', 'node', 'report', 'live')
+        name: {'studies'}
+        for name in ('messages', 'replay', 'importing', 'node', 'fleet', 'trend', 'report', 'live')
     },
 }
 GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them
@@ -60,7 +62,13 @@ ROS = {
     'ament_index_python',
 }
 FILES = {'bags', 'bags.salvage'}
-ONLY_IN = {'mcap': FILES, 'rosbags': {'messages', *FILES}, **{name: {'node'} for name in ROS}}
+FLEET = ('dask', 'distributed', 'pyarrow', 'fsspec', 's3fs')
+ONLY_IN = {
+    'mcap': FILES,
+    'rosbags': {'messages', *FILES},
+    **{name: {'node'} for name in ROS},
+    **{name: {'fleet', 'trend'} for name in FLEET},  # no other verb pays for them
+}
 SOURCES = sorted(PACKAGE.rglob('*.py'))
 
 

@@ -35,6 +35,8 @@ from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.result import ToldFact
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation import words as estimate_words
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import (
     ReplayResult,
@@ -46,7 +48,6 @@ from shipdrag_ros.replay import (
 )
 from shipdrag_ros.replay.cuts import cut_lines
 from shipdrag_ros.replay.playback import SHIP_FILE
-from shipdrag_ros.report.diagnosis_page import write_diagnosis
 from shipdrag_ros.ship import Fact, RunSheet, Ship, parse_fact, run_sheet
 from shipdrag_ros.ship.facts import RATE, overriding, usage
 
@@ -118,8 +119,10 @@ def run(options: argparse.Namespace) -> int:
             f'no ship file is attached to {runs[0].run.name!r}, and --write needs one; give it '
             'with --ship FILE'
         )
-    _show(output, found)
+    _show(output, found, ship)
     if options.report is not None:
+        from shipdrag_ros.diagnosis.page import write_diagnosis  # pictures take long to import
+
         write_diagnosis(options.report, found, ship, score=Score.published())
         output.log(f'report in {options.report}')
     if options.write is not None and ship is not None and found.verdict is Verdict.NAMED:
@@ -162,7 +165,7 @@ def _diagnosed(
     else:
         found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
-    return replace(found, notes=(*found.notes, *unused)), seen.ship
+    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
 
 
 def _unused(found: Diagnosis, facts: Sequence[Fact]) -> Diagnosis:
@@ -209,12 +212,13 @@ def coasts_of(
 
 @dataclass(frozen=True)
 class _Found:
-    """The coastdowns of all bags, and of each bag without one its name and why."""
+    """The coastdowns of all bags, their estimates, and of each bag without one why."""
 
     coasts: list[CoastRun]
     ship: Ship
     parameters: Parameters
     without: tuple[str, ...]
+    estimates: tuple[Estimate, ...]
 
 
 def _found(
@@ -225,6 +229,7 @@ def _found(
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
     without: list[str] = []
+    estimates: list[Estimate] = []
     ship, parameters = given, None
     for each, window in runs:
         with output.progress(f'replaying {each.name}') as progress:
@@ -238,6 +243,7 @@ def _found(
             )
         _tell_cuts(output, result, window)
         windows = coast_windows(result)
+        estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
         for place, (_, found) in enumerate(windows, start=1):
@@ -245,7 +251,7 @@ def _found(
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
     assert ship is not None
     assert parameters is not None
-    return _Found(coasts, ship, parameters, tuple(without))
+    return _Found(coasts, ship, parameters, tuple(without), tuple(estimates))
 
 
 def _sheet(output: Output, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:
@@ -272,10 +278,13 @@ def _tell_cuts(output: Output, result: ReplayResult, window: Span | None) -> Non
             output.log(f'{name}: {line}')
 
 
-def _show(output: Output, found: Diagnosis) -> None:
+def _show(output: Output, found: Diagnosis, ship: Ship | None) -> None:
     if found.no_coastdown:
         output.say(found.no_coastdown)
     output.say(diagnosis_words.sentence(found))
+    if ship is not None:
+        for line in estimate_words.in_service(found.estimates, ship):
+            output.say(line)
     output.say(diagnosis_words.examined(found))
     if found.where is not None:
         output.say(f'Model and data disagree {diagnosis_words.place(found)}.')

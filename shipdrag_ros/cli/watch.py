@@ -87,8 +87,8 @@ def run(options: argparse.Namespace) -> int:
     """
     if options.store is not None:
         raise ShipdragError(
-            '--store: this version reads no store of a fleet; leave it out, and give a folder of '
-            'recorded bags with --earlier DIR'
+            '--store: this page shows one ship, and reads no store; for the fleet run '
+            'shipdrag trend STORE --report FILE.html, for earlier runs give --earlier DIR'
         )
     output = Output()
     token = _token(options.listen, options.token_file)

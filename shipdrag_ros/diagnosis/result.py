@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from shipdrag_ros.display import Table
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.facts import Fact
@@ -241,6 +243,8 @@ class Diagnosis:
         speaks of these alone.
     no_coastdown
         Where none is used: that none was found and why, a sentence.
+    estimates
+        r(v) of the coastdowns as measured, where they were estimated.
     facts
         All that were told, with what the data say of each.
     """
@@ -264,3 +268,27 @@ class Diagnosis:
     examined: tuple[str, ...] = ()
     no_coastdown: str = ''
     facts: tuple[ToldFact, ...] = ()
+    estimates: tuple[Estimate, ...] = ()
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what was found: the verdict, what was examined, where, and what the record shows.
+
+        Returns
+        -------
+        tuple of str
+            A paragraph each, the verdict first.
+        """
+        from shipdrag_ros.diagnosis import words  # it tells what this module holds
+
+        where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
+        told = (words.sentence(self), self.no_coastdown, words.examined(self), where)
+        return (*filter(None, told), *words.facts(self), *self.notes)
+
+    def table(self) -> Table:
+        """
+        Show how probable each answer is.
+        """
+        from shipdrag_ros.diagnosis import tables
+
+        return tables.probabilities(self)

@@ -13,6 +13,7 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.display import LIGHT_KG
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.fields import (
     declare,
@@ -35,7 +36,7 @@ from shipdrag_ros.ship.consistency import (
     slenderness,
 )
 from shipdrag_ros.ship.facts import Fact, fact_list
-from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
+from shipdrag_ros.ship.sections import Air, Economics, Propeller, Propulsion, StatedEffect, Water
 
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.225
@@ -71,6 +72,9 @@ class Ship:
     baseline: Baseline | None = declare(baseline(), 'expected resistance', default=None)
     effects: tuple[StatedEffect, ...] = declare(
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
+    )
+    economics: Economics | None = declare(
+        section(Economics), 'prices, for a trend over months', default=None
     )
     facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
 
@@ -146,6 +150,17 @@ class Ship:
     def slenderness(self) -> float:
         """L / V^(1/3)."""
         return slenderness(self.length_m, self.displaced_volume_m3)
+
+    def summary(self) -> str:
+        """
+        Return the ship in one line: name, length, displacement, mass.
+        """
+        light = self.mass_kg < LIGHT_KG
+        mass = f'{self.mass_kg:.4g} kg' if light else f'{self.mass_kg * 1e-3:,.0f} t'
+        return (
+            f'{self.name or "a ship without a name"}: length {self.length_m:g} m, displacement '
+            f'{self.displaced_volume_m3:g} m³ ({mass})'
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:

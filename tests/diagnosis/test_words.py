@@ -64,7 +64,7 @@ def diagnosis(
         ),
         (
             diagnosis(Verdict.NAMED, (('waves',), 0.95), effects=(WAVES,)),
-            'Missing in the model: waves (force (51200 ± 6000) N, from astern); probability '
+            'Missing in the model: waves (force (51.2 ± 6.0) kN, from astern); probability '
             '95.0 %.',
         ),
         (
@@ -80,13 +80,13 @@ def diagnosis(
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),
             'Something is missing that is none of the known effects, in the force on the ship, 12 '
-            'to 900 s after the stop, at 3.0 to 7.5 m/s.',
+            'to 900 s after the stop, at 5.8 to 14.6 knots (3.0 to 7.5 m/s).',
         ),
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.98)),
             'Something is missing that is none of the known effects, in the force on the ship, 12 '
-            'to 900 s after the stop, at 3.0 to 7.5 m/s. The likeliest of them, wind, leaves more '
-            'than noise.',
+            'to 900 s after the stop, at 5.8 to 14.6 knots (3.0 to 7.5 m/s). The likeliest of '
+            'them, wind, leaves more than noise.',
         ),
     ],
 )

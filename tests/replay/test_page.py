@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page stands alone, says everything and lets nothing in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
+from shipdrag_ros.replay.hulls import rank
+from shipdrag_ros.replay.page import write_report
+from shipdrag_ros.replay.run_result import RunResult
+
+ReadPage = Callable[[Path], Any]
+
+
+@pytest.fixture
+def page(simulated: RunResult, tmp_path: Path, read_page: ReadPage) -> Any:
+    write_report(tmp_path / 'report.html', [simulated])
+    return read_page(tmp_path / 'report.html')
+
+
+def test_the_page_needs_no_network(page: Any) -> None:
+    assert page.links == []
+    assert len(page.images) == 5
+    assert all(image.startswith('data:image/svg+xml;base64,') for image in page.images)
+
+
+@pytest.mark.parametrize(
+    'words',
+    [
+        'Resistance from coastdowns: test ship',
+        'sea trial.mcap',
+        'the specific resistance is 0.01587 ± 0.00083 m/s²',
+        'the minimum speed was reached',
+        's1_joint: orthogonal polynomial',
+        'true r [m/s²]',
+        '2 nan, 1 late',
+        'All 100 outputs in the bag are identical',
+        'A note of the estimator <b>itself</b>.',
+        'How to read the band',
+    ],
+)
+def test_the_page_says(page: Any, words: str) -> None:
+    assert words in page.text
+
+
+def test_names_from_outside_are_text_and_nothing_else(
+    run: RunResult, tmp_path: Path, read_page: ReadPage
+) -> None:
+    evil = '<script>alert(1)</script>'
+    write_report(
+        tmp_path / 'report.html',
+        [replace(run, bag=evil, ship=replace(run.ship, name=evil))],
+    )
+    assert '<script' not in (tmp_path / 'report.html').read_text(encoding='utf-8')
+    assert evil in read_page(tmp_path / 'report.html').text
+
+
+def test_a_record_without_coastdown_is_a_result(
+    run: RunResult, tmp_path: Path, read_page: ReadPage
+) -> None:
+    dismissed = NotCoastdown(0, 60 * 10**9, Dismissal.TURN, 'the ship turned by 90 deg')
+    none = replace(run, coastdowns=(), not_coastdowns=(dismissed,), steady_lead_s=345.0)
+    write_report(tmp_path / 'report.html', [none])
+    page = read_page(tmp_path / 'report.html')
+    assert 'No coastdown found: longest steady sailing 345 s; one stretch was looked' in page.text
+    assert 'the ship turned by 90 deg' in page.text
+    assert page.images == []
+
+
+def test_a_coastdown_without_estimate_says_why(
+    run: RunResult, tmp_path: Path, read_page: ReadPage
+) -> None:
+    failed = replace(run.coastdowns[0], estimate=None, failure='only 3 samples')
+    write_report(tmp_path / 'report.html', [replace(run, coastdowns=(failed,))])
+    assert 'only 3 samples' in read_page(tmp_path / 'report.html').text
+
+
+def test_without_a_table_of_orders_none_is_drawn(
+    run: RunResult, tmp_path: Path, read_page: ReadPage
+) -> None:
+    (coastdown,) = run.coastdowns
+    assert coastdown.estimate is not None
+    averaged = replace(coastdown, estimate=replace(coastdown.estimate, order=None, orders=()))
+    write_report(tmp_path / 'report.html', [replace(run, coastdowns=(averaged,))])
+    page = read_page(tmp_path / 'report.html')
+    assert len(page.images) == 4
+    assert 'number of coefficients' not in page.text
+    assert 'averaged over models' in page.text
+
+
+def test_hulls_compared_come_first(run: RunResult, tmp_path: Path, read_page: ReadPage) -> None:
+    other = replace(run, ship=replace(run.ship, name='Rowdy'))
+    write_report(tmp_path / 'report.html', [run, other], ranking=rank([run, other]))
+    page = read_page(tmp_path / 'report.html')
+    assert page.text.index('Hulls compared') < page.text.index('sea trial.mcap')
+    assert len(page.images) == 11
+
+
+def test_coastdowns_of_one_ship_are_shown_together(
+    run: RunResult, tmp_path: Path, read_page: ReadPage
+) -> None:
+    write_report(tmp_path / 'report.html', [run, replace(run, bag='again.mcap')])
+    page = read_page(tmp_path / 'report.html')
+    assert page.text.index('All coastdowns together') < page.text.index('sea trial.mcap')
+    assert 'run to run' in page.text
+    assert len(page.images) == 12
+    write_report(tmp_path / 'one.html', [run])
+    assert 'All coastdowns together' not in read_page(tmp_path / 'one.html').text
+
+
+def test_a_warning_about_the_bag_is_shown(
+    run: RunResult, tmp_path: Path, read_page: ReadPage
+) -> None:
+    write_report(tmp_path / 'report.html', [replace(run, warnings=('part 2 is missing',))])
+    assert 'Warning: part 2 is missing' in read_page(tmp_path / 'report.html').text
