@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 M_S_PER_KNOT = 1852.0 / 3600.0
+# what `float` takes besides, 1_000 or nan or infinity, is no measured number
+NUMBER = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
 """Below it a ship is told in kg and N, above in t and kN."""
 
@@ -39,10 +42,13 @@ class Picture:
         The picture, as `data:`.
     caption
         What it shows, and what a reader should see in it.
+    wide
+        Whether it needs the whole width of a page; on a phone it scrolls in its box.
     """
 
     uri: str
     caption: str
+    wide: bool = False
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,16 @@ class Section:
     pictures: Sequence[Picture] = ()
     tables: Sequence[tuple[str, Table]] = ()
     entry: str = ''
+
+
+def spreadsheet_text(text: str) -> str:
+    """
+    Return a text that no spreadsheet takes for a formula.
+
+    A file name may begin with `=`; a quote before it makes it text. Numbers are
+    written as numbers and need none.
+    """
+    return f"'{text}" if text.startswith(('=', '+', '-', '@', '\t', '\r')) else text
 
 
 def utc(time_ns: int) -> str:

@@ -18,7 +18,7 @@ PACKAGE = ROOT / 'shipdrag_ros'
 
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
-    ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
+    ('errors', 'samples', 'display', 'compiled', 'strict_yaml', 'plain_file'),
     ('fields',),
     ('parameter',),
     ('parameters', 'ship', 'report'),
@@ -27,7 +27,7 @@ PICTURE = (
     ('estimation', 'simulation'),
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
-    ('bags',),
+    ('bags', 'nmea'),
     ('bags.salvage',),
     ('node', 'replay', 'importing'),
     ('fleet',),
@@ -43,10 +43,22 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags.salvage': ESTIMATING | {'studies'},
     **{
         name: {'studies'}
-        for name in ('messages', 'replay', 'importing', 'node', 'fleet', 'trend', 'report', 'live')
+        for name in (
+            *(
+                'messages',
+                'nmea',
+                'replay',
+                'importing',
+                'node',
+                'fleet',
+                'trend',
+                'report',
+                'live',
+            ),
+        )
     },
 }
-GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them
+GROUND = {'errors', 'compiled', 'strict_yaml', 'plain_file'}  # known by the modules that need them
 ROS = {
     'rclpy',
     'lifecycle_msgs',

@@ -26,7 +26,8 @@ from shipdrag_ros.samples import INPUTS, Block, concatenate
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md')))
 PROGRAMS = ('shipdrag', 'coastdown_node', 'ros2')
-NOT_HERE = ('ros2 launch',)  # needs ROS from apt
+# needs ROS from apt, and keys
+NOT_HERE = ('ros2 launch', 'ros2 run shipdrag_ros coastdown_node --ros-args --enclave')
 DATA = 'SHIPDRAG_DATA'
 LIMIT_S = 120.0
 

@@ -151,8 +151,7 @@ def _diagnosis(result: ReplayResult, hull: _Hull, window: Window) -> tuple[Diagn
     try:
         if hull.ship.baseline is None:
             return diagnose_fitted(runs, hull.ship), ''
-        found = diagnose(runs, hull.ship, result.parameters, facts=hull.ship.facts)
-        return found, ''
+        return diagnose(runs, hull.ship, result.parameters, advise=False), ''
     except (DiagnosisError, EstimationError) as error:
         return None, str(error)
 

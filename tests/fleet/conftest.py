@@ -35,14 +35,14 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 @pytest.fixture
 def fleet_folder(bags: list[Path], tmp_path: Path) -> Path:
-    """Sound bags, and all kinds of others: 4 recordings of one ship, 5 that cannot be read."""
+    """Sound bags, and all kinds of others: 3 recordings of one ship, 5 that cannot be read."""
     folder = tmp_path / 'fleet'
     bering, other = folder / 'bering' / '2026', folder / 'other'
     bering.mkdir(parents=True)
     other.mkdir()
     shutil.copy(SHIP, folder / 'bering' / 'ship.yaml')
     (folder / 'bering' / 'events.csv').write_text('date,kind,note\n2026-02-10,cleaning,Lisbon\n')
-    for path in bags:
+    for path in bags[1:]:  # without a diagnosis, which takes long
         shutil.copy(path, bering)
     shutil.copy(bags[1], bering / 'the same.mcap')
     (bering / 'notes.txt').write_text('no bag')

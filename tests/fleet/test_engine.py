@@ -56,48 +56,48 @@ def silent(text: str, done: int, total: int) -> None:
 
 
 def test_the_verb_from_bags_to_rows_and_again(
-    fleet_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    fleet_folder: Path, tmp_path: Path, engine: Engine, capsys: pytest.CaptureFixture[str]
 ) -> None:
     store, result = tmp_path / 'store', tmp_path / 'result.json'
-    line = ['fleet', str(fleet_folder), '-o', str(store), '--workers', '1']
-    assert main([*line, '--json', str(result)]) == 1  # some bags were skipped
+    line = ['fleet', str(fleet_folder), '-o', str(store)]
+    assert main([*line, '--workers', '1', '--json', str(result)]) == 1  # some bags were skipped
     said, progress = capsys.readouterr()
-    assert '7 bag(s) found; 1 other file(s) left alone' in progress
+    assert '6 bag(s) found; 1 other file(s) left alone' in progress
     assert "'bering/2026/the same.mcap' has the content of 'bering/2026/run 1.mcap'" in said
     assert '5 skipped' in said
     for name in ('empty.mcap', 'fore\\nign.mcap', 'pipe.mcap', 'endless.mcap', 'gone.mcap'):
         assert f"  'other/{name}': " in said
     found = json.loads(result.read_text())
-    assert found['ships'] == [{'name': 'Vitus Bering', 'bags': 4, 'coastdowns': 4}]
-    assert (found['new'], len(found['skipped']), found['notes']) == (6, 5, [])
+    assert found['ships'] == [{'name': 'Vitus Bering', 'bags': 3, 'coastdowns': 3}]
+    assert (found['new'], len(found['skipped']), found['notes']) == (5, 5, [])
     rows = read_coastdowns(store).to_pylist()
-    assert [row['bag'] for row in rows] == [f'bering/2026/run {n}.mcap' for n in range(4)]
-    assert [row['error'] for row in rows] == [None] * 4
+    assert [row['bag'] for row in rows] == [f'bering/2026/run {n}.mcap' for n in (1, 2, 3)]
+    assert [row['error'] for row in rows] == [None] * 3
     assert ship_texts(store)['Vitus Bering']['events.csv'].splitlines()[1:] == [
         '2026-02-10T00:00:00Z,cleaning,Lisbon'
     ]
 
+    # what is done is not done again, and a cluster that exists is used
     before = {path: path.stat().st_mtime_ns for path in (store / COASTDOWNS).rglob('*.parquet')}
     bytes_before = contents(store)
-    assert main([*line, '--json', str(result)]) == 1
+    assert main([*line, '--scheduler', engine.address, '--json', str(result)]) == 1
     assert json.loads(result.read_text())['new'] == 0
-    assert '0 bag(s) replayed now, 6 done before' in capsys.readouterr().out
+    assert '0 bag(s) replayed now, 5 done before' in capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert contents(store) == bytes_before
 
-    # a worker that is killed amid the work changes no byte
+    # workers that are killed amid the work change no byte
     killed: list[int] = []
-    again = tmp_path / 'again'
-    with Engine(workers=2) as engine:
 
-        def kill(text: str, done: int, total: int) -> None:
-            if text.startswith('replaying') and done < total and len(killed) < 2:
-                killed.extend(list(engine.pids().values())[:1])
-                os.kill(killed[-1], signal.SIGKILL)
+    def kill(text: str, done: int, total: int) -> None:
+        if text.startswith('replaying') and done < total and len(killed) < 2:
+            killed.extend(list(engine.on_each(os.getpid).values())[:1])
+            os.kill(killed[-1], signal.SIGKILL)
 
-        update(find([str(fleet_folder)]), Store(again), engine, kill)
+    again = Store(tmp_path / 'again')
+    update(find([str(fleet_folder)]), again, engine, kill)
     assert killed
-    assert contents(again) == bytes_before
+    assert contents(again.path) == bytes_before
 
 
 def test_only_what_kills_its_worker_by_itself_is_given_up(engine: Engine) -> None:
@@ -133,12 +133,7 @@ def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(
     )
 
 
-def test_a_scheduler_that_exists_is_used_and_one_that_does_not_is_told(
-    bags: list[Path], tmp_path: Path, engine: Engine, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    line = ['fleet', str(bags[1]), '-o', str(tmp_path / 'store'), '--scheduler', engine.address]
-    assert main(line) == 0
-    assert len(read_coastdowns(tmp_path / 'store')) == 1
+def test_a_scheduler_that_cannot_be_reached_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('shipdrag_ros.fleet.engine._CONNECT_S', 0.5)
     with (
         pytest.raises(FleetError, match='cannot be reached'),
