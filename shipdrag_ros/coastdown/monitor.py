@@ -31,7 +31,7 @@ from shipdrag_ros.coastdown.events import (
     Update,
 )
 from shipdrag_ros.coastdown.examination import estimate_examined
-from shipdrag_ros.coastdown.health import InputHealth, input_health
+from shipdrag_ros.coastdown.health import InputHealth, Progress, input_health
 from shipdrag_ros.coastdown.kernel import Stop, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
 from shipdrag_ros.coastdown.onset import Candidate, Doubt, Verdict, judge, propose
@@ -141,6 +141,18 @@ class Monitor:
         lead = int(self._memory.watch.lead[1])
         # the first slope is that of what came before, two thirds of a window at least
         return float(lead + 2 * self._tuning.slopes.width // 3) if lead else 0.0
+
+    @property
+    def progress(self) -> Progress:
+        """How long the ship has been steady by now, and since when she coasts."""
+        watch = self._memory.watch
+        used_s = self._parameters.steady_s
+        steady_s = 0.0
+        if int(watch.lead[0]) != NEVER and self._onset is None:
+            seconds = int(watch.seen[0]) - int(watch.lead[0]) + 2 * self._tuning.slopes.width // 3
+            steady_s = min(float(seconds), used_s)
+        since_ns = None if self._onset is None else self._onset.start_ns
+        return Progress(steady_s, used_s, since_ns)
 
     @property
     def state(self) -> State:

@@ -19,6 +19,7 @@ from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from shipdrag_ros.bags.durable import PartLimits
@@ -46,6 +47,9 @@ NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 INACTIVE = 'the node is not active'
+RELIABLE = ReliabilityPolicy.RELIABLE
+# who joins late still gets the last message
+LATCHED = QoSProfile(depth=1, reliability=RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class CoastdownNode(LifecycleNode):
@@ -56,6 +60,11 @@ class CoastdownNode(LifecycleNode):
     ----------
     arguments
         Command line, to check its parameter files.
+
+    Attributes
+    ----------
+    shown
+        Called with each message of /diagnostics, for a terminal; None: nobody looks.
 
     Raises
     ------
@@ -83,6 +92,7 @@ class CoastdownNode(LifecycleNode):
         self._mailbox = Mailbox((), ahead=False)
         self._watching: Watching | None = None
         self._outputs: dict[str, Publisher] = {}
+        self.shown: Callable[[DiagnosticArray], None] | None = None
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
@@ -171,6 +181,8 @@ class CoastdownNode(LifecycleNode):
             topic.under(self.get_fully_qualified_name()): self._publisher(topic)
             for topic in OUTPUT_TOPICS
         }
+        self._outputs['ship'] = self.create_publisher(String, '~/ship', LATCHED)
+        self._outputs['ship'].publish(String(data=self._ship.to_yaml()))
         self._input_topics = [
             InputTopic(
                 self,
@@ -256,14 +268,7 @@ class CoastdownNode(LifecycleNode):
     # traffic
 
     def _publisher(self, topic: OutputTopic) -> Publisher:
-        if topic.latched:  # who joins late still gets the last curve
-            qos = QoSProfile(
-                depth=1,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            )
-        else:
-            qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+        qos = LATCHED if topic.latched else QoSProfile(depth=10, reliability=RELIABLE)
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:
@@ -334,6 +339,8 @@ class CoastdownNode(LifecycleNode):
             hardware_id='' if self._ship is None else self._ship.name,
         )
         self._diagnostics.publish(message)
+        if self.shown is not None:
+            self.shown(message)
 
     def _doubts(self) -> dict[str, str]:
         """Say what is odd about inputs besides what became of their readings."""
@@ -363,6 +370,7 @@ class CoastdownNode(LifecycleNode):
             now_ns,
             self._simulated,
             candidates=hint,
+            progress=None if session is None else session.monitor.progress,
             steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
             steady_needed_s=0.0
             if self._settings is None

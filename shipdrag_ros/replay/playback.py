@@ -137,12 +137,28 @@ def replay(
     ShipFileError, ParameterError
         If those attached to the bag cannot be used.
     """
-    if not any(topic.input for topic in run.topics):
-        raise BagError(_no_input(run))
-    used_ship, used_parameters = _ship(run, ship), _parameters(run, parameters)
+    used_ship, used_parameters = settings_of(run, ship, parameters)
     if window is not None:
         return _in_window(run, used_ship, used_parameters, window)
     return _as_on_board(run, used_ship, used_parameters, progress)
+
+
+def settings_of(
+    run: Run, ship: Ship | None = None, parameters: Parameters | None = None
+) -> tuple[Ship, Parameters]:
+    """
+    Return what a run is replayed with: what is given, else what is attached to it.
+
+    Raises
+    ------
+    BagError
+        If the run has no input, or no ship file where none is given.
+    ShipFileError, ParameterError
+        If those attached cannot be used.
+    """
+    if not any(topic.input for topic in run.topics):
+        raise BagError(_no_input(run))
+    return _ship(run, ship), _parameters(run, parameters)
 
 
 def _no_input(run: Run) -> str:
