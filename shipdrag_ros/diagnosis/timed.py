@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.estimation.window import Series
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.samples import Float64
 
 _OUTLIER = 5.0  # robust standard deviations
-_MAD_TO_SD = 1.4826
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Timed:
         """Return the mean of all, and of each half, without outliers."""
         value = np.asarray(self.value, np.float64)
         away = np.abs(value - np.median(value))
-        keep = away <= _OUTLIER * _MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
+        keep = away <= _OUTLIER * MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
         edges = np.array([-np.inf, middle_s, np.inf])
         halves = bin_means(self.time_s[keep], value[keep], edges)[1]
         return float(value[keep].mean()), float(halves[0]), float(halves[-1])
