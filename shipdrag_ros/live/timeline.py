@@ -16,13 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.bags.run import ResetMark, Run
+from shipdrag_ros.bags.run import Mark, Run
 from shipdrag_ros.coastdown import InputHealth, Monitor
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.messages import outputs
 from shipdrag_ros.messages.heard import OK, STALE, WARN, Health, Heard, Output, Samples, Status
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay.playback import feed
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
@@ -106,13 +107,12 @@ class Timeline:
             if self._stop.is_set():
                 return
             heard: list[Heard] = []
-            if isinstance(piece, ResetMark):
-                at_ns = piece.receive_ns
-                heard += self._told(monitor, monitor.reset(at_ns, piece.reason))
-            else:
+            if isinstance(piece, Block):
                 at_ns = int(piece.receive_ns[-1])
                 heard.append(Samples(piece))
-                heard += self._told(monitor, monitor.update(piece))
+            else:
+                at_ns = piece.receive_ns
+            heard += self._told(monitor, feed(monitor, piece))
             if at_ns - health_ns >= _HEALTH_NS or len(heard) > 1:
                 health_ns = at_ns
                 heard.append(_health(monitor, at_ns))
@@ -121,10 +121,10 @@ class Timeline:
         self._add(self.end_ns, [*last, _health(monitor, self.end_ns)])
         self.done = True
 
-    def _pieces(self) -> Iterator[Block | ResetMark]:
+    def _pieces(self) -> Iterator[Block | Mark]:
         """Yield the inputs, a second of arrival at a time."""
         for item in self._run.inputs():
-            if isinstance(item, ResetMark):
+            if not isinstance(item, Block):
                 yield item
                 continue
             seconds = item.receive_ns // SECOND_NS
