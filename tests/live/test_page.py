@@ -39,7 +39,10 @@ LARGEST_BYTES = 150_000
 def violations(page: Any) -> list[str]:
     """What axe finds wrong with a page."""
     axe = pytest.importorskip('axe_playwright_python.sync_playwright')
-    return [found['id'] for found in axe.Axe().run(page).response['violations']]
+    return [
+        f'{found["id"]}: {found["nodes"][0]["target"]}'
+        for found in axe.Axe().run(page).response['violations']
+    ]
 
 
 def test_a_coastdown_over_topics_from_steady_to_verdict(
