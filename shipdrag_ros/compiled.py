@@ -239,7 +239,7 @@ def _short(text: str) -> str:
 def _folder(module: str) -> Path | None:
     """Return where a module's compiled functions are kept; None if nowhere."""
     package, _, name = module.partition('.')
-    root = _root() if package == _NAME else None
+    root = cache_root() if package == _NAME else None
     if root is None:
         return None
     try:
@@ -305,8 +305,10 @@ def _compiler() -> tuple[object, ...]:
 
 
 @cache
-def _root() -> Path | None:
-    """Return the folder that compiled code is kept in; None if none can be written."""
+def cache_root() -> Path | None:
+    """
+    Return the folder that compiled code is kept in; None if none can be written.
+    """
     told = []
     for path, own in _places():
         try:

@@ -54,6 +54,7 @@ VERBS = (
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
     Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
     Verb('import', '.import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
+    Verb('doctor', '.doctor', 'what of the installation works, and what to do about the rest'),
     Verb('info', '.info', 'what is in a bag'),
     Verb('check', '.check', 'is a bag sound'),
     Verb('recover', '.recover', 'save what is whole in a damaged bag'),

@@ -42,6 +42,7 @@ EXAMPLES = {
         '--map position=x,y:km',
         'shipdrag import log.csv -o globe.mcap --rate 1 --map position=lat,lon:deg',
     ),
+    'doctor': ('shipdrag doctor', 'shipdrag doctor --out records --json'),
     'info': ('shipdrag info run.mcap',),
     'check': ('shipdrag check run.mcap --json check.json',),
     'recover': ('shipdrag recover damaged.mcap -o saved.mcap',),

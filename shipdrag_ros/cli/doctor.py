@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag doctor`: what of the installation works, and what to do about the rest."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+import platform
+import shutil
+import socket
+import sys
+from collections.abc import Iterator
+from enum import Enum
+from pathlib import Path
+from typing import NamedTuple
+
+from shipdrag_ros import __version__
+from shipdrag_ros.cli.arguments import add_json
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import Table
+
+BROKEN = 1
+_PAGE_PORT = 8088
+_LITTLE_BYTES = 2e9  # a week of three inputs at 10 Hz
+_SYNCHRONISED = Path('/run/systemd/timesync/synchronized')
+_NEEDED = ('numpy', 'scipy', 'numba', 'mcap', 'rosbags', 'pynmeagps', 'ruamel.yaml', 'matplotlib')
+_OPTIONAL = {  # module: what does not work without it
+    'rclpy': 'node, demo, and watch over a running node',
+    'starlette': 'watch',
+    'uvicorn': 'watch',
+    'serial': 'node --nmea serial:...',
+    'distributed': 'fleet',
+    'pyarrow': 'fleet and trend',
+    's3fs': 'fleet over s3://',
+    'duckdb': 'trend --sql',
+}
+
+
+class State(Enum):
+    """How a thing is."""
+
+    FINE = 'fine'
+    LOOK = 'look'
+    BROKEN = 'BROKEN'
+
+
+class Finding(NamedTuple):
+    """What was looked at, how it is, and what to do; '' where nothing is to be done."""
+
+    what: str
+    state: State
+    found: str
+    do: str = ''
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Look at the installation: Python, packages, ROS 2, where compiled code is kept, the '
+        'port of the page, disk and clock. Changes nothing. Exit status: 0 all works, 1 '
+        'something is broken.'
+    )
+    parser.add_argument(
+        '--out',
+        type=Path,
+        default=Path(),
+        metavar='DIR',
+        help='where recordings would go (default: this folder)',
+    )
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Look, and say what to do.
+    """
+    output = Output(options.json)
+    found = list(findings(options.out))
+    output.table(
+        Table(
+            ('what', 'state', 'found', 'what to do'),
+            tuple((each.what, each.state.value, each.found, each.do or '-') for each in found),
+        )
+    )
+    broken = any(each.state is State.BROKEN for each in found)
+    output.json(
+        {
+            'works': not broken,
+            'findings': [
+                {
+                    'what': each.what,
+                    'state': each.state.value.lower(),
+                    'found': each.found,
+                    'do': each.do or None,
+                }
+                for each in found
+            ],
+        }
+    )
+    return BROKEN if broken else 0
+
+
+def findings(out: Path) -> Iterator[Finding]:
+    """
+    Look at everything.
+
+    Parameters
+    ----------
+    out
+        Where recordings would go.
+
+    Yields
+    ------
+    Finding
+    """
+    yield Finding(
+        'shipdrag_ros', State.FINE, f'{__version__} on Python {platform.python_version()}'
+    )
+    yield _machine()
+    yield from _packages()
+    yield _discovery()
+    yield _compiled()
+    yield _port(_PAGE_PORT)
+    yield _disk(out)
+    yield _clock()
+
+
+def _machine() -> Finding:
+    if platform.machine() in ('x86_64', 'AMD64'):
+        return Finding('machine', State.FINE, f'{platform.machine()}, {os.cpu_count()} cores')
+    return Finding(
+        'machine',
+        State.LOOK,
+        platform.machine(),
+        'the lock file is tried on x86-64 alone; without ROS most of it works elsewhere',
+    )
+
+
+def _packages() -> Iterator[Finding]:
+    missing = [name for name in _NEEDED if not _is_there(name)]
+    if missing:
+        yield Finding('packages', State.BROKEN, f'missing: {", ".join(missing)}', 'make env')
+    else:
+        yield Finding('packages', State.FINE, f'all {len(_NEEDED)} that every verb needs')
+    for name, without in _OPTIONAL.items():
+        if _is_there(name):
+            yield Finding(name, State.FINE, 'there')
+        else:
+            do = 'pip install .[ros], or source ROS 2 Jazzy' if name == 'rclpy' else 'make env'
+            yield Finding(name, State.LOOK, f'missing; does not work: {without}', do)
+
+
+def _is_there(name: str) -> bool:
+    try:
+        return importlib.util.find_spec(name) is not None
+    except (ImportError, ValueError):
+        return False
+
+
+def _discovery() -> Finding:
+    told = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
+    domain = os.environ.get('ROS_DOMAIN_ID', '0')
+    if told:
+        return Finding('ROS discovery', State.FINE, f'{told}, domain {domain}, by the environment')
+    return Finding(
+        'ROS discovery',
+        State.FINE,
+        f'not set, domain {domain}: shipdrag node hears this machine alone',
+        'to hear the network: shipdrag node --network',
+    )
+
+
+def _compiled() -> Finding:
+    from shipdrag_ros.compiled import CACHE_DIR, cache_root  # numba takes long to import
+
+    root = cache_root()
+    if root is None:
+        do = f'set {CACHE_DIR} to a folder that can be written'
+        return Finding('compiled code', State.LOOK, 'not kept: each start compiles anew', do)
+    modules = sum(each.is_dir() for each in root.iterdir())
+    if not modules:
+        return Finding('compiled code', State.LOOK, f'none yet in {root}', 'make warm, once')
+    return Finding('compiled code', State.FINE, f'of {modules} modules in {root}')
+
+
+def _port(port: int) -> Finding:
+    with socket.socket() as probe:
+        try:
+            probe.bind(('127.0.0.1', port))
+        except OSError:
+            do = 'a page may run there already; else shipdrag watch --port N'
+            return Finding(f'port {port}', State.LOOK, 'in use', do)
+    return Finding(f'port {port}', State.FINE, 'free for shipdrag watch')
+
+
+def _disk(out: Path) -> Finding:
+    place = next(each for each in (out.absolute(), *out.absolute().parents) if each.exists())
+    if not os.access(place, os.W_OK):
+        return Finding('disk', State.BROKEN, f'{place} cannot be written', 'give --out DIR')
+    free = shutil.disk_usage(place).free
+    if free < _LITTLE_BYTES:
+        do = 'make room, or bound the recordings: shipdrag node --keep-bytes N'
+        return Finding('disk', State.LOOK, f'{free / 1e9:.1f} GB free in {place}', do)
+    return Finding('disk', State.FINE, f'{free / 1e9:.0f} GB free in {place}')
+
+
+def _clock() -> Finding:
+    if sys.platform != 'linux' or not _SYNCHRONISED.parent.exists():
+        do = 'see to it that one does (GNSS or NTP): runs are dated by this clock'
+        return Finding('clock', State.LOOK, 'not known whether anything sets it', do)
+    if not _SYNCHRONISED.exists():
+        return Finding('clock', State.LOOK, 'systemd has not set it yet', 'timedatectl status')
+    return Finding('clock', State.FINE, 'set by systemd-timesyncd')
