@@ -41,7 +41,7 @@ types: env
 	$(BIN)/mypy
 
 tests: env
-	$(BIN)/python -m pytest -n 2
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2  # both cores are busy as it is
 
 peers: env
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r benchmarks/peers.lock

@@ -18,6 +18,7 @@ DEVELOPMENT = [
     'pytest-xdist',  # the suite in minutes on two cores
     'hypothesis',  # property tests: cut invariance, bad input
     'mypy',
+    'PyYAML',  # an independent reader and writer of YAML
     'types-PyYAML',
     'ruff',
     'psutil',  # memory and CPU in the benchmarks
@@ -57,8 +58,7 @@ setup(
         'numpy',
         'scipy',  # PCHIP tables, ODE integration, statistical tests
         'numba',  # compiled per-sample kernels: validation, onset
-        'PyYAML',  # ship and parameter files
-        'ruamel.yaml',  # the same, YAML 1.2
+        'ruamel.yaml',  # ship, parameter and run files: YAML 1.2
         'mcap',  # bags in and out
         'rosbags',  # message definitions and CDR without ROS; rosbag2 directories
         'pynmeagps',  # NMEA 0183 sentences, checksums

@@ -273,7 +273,7 @@ CASES = (
         'a metadata.yaml that is none',
         _directory(metadata__yaml='speed: [1, 2\n'),
         1,
-        "'bag/metadata.yaml' is no metadata of rosbag2; remove it",
+        "'bag/metadata.yaml' is no metadata of rosbag2 (not YAML: line",
     ),
     _case(
         'a rosbag2 directory with a part missing',

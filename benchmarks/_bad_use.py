@@ -92,7 +92,9 @@ def _node(
 
 
 PARAMETERS = (
-    _parameters('an unknown name', 'window: 600.0\n', 1, "'window': unknown; known are"),
+    _parameters(
+        'an unknown name', 'window: 600.0\n', 1, 'window: unknown key; did you mean window_s?'
+    ),
     _parameters(
         'out of range',
         'froude_min: 5.0\nlate_s: -1.0\n',
@@ -114,7 +116,7 @@ PARAMETERS = (
         'text for a number',
         "window_s: '600'\n",
         1,
-        "window_s: '600', expected a number, 60..21600 s",
+        "window_s: '600', expected a number without quotes or unit, 60..21600 s",
     ),
     _parameters(
         'a wrong choice', 'estimator: kalman\n', 1, "estimator: 'kalman', expected one of auto,"
@@ -123,7 +125,7 @@ PARAMETERS = (
         'a value without a name',
         'just some words\n',
         1,
-        "is 'just some words', expected a list of `name: value`",
+        "is 'just some words', expected lines `name: value`",
     ),
     _parameters(
         'a name given twice',
@@ -328,7 +330,7 @@ NODE = (
     _node(
         'an unknown parameter',
         1,
-        "'windows_s': unknown; known are",
+        'windows_s: unknown key; did you mean window_s?',
         ros=('-p', 'windows_s:=600.0'),
     ),
     _node(

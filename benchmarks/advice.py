@@ -26,8 +26,9 @@ import numpy as np
 from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
+from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effect import Measure, Scope
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -74,11 +75,11 @@ def case(seed: int) -> Case:
     rng = np.random.default_rng([SEED, seed])
     effect = list(LIBRARY.values())[int(rng.integers(len(LIBRARY)))]
     values = {}
-    for quantity in effect.quantities(SHIP):
+    for quantity in effect.parameters_of(SHIP):
         drawn = quantity.prior.draw(rng)
         if not quantity.words:
             drawn = float(np.clip(drawn, quantity.low, quantity.high))
-        values[quantity.name] = Uncertain(drawn, 0.0)
+        values[quantity.name] = Parameter(drawn, 0.0)
     baseline = SHIP.baseline
     friction = 1.0 + baseline.relative_sd.friction * rng.standard_normal()
     wave = 1.0 + baseline.relative_sd.wave * rng.standard_normal()

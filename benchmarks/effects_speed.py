@@ -38,7 +38,7 @@ def main() -> None:
     rng = np.random.default_rng(0)
     groups: dict[str, list[Action]] = {'clean ship': [Action()]}
     for effect in LIBRARY.values():
-        quantities = effect.quantities(ship)
+        quantities = effect.parameters_of(ship)
         groups[effect.name] = [
             effect.action(frame, *(quantity.prior.draw(rng) for quantity in quantities))
             for _ in range(DRAWS)

@@ -28,11 +28,13 @@ from _tables import put, table
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main as shipdrag
+from shipdrag_ros.estimation import pictures
+from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import ReplayResult, replay, words
+from shipdrag_ros.replay import ReplayResult, replay
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.report import drawing, pictures
+from shipdrag_ros.report import drawing
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / 'docs' / 'real_records.md'
@@ -262,7 +264,7 @@ def show(record: Record, out: Path) -> Outcome:
     limits = f'{curve.speed_m_s[0]:.2f} to {curve.speed_m_s[-1]:.2f}'
     share = f'{100 * found.max_relative_sigma:.0f}'
     line = f'| {record.name} | {fit} | {limits} | {"<br>".join(cells)} | {share} |'
-    for note in words.notes(coastdown):
+    for note in estimate_words.notes(coastdown.estimate):
         print(textwrap.fill(note, 96, initial_indent='  - ', subsequent_indent='    '))
     return Outcome(found, line)
 
@@ -359,12 +361,14 @@ def draw(out: Path, data: Path) -> None:
     for name, result in (('real_record', real), ('simulated', RunResult.of(replay(run)))):
         (coastdown,) = result.coastdowns
         assert coastdown.estimate is not None
+        true = result.truth
         figure = pictures.resistance_picture(
-            coastdown.estimate, mass_kg=result.ship.mass_kg, truth=result.truth
+            coastdown.estimate,
+            result.ship,
+            truth=None if true is None else (true.speed_m_s, true.resistance_m_s2),
         )
-        figure.set_size_inches(6.0, 4.2)
         drawing.save(figure, out / f'{name}.png')
-        print(f'picture: {out / name}.png, {words.result_sentence(coastdown)}')
+        print(f'picture: {out / name}.png, {coastdown.estimate.summary(result.ship)[0]}')
 
 
 def main() -> None:

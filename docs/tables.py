@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields
 from pathlib import Path
 
+from shipdrag_ros.fields import keys_of
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.simulation import Quantity
 from shipdrag_ros.simulation.effects import LIBRARY, confounders, discriminating_measurements
 
 DOCS = Path(__file__).resolve().parent
@@ -85,18 +85,18 @@ def parameters() -> str:
     Return the table of the parameters that change a result.
     """
     rows = []
-    for item in fields(Parameters):
-        about = item.metadata
-        if about['choices']:
-            allowed = ', '.join(f'`{choice}`' for choice in about['choices'])
+    for name, key in keys_of(Parameters).items():
+        kind = key.kind
+        if kind.choices:
+            allowed = ', '.join(f'`{choice}`' for choice in kind.choices)
         else:
-            allowed = f'{about["low"]:g} .. {about["high"]:g}'
-        default = f'`{item.default}` {about["unit"]}'.strip()
-        rows.append([f'`{item.name}`', default, allowed, about['text']])
+            allowed = f'{kind.low:g} .. {kind.high:g}'
+        default = f'`{key.default}` {kind.unit}'.strip()
+        rows.append([f'`{name}`', default, allowed, key.text])
     return _table(['parameter', 'default', 'allowed', 'meaning'], rows)
 
 
-def _per(quantity: Quantity) -> str:
+def _per(quantity: Parameter) -> str:
     return f' times {quantity.measured_in.text}' if quantity.measured_in.text else ''
 
 
@@ -132,7 +132,7 @@ def effect_parameters() -> str:
                 accepted = ', '.join(f'`{word}`' for word in quantity.words)
             else:
                 accepted = f'{quantity.low:g} .. {quantity.high:g}{_per(quantity)}'
-            default = '' if quantity.default is None else f'{quantity.default:g}{_per(quantity)}'
+            default = f'{quantity.value:g}{_per(quantity)}' if quantity.is_given else ''
             rows.append(
                 [
                     f'`{effect.name}`',

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures, times and tables as text, the same in the terminal and on a page."""
+"""Figures, times and tables as text; the parts that a page is made of."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -25,6 +26,60 @@ class Table:
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """
+    A picture that a page holds in itself.
+
+    Attributes
+    ----------
+    uri
+        The picture, as `data:`.
+    caption
+        What it shows, and what a reader should see in it.
+    """
+
+    uri: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Section:
+    """
+    Part of a page: what it has of these, in this order.
+
+    Attributes
+    ----------
+    heading
+    level
+        Of the heading, 2 to 4.
+    quiet
+        What it is about, in small print.
+    lead
+        What was found, a paragraph each.
+    text
+        Paragraphs.
+    lines
+        Points of a list.
+    pictures
+        Beside each other where there is room.
+    tables
+        Each with its caption; one without column heads is a list of facts.
+    entry
+        Its line in the list of contents; '' for none.
+    """
+
+    heading: str = ''
+    level: int = 2
+    quiet: str = ''
+    lead: Sequence[str] = ()
+    text: Sequence[str] = ()
+    lines: Sequence[str] = ()
+    pictures: Sequence[Picture] = ()
+    tables: Sequence[tuple[str, Table]] = ()
+    entry: str = ''
 
 
 def utc(time_ns: int) -> str:
@@ -75,6 +130,28 @@ def force_unit(mass_kg: float) -> tuple[float, str]:
     Return what a force of a ship is shown in: newtons in the unit, and its name.
     """
     return (1.0, 'N') if mass_kg < LIGHT_KG else (1000.0, 'kN')
+
+
+def power_unit(mass_kg: float) -> tuple[float, str]:
+    """
+    Return what a power of a ship is shown in: watts in the unit, and its name.
+    """
+    return (1.0, 'W') if mass_kg < LIGHT_KG else (1000.0, 'kW')
+
+
+def speed_unit(mass_kg: float) -> tuple[float, str]:
+    """
+    Return what a speed of a ship is shown in: m/s in the unit, and its name.
+    """
+    return (1.0, 'm/s') if mass_kg < LIGHT_KG else (M_S_PER_KNOT, 'knots')
+
+
+def ship_speed(speed_m_s: float, mass_kg: float) -> str:
+    """
+    Return a speed with its unit, in knots but for a model ship.
+    """
+    unit, name = speed_unit(mass_kg)
+    return f'{speed_m_s / unit:.{1 if unit != 1.0 else 3}f} {name}'
 
 
 def speed_text(speed_m_s: float, *, highest_m_s: float) -> str:

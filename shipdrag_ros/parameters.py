@@ -9,7 +9,7 @@ check of a bag's `parameters.yaml` are all made from `Parameters`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from os import PathLike
 from pathlib import Path
 from pkgutil import iter_modules
@@ -17,6 +17,17 @@ from typing import Any
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ParameterError
+from shipdrag_ros.fields import (
+    choice,
+    declare,
+    keys_of,
+    number,
+    parse,
+    read_keys,
+    show,
+    text_of,
+    whole_number,
+)
 
 _SECTION = 'ros__parameters'
 FORMER_ESTIMATORS = {'warped': 'log_time', 'motion': 'ode_fit'}
@@ -38,12 +49,17 @@ def _parameter(
     text: str,
     *,
     unit: str = '',
-    low: float | None = None,
-    high: float | None = None,
+    low: float = 0.0,
+    high: float = 0.0,
     choices: tuple[str, ...] = (),
 ) -> Any:
-    metadata = {'text': text, 'unit': unit, 'low': low, 'high': high, 'choices': choices}
-    return field(default=default, metadata=metadata)
+    if isinstance(default, str):
+        kind = choice(*choices)
+    elif isinstance(default, int):
+        kind = whole_number(int(low), int(high), unit)
+    else:
+        kind = number(low, high, unit)
+    return declare(kind, text, default=default)
 
 
 @dataclass(frozen=True)
@@ -174,11 +190,10 @@ class Parameters:
     )
 
     def __post_init__(self) -> None:
-        problems = []
-        for item in fields(self):
-            problem = _problem(item.name, getattr(self, item.name), item.default, item.metadata)
-            if problem:
-                problems.append(problem)
+        problems: list[str] = []
+        given = {item.name: getattr(self, item.name) for item in fields(self)}
+        for name, value in read_keys(keys_of(type(self)), given, '', problems).items():
+            object.__setattr__(self, name, value)  # 60 for 60.0 is taken, and made a float
         if problems:
             raise ParameterError('parameters', problems)
 
@@ -198,24 +213,8 @@ class Parameters:
         >>> Parameters.from_mapping({'update_s': 10.0}, subject='mine').update_s
         10.0
         """
-        known = {item.name: item for item in fields(cls)}
-        problems = [
-            f'{name!r}: unknown; known are {", ".join(sorted(known))}'
-            for name in values
-            if name not in known
-        ]
-        accepted: dict[str, Any] = {}
-        for name, value in values.items():
-            if name not in known:
-                continue
-            item = known[name]
-            # YAML writes 60 for 60.0; nothing is lost by taking it
-            if isinstance(item.default, float) and type(value) is int:
-                value = float(value)
-            problem = _problem(name, value, item.default, item.metadata)
-            if problem:
-                problems.append(problem)
-            accepted[name] = value
+        problems: list[str] = []
+        accepted = read_keys(keys_of(cls), dict(values), '', problems)
         if problems:
             raise ParameterError(subject, problems)
         return cls(**accepted)
@@ -225,21 +224,19 @@ class Parameters:
         """
         Build from the text of a `parameters.yaml`.
         """
-        try:
-            values, problems = strict_yaml.load(text)
-        except ValueError as error:
-            raise ParameterError(subject, [f'not YAML: {error}']) from error
+        values = parse(text, subject=subject, error=ParameterError)
         if values is None:
             values = {}
         if not isinstance(values, dict):
-            problems = [f'is {values!r}, expected a list of `name: value`']
-        elif any(isinstance(value, dict) and _SECTION in value for value in values.values()):
-            problems = [
-                f'is a parameter file of the node, with {_SECTION}; '
-                'give the lines `name: value` alone'
-            ]
-        if problems:
-            raise ParameterError(subject, problems)
+            raise ParameterError(subject, [f'is {show(values)}, expected lines `name: value`'])
+        if any(isinstance(value, dict) and _SECTION in value for value in values.values()):
+            raise ParameterError(
+                subject,
+                [
+                    f'is a parameter file of the node, with {_SECTION}; '
+                    'give the lines `name: value` alone'
+                ],
+            )
         return cls.from_mapping(values, subject=subject)
 
     @classmethod
@@ -252,14 +249,7 @@ class Parameters:
         ParameterError
             Naming every problem of the file at once.
         """
-        try:
-            text = Path(path).read_text(encoding='utf-8-sig')
-        except OSError as error:
-            problem = f'cannot be read: {error.strerror}; give the path of a parameter file'
-            raise ParameterError(str(path), [problem]) from error
-        except ValueError as error:
-            problem = f'is not a text file: {error}; save it as UTF-8'
-            raise ParameterError(str(path), [problem]) from error
+        text = text_of(path, what='a parameter file', error=ParameterError)
         return cls.from_yaml(text, subject=str(path))
 
     def to_yaml(self) -> str:
@@ -268,20 +258,3 @@ class Parameters:
         """
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         return strict_yaml.dump(values)
-
-
-def _problem(name: str, value: object, default: object, about: Mapping[str, Any]) -> str | None:
-    """Say what is wrong with one value, or None."""
-    if about['choices']:
-        if value in about['choices']:
-            return None
-        return f'{name}: {value!r}, expected one of {", ".join(about["choices"])}'
-    unit = f' {about["unit"]}' if about['unit'] else ''
-    expectation = f'{about["low"]:g}..{about["high"]:g}{unit}'
-    if isinstance(value, bool) or not isinstance(value, type(default)):
-        kind = 'a whole number' if isinstance(default, int) else 'a number'
-        return f'{name}: {value!r}, expected {kind}, {expectation}'
-    # written so that NaN fails
-    if not (about['low'] <= value <= about['high']):
-        return f'{name}: {value!r}, expected {expectation}'
-    return None

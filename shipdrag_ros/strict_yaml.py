@@ -1,119 +1,189 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-YAML without its traps, for files written by hand.
+YAML without its traps, for files written by hand: a door over ruamel.yaml.
 
-PyYAML keeps the last of two equal keys, reads `1e-6` as text and `010` as 8.
-Here scalars follow the core schema of YAML 1.2 and a repeated key is reported.
+YAML 1.2, core schema: `no`, `on`, `1:30` and `2026-06-01` are text, `010` is 10,
+`1e-6` is a number. Plain data alone: keys that repeat, aliases, tags, more than
+`DEEPEST` levels and more than `LARGEST` bytes are refused, with their line.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable
+from io import StringIO
 from typing import Any
 
-import yaml
-
-_CORE_SCALARS = (
-    ('null', r'~|null|Null|NULL|', '~nN\0'),
-    ('bool', r'true|True|TRUE|false|False|FALSE', 'tTfF'),
-    ('int', r'[-+]?(?:0|[1-9][0-9]*)', '-+0123456789'),
-    (
-        'float',
-        r'[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?'
-        r'|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)',
-        '-+.0123456789',
-    ),
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import (
+    AliasEvent,
+    CollectionEndEvent,
+    DocumentStartEvent,
+    MappingStartEvent,
+    NodeEvent,
+    ScalarEvent,
+    SequenceStartEvent,
 )
-_KINDS = ('null', 'bool', 'int', 'float', 'str', 'seq', 'map')
+from ruamel.yaml.representer import SafeRepresenter
+
+LARGEST = 1_000_000
+"""Bytes of a text that is read."""
+DEEPEST = 20
+"""Levels of lists and mappings."""
+
+_WORDS = {'': None, '~': None, 'null': None, 'true': True, 'false': False}
+_WHOLE = re.compile(r'[-+]?[0-9]+')
+_NUMBER = re.compile(r'[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?')
+_NO_NUMBER = re.compile(r'[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)')
+_MOST_DIGITS = 400  # of a whole number; any float is shorter
 
 
-class _Loader(yaml.SafeLoader):
-    """Core schema; remembers repeated keys."""
+class _Mapping(dict[Any, Any]):
+    """A mapping on its way: lines of its keys, and the key that waits for a value."""
 
-    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012
-    # plain data alone: a date or a set is not expected anywhere
-    yaml_constructors = {  # noqa: RUF012
-        tag: constructor
-        for tag, constructor in yaml.SafeLoader.yaml_constructors.items()
-        if tag is None or tag.removeprefix('tag:yaml.org,2002:') in _KINDS
-    }
-
-    def __init__(self, text: str) -> None:
-        super().__init__(text)
-        self.repeated: list[str] = []
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        seen: dict[str, int] = {}
-        for key_node, _ in node.value:
-            if not isinstance(key_node, yaml.ScalarNode):
-                continue
-            line = key_node.start_mark.line + 1
-            if key_node.value in seen:
-                first = seen[key_node.value]
-                self.repeated.append(
-                    f'{key_node.value}: given twice, lines {first} and {line}; keep one'
-                )
-            seen[key_node.value] = line
-        return super().construct_mapping(node, deep=deep)
+    def __init__(self) -> None:
+        super().__init__()
+        self.lines: dict[Any, int] = {}
+        self.key: list[Any] = []
 
 
-class _Dumper(yaml.SafeDumper):
-    """Quotes what `_Loader` would not read back as text."""
-
-    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-    def represent_text(self, data: str) -> yaml.ScalarNode:
-        # PyYAML loses rare line breaks in other styles
-        style = None if data.isprintable() else '"'
-        return self.represent_scalar('tag:yaml.org,2002:str', data, style=style)
-
-
-_Dumper.add_representer(str, _Dumper.represent_text)
-
-for _kind, _pattern, _first in _CORE_SCALARS:
-    for _class in (_Loader, _Dumper):
-        _class.add_implicit_resolver(
-            f'tag:yaml.org,2002:{_kind}',
-            re.compile(f'^(?:{_pattern})$'),
-            [character.replace('\0', '') for character in _first],
-        )
-
-
-def load(text: str) -> tuple[Any, list[str]]:
+def load(text: str) -> Any:
     """
-    Read one document.
+    Read one document as plain Python data.
+
+    Parameters
+    ----------
+    text
+        Of at most `LARGEST` bytes.
 
     Returns
     -------
-    data
-        Plain Python data.
-    problems
-        One line for each repeated key.
+    object
+        None, bool, int, float, str, list and dict.
 
     Raises
     ------
     ValueError
-        If the text is not YAML.
+        If it is not YAML, or more than plain data; with the line.
+
+    Examples
+    --------
+    >>> from shipdrag_ros import strict_yaml
+    >>> strict_yaml.load('name: no\\nwater: {kinematic_viscosity_m2_s: 1e-6}')
+    {'name': 'no', 'water': {'kinematic_viscosity_m2_s': 1e-06}}
     """
+    if len(text) > LARGEST:
+        raise ValueError(f'{len(text)} characters, at most {LARGEST} are read')
     try:
-        loader = _Loader(text)
-        data = loader.get_single_data()
-    except yaml.MarkedYAMLError as error:
+        return _built(text)
+    except MarkedYAMLError as error:
         mark = error.problem_mark
         place = f'line {mark.line + 1}, column {mark.column + 1}: ' if mark else ''
-        raise ValueError(f'{place}{error.problem}') from error
-    except (yaml.YAMLError, KeyError, RecursionError) as error:
-        # the parser knows KeyError and RecursionError for `!!bool maybe` and `[[[[...`
-        raise ValueError(str(error)) from error
-    return data, loader.repeated
+        raise ValueError(f'not YAML: {place}{error.problem}') from error
+    except YAMLError as error:
+        raise ValueError(f'not YAML: {error}') from error
+
+
+def _built(text: str) -> Any:
+    """Put the events of a text together; a loop, so that no depth can exhaust the stack."""
+    whole: list[Any] = []  # holds the document
+    stack: list[Any] = [whole]
+    repeated: list[str] = []
+    documents = 0
+    for event in YAML(typ='safe', pure=True).parse(text):
+        if isinstance(event, DocumentStartEvent):
+            documents += 1
+            if documents > 1:
+                raise ValueError(f'line {_line(event)}: a second document; give one')
+        elif isinstance(event, CollectionEndEvent):
+            done = stack.pop()
+            _put(stack[-1], dict(done) if isinstance(done, _Mapping) else done, event, repeated)
+        elif isinstance(event, NodeEvent):
+            _refuse(event, len(stack))
+            if isinstance(event, MappingStartEvent):
+                stack.append(_Mapping())
+            elif isinstance(event, SequenceStartEvent):
+                stack.append([])
+            elif isinstance(event, ScalarEvent):
+                plain = event.implicit[0]
+                _put(stack[-1], _scalar(event) if plain else event.value, event, repeated)
+    if repeated:
+        raise ValueError('; '.join(repeated))
+    return whole[0] if whole else None
+
+
+def _refuse(event: NodeEvent, depth: int) -> None:
+    """Refuse what is no plain data."""
+    if isinstance(event, AliasEvent) or event.anchor is not None:
+        raise ValueError(f'line {_line(event)}: an anchor or alias ({event.anchor}); write it out')
+    tag = getattr(event, 'tag', None)
+    if tag is not None:
+        raise ValueError(f'line {_line(event)}: a tag ({tag}); leave it out')
+    if depth > DEEPEST and not isinstance(event, ScalarEvent):
+        raise ValueError(f'line {_line(event)}: more than {DEEPEST} levels')
+
+
+def _put(into: Any, value: Any, event: Any, repeated: list[str]) -> None:
+    """Add a value to the list or mapping that it stands in; in a mapping keys come first."""
+    if not isinstance(into, _Mapping):
+        into.append(value)
+    elif into.key:
+        into[into.key.pop()] = value
+    elif isinstance(value, list | dict):
+        raise ValueError(f'line {_line(event)}: a list or mapping as a key; give a name')
+    else:
+        line = _line(event)
+        if value in into.lines:
+            first = into.lines[value]
+            repeated.append(f'{value}: given twice, lines {first} and {line}; keep one')
+        into.lines[value] = line
+        into.key.append(value)
+
+
+def _scalar(event: ScalarEvent) -> Any:
+    """Return what a plain word stands for."""
+    word: str = event.value
+    if word.lower() in _WORDS and word in (word.lower(), word.title(), word.upper()):
+        return _WORDS[word.lower()]
+    if _WHOLE.fullmatch(word):
+        if len(word) > _MOST_DIGITS:
+            raise ValueError(f'line {_line(event)}: a number of {len(word)} digits')
+        return int(word)
+    if _NUMBER.fullmatch(word):
+        return float(word)
+    if _NO_NUMBER.fullmatch(word):
+        return float(word.replace('.', ''))
+    return word
+
+
+def _line(event: Any) -> int:
+    return int(event.start_mark.line) + 1
+
+
+class _Representer(SafeRepresenter):
+    """Quotes what would not be read back as text."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+    def represent_text(self, data: str) -> Any:
+        # other styles lose rare line breaks
+        event = ScalarEvent(None, None, (True, False), data)
+        plain = data.isprintable() and isinstance(_scalar(event), str)
+        return self.represent_scalar('tag:yaml.org,2002:str', data, style=None if plain else '"')
+
+
+_Representer.add_representer(str, _Representer.represent_text)
 
 
 def dump(data: Any) -> str:
     """
     Return the text that `load` reads back, in the order of the keys.
     """
-    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
+    writer = YAML(typ='safe', pure=True)
+    writer.Representer = _Representer
+    writer.default_flow_style = False
+    writer.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    into = StringIO()
+    writer.dump(data, into)
+    return into.getvalue()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What holds for all tests.
+What holds for all tests, and a made-up result, every field of which a page or a table shows.
 
 Property tests try the same examples each time, new ones with
 `--hypothesis-profile=default`. What was skipped for want of a browser is told.
@@ -9,16 +9,33 @@ Property tests try the same examples each time, new ones with
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
+
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.estimation.result import (
+    Estimate,
+    FroudeMax,
+    OrderTrial,
+    ResistanceCurve,
+    Track,
+)
+from shipdrag_ros.replay import InputCounts, Recorded
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.ship import Ship
 
 settings.register_profile('repeatable', derandomize=True)
 settings.load_profile('repeatable')
 
 NO_BROWSER = 'no browser'
+_START_NS = 1_700_000_000_000_000_000
+_SECOND_NS = 1_000_000_000
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -53,7 +70,8 @@ class Page(HTMLParser):
         if tag == 'img':
             self.images.append(values['src'] or '')
             assert values['alt']
-        if 'href' in values or (tag != 'img' and 'src' in values):
+        inside = (values.get('href') or '').startswith('#')
+        if ('href' in values and not inside) or (tag != 'img' and 'src' in values):
             self.links.append(tag)
         if tag not in ('img', 'meta', 'br'):
             self.open.append(tag)
@@ -69,3 +87,92 @@ class Page(HTMLParser):
 @pytest.fixture
 def read_page() -> type[Page]:
     return Page
+
+
+@pytest.fixture
+def ship() -> Ship:
+    return Ship(name='Vitus Bering', length_m=150.0, displaced_volume_m3=20200.0)
+
+
+@pytest.fixture
+def estimate(ship: Ship) -> Estimate:
+    """r = v^2 / 3000 and a joint fit of it, 1500 s long."""
+    speed = np.linspace(0.5, 8.2, 155)
+    r = speed**2 / 3000.0
+    curve = ResistanceCurve(
+        speed_m_s=speed,
+        resistance_m_s2=r,
+        sigma_m_s2=0.02 * r + 1e-4,
+        sigma_repeatable_m_s2=0.01 * r + 1e-4,
+        froude=ship.froude(speed),
+        slope=np.gradient(r, ship.froude(speed)),
+        slope_sigma=np.full_like(speed, 1e-3),
+    )
+    time_s = np.arange(1500.0)
+    fitted = 8.2 / (1.0 + 8.2 * time_s / 3000.0)
+    position = 3000.0 * np.log1p(8.2 * time_s / 3000.0)
+    random = np.random.default_rng(5)
+    stamps = _START_NS + (time_s * 1e9).astype(np.int64)
+    return Estimate(
+        estimator='s1_joint',
+        start_ns=_START_NS,
+        end_ns=_START_NS + 1500 * _SECOND_NS,
+        order=5,
+        orders=tuple(
+            OrderTrial(n, 1.0 + 50.0 / n**6, 0.0025 + 3.0 / n**6, 100.0 + 3e4 / n**6, 10.0, 0.01)
+            for n in range(1, 13)
+        ),
+        samples={'speed_through_water': 1500, 'position': 1500},
+        noise_sd={'speed_through_water': 0.05, 'position': 10.0},
+        curve=curve,
+        froude_valid=(0.05, 0.18),
+        froude_max_by=FroudeMax.INFLECTION,
+        froude_max_argmax=0.2,
+        max_relative_sigma=0.013,
+        last_speed_m_s=0.5,
+        last_speed_sigma_m_s=0.01,
+        last_resistance_m_s2=1e-4,
+        last_sigma_m_s2=1e-5,
+        tracks={
+            'speed_through_water': Track(stamps, fitted + random.normal(0, 0.05, 1500), fitted),
+            'position': Track(stamps, position + random.normal(0, 10.0, 1500), position),
+        },
+        notes=('A note of the estimator <b>itself</b>.',),
+    )
+
+
+@pytest.fixture
+def coastdown(estimate: Estimate) -> Coastdown:
+    return Coastdown(
+        start_ns=estimate.start_ns,
+        end_ns=estimate.end_ns,
+        onset_detected_ns=estimate.start_ns + 40 * _SECOND_NS,
+        ended_by=EndedBy.SPEED,
+        estimate=estimate,
+    )
+
+
+@pytest.fixture
+def run(ship: Ship, coastdown: Coastdown) -> RunResult:
+    return RunResult(
+        bag='sea trial.mcap',
+        ship=ship,
+        coastdowns=(coastdown,),
+        inputs={
+            'speed_through_water': InputCounts(1503, 1500, {'nan': 2, 'late': 1, 'frozen': 0}),
+            'position': InputCounts(1500, 1500, {}),
+        },
+        recorded=Recorded(100, 100, None),
+        truth=None,
+    )
+
+
+@pytest.fixture
+def truth() -> TrueCurve:
+    speed = np.linspace(0.0, 8.2, 83)
+    return TrueCurve(speed, speed**2 / 3100.0, {'speed_m_s': 8.2, 'seed': 1})
+
+
+@pytest.fixture
+def simulated(run: RunResult, truth: TrueCurve) -> RunResult:
+    return replace(run, truth=truth)

@@ -19,7 +19,9 @@ PACKAGE = ROOT / 'shipdrag_ros'
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
     ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
-    ('parameters', 'ship'),
+    ('fields',),
+    ('parameter',),
+    ('parameters', 'ship', 'report'),
     ('inference',),
     ('regression',),
     ('estimation', 'simulation'),
@@ -28,7 +30,6 @@ PICTURE = (
     ('bags',),
     ('bags.salvage',),
     ('node', 'replay', 'importing', 'fleet'),
-    ('report',),
     ('live',),
     ('cli',),
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none

@@ -116,7 +116,10 @@ def test_a_path_to_nothing_is_found() -> None:
 
 def test_the_state_has_the_name_that_the_node_gives_it() -> None:
     diagnostics = pytest.importorskip('shipdrag_ros.node.diagnostics')
-    status = diagnostics.state_status('active', 'idle', [], clock_ns=1, sim_time=False)
+    standing = diagnostics.Standing('active', None, clock_ns=1, sim_time=False)
+    (status,) = diagnostics.label(
+        [diagnostics.state_status(standing, [])], node=DEFAULT_NODE, hardware_id=''
+    )
     assert any(f'{{name=="{status.name}"}}' in path for path in paths())
 
 

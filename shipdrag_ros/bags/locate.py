@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags.mcap_file import CONVERT
 from shipdrag_ros.errors import BagError
 
@@ -95,10 +94,11 @@ def _rosbag2(path: Path) -> BagFiles:
 
 def _metadata(path: Path) -> dict[str, Any]:
     try:
-        about = yaml.safe_load(path.read_text())['rosbag2_bagfile_information']
-    except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError) as error:
+        about = strict_yaml.load(path.read_text())['rosbag2_bagfile_information']
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise BagError(
-            f'{str(path)!r} is no metadata of rosbag2; remove it to read the .mcap files beside it'
+            f'{str(path)!r} is no metadata of rosbag2 ({error}); remove it to read the .mcap '
+            'files beside it'
         ) from error
     if not isinstance(about, dict):
         raise BagError(f'{str(path)!r} holds {about!r}, expected the metadata of rosbag2')

@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
     block, truth = simulate.make(ship, SETTINGS)
     seconds = SETTINGS.lead_in_s + SETTINGS.duration_s
     output.say(
-        f'A simulated {words.ship_line(ship)},\n'
+        f'A simulated {ship.summary()},\n'
         f'sails at {SETTINGS.speed_m_s:g} m/s; after {SETTINGS.lead_in_s:.0f} s her engine is '
         f'stopped. {seconds:.0f} s of data take {seconds / options.speed_up:.0f} s.\n'
     )

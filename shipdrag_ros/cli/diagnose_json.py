@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import Diagnosis, Gap, Verdict
+from shipdrag_ros.diagnosis import Diagnosis, EffectEstimate, Gap, Verdict
 
 
 def document(found: Diagnosis) -> dict[str, Any]:
@@ -17,24 +17,22 @@ def document(found: Diagnosis) -> dict[str, Any]:
     something without a name.
     """
     candidates: list[dict[str, Any]] = [
-        {'names': list(each.names) or ['none'], 'probability': each.probability}
+        {
+            'names': list(each.names) or ['none'],
+            'probability': each.probability,
+            'effects': [_sized(effect) for effect in each.effects],
+        }
         for each in found.candidates
     ]
     if found.verdict is Verdict.UNKNOWN:
-        candidates.insert(0, {'names': ['unknown'], 'probability': found.unnamed})
+        candidates.insert(0, {'names': ['unknown'], 'probability': found.unnamed, 'effects': []})
     return {
         'verdict': str(found.verdict),
-        'effects': [
-            {
-                'name': effect.name,
-                'probability': effect.probability,
-                'parameters': {name: asdict(v) for name, v in effect.parameters.items()},
-            }
-            for effect in found.effects
-        ],
+        'effects': [_sized(effect) for effect in found.effects],
         'candidates': candidates,
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
+        'advice': [asdict(each) for each in found.would_decide],
         'where': None if found.where is None else asdict(found.where),
         'gap': {
             'before': _gap(found.before),
@@ -47,6 +45,26 @@ def document(found: Diagnosis) -> dict[str, Any]:
         'examined': list(found.examined),
         'no_coastdown': found.no_coastdown or None,
         'notes': list(found.notes),
+        'facts': [
+            {
+                **asdict(each.fact),
+                'bag': each.run or None,
+                'wrong': each.wrong,
+                'contradicted': each.contradicted,
+                'against': list(each.against),
+            }
+            for each in found.facts
+        ],
+    }
+
+
+def _sized(effect: EffectEstimate) -> dict[str, Any]:
+    return {
+        'name': effect.name,
+        'probability': effect.probability,
+        'parameters': {
+            name: {'value': size.value, 'sd': size.sd} for name, size in effect.parameters.items()
+        },
     }
 
 

@@ -8,8 +8,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-import yaml
-
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.ship import Ship
@@ -99,8 +98,8 @@ def _parameters(tree: object) -> Iterator[tuple[str, object]]:
 
 def _yaml(text: str) -> object:
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError:
+        return strict_yaml.load(text)
+    except ValueError:
         return None
 
 

@@ -101,9 +101,9 @@ def run(options: argparse.Namespace) -> int:
     if ranking is not None:
         replay_text.show_ranking(output, ranking)
     else:
-        replay_text.show_together(output, together(results))
+        replay_text.show_together(output, together(results), results)
     if options.report is not None:
-        from shipdrag_ros.report.page import write_report  # pictures take long to import
+        from shipdrag_ros.replay.page import write_report  # pictures take long to import
 
         write_report(options.report, results, ranking=ranking)
         output.log(f'report in {options.report}')
@@ -164,8 +164,8 @@ def write_results(
     """
     Write the page, the JSON and the curves into a directory.
     """
-    from shipdrag_ros.report.page import write_report  # pictures take long to import
-    from shipdrag_ros.report.spreadsheet import write_curves
+    from shipdrag_ros.replay.page import write_report  # pictures take long to import
+    from shipdrag_ros.replay.spreadsheet import write_curves
 
     write_report(directory / REPORT, results, ranking=ranking)
     document: dict[str, Any] = replay_json.document(results, ranking=ranking)

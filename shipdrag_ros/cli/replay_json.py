@@ -22,8 +22,10 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
     empty arrays and says why under `failure`; `hulls` is there only if they
     were compared. `combined` is one r(v) from two or more coastdowns of one
     ship: `scatter_m_s2` is the standard deviation of one run about it, the
-    current is along the heading of the first run.
+    current is along the heading of the first run; where it is null although there
+    are several, `not_combined` says why.
     """
+    whole = together(runs)
     found = {
         'coastdowns': [
             _coastdown(run.bag, coastdown) for run in runs for coastdown in run.coastdowns
@@ -31,7 +33,8 @@ def document(runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> di
         'not_coastdowns': [
             _not_coastdown(run.bag, dismissed) for run in runs for dismissed in run.not_coastdowns
         ],
-        'combined': _combined(together(runs).combined),
+        'combined': _combined(whole.combined),
+        'not_combined': whole.why_not or None,
         'inputs': _inputs([run.inputs for run in runs]),
         'recorded': _recorded(runs),
         'warnings': [

@@ -3,9 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.replay import tables as cells
-from shipdrag_ros.replay import words
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.estimation import tables as estimate_tables
+from shipdrag_ros.estimation import words as estimate_words
+from shipdrag_ros.estimation.force import Force
+from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.cuts import cut_lines
 from shipdrag_ros.replay.hulls import Ranking
 from shipdrag_ros.replay.run_result import RunResult
@@ -17,29 +22,44 @@ def show_run(output: Output, run: RunResult) -> None:
     Print what one bag gave.
     """
     output.heading(run.bag)
-    output.say(words.ship_line(run.ship))
+    output.say(run.ship.summary())
     for warning in run.warnings:
         output.say(f'Warning: {warning}')
     if not run.coastdowns:
-        output.say(
-            words.no_coastdown_sentence(run.steady_lead_s, len(run.not_coastdowns), run.why_none)
-        )
+        for line in run.summary():
+            output.say(line)
     for number, coastdown in enumerate(run.coastdowns, start=1):
         output.heading(f'Coastdown {number}')
-        for line in cut_lines(coastdown, run.span_ns):
-            output.say(line)
-        output.table(cells.facts(coastdown))
-        output.say(words.result_sentence(coastdown, mass_kg=run.ship.mass_kg))
-        if coastdown.estimate is not None:
-            output.table(cells.curve_table(coastdown.estimate.valid_curve, truth=run.truth))
-        for note in words.notes(coastdown):
-            output.say(f'- {note}')
+        _show_coastdown(output, coastdown, run)
     if run.dismissed:
         output.heading('What is no coastdown')
-        output.table(cells.not_coastdowns_table(run.dismissed))
+        output.table(tables.not_coastdowns_table(run.dismissed))
     output.heading('Messages')
-    output.table(cells.inputs_table(run.inputs))
+    output.table(tables.inputs_table(run.inputs))
     output.say(words.recorded_sentence(run.recorded))
+
+
+def _show_coastdown(output: Output, coastdown: Coastdown, run: RunResult) -> None:
+    """Print one coastdown: knots and kN first, m/s and m/s² below."""
+    for line in cut_lines(coastdown, run.span_ns):
+        output.say(line)
+    told = words.summary(coastdown, run.ship)
+    for line in told[:-1]:
+        output.say(line)
+    estimate = coastdown.estimate
+    curve = None if estimate is None else estimate.valid_curve
+    if curve is not None and len(curve):
+        output.table(estimate_tables.force_table(curve, run.ship))
+        output.say('')
+    output.say(told[-1])
+    if curve is not None and len(curve):
+        truth = None if run.truth is None else run.truth.at
+        output.table(estimate_tables.curve_table(curve, truth=truth))
+        output.say('')
+    output.table(tables.facts(coastdown))
+    if estimate is not None:
+        for note in estimate_words.notes(estimate):
+            output.say(f'- {note}')
 
 
 def show_ranking(output: Output, ranking: Ranking) -> None:
@@ -47,20 +67,28 @@ def show_ranking(output: Output, ranking: Ranking) -> None:
     Print hulls by Fr_max.
     """
     output.heading('Hulls compared: the higher Fr_max, the later a hull makes wave')
-    output.table(cells.ranking_table(ranking))
+    output.table(tables.ranking_table(ranking))
     for note in ranking.notes:
         output.say(f'- {note}')
 
 
-def show_together(output: Output, found: Together) -> None:
+def show_together(output: Output, found: Together, runs: Sequence[RunResult]) -> None:
     """
-    Print the one r(v) of several coastdowns, or why there is none.
+    Print all coastdowns, a line each, and their one r(v), or why there is none.
     """
+    if sum(len(run.coastdowns) for run in runs) > 1:
+        output.heading('All coastdowns')
+        output.table(tables.coastdowns_table(runs))
     if found.combined is None:
         if found.why_not:
             output.say(f'Not combined: {found.why_not}.')
         return
+    ship = runs[0].ship
+    force = Force.of(found.combined, ship)
     output.heading(f'{found.combined.runs} coastdowns together')
-    output.table(cells.combined_table(found.combined))
+    output.say(force.at(force.near(tables.common_speed_m_s(runs))))
+    output.table(estimate_tables.force_table(found.combined, ship))
+    output.say('')
+    output.table(estimate_tables.combined_table(found.combined))
     for note in words.combined_notes(found.combined):
         output.say(f'- {note}')

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import SOURCES, warm
+from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.ending import End, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
@@ -158,6 +159,12 @@ class Monitor:
         `window_s`, or a sensor that froze longer ago, reaches back beyond it.
         """
         return self._history_ns
+
+    def heading_doubt(self) -> str:
+        """
+        Say what is wrong with the heading, by the course over ground; '' if nothing is seen.
+        """
+        return heading_doubt(self._memory.bins, self._parameters.heading_convention)
 
     def health(self) -> dict[str, InputHealth]:
         """

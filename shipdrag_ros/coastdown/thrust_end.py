@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular, toeplitz
 
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, clean_readings, means, seconds
 from shipdrag_ros.estimation.window import Window
@@ -181,8 +180,7 @@ def _chi2(
     likeness = 0.0
     prior = ((_POWERS - _POWER) / _POWER_SD) ** 2
     for _ in range(_ROUNDS):
-        root = np.linalg.cholesky(toeplitz(_correlation(likeness, len(time_s))))
-        white = [solve_triangular(root, table, lower=True) for table in tables]
+        white = np.split(_whitened(np.hstack(tables), likeness), len(tables), axis=1)
         found = [_sums_of_squares(table, len(at)) for table in white]
         sums, lagged = (np.array(sums) for sums in zip(*found, strict=True))
         variance = max(float(sums.min()) / (len(time_s) - 6), 1e-12)
@@ -195,11 +193,23 @@ def _chi2(
     return chi2.min(axis=0), float(np.min(lagged / variance + prior))
 
 
-def _correlation(likeness: float, count: int) -> Float64:
-    """Return that of noise which fades, or, where neighbours are opposed, of differences."""
+def _whitened(table: Float64, likeness: float) -> Float64:
+    """
+    Whiten columns: noise that fades, or, where neighbours are opposed, differences.
+
+    The inverse Cholesky factor of a first-order autoregression, or of a first-order
+    moving average, applied row by row: both have two diagonals.
+    """
+    white = table.copy()
     if likeness >= 0.0:
-        return np.asarray(likeness ** np.arange(count))
-    return np.concatenate([[1.0, likeness], np.zeros(count - 2)])
+        white[1:] = (table[1:] - likeness * table[:-1]) / np.sqrt(1.0 - likeness**2)
+        return white
+    size = 1.0
+    for i in range(1, len(table)):
+        below = likeness / size
+        size = np.sqrt(1.0 - below * below)
+        white[i] = (table[i] - below * white[i - 1]) / size
+    return white
 
 
 def _sums_of_squares(table: Float64, count: int) -> tuple[Float64, float]:

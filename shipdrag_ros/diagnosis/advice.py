@@ -9,7 +9,7 @@ be simulated, the declarations of the effects say that it would help.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -29,13 +29,15 @@ from shipdrag_ros.diagnosis.outcomes import (
     with_known,
 )
 from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
-from shipdrag_ros.diagnosis.result import Advice, Candidate
+from shipdrag_ros.diagnosis.result import Advice, Candidate, Verdict
+from shipdrag_ros.diagnosis.verdict import decide
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.samples import Block, Channel, Float64
-from shipdrag_ros.simulation.effect import Measure
+from shipdrag_ros.ship.facts import advice as fact_advice
 from shipdrag_ros.simulation.effects import discriminating_measurements
+from shipdrag_ros.simulation.measures import COSTS, Cost, Measure
 
 _MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed
@@ -60,7 +62,7 @@ def advice(
     candidates: Sequence[Candidate],
 ) -> tuple[Advice, ...]:
     """
-    Return what would decide, the most promising first.
+    Return what would decide; first what is likely to cost the crew least.
 
     Parameters
     ----------
@@ -98,7 +100,7 @@ def advice(
             for one in ways
         ):
             named = probability_of_naming(settings, setting, rivals, inseparable=model.inseparable)
-            found.append(Advice(measure.value, named))
+            found.append(Advice(measure.value, named, COSTS[measure]))
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
     ranked = {each: each.probability or 0.0 for each in promising}
@@ -106,7 +108,31 @@ def advice(
         measure = Measure(each.measure)
         if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, model.seen):
             ranked[each] = _reach(measure, candidates, model.inseparable)
-    return tuple(sorted(ranked, key=lambda each: -ranked[each]))
+    for name, named in _facts(model, posterior).items():
+        ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
+    return _by_cost(ranked)
+
+
+def _facts(model: CoastModel, posterior: Posterior) -> dict[str, float]:
+    """Return the facts that would name something, and how probably."""
+    if model.facts is None:
+        return {}
+
+    def names_one(after: Posterior) -> bool:
+        verdict, _ = decide(after, lacking=False, inseparable=model.inseparable)
+        return verdict is Verdict.NAMED
+
+    found = model.facts.naming(posterior, names_one)
+    return {name: named for name, named in found.items() if named >= _HARDLY}
+
+
+def _by_cost(ranked: Mapping[Advice, float]) -> tuple[Advice, ...]:
+    """Put first what is likely to need the fewest hours of the ship until something is named."""
+
+    def hours(each: Advice) -> float:
+        return Cost(each.cost).hours / max(ranked[each], 1e-3)
+
+    return tuple(sorted(ranked, key=hours))
 
 
 def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
@@ -129,7 +155,7 @@ def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
             weight = one.probability * other.probability
             votes[measure] = votes.get(measure, 0.0) + weight
     ranked = sorted(votes, key=lambda measure: -votes[measure])
-    return tuple(Advice(measure.value, None) for measure in ranked)
+    return tuple(Advice(measure.value, None, COSTS[measure]) for measure in ranked)
 
 
 def _discriminating(one: Candidate, other: Candidate) -> list[Measure]:

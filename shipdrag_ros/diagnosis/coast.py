@@ -25,14 +25,16 @@ from shipdrag_ros.diagnosis.coast_terms import (
     SpeedErrorTerm,
     Term,
 )
+from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.simulation.effect import Effect, Quantity, Scope, Shape
+from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
 DISCREPANCIES = ('force', 'log', 'radar')
@@ -44,7 +46,14 @@ _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find
 class CoastModel(CoastSimulation):
     """
     The hypotheses about some runs, and their simulation; a `Model`.
+
+    Attributes
+    ----------
+    facts
+        Of the log book; None: none are told.
     """
+
+    facts: Facts | None = None
 
     # each iteration is a simulation
     iterations: ClassVar[int] = 16
@@ -84,19 +93,20 @@ class CoastModel(CoastSimulation):
                 gaussian=tuple(
                     (effect.parameters[q.name].value, effect.parameters[q.name].sd)
                     if q.name in effect.parameters
-                    else (q.of(ship).default or 0.0, 0.0)
+                    else (np.nan_to_num(q.of(ship).value), 0.0)
                     for q in find(effect.name).parameters
                 ),
                 stated=True,
             )
             for effect in self.ship.effects
         ]
-        return Hypothesis(
-            (),
-            (baseline, *given),
-            places,
-            log_prior=math.log(nothing_missing(self.effects, places=len(DISCREPANCIES))),
-        )
+        log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES)))
+        found = Hypothesis((), (baseline, *given), places, log_prior=log_prior)
+        return replace(found, log_prior=log_prior + self._log_facts(found))
+
+    def _log_facts(self, hypothesis: Hypothesis) -> float:
+        """Return the log probability that the facts are told; they are evidence, no prior."""
+        return 0.0 if self.facts is None else self.facts.log_likelihood(hypothesis)
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
         """
@@ -138,11 +148,11 @@ class CoastModel(CoastSimulation):
             sd = effect.formula_sd
             errors = (ModelErrorTerm(term, sd),) if sd > 0.0 else ()
             log_odds = math.log(effect.odds)
-            found.append(
-                base.with_effect(
-                    effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
-                )
+            more = base.with_effect(
+                effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
             )
+            told = self._log_facts(more) - self._log_facts(base)
+            found.append(replace(more, log_prior=more.log_prior + told))
         return found
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
@@ -228,7 +238,7 @@ class CoastModel(CoastSimulation):
         for part, place in fit.hypothesis.parts:
             if isinstance(part, RunNuisance) and part.run == run:
                 at = part.place_of_stop
-                return part.unknowns[at].value(float(fit.best.z[place + at]))
+                return part.unknowns[at].prior.at(float(fit.best.z[place + at]))
         raise AssertionError(f'run {run} has no place')
 
     @property
@@ -242,7 +252,7 @@ class CoastModel(CoastSimulation):
         return np.array([run.speed_m_s for run in self.seen])
 
 
-def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:
+def _starts(quantity: Parameter, *, first: bool) -> tuple[float, ...]:
     shape = quantity.prior.shape
     if first:
         return {Shape.HALF_NORMAL: (0.3,), Shape.LOG_NORMAL: _APART}.get(shape, (0.0,))
@@ -252,6 +262,6 @@ def _starts(quantity: Quantity, *, first: bool) -> tuple[float, ...]:
 
 
 def _named(
-    choices: Sequence[Quantity], values: tuple[float, ...]
+    choices: Sequence[Parameter], values: tuple[float, ...]
 ) -> tuple[tuple[str, float], ...]:
     return tuple((q.name, value) for q, value in zip(choices, values, strict=True))

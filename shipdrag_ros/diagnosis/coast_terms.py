@@ -18,8 +18,9 @@ from scipy.integrate import cumulative_trapezoid
 
 from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.terms import EffectTerm, Tail, Unknown, cubic_bsplines, scaled
+from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
+from shipdrag_ros.parameter import Parameter, flat, free, heavy_tailed, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import CoefficientBaseline
@@ -71,7 +72,7 @@ class BaselineTerm:
     one_size: ClassVar[Sequence[int]] = ()
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Scales of its parts, its shape, n_r, run-down."""
         base = self.ship.baseline
         assert base is not None
@@ -79,13 +80,13 @@ class BaselineTerm:
             scales = {'friction': base.relative_sd.friction, 'wave': base.relative_sd.wave}
         else:
             scales = {'resistance': base.relative_sd}
-        found = [scaled(name, sd, tail=Tail.WIDE) for name, sd in scales.items()]
-        found += [scaled(f'shape {k}', SHAPE_SD) for k in range(_SHAPES)]
+        found = [free(name, heavy_tailed(sd)) for name, sd in scales.items()]
+        found += [free(f'shape {k}', normal(SHAPE_SD)) for k in range(_SHAPES)]
         # a retardation that is known stays so whatever n_r is
         known = base.relative_sd_of == 'retardation'
-        found.append(scaled('n_r', 0.0 if known else self.ship.added_mass.sd))
-        found.append(scaled('run-down', self.run_down_sd_s))
-        found.append(scaled('free shaft', FREE_SHAFT_SD, mean=FREE_SHAFT))
+        found.append(free('n_r', normal(0.0 if known else self.ship.added_mass.sd)))
+        found.append(free('run-down', normal(self.run_down_sd_s)))
+        found.append(free('free shaft', normal(FREE_SHAFT_SD, mean=FREE_SHAFT)))
         return tuple(found)
 
     def acts_in(self, run: int) -> bool:
@@ -104,14 +105,14 @@ class BaselineTerm:
             if sd.friction > 0.0:
                 scales[1] += rho * sd.wave / sd.friction * scales[0]
         return Action(
-            resistance=(lambda speed: self._departure(speed, scales),),
+            resistance=(lambda speed: self._departure(frame.ship, speed, scales),),
             n_r_change=n_r,
             run_down_change_s=self.run_down_change_s[run] + run_down_s,
             free_shaft=free_shaft,
         )
 
-    def _departure(self, speed_m_s: Float64, scales: Float64) -> Float64:
-        result: Float64 = scales @ baseline_parts(self.ship, self.top_m_s, speed_m_s.tobytes())
+    def _departure(self, ship: Ship, speed_m_s: Float64, scales: Float64) -> Float64:
+        result: Float64 = scales @ baseline_parts(ship, self.top_m_s, speed_m_s.tobytes())
         return result
 
 
@@ -156,10 +157,10 @@ class ForceTerm:
     one_size: ClassVar[Sequence[int]] = range(_DISCREPANCIES)
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Its sizes about some speeds [N]."""
         sd = _FORCE_SD * float(self.ship.resistance_n(self.top_m_s))
-        return tuple(scaled(f'force {k}', sd) for k in range(_DISCREPANCIES))
+        return tuple(free(f'force {k}', normal(sd)) for k in range(_DISCREPANCIES))
 
     def acts_in(self, run: int) -> bool:
         """Tell that it acts in all runs."""
@@ -217,9 +218,9 @@ class ModelErrorTerm:
     one_size: ClassVar[Sequence[int]] = ()
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Departures about some times, relative to the trace of the effect."""
-        return tuple(scaled(f'form {k}', self.sd) for k in range(_FORMS))
+        return tuple(free(f'form {k}', normal(self.sd)) for k in range(_FORMS))
 
     def columns(
         self, seen: Observation, trace: tuple[Float64, Float64]
@@ -266,17 +267,17 @@ class RunNuisance:
     one_size: ClassVar[Sequence[int]] = ()
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Place [m], heading [rad], stop [s], factor on the resistance, - 1, clocks [s]."""
         # where no row shows it, a place with a prior leaves the evidence as it is
-        tail = Tail.FLAT if self.has_positions else Tail.NORMAL
+        place = flat() if self.has_positions else normal(1.0)
         return (
-            scaled('ahead', 1.0, tail=tail),
-            scaled('to port', 1.0, tail=tail),
-            scaled('heading', self.heading_sd_rad),
-            scaled('stop', self.stop_sd_s),
-            scaled('factor', self.scatter),
-            scaled('log late', _CLOCKS_SD_S if self.has_positions else 0.0),
+            free('ahead', place),
+            free('to port', place),
+            free('heading', normal(self.heading_sd_rad)),
+            free('stop', normal(self.stop_sd_s)),
+            free('factor', normal(self.scatter)),
+            free('log late', normal(_CLOCKS_SD_S if self.has_positions else 0.0)),
         )
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
@@ -313,11 +314,11 @@ class SpeedErrorTerm:
     one_size: ClassVar[Sequence[int]] = range(_DISCREPANCIES)
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Its sizes about some times [m/s]."""
         sd = _SPEED_SD * self.speed_m_s
         what = 'log' if self.of_log else 'radar'
-        return tuple(scaled(f'{what} {k}', sd) for k in range(_DISCREPANCIES))
+        return tuple(free(f'{what} {k}', normal(sd)) for k in range(_DISCREPANCIES))
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
         """Return (6, n) and (6, k)."""

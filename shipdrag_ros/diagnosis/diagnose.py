@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from shipdrag_ros.diagnosis.advice import advice
 from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.facts import Facts, told_of
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
@@ -15,7 +16,7 @@ from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
     Advice,
     Diagnosis,
-    Named,
+    EffectEstimate,
     Verdict,
     Where,
 )
@@ -25,7 +26,7 @@ from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship, StatedEffect
+from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation.effect import Scope
 from shipdrag_ros.simulation.effects import find
 
@@ -33,7 +34,13 @@ _NEAR_S = 4.0  # by which a stop may be moved without seeing the run anew
 _LOOKS = 3  # at a run
 
 
-def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Diagnosis:
+def diagnose(
+    runs: Sequence[CoastRun],
+    ship: Ship,
+    parameters: Parameters,
+    *,
+    facts: Sequence[Fact] = (),
+) -> Diagnosis:
     """
     Name the effect that is missing in a ship's model.
 
@@ -45,6 +52,8 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         With a baseline; the effects that its file states are part of the model.
     parameters
         For the noise of the sensors and the convention of the heading.
+    facts
+        That a log book knows of all runs, whatever the ship file and the runs say.
 
     Returns
     -------
@@ -70,10 +79,11 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     >>> from shipdrag_ros.diagnosis import CoastRun, diagnose
     >>> from shipdrag_ros.estimation import Window
     >>> from shipdrag_ros.parameters import Parameters
-    >>> from shipdrag_ros.ship import StatedEffect, Uncertain
+    >>> from shipdrag_ros.parameter import Parameter
+    >>> from shipdrag_ros.ship import StatedEffect
     >>> from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
     >>> scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
-    >>> scale = StatedEffect('log_scale', {'factor': Uncertain(0.1, 0.0)})
+    >>> scale = StatedEffect('log_scale', {'factor': Parameter(0.1, 0.0)})
     >>> truth = simulate(ship, scenario, effects=[scale])
     >>> block = sense(truth, standard_sensors(), seed=1)
     >>> stop_ns = START_NS + round(scenario.lead_in_s * 1e9)
@@ -86,7 +96,8 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):
         seen, notes = _observed(runs, ship, parameters, moved_s)
-        model = CoastModel(ship, seen, seen[0].heading_rad)
+        told = _told(runs, seen, ship, facts)
+        model = CoastModel(ship, seen, seen[0].heading_rad, told)
         found = search(model)
         more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
@@ -120,7 +131,18 @@ def diagnose(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Di
         traces=traces(model, as_stated.best, explained.best),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
+        facts=told.weighed(judged.posterior, [run.name for run in seen]),
     )
+
+
+def _told(
+    runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
+) -> Facts:
+    """Gather what is told of the runs that are diagnosed."""
+    own = {run.name: run.facts for run in runs}
+    stops = [run.context.stop for run in seen]
+    at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
+    return told_of(ship, [(own[run.name], ns) for run, ns in zip(seen, at_ns)], facts)
 
 
 def _has_both(run: Observation) -> bool:
@@ -146,7 +168,9 @@ def _observed(
         try:
             by_s = moved_s.get(run.name, 0.0)
             seen.append(
-                Observation.of(run.window, ship, parameters, name=run.name, stop_moved_s=by_s)
+                Observation.of(
+                    run.window, run.ship or ship, parameters, name=run.name, stop_moved_s=by_s
+                )
             )
         except (DiagnosisError, EstimationError) as error:
             refused[run.name] = error
@@ -178,7 +202,7 @@ def _before_the_stop(seen: Sequence[Observation]) -> Where:
     return Where('log_radar', (-lead_in_s, 0.0), (min(speeds), max(speeds)))
 
 
-def with_effects(ship: Ship, effects: Sequence[Named]) -> Ship:
+def with_effects(ship: Ship, effects: Sequence[EffectEstimate]) -> Ship:
     """
     Return a ship with effects added to what its file states.
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Linearised
-from shipdrag_ros.diagnosis.terms import Tail
+from shipdrag_ros.parameter import Shape
 from shipdrag_ros.samples import Float64
 
 _ANEW = (0, 3)  # iterations in which all derivatives are found anew
@@ -119,7 +119,7 @@ class _State:
         self.done = False
         self._half = np.zeros(len(z), bool)
         for i, unknown in enumerate(hypothesis.unknowns):
-            self._half[i] = unknown.tail is Tail.HALF
+            self._half[i] = unknown.prior.shape is Shape.HALF_NORMAL
 
     def take(self, point: Linear) -> None:
         """Go on from a point that was tried, or from the one before with a smaller step."""

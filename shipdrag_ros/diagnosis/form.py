@@ -27,8 +27,9 @@ from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
 from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Where
 from shipdrag_ros.diagnosis.search import search
 from shipdrag_ros.diagnosis.speeds import CoastRun, MeanSpeeds
-from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
+from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.diagnosis.verdict import Judgement, judge
+from shipdrag_ros.parameter import Parameter, free, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Frame, Scenario
@@ -58,7 +59,7 @@ class GaussianTerm:
     unknowns
     """
 
-    unknowns: tuple[Unknown, ...]
+    unknowns: tuple[Parameter, ...]
     one_size: ClassVar[Sequence[int]] = ()
 
 
@@ -156,10 +157,10 @@ class FormModel(DirectModel):
         first = [float(coast.speed_m_s[0]) for coast in self.seen]
         top, duration = self._top_m_s, self._duration_s
         unknowns = (
-            scaled('ln a', _SD_OF_LOG, mean=math.log(1.0 / duration)),
-            scaled('ln b', _SD_OF_LOG, mean=math.log(1.0 / (duration * top))),
-            *(scaled(f'shape {k}', _SHAPE_SD) for k in range(_SHAPES)),
-            *(scaled(f'first {j}', _START_SD * v, mean=v) for j, v in enumerate(first)),
+            free('ln a', normal(_SD_OF_LOG, mean=math.log(1.0 / duration))),
+            free('ln b', normal(_SD_OF_LOG, mean=math.log(1.0 / (duration * top)))),
+            *(free(f'shape {k}', normal(_SHAPE_SD)) for k in range(_SHAPES)),
+            *(free(f'first {j}', normal(_START_SD * v, mean=v)) for j, v in enumerate(first)),
         )
         return Hypothesis((), (FormTerm(unknowns),), log_prior=math.log(_NOTHING))
 
@@ -182,7 +183,7 @@ class FormModel(DirectModel):
         """
         sd = _SPLINE_SD * self._top_m_s
         sizes = tuple(
-            scaled(f'{channel} {j} {k}', sd)
+            free(f'{channel} {j} {k}', normal(sd))
             for j in range(len(self.seen))
             for k in range(_SPLINES)
         )
@@ -207,7 +208,7 @@ class FormModel(DirectModel):
         force, offset, splines = np.zeros((2, count)), np.zeros(count), None
         for part, place in hypothesis.parts:
             value = np.array(
-                [[u.value(each) for each in z[place + i]] for i, u in enumerate(part.unknowns)]
+                [[u.prior.at(each) for each in z[place + i]] for i, u in enumerate(part.unknowns)]
             )
             if isinstance(part, FormTerm):
                 (a, b), shape = np.exp(value[:2]), value[2 : 2 + _SHAPES]
@@ -243,7 +244,12 @@ class FormModel(DirectModel):
     @cached_property
     def _force(self) -> ConstantForceTerm:
         sd = _FORCE_SD * 2.0 * self._top_m_s / self._duration_s
-        return ConstantForceTerm((scaled('ahead', sd), scaled('to port', sd)))
+        return ConstantForceTerm(
+            (
+                free('ahead', normal(sd)),
+                free('to port', normal(sd)),
+            )
+        )
 
     @cached_property
     def _frame(self) -> Frame:
@@ -306,7 +312,7 @@ def _covariance(seen: Sequence[MeanSpeeds], sizes: Float64) -> Float64:
 
 def _notes(model: FormModel, judged: Judgement, fit: Fit) -> list[str]:
     seen, parts = model.seen, fit.hypothesis.parts
-    a, b = np.exp([u.value(z) for u, z in zip(parts[0][0].unknowns[:2], fit.best.z.tolist())])
+    a, b = np.exp([u.prior.at(z) for u, z in zip(parts[0][0].unknowns[:2], fit.best.z.tolist())])
     found = [
         f'the ship file has no baseline: -dv/dt = a v + b v^2 with a = {a:.3g} 1/s and '
         f'b = {b:.3g} 1/m is fitted to the {len(seen)} run(s) themselves; what has that form '
@@ -316,8 +322,8 @@ def _notes(model: FormModel, judged: Judgement, fit: Fit) -> list[str]:
     for part, place in parts:
         if isinstance(part, ConstantForceTerm):
             ahead, z = part.unknowns[0], float(fit.best.z[place])
-            force = ahead.value(z)
-            sd = ahead.slope(z) * math.sqrt(fit.covariance[place, place])
+            force = ahead.prior.at(z)
+            sd = ahead.prior.slope(z) * math.sqrt(fit.covariance[place, place])
             n_r = float(model.ship.n_r(np.array([abs(float(seen[0].speed_m_s[0]))]))[0])
             found.append(
                 f'a constant part of {force:.3g} ± {sd:.1g} m/s^2 is there besides: a force of '

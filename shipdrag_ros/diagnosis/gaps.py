@@ -176,8 +176,8 @@ def predicted(model: CoastModel, run: int, found: Fit) -> Linear:
             break
         matrix, negative_gradient = linear.normal_equations
         for i, unknown in enumerate(here.unknowns[:shared]):
-            matrix[i, i] -= unknown.weight(linear.z[i])
-            negative_gradient[i] += unknown.weight(linear.z[i]) * linear.z[i]
+            matrix[i, i] -= unknown.prior.weight(linear.z[i])
+            negative_gradient[i] += unknown.prior.weight(linear.z[i]) * linear.z[i]
         matrix[:shared, :shared] += precision
         negative_gradient[:shared] -= precision @ (linear.z[:shared] - mean)
         step = np.linalg.lstsq(matrix, negative_gradient, rcond=1e-13)[0]

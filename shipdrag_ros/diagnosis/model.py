@@ -18,7 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.terms import Unknown
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effect import Effect
 
@@ -29,7 +29,7 @@ class Part(Protocol):
     """A part of a hypothesis that leaves something open."""
 
     @property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Its parameters."""
 
     @property
@@ -127,7 +127,7 @@ class Hypothesis:
         return [[place + k for k in part.one_size] for part, place in self.parts if part.one_size]
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """In the order of the parts; parameters without a prior are behind them."""
         return tuple(unknown for part, _ in self.parts for unknown in part.unknowns)
 
@@ -169,14 +169,16 @@ class Linear:
     @cached_property
     def cost(self) -> float:
         """-2 ln of the posterior, less a constant."""
-        return self.chi2 + sum(u.penalty(z) for u, z in zip(self.hypothesis.unknowns, self.z))
+        return self.chi2 + sum(
+            u.prior.penalty(z) for u, z in zip(self.hypothesis.unknowns, self.z)
+        )
 
     @cached_property
     def normal_equations(self) -> tuple[Float64, Float64]:
         """Matrix (p, p) and negative gradient (p,) of half the cost."""
         weight = np.zeros(len(self.z))
         for i, (unknown, z) in enumerate(zip(self.hypothesis.unknowns, self.z)):
-            weight[i] = unknown.weight(z)
+            weight[i] = unknown.prior.weight(z)
         matrix = np.diag(weight)
         negative_gradient = -weight * self.z
         for table in self.tables:

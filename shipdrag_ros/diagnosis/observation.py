@@ -96,6 +96,8 @@ class Observation:
         positions, None without.
     context
         What is measured besides.
+    ship
+        As she was in this run, without effects.
     """
 
     name: str
@@ -110,6 +112,7 @@ class Observation:
     along: Measured
     across: Measured | None
     context: Context
+    ship: Ship
 
     @property
     def duration_s(self) -> float:
@@ -200,6 +203,7 @@ class Observation:
             learnt.measured(parts, times),
             learnt.measured(across, times) if across else None,
             Context.of(window, ship, times, Stop(since_ns, lead_in_s, heading_rad, speed)),
+            replace(ship, effects=()),
         )
 
 

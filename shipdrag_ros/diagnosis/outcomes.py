@@ -127,7 +127,9 @@ def of_another_run(
         for hypothesis, log_weight in _transferred(one.hypothesis, runs=len(model.seen)):
             kept = _places(one.hypothesis, hypothesis)
             z = np.array([*(unknown.start for unknown in hypothesis.unknowns), run.speed_m_s])
-            covariance = np.diag([*(float(u.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0])
+            covariance = np.diag(
+                [*(float(u.prior.weight(0.0) > 0.0) for u in hypothesis.unknowns), 0.0]
+            )
             precision = covariance.copy()
             old, new = [pair[0] for pair in kept], [pair[1] for pair in kept]
             z[new] = one.best.z[old]
@@ -221,9 +223,9 @@ def with_known(
                 known = sd[unknown.name][run] if unknown.name in sd else 0.0
                 if known > 0.0:
                     z = float(one.best.z[at])
-                    mean.append(unknown.value(z) / known)
+                    mean.append(unknown.prior.at(z) / known)
                     slope.append(np.zeros(len(one.best.z)))
-                    slope[-1][at] = unknown.slope(z) / known
+                    slope[-1][at] = unknown.prior.slope(z) / known
         rows = np.array(slope).reshape(len(mean), len(one.best.z)).T
         found.append(
             [

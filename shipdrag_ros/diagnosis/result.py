@@ -7,11 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from shipdrag_ros.display import Table
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.sections import Uncertain
+from shipdrag_ros.ship.facts import Fact
 
 FORCE = 'force'  # on the ship, against her baseline
 LOG_TRACK = 'log_track'  # the log against the way over ground
+DOUBTED = 0.5  # probability that a fact is wrong, from which the data contradict it
 
 
 class Verdict(StrEnum):
@@ -24,7 +28,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Named:
+class EffectEstimate:
     """
     An effect with its size.
 
@@ -39,25 +43,74 @@ class Named:
 
     name: str
     probability: float
-    parameters: Mapping[str, Uncertain]
+    parameters: Mapping[str, Parameter]
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One name, or a pair, with its probability."""
+    """
+    One name, or a pair.
+
+    Attributes
+    ----------
+    names
+        Empty: nothing is missing.
+    probability
+    effects
+        The same with the sizes that they would have.
+    """
 
     names: tuple[str, ...]
     probability: float
+    effects: tuple[EffectEstimate, ...] = ()
 
 
 @dataclass(frozen=True)
 class Advice:
     """
     What would decide, and how probably it would.
+
+    Attributes
+    ----------
+    measure
+        What to do, in words.
+    probability
+        That something is named after it; None: not known.
+    cost
+        Of the crew, in words.
     """
 
     measure: str
     probability: float | None
+    cost: str = ''
+
+
+@dataclass(frozen=True)
+class ToldFact:
+    """
+    A fact of the log book, and what the data say of it.
+
+    Attributes
+    ----------
+    fact
+    run
+        Its name; '' where the fact is told of all runs.
+    wrong
+        Probability that the fact is wrong; None: it says nothing about what was
+        examined.
+    against
+        Effects of the most probable hypothesis that contradicts it.
+    """
+
+    fact: Fact
+    run: str
+    wrong: float | None
+    against: tuple[str, ...] = ()
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the data contradict it."""
+        return self.wrong is not None and self.wrong > DOUBTED
 
 
 @dataclass(frozen=True)
@@ -190,10 +243,14 @@ class Diagnosis:
         speaks of these alone.
     no_coastdown
         Where none is used: that none was found and why, a sentence.
+    estimates
+        r(v) of the coastdowns as measured, where they were estimated.
+    facts
+        All that were told, with what the data say of each.
     """
 
     verdict: Verdict
-    effects: tuple[Named, ...]
+    effects: tuple[EffectEstimate, ...]
     candidates: tuple[Candidate, ...]
     nothing: float
     unnamed: float
@@ -204,9 +261,34 @@ class Diagnosis:
     held_out_before: Gap | None
     held_out_after: Gap | None
     baseline: str
-    best: tuple[Named, ...] = ()
+    best: tuple[EffectEstimate, ...] = ()
     notes: tuple[str, ...] = ()
     traces: tuple[Trace, ...] = ()
     coastdowns_used: int = 0
     examined: tuple[str, ...] = ()
     no_coastdown: str = ''
+    facts: tuple[ToldFact, ...] = ()
+    estimates: tuple[Estimate, ...] = ()
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what was found: the verdict, what was examined, where, and what the record shows.
+
+        Returns
+        -------
+        tuple of str
+            A paragraph each, the verdict first.
+        """
+        from shipdrag_ros.diagnosis import words  # it tells what this module holds
+
+        where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
+        told = (words.sentence(self), self.no_coastdown, words.examined(self), where)
+        return (*filter(None, told), *words.facts(self), *self.notes)
+
+    def table(self) -> Table:
+        """
+        Show how probable each answer is.
+        """
+        from shipdrag_ros.diagnosis import tables
+
+        return tables.probabilities(self)

@@ -25,8 +25,9 @@ from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing, start
 from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Where
 from shipdrag_ros.diagnosis.search import Found, search, with_pairs
-from shipdrag_ros.diagnosis.terms import EffectTerm, Unknown, cubic_bsplines, scaled
+from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.diagnosis.verdict import judge
+from shipdrag_ros.parameter import Parameter, free, normal
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -66,9 +67,9 @@ class LogErrorTerm:
     one_size: ClassVar[Sequence[int]] = ()
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Sizes about some speeds [m/s]."""
-        return tuple(scaled(f'log {k}', self.sd_m_s) for k in range(_SPLINES))
+        return tuple(free(f'log {k}', normal(self.sd_m_s)) for k in range(_SPLINES))
 
 
 @dataclass(frozen=True)
@@ -182,7 +183,7 @@ class SailingModel(DirectModel):
     def _predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
         action, extra = Action(), np.zeros(len(self.legs))
         for part, place in hypothesis.parts:
-            values = [u.value(float(z[place + i])) for i, u in enumerate(part.unknowns)]
+            values = [u.prior.at(float(z[place + i])) for i, u in enumerate(part.unknowns)]
             if isinstance(part, EffectTerm):
                 action += part.action(self._frame, 0, values)
             else:

@@ -19,7 +19,8 @@ import numpy as np
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
 from shipdrag_ros.diagnosis.posterior import QUIET, Posterior, mode_of, posterior_of
-from shipdrag_ros.diagnosis.terms import Tail, Unknown, trial_z
+from shipdrag_ros.diagnosis.terms import trial_z
+from shipdrag_ros.parameter import Parameter, Shape
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
 
@@ -155,9 +156,9 @@ def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -
     return found
 
 
-def _amount(first: Unknown) -> tuple[float, float]:
+def _amount(first: Parameter) -> tuple[float, float]:
     """Return mean and precision of the size, in parts of that which is tried."""
-    if first.tail is Tail.HALF or first.start == 0.0:
+    if first.prior.shape is Shape.HALF_NORMAL or first.start == 0.0:
         return 0.0, trial_z(first) ** 2
     return 1.0, 1.0 / _AMOUNT_SD**2
 

@@ -22,8 +22,8 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.speeds import CoastRun
-from shipdrag_ros.diagnosis.terms import Tail
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.parameter import Shape
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientSd, Ship, TableBaseline
@@ -274,7 +274,9 @@ class SharedBaseline:
             )
         unknowns = nothing.terms[0].unknowns
         # scales of the parts, then the shape; the rest is each run's own
-        scales = [i for i, unknown in enumerate(unknowns) if unknown.tail is Tail.WIDE]
+        scales = [
+            i for i, unknown in enumerate(unknowns) if unknown.prior.shape is Shape.HEAVY_TAILED
+        ]
         shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
         shared = [*scales, *shapes]
         speeds = [model.predict(j, fitted.best).speed for j in range(len(seen))]
@@ -282,7 +284,7 @@ class SharedBaseline:
             model,
             fitted,
             tuple(unknowns[i].name for i in scales),
-            np.array([unknowns[i].slope(0.0) for i in shared]),
+            np.array([unknowns[i].prior.slope(0.0) for i in shared]),
             tuple(_normal(fitted, j, shared) for j in range(len(seen))),
             (
                 max(min(float(speed.min()) for speed in speeds), 0.0),
@@ -301,7 +303,9 @@ class SharedBaseline:
         """Return what runs share, with the prior of the baseline."""
         z = self.fitted.best.z[: len(self.unit)]
         unknowns = self.fitted.hypothesis.unknowns[: len(self.unit)]
-        weight = np.array([unknown.weight(at) for unknown, at in zip(unknowns, z, strict=True)])
+        weight = np.array(
+            [unknown.prior.weight(at) for unknown, at in zip(unknowns, z, strict=True)]
+        )
         prior = Normal(np.diag(weight), -weight * z)
         return share(normals, prior, self.along, usual_scatter=float(self.unit[0]))
 
@@ -366,7 +370,7 @@ def _normal(fitted: Fit, run: int, shared: list[int]) -> Normal:
     matrix, negative_gradient = rows @ rows.T, rows @ table[0]
     for place, i in enumerate(own, start=len(shared)):
         if i < len(unknowns):  # the steady speeds have no prior
-            weight = unknowns[i].weight(best.z[i])
+            weight = unknowns[i].prior.weight(best.z[i])
             matrix[place, place] += weight
             negative_gradient[place] -= weight * best.z[i]
     return Normal.without(matrix, negative_gradient, len(shared))

@@ -53,7 +53,7 @@ class _Plan:
     base
         At its unknowns.
     steps
-        Unknown, column and size of the step of each.
+        Parameter, column and size of the step of each.
     without
         Without each effect whose form is open.
     """
@@ -93,7 +93,7 @@ class CoastSimulation:
         """One a run; effects of the earth lie along the first run."""
         return tuple(
             Frame(
-                self.bare,
+                run.ship,
                 Scenario(
                     speed_m_s=run.speed_m_s,
                     lead_in_s=run.lead_in_s,
@@ -158,7 +158,7 @@ class CoastSimulation:
             for hypothesis in hypotheses:
                 term = hypothesis.terms[-1]
                 first, *others = term.unknowns
-                sizes = [first.value(trial_z(first)), *(u.value(u.start) for u in others)]
+                sizes = [first.prior.at(trial_z(first)), *(u.prior.at(u.start) for u in others)]
                 more = term.action(frame, j, sizes) if term.acts_in(j) else Action()
                 batch.add(whole + more, speed)
             columns = self._simulate(j, batch)
@@ -198,7 +198,7 @@ class CoastSimulation:
     def _simulate(self, run: int, batch: _Batch) -> Columns:
         frame = self.frames[run]
         return simulate_columns(
-            self.bare,
+            frame.ship,
             frame.scenario,
             batch.actions,
             self.seen[run].time_s,
@@ -248,7 +248,7 @@ class CoastSimulation:
             if id(term) in with_errors:
                 without[id(term)] = batch.add(others, speed)
             for k, unknown in enumerate(term.unknowns):
-                value = unknown.value(z[place + k] + _STEP_Z)
+                value = unknown.prior.at(z[place + k] + _STEP_Z)
                 if value != values[k] and place + k not in skipped:
                     stepped = [*values[:k], value, *values[k + 1 :]]
                     column = batch.add(others + term.action(frame, run, stepped), speed)
@@ -262,7 +262,7 @@ class CoastSimulation:
     ) -> list[tuple[Term, int, list[float]]]:
         """Return what acts in a run, the places of its unknowns and their values."""
         return [
-            (term, place, [u.value(z[place + i]) for i, u in enumerate(term.unknowns)])
+            (term, place, [u.prior.at(z[place + i]) for i, u in enumerate(term.unknowns)])
             for term, (_, place) in zip(hypothesis.terms, hypothesis.parts)
             if term.acts_in(run)
         ]
@@ -298,8 +298,8 @@ class CoastSimulation:
             for i, of_part in enumerate(part.unknowns):
                 at = place + i
                 table[1 + at, :n], table[1 + at, n : n + k] = along[i], across[i]
-                table[0] -= table[1 + at] * of_part.value(z[at])
-                table[1 + at] *= of_part.slope(z[at])
+                table[0] -= table[1 + at] * of_part.prior.at(z[at])
+                table[1 + at] *= of_part.prior.slope(z[at])
         residual = table[0].copy()
         return self._whitened(run, table), residual
 

@@ -14,6 +14,7 @@ from shipdrag_ros.estimation.ode_fit.steady import white_sd
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Fact, Ship
 
 _BINS, _LEAST_ROWS = 150, 20
 _KINK_BEFORE_S, _KINK_AFTER_S = 240.0, 240.0  # of the onset that was found
@@ -32,10 +33,16 @@ class CoastRun:
         For the user.
     window
         With the steady record before it.
+    facts
+        That a log book knows of this run.
+    ship
+        The ship as she was in this run; None: as in all.
     """
 
     name: str
     window: Window
+    facts: tuple[Fact, ...] = ()
+    ship: Ship | None = None
 
 
 @dataclass(frozen=True)

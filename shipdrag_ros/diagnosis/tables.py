@@ -7,11 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipdrag_ros.diagnosis import Compared, Diagnosis, Named, Trace
+from shipdrag_ros.diagnosis import Compared, Diagnosis, EffectEstimate, Trace
 from shipdrag_ros.diagnosis import words as words
 from shipdrag_ros.display import TRACK_LABELS, Table, plus_minus
-from shipdrag_ros.ship import Uncertain
-from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.simulation.effects import LIBRARY
 
 
@@ -25,21 +24,56 @@ def probabilities(found: Diagnosis) -> Table:
     return Table(('what is missing', 'probability'), rows)
 
 
-def parameters(effects: Sequence[Named]) -> Table:
+def parameters(effects: Sequence[EffectEstimate]) -> Table:
     """
     Show how large effects are; the names are those of `simulate --effect`.
     """
     rows = [
-        (
-            effect.name,
-            quantity.name,
-            *_figures(quantity, effect.parameters[quantity.name]),
-            quantity.meaning,
-        )
+        (effect.name, *_parameter(quantity, effect))
         for effect in effects
         for quantity in LIBRARY[effect.name].parameters
     ]
     return Table(('effect', 'parameter', 'value', 'sd', 'meaning'), tuple(rows))
+
+
+def sizes(found: Diagnosis) -> Table:
+    """
+    Show how large each candidate would be, were it the one.
+    """
+    rows = [
+        (
+            words.names_text(each.names),
+            words.probability(each.probability),
+            *_parameter(quantity, effect),
+        )
+        for each in found.candidates
+        for effect in each.effects
+        for quantity in LIBRARY[effect.name].parameters
+    ]
+    heads = ('candidate', 'probability', 'parameter', 'value', 'sd', 'meaning')
+    return Table(heads, tuple(rows))
+
+
+def _parameter(quantity: Parameter, effect: EffectEstimate) -> tuple[str, ...]:
+    """Return name, value, sd and meaning of a parameter."""
+    value, sd = _figures(quantity, effect.parameters[quantity.name])
+    return quantity.name, value, sd, quantity.meaning
+
+
+def facts(found: Diagnosis) -> Table:
+    """
+    Show the facts that were told, and how probable it is that each is wrong.
+    """
+    rows = [
+        (
+            str(each.fact),
+            each.run or 'all',
+            f'{each.fact.words}',
+            '-' if each.wrong is None else words.probability(each.wrong),
+        )
+        for each in found.facts
+    ]
+    return Table(('fact', 'of run', 'says', 'wrong with probability'), tuple(rows))
 
 
 def gaps(found: Diagnosis) -> Table:
@@ -84,7 +118,7 @@ def noise(traces: Sequence[Trace]) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _figures(quantity: Quantity, found: Uncertain) -> tuple[str, str]:
+def _figures(quantity: Parameter, found: Parameter) -> tuple[str, str]:
     """Return value and sd, as the sd deserves; what was a choice has none."""
     if found.sd == 0.0:
         return words.size(quantity, found), '-'

@@ -1,93 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What a hypothesis leaves open: unknowns with a prior, and the parts that hold them.
+What a hypothesis leaves open: parameters with a prior, and the parts that hold them.
 
-Every unknown is fitted as z, standard normal before the data, so that the
-evidence of hypotheses can be compared whatever the units of their parameters.
 An effect, and B-splines for what has no name, are parts of all models.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from enum import Enum, auto
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import BSpline
-from scipy.special import expit, ndtr
 
+from shipdrag_ros.parameter import Parameter, Shape, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Prior, Scope, Shape
+from shipdrag_ros.simulation.effect import Effect, Frame, Scope
 
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
-_WORSE, _HOW_OFTEN = 3.0, 0.1  # times worse than stated that a baseline is, in so many cases
 
 
-class Tail(Enum):
-    """How the prior of z falls off."""
-
-    NORMAL = auto()
-    HALF = auto()  # twice the normal one, of z >= 0
-    WIDE = auto()  # a baseline may be three times worse than stated, but hardly more
-    FLAT = auto()  # the data alone decide
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """
-    One number to be fitted.
-
-    Attributes
-    ----------
-    name
-    tail
-    value
-        From z to the number in its unit.
-    slope
-        Its derivative.
-    start
-        z that a fit begins from.
-    """
-
-    name: str
-    tail: Tail
-    value: Callable[[float], float]
-    slope: Callable[[float], float]
-    start: float = 0.0
-
-    def penalty(self, z: float) -> float:
-        """
-        Return -2 ln of the prior, less a constant.
-        """
-        if self.tail is Tail.FLAT:
-            return 0.0
-        if self.tail is Tail.WIDE:
-            return z * z - 2.0 * float(np.logaddexp(0.0, _odds(z)))
-        return z * z
-
-    def weight(self, z: float) -> float:
-        """
-        Return the precision that gives the slope of the penalty at z.
-        """
-        if self.tail is Tail.FLAT:
-            return 0.0
-        if self.tail is Tail.WIDE:
-            return 1.0 - float(expit(_odds(z))) * (1.0 - 1.0 / _WORSE**2)
-        return 1.0
-
-
-def _odds(z: float) -> float:
-    """Return the logarithm of the odds that a baseline that is z off is worse than stated."""
-    before = math.log(_HOW_OFTEN / (_WORSE * (1.0 - _HOW_OFTEN)))
-    return before + 0.5 * z * z * (1.0 - 1.0 / _WORSE**2)
-
-
-def trial_z(unknown: Unknown) -> float:
+def trial_z(unknown: Parameter) -> float:
     """
     Return z of a likely size, for one that is tried before it is fitted.
 
@@ -102,73 +38,6 @@ def trial_z(unknown: Unknown) -> float:
         Where its fit begins, or 0.5 for one that begins from 0.
     """
     return unknown.start or _TRIAL_Z
-
-
-def scaled(name: str, sd: float, *, mean: float = 0.0, tail: Tail = Tail.NORMAL) -> Unknown:
-    """
-    Return an unknown that is mean + sd z.
-
-    Parameters
-    ----------
-    name
-        Of the unknown.
-    sd
-        Prior standard deviation, in its unit.
-    mean
-        Prior mean.
-    tail
-        Of the prior.
-
-    Returns
-    -------
-    Unknown
-        In its unit.
-    """
-    return Unknown(name, tail, lambda z: mean + sd * z, lambda z: sd)
-
-
-def of_prior(name: str, prior: Prior, *, start: float = 0.0, sign: float = 1.0) -> Unknown:
-    """
-    Return an unknown of the prior that an effect states.
-
-    Parameters
-    ----------
-    name
-        Of the parameter.
-    prior
-        In SI.
-    start
-        z that a fit begins from.
-    sign
-        Where the prior leaves it open.
-
-    Returns
-    -------
-    Unknown
-        Whose z is standard normal under the prior, or the positive half of it.
-    """
-    a, b = sign * prior.first, prior.second
-    match prior.shape:
-        case Shape.HALF_NORMAL:
-            return Unknown(name, Tail.HALF, lambda z: b * z, lambda z: b, start)
-        case Shape.LOG_NORMAL | Shape.EITHER_SIGN:
-            return Unknown(
-                name,
-                Tail.NORMAL,
-                lambda z: a * math.exp(b * z),
-                lambda z: a * b * math.exp(b * z),
-                start,
-            )
-        case Shape.UNIFORM:
-            return Unknown(
-                name,
-                Tail.NORMAL,
-                lambda z: a + (b - a) * float(ndtr(z)),
-                lambda z: (b - a) * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi),
-                start,
-            )
-        case _:
-            return Unknown(name, Tail.NORMAL, lambda z: a + b * z, lambda z: b, start)
 
 
 @dataclass(frozen=True)
@@ -205,22 +74,20 @@ class EffectTerm:
     stated: bool = False
 
     @cached_property
-    def unknowns(self) -> tuple[Unknown, ...]:
+    def unknowns(self) -> tuple[Parameter, ...]:
         """Its parameters, without those that are fixed."""
-        quantities = [quantity.of(self.ship) for quantity in self.effect.parameters]
+        parameters = self.effect.parameters_of(self.ship)
         if self.gaussian:
             return tuple(
-                scaled(quantity.name, sd, mean=mean)
-                for quantity, (mean, sd) in zip(quantities, self.gaussian, strict=True)
+                replace(one, prior=normal(sd, mean=mean))
+                for one, (mean, sd) in zip(parameters, self.gaussian, strict=True)
             )
-        free = [quantity for quantity in quantities if quantity.name not in dict(self.fixed)]
+        free = [one for one in parameters if one.name not in dict(self.fixed)]
         starts = self.starts or (0.0,) * len(free)
         signs = dict(self.signs)
         return tuple(
-            of_prior(
-                quantity.name, quantity.prior, start=start, sign=signs.get(quantity.name, 1.0)
-            )
-            for quantity, start in zip(free, starts, strict=True)
+            replace(one, prior=one.prior.of_sign(signs.get(one.name, 1.0)), start=start)
+            for one, start in zip(free, starts, strict=True)
         )
 
     @property

@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
-from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, Gap, Named, Verdict
+from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.search import Found
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.ship import Uncertain
+from shipdrag_ros.parameter import Parameter
 
 _SET = 0.99  # of the candidates
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
@@ -55,21 +55,10 @@ class Judgement:
         return self.verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(names)
 
     @property
-    def best(self) -> tuple[Named, ...]:
+    def best(self) -> tuple[EffectEstimate, ...]:
         """Effects of the most probable hypothesis, with their parameters."""
         fit = self.found.best
-        probability = self.posterior.probability[fit.hypothesis.names]
-        found = []
-        for part, place in fit.hypothesis.parts:
-            if not isinstance(part, EffectTerm) or part.stated:
-                continue
-            values = {name: Uncertain(value, 0.0) for name, value in part.fixed}
-            for i, unknown in enumerate(part.unknowns, place):
-                z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
-                values[unknown.name] = Uncertain(unknown.value(z), abs(unknown.slope(z)) * sd)
-            ordered = {q.name: values[q.name] for q in part.effect.parameters}
-            found.append(Named(part.effect.name, probability, ordered))
-        return tuple(sorted(found, key=lambda effect: effect.name))
+        return sized(fit, self.posterior.probability[fit.hypothesis.names])
 
     def diagnosis(self, **rest: Any) -> Diagnosis:
         """
@@ -122,7 +111,42 @@ def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False
     if doubted:
         posterior = posterior.doubted()
     verdict, candidates = decide(posterior, lacking=doubted, inseparable=found.model.inseparable)
-    return Judgement(found, posterior, verdict, candidates)
+    fits = posterior.best
+    with_sizes = tuple(
+        replace(each, effects=sized(fits[each.names], each.probability)) for each in candidates
+    )
+    return Judgement(found, posterior, verdict, with_sizes)
+
+
+def sized(fit: Fit, probability: float) -> tuple[EffectEstimate, ...]:
+    """
+    Return the effects of a hypothesis with their sizes, by name.
+
+    Parameters
+    ----------
+    fit
+        Of the hypothesis.
+    probability
+        Of its names.
+
+    Returns
+    -------
+    tuple of EffectEstimate
+        Of the effects that have parameters of their own; not those that the ship
+        file states.
+    """
+    found = []
+    for part, place in fit.hypothesis.parts:
+        if not isinstance(part, EffectTerm) or part.stated:
+            continue
+        values = {name: Parameter(value, 0.0) for name, value in part.fixed}
+        for i, unknown in enumerate(part.unknowns, place):
+            z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
+            prior = unknown.prior
+            values[unknown.name] = Parameter(prior.at(z), abs(prior.slope(z)) * sd)
+        ordered = {q.name: values[q.name] for q in part.effect.parameters}
+        found.append(EffectEstimate(part.effect.name, probability, ordered))
+    return tuple(sorted(found, key=lambda effect: effect.name))
 
 
 def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, Named, Verdict
-from shipdrag_ros.display import plus_minus
-from shipdrag_ros.ship import CoefficientBaseline, Ship, Uncertain
-from shipdrag_ros.simulation.effect import Quantity
+from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, EffectEstimate, Verdict
+from shipdrag_ros.display import M_S_PER_KNOT, plus_minus
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 
 _CHANNELS = {
@@ -22,6 +22,7 @@ NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
 _LEAST = 0.001  # probability that is told
 _WORTH_A_WORD = 0.01
+_LARGE_N = 1e4  # from here on a force is told in kN
 
 
 def sentence(found: Diagnosis) -> str:
@@ -85,14 +86,39 @@ def examined(found: Diagnosis) -> str:
     return f'{said}; not examined: {" and ".join(unseen)}.' if unseen else f'{said}.'
 
 
+def facts(found: Diagnosis) -> list[str]:
+    """
+    Say which facts the data contradict, and which say nothing here, a line each.
+    """
+    told = []
+    for each in found.facts:
+        where = f' ({each.run})' if each.run else ''
+        if each.contradicted and each.wrong is not None:
+            instead = f', most probably {names_text(each.against)}' if each.against else ''
+            told.append(
+                f'The data contradict the fact `{each.fact}`{where}: {each.fact.words}. It is '
+                f'wrong with probability {probability(each.wrong)}{instead}; look at it again.'
+            )
+        elif each.wrong is None:
+            told.append(
+                f'The fact `{each.fact}`{where} is not used: it says nothing of the log against '
+                'the way over ground.'
+            )
+    return told
+
+
 def advice(found: Diagnosis) -> list[str]:
     """
     Return what would decide, a line each.
     """
     return [
         each.measure
-        if each.probability is None
-        else f'{each.measure}; decides with probability {probability(each.probability)}'
+        + (f'; costs {each.cost}' if each.cost else '')
+        + (
+            ''
+            if each.probability is None
+            else f'; decides with probability {probability(each.probability)}'
+        )
         for each in found.would_decide
     ]
 
@@ -104,13 +130,14 @@ def place(found: Diagnosis) -> str:
     if found.where is None:
         return 'nowhere'
     where = found.where
-    first, last = where.time_s
+    (first, last), (slow, fast) = where.time_s, where.speed_m_s
     since = 'of the record' if found.baseline == 'none' else 'after the stop'
     if last <= 0.0:
         first, last, since = -first, -last, 'before the stop'
     return (
         f'{_CHANNELS[where.channel]}, {first:.0f} to {last:.0f} s {since}, '
-        f'at {where.speed_m_s[0]:.1f} to {where.speed_m_s[1]:.1f} m/s'
+        f'at {slow / M_S_PER_KNOT:.1f} to {fast / M_S_PER_KNOT:.1f} knots ({slow:.1f} to '
+        f'{fast:.1f} m/s)'
     )
 
 
@@ -199,7 +226,7 @@ def baseline(found: Diagnosis, ship: Ship | None) -> str:
     return f'{given.source or "of unstated source"}; {known} (two standard deviations, as stated)'
 
 
-def size(quantity: Quantity, found: Uncertain) -> str:
+def size(quantity: Parameter, found: Parameter) -> str:
     """
     Return a value with two standard deviations; what was a choice has none.
     """
@@ -212,7 +239,7 @@ def size(quantity: Quantity, found: Uncertain) -> str:
     return f'({text}) {quantity.unit}' if quantity.unit else text
 
 
-def quantity_text(quantity: Quantity) -> str:
+def quantity_text(quantity: Parameter) -> str:
     """
     Name a parameter without its unit.
     """
@@ -221,13 +248,26 @@ def quantity_text(quantity: Quantity) -> str:
     return name.replace('_', ' ')
 
 
-def _sized(effect: Named) -> str:
+def _sized(effect: EffectEstimate) -> str:
     """Return an effect with its sizes."""
     sizes = ', '.join(
-        f'{quantity_text(quantity)} {size(quantity, effect.parameters[quantity.name])}'
+        f'{quantity_text(quantity)} {_on_board(quantity, effect.parameters[quantity.name])}'
         for quantity in LIBRARY[effect.name].parameters
     )
     return f'{names_text([effect.name])} ({sizes})'
+
+
+def _on_board(quantity: Parameter, found: Parameter) -> str:
+    """Return a size as it is read on board: speeds in knots, large forces in kN."""
+    told = size(quantity, found)
+    if found.sd == 0.0:
+        return told
+    if quantity.unit == 'm/s':
+        knots = plus_minus(found.value / M_S_PER_KNOT, 2.0 * found.sd / M_S_PER_KNOT)
+        return f'({knots}) knots = {told}'
+    if quantity.unit == 'N' and abs(found.value) >= _LARGE_N:
+        return f'({plus_minus(1e-3 * found.value, 2e-3 * found.sd)}) kN'
+    return told
 
 
 def _listed(candidates: Sequence[Candidate]) -> str:

@@ -61,11 +61,17 @@ class EventKind(Enum):
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
+    MESSAGE_LOST = 'message_lost'  # sent, and not heard
 
     @property
     def is_warning(self) -> bool:
         """Whether an operator should look at it."""
-        return self in (EventKind.NO_ESTIMATE, EventKind.RESET, EventKind.CLOCK_JUMP)
+        return self in (
+            EventKind.NO_ESTIMATE,
+            EventKind.RESET,
+            EventKind.CLOCK_JUMP,
+            EventKind.MESSAGE_LOST,
+        )
 
 
 @dataclass(frozen=True)

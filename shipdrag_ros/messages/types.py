@@ -169,6 +169,13 @@ def type_hash(type_name: str) -> str:
     return digest
 
 
+def is_stamped(type_name: str) -> bool:
+    """
+    Say whether a type begins with a header, which holds the time of measurement.
+    """
+    return any(name == 'header' for name, _ in _store.fielddefs[type_name][1][:1])
+
+
 def is_known(type_name: str) -> bool:
     """
     Say whether the store has a definition of this type.

@@ -9,14 +9,17 @@ its unit in its key.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
-from shipdrag_ros.coastdown import InputHealth
+from shipdrag_ros.coastdown.events import State
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
-from shipdrag_ros.node.inputs import InputTopic
+from shipdrag_ros.node.health import InputState
+from shipdrag_ros.node.judging import Level
 from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
 from shipdrag_ros.samples import MOTION_INPUTS
 
@@ -26,23 +29,33 @@ if TYPE_CHECKING:
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
-STALE = DiagnosticStatus.STALE
-
-SILENT_S = 10.0  # an input heard before and silent for longer is stale
 
 
-def state_status(
-    lifecycle: str,
-    monitor: str | None,
-    inputs: Sequence[InputTopic],
-    *,
-    clock_ns: int,
-    sim_time: bool,
-) -> DiagnosticStatus:
+def label(
+    statuses: Sequence[DiagnosticStatus], *, node: str, hardware_id: str
+) -> list[DiagnosticStatus]:
     """
-    Say where the node stands, and what keeps it from estimating.
+    Say whose statuses these are, so that two nodes are told apart.
 
     Parameters
+    ----------
+    node
+        Its full name; without the leading slash, as diagnostic_updater has it.
+    hardware_id
+        The ship.
+    """
+    for status in statuses:
+        status.name = f'{node.lstrip("/")}: {status.name}'
+        status.hardware_id = hardware_id
+    return list(statuses)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """
+    Where the node stands.
+
+    Attributes
     ----------
     lifecycle
         State of the managed node.
@@ -50,63 +63,90 @@ def state_status(
         State of the monitor, None while not active.
     clock_ns
         The node's clock; 0 under sim time before the first /clock.
+    candidates
+        Which topics may be meant, where nothing is heard; '' without any.
+    steady_lead_s, steady_needed_s
+        The longest that the ship was seen to be steady, and what an onset needs.
     """
-    values = {
-        'lifecycle': lifecycle,
-        'monitor': monitor or 'none',
-        'clock': 'simulated' if sim_time else 'system',
+
+    lifecycle: str
+    monitor: State | None
+    clock_ns: int
+    sim_time: bool
+    candidates: str = ''
+    steady_lead_s: float = 0.0
+    steady_needed_s: float = 0.0
+
+
+def state_status(standing: Standing, inputs: Sequence[InputState]) -> DiagnosticStatus:
+    """
+    Say where the node stands, and what keeps it from estimating.
+    """
+    monitor = standing.monitor
+    values: dict[str, object] = {
+        'lifecycle': standing.lifecycle,
+        'monitor': 'none' if monitor is None else monitor.value,
+        'clock': 'simulated' if standing.sim_time else 'system',
     }
-    motion = [topic for topic in inputs if topic.name in MOTION_INPUTS]
-    if sim_time and clock_ns == 0:
-        return _status(
-            'state', ERROR, 'use_sim_time is true but no /clock: messages are not used', values
-        )
+    if standing.sim_time and standing.clock_ns == 0:
+        text = 'use_sim_time is true but no /clock: messages are not used'
+        return _status('state', ERROR, text, values)
     if monitor is None:
-        return _status('state', WARN, f'{lifecycle}: not estimating', values)
-    if not any(topic.age_s is not None and topic.age_s < SILENT_S for topic in motion):
-        names = ', '.join(topic.name for topic in motion)
-        return _status('state', ERROR, f'no data: nothing on any of {names}', values)
-    return _status('state', OK, monitor, values)
+        return _status('state', WARN, f'{standing.lifecycle}: not estimating', values)
+    values['longest steady sailing [s]'] = standing.steady_lead_s
+    motion = [each for each in inputs if each.topic.name in MOTION_INPUTS]
+    fresh = [each for each in motion if each.fresh]
+    if motion and not fresh:
+        names = ', '.join(each.topic.name for each in motion)
+        text = f'no data: nothing on any of {names}'
+        if standing.candidates:
+            values['candidates'] = standing.candidates
+            text = f'{text}; {standing.candidates}'
+        return _status('state', ERROR, text, values)
+    if fresh and all(each.finding.level is Level.ERROR for each in fresh):
+        why = '; '.join(f'{each.topic.name}: {each.finding.text}' for each in fresh)
+        return _status('state', ERROR, f'no input can be used: {why}', values)
+    if monitor is State.WAITING:
+        text = f'waiting: not enough steady sailing yet to know a coastdown by, {_lead(standing)}'
+        return _status('state', OK, text, values)
+    return _status('state', OK, monitor.value, values)
 
 
-def input_status(topic: InputTopic, health: InputHealth | None) -> DiagnosticStatus:
+def _lead(standing: Standing) -> str:
+    return f'{standing.steady_lead_s:.0f} of {standing.steady_needed_s:.0f} s'
+
+
+def input_status(state: InputState) -> DiagnosticStatus:
     """
-    Say how one input is doing; there is no health while the node is not active.
+    Say how one input is doing.
     """
-    level, message = _input_health(topic)
+    topic, health = state.topic, state.health
     values: dict[str, object] = {
         'topic': topic.topic,
         'type': topic.type or 'not yet known',
         'publishers': sum(topic.publishers.values()),
+        'published by': ', '.join(topic.senders) or 'none',
+        'reliability': 'reliable' if topic.reliable else 'best effort',
         'messages': topic.received,
-        'rate [Hz]': topic.rate_hz,
+        'messages lost': topic.lost,
+        'rate [Hz]': state.rate_hz,
         'age [s]': topic.age_s,
-        'clock offset [s]': None if health is None else health.clock_offset_s,
+        'clock offset [s]': topic.clock_offset_s,
         'not used, node inactive or without clock': topic.unused,
         **{f'unreadable {reason}': times for reason, times in topic.unreadable.items()},
     }
+    if topic.type is not None and not is_stamped(topic.type):
+        values['time'] = 'of arrival: the type holds none'
+    if topic.unstamped:
+        values['unstamped'] = topic.unstamped
     if health is not None:
         values['used'] = health.used
         values |= {f'rejected {reason}': times for reason, times in health.rejected.items()}
-    return _status(f'input {topic.name}', level, message, values)
-
-
-def _input_health(topic: InputTopic) -> tuple[bytes, str]:
-    others = ', '.join(topic.other_types)
-    if topic.type is None and others:
-        accepted = ', '.join(topic.accepted)
-        return ERROR, f'wrong type: {others} is published, accepted are {accepted}'
-    if topic.type is None:
-        return OK, 'no publisher'
-    if others:
-        return WARN, f'wrong type: also published as {others}, heard is only {topic.type}'
-    if topic.incompatible_qos is not None:
-        return WARN, f'a publisher is not heard: its {topic.incompatible_qos} QoS does not fit'
-    if topic.age_s is None:
-        return WARN, 'no data'
-    if topic.age_s > SILENT_S:
-        return STALE, f'no data for {topic.age_s:.0f} s'
-    return OK, 'receiving'
+        readings = state.recent.used + sum(state.recent.rejected.values())
+        if readings:
+            values['share used lately [1]'] = state.recent.used / readings
+    level = bytes([state.finding.level])
+    return _status(f'input {topic.name}', level, state.finding.text, values)
 
 
 def recording_status(status: RecordingStatus) -> DiagnosticStatus:
@@ -135,17 +175,25 @@ def recording_status(status: RecordingStatus) -> DiagnosticStatus:
     return _status('recording', level, status.text, values)
 
 
-def estimate_status(estimate: Estimate | None) -> DiagnosticStatus:
+def estimate_status(estimate: Estimate | None, why_none: str) -> DiagnosticStatus:
     """
-    Give the latest figures.
+    Give the latest figures, or say why there are none.
+
+    Parameters
+    ----------
+    why_none
+        Why the coastdown that runs has no estimate, '' where it has one or none runs.
     """
     if estimate is None:
-        return _status('estimate', OK, 'none yet', {})
+        if why_none:
+            return _status('estimate', WARN, f'none yet: {why_none}', {})
+        return _status('estimate', OK, 'none yet: no coastdown so far', {})
     low, high = estimate.froude_valid
     return _status(
         'estimate',
-        OK,
-        f'{estimate.estimator} over {estimate.duration_s:.0f} s',
+        WARN if why_none else OK,
+        f'{estimate.estimator} over {estimate.duration_s:.0f} s'
+        + (f'; none now: {why_none}' if why_none else ''),
         {
             'stamp [ns]': estimate.end_ns,
             'speed through water [m/s]': estimate.last_speed_m_s,
@@ -212,7 +260,7 @@ def _status(
 ) -> DiagnosticStatus:
     return DiagnosticStatus(
         level=level,
-        name=f'coastdown_node: {name}',
+        name=name,
         message=message,
         hardware_id='',
         values=[KeyValue(key=key, value=_text(value)) for key, value in values.items()],

@@ -2,19 +2,25 @@
 """
 Input topics: found in the graph, subscribed as bytes, counted.
 
-Nobody has to say which of the accepted types a driver publishes, and nobody is
-left wondering why a topic is silent.
+Nobody has to say which of the accepted types a driver publishes, or whether it
+sends reliably, and nobody is left wondering why a topic is silent.
 """
 
 from __future__ import annotations
 
 import importlib
 import time
-from collections import Counter
-from collections.abc import Callable
-from typing import Any
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from statistics import median
+from typing import Any, NamedTuple
 
-from rclpy.event_handler import QoSRequestedIncompatibleQoSInfo, SubscriptionEventCallbacks
+from rclpy.event_handler import (
+    QoSMessageLostInfo,
+    QoSRequestedIncompatibleQoSInfo,
+    SubscriptionEventCallbacks,
+    UnsupportedEventTypeError,
+)
 from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
@@ -26,16 +32,14 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 
 from shipdrag_ros.messages import Decoded
+from shipdrag_ros.node.losses import Sequences
 
-# best effort hears every publisher; deep, because one estimate may take as long as many messages
-INPUT_QOS = QoSProfile(
-    history=HistoryPolicy.KEEP_LAST,
-    depth=1000,
-    reliability=ReliabilityPolicy.BEST_EFFORT,
-    durability=DurabilityPolicy.VOLATILE,
-)
+# As deep as Fast DDS goes unless told otherwise, some seconds of a flood: one estimate may take
+# as long as many messages.
+DEPTH = 5000
+_OFFSETS = 32  # readings whose clock offset is kept
 
-Receive = Callable[['InputTopic', bytes], None]
+Arrived = Callable[[], None]
 
 
 def message_class(type_name: str) -> Any:
@@ -46,9 +50,17 @@ def message_class(type_name: str) -> Any:
     return getattr(importlib.import_module(f'{package}.{kind}'), name)
 
 
+class Heard(NamedTuple):
+    """A message, and when the middleware of this computer got it [ns, 0 if it does not say]."""
+
+    topic: InputTopic
+    data: bytes
+    received_ns: int
+
+
 class InputTopic:
     """
-    One input: its subscription, once its type is known, and its health.
+    One input: its subscription, once its type is known, and what became of its messages.
 
     Parameters
     ----------
@@ -58,53 +70,75 @@ class InputTopic:
         Types that can be decoded, the preferred one first.
     fixed
         Type set by the user, '' for the one in the graph.
-    receive
-        Called with this object and the bytes of each message.
+    arrived
+        Called when there is something to `take`.
 
     Attributes
     ----------
     type
         Type subscribed to, None until known.
+    reliable
+        Whether the subscription asks for what got lost again; only where all publishers offer
+        it, because one that does not would not be heard.
+    publishers
+        Number by type.
+    senders
+        Names of the nodes that publish, one a publisher of the type heard.
     received, unused
         Messages heard; heard while not active or without a clock.
+    reported_lost
+        Messages that the middleware says it lost.
     unreadable
         Messages that gave no sample, by reason, and joints that have no place.
-    rate_hz
-        Messages a second of steady time, before the last `tick`.
+    unstamped
+        Readings whose header holds no time.
     """
 
     def __init__(
-        self, node: Node, name: str, *, accepted: tuple[str, ...], fixed: str, receive: Receive
+        self, node: Node, name: str, *, accepted: tuple[str, ...], fixed: str, arrived: Arrived
     ) -> None:
         self._node = node
-        self._receive = receive
+        self._arrived = arrived
         self._subscription: Subscription | None = None
         self._last_s: float | None = None
-        self._tick_s = time.monotonic()
-        self._tick_received = 0
+        self._taken: list[Heard] = []
+        self._found: list[Any] = []
+        self._sequences = Sequences(self._identities)
+        self._offsets_s: deque[float] = deque(maxlen=_OFFSETS)
         self.name = name
         self.topic = node.resolve_topic_name(name)
         self.accepted = accepted
         self.type: str | None = None
+        self.reliable = True
         self.publishers: Counter[str] = Counter()
+        self.senders: tuple[str, ...] = ()
         self.incompatible_qos: str | None = None
         self.received = 0
         self.unused = 0
+        self.reported_lost = 0
+        self.unstamped = 0
         self.unreadable: Counter[str] = Counter()
-        self.rate_hz = 0.0
         if fixed:
-            self._subscribe(fixed)
+            self._subscribe(fixed, reliable=True)
 
     def look(self) -> None:
         """
-        Read the graph, and subscribe once a type is there.
+        Read the graph, and subscribe once a type is there, as its publishers offer it.
         """
-        found = self._node.get_publishers_info_by_topic(self.topic)
-        self.publishers = Counter(info.topic_type for info in found)
-        if self.type is None:
-            usable = [name for name in self.accepted if name in self.publishers]
-            if usable:
-                self._subscribe(usable[0])
+        self._sequences.look()
+        self.publishers = Counter(info.topic_type for info in self._found)
+        type_name = self.type
+        if type_name is None:
+            type_name = next((name for name in self.accepted if name in self.publishers), None)
+            if type_name is None:
+                return
+        heard = [info for info in self._found if info.topic_type == type_name]
+        self.senders = tuple(sorted(_sender(info) for info in heard))
+        reliable = all(
+            info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in heard
+        )
+        if self.type is None or (heard and reliable is not self.reliable):
+            self._subscribe(type_name, reliable=reliable)
 
     @property
     def other_types(self) -> tuple[str, ...]:
@@ -116,21 +150,48 @@ class InputTopic:
         """Time since the last message [s, steady clock], None before the first."""
         return None if self._last_s is None else time.monotonic() - self._last_s
 
+    @property
+    def lost(self) -> int:
+        """Messages that were sent and not heard."""
+        return self._sequences.lost if self._sequences.told else self.reported_lost
+
+    @property
+    def clock_offset_s(self) -> float | None:
+        """Median of arrival minus stamp of the last readings, used or not [s]."""
+        return median(self._offsets_s) if self._offsets_s else None
+
+    def take(self, most: int, *, ahead: bool = True) -> list[Heard]:
+        """
+        Return the messages that have arrived, at most so many.
+
+        Parameters
+        ----------
+        ahead
+            With those that the executor has not come to.
+        """
+        subscription = self._subscription if ahead else None
+        while subscription is not None and len(self._taken) < most:
+            with subscription.handle:
+                found = subscription.handle.take_message(subscription.msg_type, True)
+            if found is None:
+                break
+            self._note(*found)
+        taken, self._taken = self._taken[:most], self._taken[most:]
+        return taken
+
     def count(self, decoded: Decoded) -> None:
         """
         Take what became of one message.
         """
         for reason, times in decoded.unreadable.items():
             self.unreadable[reason.value] += times
-
-    def tick(self) -> None:
-        """
-        Refresh the rate, from the messages since the last tick.
-        """
-        now = time.monotonic()
-        if now > self._tick_s:
-            self.rate_hz = (self.received - self._tick_received) / (now - self._tick_s)
-        self._tick_s, self._tick_received = now, self.received
+        for stamp_ns, receive_ns in zip(
+            decoded.block.stamp_ns.tolist(), decoded.block.receive_ns.tolist(), strict=True
+        ):
+            if stamp_ns <= 0:
+                self.unstamped += 1
+            else:
+                self._offsets_s.append((receive_ns - stamp_ns) * 1e-9)
 
     def close(self) -> None:
         """
@@ -140,26 +201,72 @@ class InputTopic:
             self._node.destroy_subscription(self._subscription)
             self._subscription = None
 
-    def _subscribe(self, type_name: str) -> None:
-        self._subscription = self._node.create_subscription(
+    def _identities(self) -> frozenset[str]:
+        self._found = self._node.get_publishers_info_by_topic(self.topic)
+        return frozenset(
+            bytes(info.endpoint_gid).hex()
+            for info in self._found
+            if self.type is None or info.topic_type == self.type
+        )
+
+    def _subscribe(self, type_name: str, *, reliable: bool) -> None:
+        again = self._subscription is not None
+        if again:
+            waiting = self.take(DEPTH)  # would go with the subscription
+            self.close()
+            self._taken = waiting + self._taken
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_LAST,
+            depth=DEPTH,
+            reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.VOLATILE,
+        )
+        try:
+            self._subscription = self._create(type_name, qos, message_lost=self._on_message_lost)
+        except UnsupportedEventTypeError:  # not every middleware tells
+            self._subscription = self._create(type_name, qos)
+        self.type, self.reliable = type_name, reliable
+        self.incompatible_qos = None
+        how = 'reliably' if reliable else 'as best effort, as it is sent'
+        what = 'now ' if again else ''
+        self._node.get_logger().info(
+            f'{self.name}: {what}hearing {type_name} on {self.topic}, {how}'
+        )
+
+    def _create(self, type_name: str, qos: QoSProfile, **callbacks: Any) -> Subscription:
+        return self._node.create_subscription(
             message_class(type_name),
             self.name,
             self._on_message,
-            INPUT_QOS,
+            qos,
             raw=True,
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._on_incompatible_qos),
+            event_callbacks=SubscriptionEventCallbacks(
+                incompatible_qos=self._on_incompatible_qos, **callbacks
+            ),
         )
-        self.type = type_name
-        self._node.get_logger().info(f'{self.name}: hearing {type_name} on {self.topic}')
 
-    def _on_message(self, data: bytes) -> None:
+    def _on_message(self, data: bytes, info: Mapping[str, int | None]) -> None:
+        self._note(data, info)
+        self._arrived()
+
+    def _note(self, data: bytes, info: Mapping[str, int | None]) -> None:
         self.received += 1
         self._last_s = time.monotonic()
-        self._receive(self, data)
+        self._sequences.take(info.get('publication_sequence_number'))
+        self._taken.append(Heard(self, data, info.get('received_timestamp') or 0))
+
+    def _on_message_lost(self, event: QoSMessageLostInfo) -> None:
+        self.reported_lost += event.total_count_change
 
     def _on_incompatible_qos(self, event: QoSRequestedIncompatibleQoSInfo) -> None:
         policy = qos_policy_name_from_kind(event.last_policy_kind)
+        if policy == 'RELIABILITY':
+            return  # the next look asks for less
         self.incompatible_qos = policy
         self._node.get_logger().warning(
             f'{self.name}: a publisher on {self.topic} is not heard, its {policy} QoS does not fit'
         )
+
+
+def _sender(info: Any) -> str:
+    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
@@ -25,23 +25,18 @@ from std_srvs.srv import Trigger
 from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.errors import ShipdragError, ShipFileError
-from shipdrag_ros.messages import (
-    OUTPUT_TOPICS,
-    TOPICS,
-    EventKind,
-    OutputMessage,
-    OutputTopic,
-    Source,
-    read_event,
-)
-from shipdrag_ros.messages.topics import EVENTS
+from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
 from shipdrag_ros.node import diagnostics
+from shipdrag_ros.node.announcer import Announcer
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
+from shipdrag_ros.node.health import InputStates, candidates, candidates_text
 from shipdrag_ros.node.inputs import InputTopic, message_class
+from shipdrag_ros.node.mailbox import Mailbox
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder, RecordingState
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
+from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 
 NAME = 'coastdown_node'
@@ -75,11 +70,14 @@ class CoastdownNode(LifecycleNode):
         self._settings: NodeSettings | None = None
         self._ship: Ship | None = None
         self._recorder: Recorder | None = None
-        self._recording_level = DiagnosticStatus.OK
+        self._announcer = Announcer(self.get_logger())
         self._session: Session | None = None
         self._diagnosing: Diagnosing | None = None
         self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
+        self._input_states = InputStates()
+        self._mailbox = Mailbox((), ahead=False)
+        self._lost: dict[str, int] = {}
         self._outputs: dict[str, Publisher] = {}
         self._survive_illegal_transitions()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -188,10 +186,13 @@ class CoastdownNode(LifecycleNode):
                 name,
                 accepted=accepted,
                 fixed=settings.types.get(name, ''),
-                receive=self._on_message,
+                arrived=self._hear,
             )
             for name, accepted in TOPICS.items()
         ]
+        self._input_states = InputStates()
+        self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
+        self._lost = {}
         self._node_parameters.fixed = True
         effective = ', '.join(f'{name}={value!r}' for name, value in settings.to_mapping().items())
         self.get_logger().info(f'configured: {effective}')
@@ -215,13 +216,14 @@ class CoastdownNode(LifecycleNode):
             publish=self._send,
             node=self.get_fully_qualified_name(),
             ended=self._diagnosing.begin,
+            told=self._announcer.event,
         )
         if self._settings.record:
             self._recorder.start()
         self._session.note_lifecycle('active', self._now_ns())
         recording = self._recorder.status()
         self.get_logger().info(f'active; {recording.text}')
-        self._log_recording(diagnostics.recording_status(recording))
+        self._announcer.status(diagnostics.recording_status(recording))
 
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
@@ -243,8 +245,13 @@ class CoastdownNode(LifecycleNode):
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
         self._input_topics, self._outputs = [], {}
+        self._mailbox = Mailbox((), ahead=False)
         self._ship = self._settings = self._recorder = None
         self._node_parameters.fixed = False
+
+    @property
+    def _simulated(self) -> bool:
+        return bool(self.get_parameter('use_sim_time').value)
 
     # traffic
 
@@ -260,75 +267,104 @@ class CoastdownNode(LifecycleNode):
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:
-        if message.type == EVENTS.type:
-            note = read_event(message.payload)
-            if note.kind is EventKind.DISMISSED:
-                self.get_logger().info(note.text)
         if self.context.ok():  # after an outside shutdown the bag alone gets the last figures
             self._outputs[message.topic].publish(message.payload)
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
-    def _on_message(self, topic: InputTopic, payload: bytes) -> None:
-        now_ns = self._now_ns()
-        if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
-            topic.unused += 1
-            return
-        assert topic.type is not None
-        topic.count(self._session.receive(Source(topic.name, topic.type), payload, now_ns))
+    def _hear(self) -> None:
+        """Take what has come on all topics, in its order."""
+        for topic, data, _ in self._mailbox.take():
+            now_ns = self._now_ns()
+            if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
+                topic.unused += 1
+                continue
+            assert topic.type is not None
+            topic.count(self._session.receive(Source(topic.name, topic.type), data, now_ns))
 
     def _look(self) -> None:
         for topic in self._input_topics:
             topic.look()
+        self._hear()  # what a changed subscription left, and what a limit held back
+
+    # health
 
     def _publish_diagnostics(self) -> None:
-        for topic in self._input_topics:
-            topic.tick()
-        monitor = None if self._session is None else self._session.monitor
-        health = {} if monitor is None else monitor.health()
         now_ns = self._now_ns()
-        if self._session is not None and now_ns:
-            self._session.watch_clock(now_ns)  # also while nothing arrives
-        message = DiagnosticArray()
-        message.header.stamp = self.get_clock().now().to_msg()
-        message.status = [
-            diagnostics.state_status(
-                self._state_machine.current_state[1],
-                None if monitor is None else monitor.state.value,
-                self._input_topics,
-                clock_ns=now_ns,
-                sim_time=self.get_parameter('use_sim_time').value,
-            ),
-            *(
-                diagnostics.input_status(topic, health.get(topic.name))
-                for topic in self._input_topics
-            ),
-        ]
+        session = self._session
+        if session is not None and now_ns:
+            session.watch_clock(now_ns)  # also while nothing arrives
+        states = self._input_states.tick(
+            self._input_topics,
+            {} if session is None else session.monitor.health(),
+            direction='' if session is None else session.monitor.heading_doubt(),
+            simulated=self._simulated,
+        )
+        standing = self._standing(now_ns)
+        statuses = [diagnostics.state_status(standing, states)]
+        statuses += map(diagnostics.input_status, states)
         if self._recorder is not None:
-            message.status.append(diagnostics.recording_status(self._recorder.status()))
-            self._log_recording(message.status[-1])
-        if self._session is not None:
-            message.status.append(diagnostics.estimate_status(self._session.latest))
+            statuses.append(diagnostics.recording_status(self._recorder.status()))
+            self._announcer.status(statuses[-1])
+        if session is not None:
+            statuses.append(diagnostics.estimate_status(session.latest, session.why_none))
+            self._announcer.inputs(states)
+            self._announcer.silence(states, standing.candidates)
+            self._note_lost(session, now_ns)
         if self._diagnosing is not None:
             found = self._diagnosing.status
-            message.status.append(diagnostics.diagnosis_status(found))
+            statuses.append(diagnostics.diagnosis_status(found))
             if found is not self._diagnosed:
                 self._diagnosed = found
-                self.get_logger().info(f'diagnosis: {message.status[-1].message}')
+                self.get_logger().info(f'diagnosis: {statuses[-1].message}')
+        message = DiagnosticArray()
+        message.header.stamp = self.get_clock().now().to_msg()
+        message.status = diagnostics.label(
+            statuses,
+            node=self.get_fully_qualified_name(),
+            hardware_id='' if self._ship is None else self._ship.name,
+        )
         self._diagnostics.publish(message)
 
-    def _log_recording(self, status: DiagnosticStatus) -> None:
-        """Keep a trace of when a disk failed, and of when it was back."""
-        if status.level == self._recording_level:
-            return
-        self._recording_level = status.level
-        if status.level == DiagnosticStatus.ERROR:
-            self.get_logger().error(status.message)
-        elif status.level == DiagnosticStatus.WARN:
-            self.get_logger().warning(status.message)
-        else:
-            self.get_logger().info(status.message)
+    def _standing(self, now_ns: int) -> diagnostics.Standing:
+        session, states = self._session, self._input_states.seen
+        motion = [each for each in states if each.topic.name in MOTION_INPUTS]
+        hint = ''
+        if not any(each.fresh for each in motion):
+            hint = candidates_text(
+                candidates(
+                    self.get_topic_names_and_types(),
+                    MOTION_INPUTS,
+                    taken=[
+                        *(each.topic.topic for each in states),
+                        *(topic.under(self.get_fully_qualified_name()) for topic in OUTPUT_TOPICS),
+                    ],
+                )
+            )
+        return diagnostics.Standing(
+            self._state_machine.current_state[1],
+            None if session is None else session.monitor.state,
+            now_ns,
+            self._simulated,
+            candidates=hint,
+            steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
+            steady_needed_s=0.0
+            if self._settings is None
+            else self._settings.parameters.slope_window_s,
+        )
+
+    def _note_lost(self, session: Session, now_ns: int) -> None:
+        """Keep in the recording how many messages were lost on their way."""
+        for topic in self._input_topics:
+            before = self._lost.get(topic.name, 0)
+            if topic.lost > before and now_ns:
+                self._lost[topic.name] = topic.lost
+                text = (
+                    f'{topic.name}: {topic.lost - before} messages were sent and not heard, '
+                    f'{topic.lost} so far'
+                )
+                session.note_lost(text, now_ns)
 
     # services
 

@@ -11,10 +11,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
-import yaml
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -25,6 +23,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from shipdrag_ros.errors import ParameterError
+from shipdrag_ros.fields import parse, text_of
 from shipdrag_ros.node.settings import SETTINGS, NodeSettings, Setting
 
 ROS_OWN = ('use_sim_time', 'start_type_description_service')  # declared by rclpy itself
@@ -131,7 +130,8 @@ def check_sections(arguments: Sequence[str], node: Node) -> None:
     for flag, path in pairwise(arguments):
         if flag != '--params-file':
             continue
-        sections = list(_sections(yaml.safe_load(Path(path).read_text(encoding='utf-8')), ''))
+        text = text_of(path, what='a parameter file', error=ParameterError)
+        sections = list(_sections(parse(text, subject=path, error=ParameterError), ''))
         if not any(_pattern(section).fullmatch(name) for section in sections):
             raise ParameterError(
                 path,

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event, Update
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event, NoEstimate, Update
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
@@ -30,6 +30,7 @@ from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]
 Ended = Callable[[Coastdown, Window], None]
+Told = Callable[[Event], None]
 
 
 class Session:
@@ -47,11 +48,15 @@ class Session:
     ended
         Called after each coastdown with all of its samples; not after one that
         was withdrawn, or that a reset ended, which has dropped them.
+    told
+        Called with every event of the monitor.
 
     Attributes
     ----------
     latest
         The last estimate, None before the first and after a reset.
+    why_none
+        Why the coastdown that runs has no estimate, '' where it has one.
     """
 
     def __init__(
@@ -62,6 +67,7 @@ class Session:
         publish: Publish,
         node: str,
         ended: Ended | None = None,
+        told: Told | None = None,
     ) -> None:
         self.monitor = monitor
         self.recorder = recorder
@@ -69,6 +75,8 @@ class Session:
         self._publish = publish
         self._node = node
         self._ended = ended
+        self._told = told
+        self.why_none = ''
         self._arrival_ns = 0
 
     def receive(self, source: Source, payload: bytes, now_ns: int) -> Decoded:
@@ -113,6 +121,13 @@ class Session:
         self.watch_clock(now_ns)
         self._note(EventKind.LIFECYCLE, text)
 
+    def note_lost(self, text: str, now_ns: int) -> None:
+        """
+        Publish and record that messages were lost on their way here.
+        """
+        self.watch_clock(now_ns)
+        self._note(EventKind.MESSAGE_LOST, text)
+
     def finish(self) -> None:
         """
         Give the last figures and close the recording; needs no ROS.
@@ -136,6 +151,9 @@ class Session:
         for event in events:
             if isinstance(event, Update | Coastdown) and event.estimate is not None:
                 self.latest = event.estimate
+            self.why_none = event.reason if isinstance(event, NoEstimate) else ''
+            if self._told is not None:
+                self._told(event)
             for message in outputs(event, node=self._node):
                 self._send(message)
             if (

@@ -11,10 +11,21 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.errors import ParameterError
+from shipdrag_ros.fields import (
+    Key,
+    Kind,
+    choice,
+    flag,
+    keys_of,
+    number,
+    read_keys,
+    text,
+    whole_number,
+)
 from shipdrag_ros.messages import TOPICS
 from shipdrag_ros.parameters import Parameters
 
@@ -32,6 +43,25 @@ class Setting:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> Key:
+        """How a value of it is checked."""
+        return Key(self._kind, self.text, self.default)
+
+    @property
+    def _kind(self) -> Kind:
+        if self.choices:
+            return choice(*self.choices)
+        if isinstance(self.default, bool):
+            return flag()
+        if isinstance(self.default, str):
+            return text()
+        assert self.low is not None
+        assert self.high is not None
+        if isinstance(self.default, int):
+            return whole_number(int(self.low), int(self.high), self.unit)
+        return number(self.low, self.high, self.unit)
 
 
 OWN: tuple[Setting, ...] = (
@@ -81,15 +111,15 @@ SETTINGS: tuple[Setting, ...] = (
     *TYPES,
     *(
         Setting(
-            item.name,
-            getattr(Parameters(), item.name),
-            item.metadata['text'],
-            unit=item.metadata['unit'],
-            low=item.metadata['low'],
-            high=item.metadata['high'],
-            choices=item.metadata['choices'],
+            name,
+            key.default,
+            key.text,
+            unit=key.kind.unit,
+            low=key.kind.low,
+            high=key.kind.high,
+            choices=key.kind.choices,
         )
-        for item in fields(Parameters)
+        for name, key in keys_of(Parameters).items()
     ),
 )
 
@@ -125,47 +155,17 @@ class NodeSettings:
         ParameterError
             Naming every unknown key and every bad value at once.
         """
-        known = {setting.name: setting for setting in SETTINGS}
-        here = {setting.name: setting for setting in (*OWN, *TYPES)}
-        problems = [
-            f'{name!r}: unknown; known are {", ".join(sorted(known))}'
-            for name in values
-            if name not in known
-        ]
-        merged = {name: values.get(name, setting.default) for name, setting in here.items()}
-        for name, value in merged.items():
-            setting = here[name]
-            kind = type(setting.default)
-            choices = setting.choices
-            if kind is float and type(value) is int:
-                merged[name] = value = float(value)
-            if type(value) is not kind:
-                problems.append(
-                    f'{name}: {value!r} is of type {type(value).__name__}, '
-                    f'expected {kind.__name__}'
-                )
-            elif choices and value not in choices:
-                problems.append(f'{name}: {value!r}, expected one of {", ".join(choices[1:])}')
-            elif (
-                isinstance(value, int | float)
-                and setting.low is not None
-                and setting.high is not None
-                and not setting.low <= value <= setting.high
-            ):
-                problems.append(f'{name}: {value!r}, expected {setting.low:g} to {setting.high:g}')
-        parameters = Parameters()
-        try:
-            parameters = Parameters.from_mapping(
-                {name: values[name] for name in values if name in known and name not in here},
-                subject=subject,
-            )
-        except ParameterError as error:
-            problems.extend(error.problems)
+        problems: list[str] = []
+        keys = {setting.name: setting.key for setting in SETTINGS}
+        given = read_keys(keys, dict(values), '', problems)
         if problems:
             raise ParameterError(subject, problems)
-        types = {name: str(merged[f'{name}.type']) for name in TOPICS if merged[f'{name}.type']}
-        own = {setting.name: merged[setting.name] for setting in OWN}
-        return cls(**own, types=types, parameters=parameters)  # type: ignore[arg-type]
+        chosen = {name: given.get(name, key.default) for name, key in keys.items()}
+        return cls(
+            **{setting.name: chosen[setting.name] for setting in OWN},
+            types={name: chosen[f'{name}.type'] for name in TOPICS if chosen[f'{name}.type']},
+            parameters=Parameters(**{name: chosen[name] for name in keys_of(Parameters)}),
+        )
 
     def to_mapping(self) -> dict[str, Value]:
         """

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
+from shipdrag_ros.display import Table
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.replay.no_coastdown import why_no_coastdown
 from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
@@ -65,6 +66,30 @@ class RunResult:
         """What is no coastdown, without what is told as cut off one."""
         told = [cut for coastdown in self.coastdowns for cut in coastdown.cuts]
         return tuple(one for one in self.not_coastdowns if one not in told)
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what each coastdown gave, or why there is none.
+
+        Returns
+        -------
+        tuple of str
+            A paragraph each, the engineer's units first.
+        """
+        from shipdrag_ros.replay import words  # it tells what this module holds
+
+        if not self.coastdowns:
+            dismissed = len(self.not_coastdowns)
+            return (words.no_coastdown_sentence(self.steady_lead_s, dismissed, self.why_none),)
+        return tuple(line for part in self.coastdowns for line in words.summary(part, self.ship))
+
+    def table(self) -> Table:
+        """
+        Show the coastdowns, a line each.
+        """
+        from shipdrag_ros.replay import tables
+
+        return tables.coastdowns_table([self])
 
     @classmethod
     def of(cls, result: ReplayResult) -> RunResult:

@@ -1,14 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coastdowns of one ship, from all bags, as one result."""
+"""The coastdowns of one ship, from all bags, as one result; or why they are not one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
+import numpy as np
+
+from shipdrag_ros.display import ship_speed, utc
 from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.force import Force, usual_speed_m_s
 from shipdrag_ros.estimation.reciprocal import Combined, combine
+from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.ship import Ship
+
+_CAMPAIGN_NS = 2 * 86_400 * 1_000_000_000  # runs closer than that show one state of the hull
+_DIFFER_SD = 3.0
+_RUN_TO_RUN = 0.02  # of r: wind and sea that the band of a run does not hold
 
 
 @dataclass(frozen=True)
@@ -30,13 +41,24 @@ class Together:
 
 def together(runs: Sequence[RunResult]) -> Together:
     """
-    Combine all coastdowns that gave an estimate, if they are of one ship.
+    Combine all coastdowns that gave an estimate, if they are of one ship in one state.
+
+    Parameters
+    ----------
+    runs
+        What each bag gave.
+
+    Notes
+    -----
+    Runs more than two days apart are held against each other first. Where two
+    such campaigns differ by more than three standard deviations (run-to-run
+    scatter of 2 % counted), they show two states of the ship and stay apart.
     """
     found = [
-        (coastdown.estimate, coastdown.heading_rad)
+        (part.estimate, part.heading_rad)
         for run in runs
-        for coastdown in run.coastdowns
-        if coastdown.estimate is not None
+        for part in run.coastdowns
+        if part.estimate is not None
     ]
     if len(found) < 2:
         return Together(None)
@@ -45,10 +67,65 @@ def together(runs: Sequence[RunResult]) -> Together:
     twice = _twice(runs)
     if twice:
         return Together(None, f'windows of {twice!r} overlap, and what they share is one run')
+    apart = _differ([part[0] for part in found], runs[0].ship)
+    if apart:
+        return Together(None, apart)
     try:
         return Together(combine([part[0] for part in found], [part[1] for part in found]))
     except EstimationError as error:
         return Together(None, str(error))
+
+
+def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
+    """Say that campaigns differ, by how much; '' where one state of the hull fits all."""
+    campaigns: list[list[Estimate]] = []
+    usable = [each for each in estimates if len(each.valid_curve)]
+    for each in sorted(usable, key=lambda one: one.start_ns):
+        if campaigns and each.start_ns - campaigns[-1][-1].end_ns < _CAMPAIGN_NS:
+            campaigns[-1].append(each)
+        else:
+            campaigns.append([each])
+    if len(campaigns) < 2:
+        return ''
+    low = max(each.valid_curve.speed_m_s[0] for each in usable)
+    high = min(each.valid_curve.speed_m_s[-1] for each in usable)
+    if low > high:
+        return ''  # no speed in common: `combine` says so
+    speed = float(np.clip(usual_speed_m_s(usable), low, high))
+    means = [_mean(campaign, speed) for campaign in campaigns]
+    far = max(
+        abs(one[0] - other[0]) / np.hypot(one[1], other[1])
+        for one, other in combinations(means, 2)
+    )
+    if far <= _DIFFER_SD:
+        return ''
+    told = []
+    for campaign in campaigns:
+        force = Force.of(campaign[0].valid_curve, ship)
+        _, resistance, _, over = force.cells(force.near(speed))
+        told.append(
+            f'{utc(campaign[0].start_ns)[:10]}: {", ".join(filter(None, (resistance, over)))}'
+        )
+    return (
+        f'these runs differ at {ship_speed(speed, ship.mass_kg)} ({"; ".join(told)}), by '
+        f'{far:.1f} standard deviations: one state of the hull does not fit all. Give the runs of '
+        'one state at a time to combine them'
+    )
+
+
+def _mean(campaign: Sequence[Estimate], speed_m_s: float) -> tuple[float, float]:
+    """Return the mean of r at a speed, and its sd without what all runs share."""
+    r, sd = np.array(
+        [
+            [
+                np.interp(speed_m_s, curve.speed_m_s, curve.resistance_m_s2),
+                np.interp(speed_m_s, curve.speed_m_s, curve.sigma_repeatable_m_s2),
+            ]
+            for curve in (each.valid_curve for each in campaign)
+        ]
+    ).T
+    sd = np.hypot(sd, _RUN_TO_RUN * r)
+    return float(np.mean(r)), float(np.sqrt(np.sum(sd**2)) / len(r))
 
 
 def _twice(runs: Sequence[RunResult]) -> str:

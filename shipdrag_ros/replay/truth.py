@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import ArrayLike
 
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import Float64
 
@@ -51,13 +51,12 @@ class TrueCurve:
         """
         Return the text that `from_yaml` reads back, digit for digit.
         """
-        return yaml.safe_dump(
+        return strict_yaml.dump(
             {
                 'settings': dict(self.settings),
                 'speed_m_s': self.speed_m_s.tolist(),
                 'resistance_m_s2': self.resistance_m_s2.tolist(),
             },
-            sort_keys=False,
         )
 
     @classmethod
@@ -71,11 +70,11 @@ class TrueCurve:
             If it is not one.
         """
         try:
-            values = yaml.safe_load(text)
+            values = strict_yaml.load(text)
             speed = np.array(values['speed_m_s'], np.float64)
             resistance = np.array(values['resistance_m_s2'], np.float64)
             settings = dict(values['settings'])
-        except (yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise BagError(
                 f'{subject}: {ATTACHMENT} cannot be read ({error}); '
                 'write the bag anew with `shipdrag simulate`'

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was found, told to a reader: sentences, tables, pictures, one page."""
+"""The one builder of pages, and how pictures look; what they tell stands with each result."""

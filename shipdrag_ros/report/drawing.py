@@ -11,6 +11,8 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
+from shipdrag_ros.display import Picture
+
 # Okabe and Ito's colours, told apart by colour-blind readers; line styles and
 # shades of grey differ as well, for print
 BLUE, VERMILION, GREEN, ORANGE, SKY, PURPLE = (
@@ -21,6 +23,9 @@ BLUE, VERMILION, GREEN, ORANGE, SKY, PURPLE = (
     '#56B4E9',
     '#CC79A7',
 )
+SIZE = (5.4, 3.7)
+"""Of a picture [inches]: two beside each other fill a page, one a phone."""
+WIDE = 9.0  # inches, of the few that need the whole width
 STYLE: dict[Any, Any] = {
     'font.family': 'DejaVu Sans',  # comes with matplotlib: the same picture everywhere
     'font.size': 9,
@@ -35,6 +40,13 @@ STYLE: dict[Any, Any] = {
     'svg.hashsalt': 'shipdrag',  # the same page from the same data
 }
 _PIXELS_PER_INCH = 200  # of what is drawn as pixels
+
+
+def picture(figure: Figure, caption: str) -> Picture:
+    """
+    Draw a figure for a page.
+    """
+    return Picture(data_uri(figure), caption)
 
 
 def data_uri(figure: Figure) -> str:

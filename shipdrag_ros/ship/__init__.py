@@ -8,15 +8,10 @@ from shipdrag_ros.ship.added_mass import (
     TableAddedMass,
 )
 from shipdrag_ros.ship.baseline import Baseline, CoefficientBaseline, CoefficientSd, TableBaseline
+from shipdrag_ros.ship.facts import Fact, parse_fact
 from shipdrag_ros.ship.model import AIR_DENSITY_KG_M3, GRAVITY_M_S2, Ship
-from shipdrag_ros.ship.sections import (
-    Air,
-    Propeller,
-    Propulsion,
-    StatedEffect,
-    Uncertain,
-    Water,
-)
+from shipdrag_ros.ship.run_sheet import RunSheet
+from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
 
 __all__ = [
     'AIR_DENSITY_KG_M3',
@@ -27,13 +22,15 @@ __all__ = [
     'CoefficientBaseline',
     'CoefficientSd',
     'ConstantAddedMass',
+    'Fact',
     'MerchantAddedMass',
     'Propeller',
     'Propulsion',
+    'RunSheet',
     'Ship',
     'StatedEffect',
     'TableAddedMass',
     'TableBaseline',
-    'Uncertain',
     'Water',
+    'parse_fact',
 ]

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.fields import (
+from shipdrag_ros.fields import (
     INVALID,
     Kind,
     Problems,
@@ -20,6 +19,7 @@ from shipdrag_ros.ship.fields import (
     section,
     show,
 )
+from shipdrag_ros.samples import Float64
 
 # rows: powers of the Froude number; columns: powers of L / V^(1/3)
 _MERCHANT = (

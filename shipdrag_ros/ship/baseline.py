@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.fields import (
+from shipdrag_ros.fields import (
     Kind,
     Problems,
     choice,
@@ -26,6 +25,7 @@ from shipdrag_ros.ship.fields import (
     section,
     text,
 )
+from shipdrag_ros.samples import Float64
 
 # Below this the flow along the hull is laminar and the ITTC line, singular at 100, means
 # nothing: C_F is held, so that the resistance falls to 0 with the square of the speed.

@@ -4,17 +4,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass
 from functools import cached_property
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.display import LIGHT_KG
 from shipdrag_ros.errors import ShipdragError, ShipFileError
+from shipdrag_ros.fields import (
+    declare,
+    keys_of,
+    list_of,
+    number,
+    parse,
+    plain,
+    read_keys,
+    section,
+    text,
+    text_of,
+)
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.added_mass import AddedMass, MerchantAddedMass, added_mass, n_r_polynomial
 from shipdrag_ros.ship.baseline import Baseline, TableBaseline, baseline
@@ -23,7 +35,7 @@ from shipdrag_ros.ship.consistency import (
     inconsistencies,
     slenderness,
 )
-from shipdrag_ros.ship.fields import declare, list_of, number, plain, read_keys, section, text
+from shipdrag_ros.ship.facts import Fact, fact_list
 from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
 
 GRAVITY_M_S2 = 9.81
@@ -61,6 +73,7 @@ class Ship:
     effects: tuple[StatedEffect, ...] = declare(
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
     )
+    facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Ship:
@@ -82,15 +95,7 @@ class Ship:
         >>> f'{ship.n_r(5.0):.3f}'
         '0.077'
         """
-        try:
-            content = Path(path).read_text(encoding='utf-8-sig')
-        except OSError as error:
-            problem = f'cannot be read: {error.strerror or error}; give the path of a ship file'
-            raise ShipFileError(str(path), [problem]) from error
-        except ValueError as error:
-            raise ShipFileError(
-                str(path), [f'is not a text file: {error}; save it as UTF-8']
-            ) from error
+        content = text_of(path, what='a ship file', error=ShipFileError)
         return cls.from_yaml(content, subject=str(path))
 
     @classmethod
@@ -111,17 +116,16 @@ class Ship:
         >>> f'{ship.mass_kg / 1000.0:.0f} t'
         '4100 t'
         """
-        try:
-            data, problems = strict_yaml.load(content)
-        except ValueError as error:
-            raise ShipFileError(subject, [f'not YAML: {error}']) from error
-        accepted = read_keys(cls, data, '', problems)
+        data = parse(content, subject=subject, error=ShipFileError)
+        problems: list[str] = []
+        keys = keys_of(cls)
+        accepted = read_keys(keys, data, '', problems)
         # a section that was refused is not checked as if it were the default
         given = data if isinstance(data, dict) else {}
         defaults = {
-            item.name: item.default
-            for item in fields(cls)
-            if item.name not in given and item.default is not MISSING
+            name: key.default
+            for name, key in keys.items()
+            if name not in given and key.default is not MISSING
         }
         problems.extend(inconsistencies({**defaults, **accepted}))
         if problems:
@@ -143,6 +147,17 @@ class Ship:
     def slenderness(self) -> float:
         """L / V^(1/3)."""
         return slenderness(self.length_m, self.displaced_volume_m3)
+
+    def summary(self) -> str:
+        """
+        Return the ship in one line: name, length, displacement, mass.
+        """
+        light = self.mass_kg < LIGHT_KG
+        mass = f'{self.mass_kg:.4g} kg' if light else f'{self.mass_kg * 1e-3:,.0f} t'
+        return (
+            f'{self.name or "a ship without a name"}: length {self.length_m:g} m, displacement '
+            f'{self.displaced_volume_m3:g} m³ ({mass})'
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:

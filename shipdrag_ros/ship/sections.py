@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.ship.fields import choice, declare, named, number, section, text
+from shipdrag_ros.fields import choice, declare, named, number, section, text
+from shipdrag_ros.parameter import Parameter
 
 
 @dataclass(frozen=True)
@@ -54,22 +55,12 @@ class Propulsion:
 
 
 @dataclass(frozen=True)
-class Uncertain:
-    """
-    A value with its standard deviation.
-    """
-
-    value: float = declare(number(-1e12, 1e12), 'value')
-    sd: float = declare(number(0.0, 1e12), 'standard deviation')
-
-
-@dataclass(frozen=True)
 class StatedEffect:
     """
     An effect added to the baseline, as a diagnosis writes it.
     """
 
     name: str = declare(text(), 'which effect')
-    parameters: Mapping[str, Uncertain] = declare(
-        named(section(Uncertain)), 'its parameters', hashed=False
+    parameters: Mapping[str, Parameter] = declare(
+        named(section(Parameter, required=('value', 'sd'))), 'its parameters', hashed=False
     )

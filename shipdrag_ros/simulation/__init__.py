@@ -3,7 +3,7 @@
 
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.columns import Columns, simulate_columns
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Prior, Quantity, Scope, Shape
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.noise import GaussMarkov
 from shipdrag_ros.simulation.scenario import STOP, EngineOrder, Scenario, Turn
 from shipdrag_ros.simulation.sensors import (
@@ -28,12 +28,9 @@ __all__ = [
     'Frame',
     'GaussMarkov',
     'Measure',
-    'Prior',
-    'Quantity',
     'Scenario',
     'Scope',
     'Sensor',
-    'Shape',
     'Truth',
     'Turn',
     'sense',

@@ -34,6 +34,7 @@ def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
     assert set(found) == {
         'coastdowns',
         'not_coastdowns',
+        'not_combined',
         'combined',
         'inputs',
         'recorded',
@@ -99,7 +100,7 @@ def test_the_words_give_every_figure(
         'coefficients',
         'samples used',
         'valid range',
-        'speed [m/s]  [knots]     Fr',
+        'speed [knots]  resistance [kN]',
         'true r',
         'speed_through_water      1801  1801         -',
         'no outputs of its own',

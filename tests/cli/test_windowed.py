@@ -129,9 +129,9 @@ def test_what_is_cut_is_said_first_in_text_and_report(
     assert main(['replay', f'{coastdown_bag}@100:1200', '--report', str(page)]) == 0
     said = capsys.readouterr().out
     assert 'Of 100.0 s to 1200.0 s only' in said
-    assert said.index('is taken for a coastdown') < said.index('The resistance is known')
+    assert said.index('is taken for a coastdown') < said.index('r(v) is known from')
     text = page.read_text(encoding='utf-8')
-    assert text.index('is taken for a coastdown') < text.index('The resistance is known')
+    assert text.index('is taken for a coastdown') < text.index('r(v) is known from')
     assert 'Hatched: what was cut, and why' in text
     found = replayed(capsys, f'{coastdown_bag}@100:1200')
     (coastdown,) = found['coastdowns']

@@ -18,10 +18,10 @@ from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, with_known
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.simulation.effect import Measure
 from shipdrag_ros.simulation.effects import parse
+from shipdrag_ros.simulation.measures import Cost, Measure
 
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 LEAD_IN_S, COAST_S = 1200.0, 1200.0
@@ -42,7 +42,13 @@ def run(effect: str, *more: str, heading_rad: float = HEADING_RAD, seed: int = 1
 
 
 def resolves(found: Diagnosis) -> dict[Measure, float | None]:
-    return {Measure(each.measure): each.probability for each in found.would_decide}
+    """Return what is measured, of what is advised; facts are asked for besides."""
+    known = {measure.value for measure in Measure}
+    return {
+        Measure(each.measure): each.probability
+        for each in found.would_decide
+        if each.measure in known
+    }
 
 
 @pytest.fixture(scope='module')
@@ -64,9 +70,24 @@ def test_reciprocal_run_is_advised_for_a_current_and_names_it(current: Diagnosis
 
 
 def test_advice_is_ranked_and_its_probabilities_are_some(current: Diagnosis) -> None:
-    known = [each for each in resolves(current).values() if each is not None]
-    assert known == sorted(known, reverse=True)
-    assert all(0.0 <= each <= 1.0 for each in known)
+    known = [each for each in current.would_decide if each.probability is not None]
+    assert known
+    assert all(0.0 <= (each.probability or 0.0) <= 1.0 for each in known)
+    # what is likely to need the fewest hours of the ship comes first
+    hours = [Cost(each.cost).hours / (each.probability or 0.0) for each in known]
+    assert hours == sorted(hours)
+
+
+def test_a_fact_that_would_decide_is_asked_for_before_anything_that_costs_more() -> None:
+    found = diagnose([run('towed_cable=6')], SHIP, Parameters())
+    assert found.verdict is Verdict.ONE_OF
+    asked = [each for each in found.would_decide if '--fact no_towed_cable' in each.measure]
+    (at,) = asked
+    assert at.cost == Cost.LOOK
+    ranked = [each.measure for each in found.would_decide]
+    assert ranked.index(at.measure) < ranked.index(Measure.WITHOUT_CABLE)
+    told = diagnose([run('towed_cable=6')], SHIP, Parameters(), facts=[Fact('no_towed_cable')])
+    assert not any('--fact no_towed_cable' in each.measure for each in told.would_decide)
 
 
 def test_echo_sounder_would_name_shallow_water_as_often_as_it_is_shallow() -> None:
@@ -83,8 +104,9 @@ def test_echo_sounder_would_name_shallow_water_as_often_as_it_is_shallow() -> No
     assert resolves(found)[Measure.WITHOUT_CABLE] is None
     ranked = list(resolves(found))
     assert found.candidates[0].names == ('towed_cable',)
-    assert ranked.index(Measure.WITHOUT_CABLE) < ranked.index(Measure.DEPTH)
-    assert ranked.index(Measure.DEPTH) < ranked.index(Measure.DRAUGHT)
+    # a look at the echo sounder costs less than to haul a cable in
+    assert ranked.index(Measure.DEPTH) < ranked.index(Measure.WITHOUT_CABLE)
+    assert ranked.index(Measure.WITHOUT_CABLE) < ranked.index(Measure.CLEAN_HULL)
 
 
 def test_what_is_measured_already_is_not_advised(current: Diagnosis) -> None:

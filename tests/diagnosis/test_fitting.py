@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from shipdrag_ros.diagnosis.coast_terms import ForceTerm
 from shipdrag_ros.diagnosis.fitting import fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
-from shipdrag_ros.diagnosis.terms import Tail, Unknown, scaled
+from shipdrag_ros.parameter import Parameter, Prior, Shape, flat, free, half_normal, normal
 from shipdrag_ros.samples import Float64
 
 
@@ -22,7 +22,7 @@ from shipdrag_ros.samples import Float64
 class OneSize:
     """A part with one unknown."""
 
-    unknowns: tuple[Unknown, ...]
+    unknowns: tuple[Parameter, ...]
     one_size: ClassVar[Sequence[int]] = ()
 
 
@@ -47,13 +47,13 @@ class Straight:
         return found
 
 
-@pytest.mark.parametrize('tail', [Tail.NORMAL, Tail.HALF])
+@pytest.mark.parametrize('prior', [normal(1.0), half_normal(1.0)])
 @pytest.mark.parametrize('size', [-3.0, -0.5, 0.0, 0.4, 3.0])
-def test_the_evidence_is_the_integral_over_the_prior(tail: Tail, size: float) -> None:
+def test_the_evidence_is_the_integral_over_the_prior(prior: Prior, size: float) -> None:
     rng = np.random.default_rng(3)
     slope = rng.standard_normal(20)
     value = size * slope + rng.standard_normal(20)
-    unknown = scaled('size', 1.0, tail=tail)
+    unknown = free('size', prior)
     hypothesis = Hypothesis(('one',), (OneSize((unknown,)),), ())  # type: ignore[arg-type]
     found = fit(Straight(value, slope), [hypothesis], [np.array([0.2])])[0]  # type: ignore[arg-type]
 
@@ -61,11 +61,11 @@ def test_the_evidence_is_the_integral_over_the_prior(tail: Tail, size: float) ->
         left = value - slope * z
         return float(np.exp(-0.5 * (left @ left) - 0.5 * z * z)) / np.sqrt(2.0 * np.pi)
 
-    low = 0.0 if tail is Tail.HALF else -9.0
+    low = 0.0 if prior.shape is Shape.HALF_NORMAL else -9.0
     whole = quad(density, low, 9.0, epsabs=0.0, points=[0.0, size])[0]
-    expected = np.log(whole * (2.0 if tail is Tail.HALF else 1.0))
+    expected = np.log(whole * (2.0 if prior.shape is Shape.HALF_NORMAL else 1.0))
     assert found.log_evidence == pytest.approx(expected, abs=1e-6)
-    if tail is Tail.HALF:
+    if prior.shape is Shape.HALF_NORMAL:
         assert found.best.z[0] >= 0.0
 
 
@@ -73,22 +73,22 @@ def test_the_covariance_is_that_of_least_squares() -> None:
     rng = np.random.default_rng(4)
     slope = rng.standard_normal(50)
     problem = Straight(slope + rng.standard_normal(50), slope)
-    flat = Hypothesis((), (OneSize((scaled('a', 1.0, tail=Tail.FLAT),)),), ())  # type: ignore[arg-type]
-    found = fit(problem, [flat], [np.array([5.0])])[0]  # type: ignore[arg-type]
+    straight = Hypothesis((), (OneSize((free('a', flat(1.0)),)),), ())  # type: ignore[arg-type]
+    found = fit(problem, [straight], [np.array([5.0])])[0]  # type: ignore[arg-type]
     assert found.best.z[0] == pytest.approx(slope @ problem.value / (slope @ slope), rel=1e-9)
     assert found.covariance[0, 0] == pytest.approx(1.0 / (slope @ slope), rel=1e-9)
 
 
 def test_what_cannot_be_simulated_has_no_evidence() -> None:
     problem = Straight(np.full(5, np.nan), np.ones(5))
-    one = Hypothesis(('one',), (OneSize((scaled('a', 1.0),)),), ())  # type: ignore[arg-type]
+    one = Hypothesis(('one',), (OneSize((free('a', normal(1.0)),)),), ())  # type: ignore[arg-type]
     assert fit(problem, [one], [np.zeros(1)])[0].log_evidence == -np.inf  # type: ignore[arg-type]
 
 
 class OneForce(ForceTerm):
     """Something unnamed of one unknown."""
 
-    unknowns = (scaled('force', 1.0),)  # type: ignore[assignment]
+    unknowns = (free('force', normal(1.0)),)  # type: ignore[assignment]
     one_size = (0,)
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.diagnosis import Candidate, Diagnosis, Gap, Named, Verdict, Where
+from shipdrag_ros.diagnosis import Candidate, Diagnosis, EffectEstimate, Gap, Verdict, Where
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.words import answers, probability, sentence
-from shipdrag_ros.ship import Uncertain
+from shipdrag_ros.parameter import Parameter
 
-FOULING = Named('fouling', 0.9995, {'friction_factor': Uncertain(0.4013, 0.0121)})
-WAVES = Named('waves', 0.95, {'force_n': Uncertain(51234.0, 3000.0), 'from': Uncertain(-1.0, 0.0)})
+FOULING = EffectEstimate('fouling', 0.9995, {'friction_factor': Parameter(0.4013, 0.0121)})
+WAVES = EffectEstimate(
+    'waves', 0.95, {'force_n': Parameter(51234.0, 3000.0), 'from': Parameter(-1.0, 0.0)}
+)
 
 
 def diagnosis(
@@ -19,7 +21,7 @@ def diagnosis(
     *candidates: tuple[tuple[str, ...], float],
     nothing: float = 0.0,
     unnamed: float = 0.0,
-    effects: tuple[Named, ...] = (),
+    effects: tuple[EffectEstimate, ...] = (),
 ) -> Diagnosis:
     return Diagnosis(
         verdict=verdict,
@@ -62,7 +64,7 @@ def diagnosis(
         ),
         (
             diagnosis(Verdict.NAMED, (('waves',), 0.95), effects=(WAVES,)),
-            'Missing in the model: waves (force (51200 ± 6000) N, from astern); probability '
+            'Missing in the model: waves (force (51.2 ± 6.0) kN, from astern); probability '
             '95.0 %.',
         ),
         (
@@ -78,13 +80,13 @@ def diagnosis(
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),
             'Something is missing that is none of the known effects, in the force on the ship, 12 '
-            'to 900 s after the stop, at 3.0 to 7.5 m/s.',
+            'to 900 s after the stop, at 5.8 to 14.6 knots (3.0 to 7.5 m/s).',
         ),
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.98)),
             'Something is missing that is none of the known effects, in the force on the ship, 12 '
-            'to 900 s after the stop, at 3.0 to 7.5 m/s. The likeliest of them, wind, leaves more '
-            'than noise.',
+            'to 900 s after the stop, at 5.8 to 14.6 knots (3.0 to 7.5 m/s). The likeliest of '
+            'them, wind, leaves more than noise.',
         ),
     ],
 )

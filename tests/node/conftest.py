@@ -89,6 +89,18 @@ class NodeProcess:
         soft = hard if full_bytes is None else full_bytes
         resource.prlimit(self._process.pid, resource.RLIMIT_FSIZE, (soft, hard))
 
+    def pause(self) -> None:
+        """
+        Let it stand still.
+        """
+        self._process.send_signal(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        """
+        Let it run again.
+        """
+        self._process.send_signal(signal.SIGCONT)
+
     def kill(self) -> None:
         """
         End it at once, with no chance to close anything.
@@ -219,7 +231,7 @@ class Diagnostics:
         name = f'coastdown_node: {part}'
         for array in reversed(self._heard):
             for status in array.status:
-                if status.name == name:
+                if status.name in (name, f'ship/{name}'):
                     return status
         return None
 

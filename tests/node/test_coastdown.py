@@ -118,6 +118,8 @@ def test_live_figures_are_recorded_and_replayed(
     kinds = [read_event(payload).kind for payload in heard['events']]
     assert kinds == [EventKind.ONSET, EventKind.LIFECYCLE, EventKind.COASTDOWN]
 
+    assert 'a coastdown began at' in node.log
+    assert 'record_end: the node stops): r = (' in node.log
     result = assert_replayed(bag, at_least=60)
     assert [it.ended_by for it in result.coastdowns] == [EndedBy.RECORD_END]
 

@@ -70,7 +70,10 @@ def test_records_all_it_hears_and_counts_what_is_no_use(
     assert 1.5 < float(values['clock offset [s]']) < 30.0
     assert float(values['age [s]']) < 30.0
     assert values['publishers'] == '2'
-    diagnostics.wait_for('state', 'waiting')
+    status = diagnostics.wait_for(part, 'of 11 readings used')
+    assert status.level == b'\x02'
+    assert '5 out of order' in status.message or '4 out of order' in status.message
+    diagnostics.wait_for('state', 'no input can be used: speed_through_water: ')
     assert node.stop() == 0
     assert topics_in(the_bag(tmp_path)) == {
         '/speed_through_water': 11,
@@ -140,6 +143,76 @@ def test_reports_why_an_input_is_silent(start_node: Any, peer: Any, diagnostics:
     finally:
         other.close()
     assert 'also published as geometry_msgs/msg/TwistStamped' in status.message
+
+
+def test_hears_reliably_what_is_sent_so_and_counts_what_is_lost(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+) -> None:
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+    node = start_node()
+    part = 'input speed_through_water'
+    one = peer.advertise('/speed_through_water', SPEED_TYPE, QoSProfile(depth=1))
+    diagnostics.wait_for(part, 'reliable', value='reliability')
+    peer.wait_for_listener(one)
+    sent = [message.payload for message in encode(speeds(count=400))]
+    for payload in sent[:3]:
+        one.publish(payload)
+    diagnostics.wait_for(part, '3', value='messages')
+    # a node that stands still hears of a flood no more than the publisher keeps
+    node.pause()
+    for payload in sent[3:]:
+        one.publish(payload)
+    node.go_on()
+    peer.spin_for(2.0)
+    one.publish(sent[-1])
+    peer.spin_for(2.0)
+    values = {item.key: item.value for item in diagnostics.of(part).values}
+    heard, lost = int(values['messages']), int(values['messages lost'])
+    assert heard + lost == 401
+
+    other = type(peer)()
+    try:
+        two = other.advertise(
+            '/speed_through_water',
+            SPEED_TYPE,
+            QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
+        )
+        diagnostics.wait_for(part, 'best effort', value='reliability')
+        assert '2 publishers, /peer 2 times, are taken for one stream' in (
+            diagnostics.wait_for(part, '2 publishers').message
+        )
+        other.wait_for_listener(two)
+        two.publish(sent[0])
+        diagnostics.wait_for(part, str(heard + 1), value='messages')
+    finally:
+        other.close()
+    assert node.stop() == 0
+    with the_bag(tmp_path).open('rb') as stream:
+        messages = make_reader(stream).iter_messages(topics=['/coastdown_node/events'])
+        notes = [read_event(message.data) for _, _, message in messages]
+    said = [note.text for note in notes if note.kind is EventKind.MESSAGE_LOST]
+    assert bool(said) is bool(lost)
+    if lost:
+        assert said[-1].endswith(f'{lost} so far')
+
+
+def test_two_nodes_are_told_apart_and_silence_names_what_may_be_meant(
+    start_node: Any, peer: Any, diagnostics: Any, ship_file: Path
+) -> None:
+    ship_file.write_text(f'name: Sea Worthy\n{ship_file.read_text()}')
+    node = start_node('-r', '__ns:=/ship')
+    peer.advertise('/gps/speed_log', SPEED_TYPE)
+    peer.advertise('/rudder_angle', 'sensor_msgs/msg/JointState')
+    status = diagnostics.wait_for('state', '/gps/speed_log')
+    assert status.name == 'ship/coastdown_node: state'
+    assert status.hardware_id == 'Sea Worthy'
+    assert 'name one with -r speed_through_water:=/gps/speed_log' in status.message
+    assert '/rudder_angle' not in status.message
+    assert diagnostics.wait_for('input position', 'no publisher').level == b'\x01'
+    assert diagnostics.wait_for('input depth', 'no publisher').level == b'\x00'
+    node.wait_for_log('no input heard on any of')
+    assert '/gps/speed_log' in node.log.partition('no input heard on any of')[2]
 
 
 def test_reports_sim_time_without_a_clock(start_node: Any, peer: Any, diagnostics: Any) -> None:

@@ -45,7 +45,7 @@ def test_problems_come_together() -> None:
     with pytest.raises(ParameterError) as caught:
         settings(record='yes', windows_s=1.0, window_s=1.0, ship_file=3)
     assert len(caught.value.problems) == 4
-    assert 'known are autostart, confirm_s' in caught.value.problems[0]
+    assert 'did you mean window_s?' in caught.value.problems[0]
 
 
 def test_the_file_is_up_to_date() -> None:

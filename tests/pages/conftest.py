@@ -91,6 +91,11 @@ class Browser:
         while not self._loaded:
             self._take(self._receive())
 
+    def show_as(self, media: str = '', scheme: str = 'light') -> None:
+        """Show the page as on paper (`print`), or in light or dark colours."""
+        features = [{'name': 'prefers-color-scheme', 'value': scheme}]
+        self._call('Emulation.setEmulatedMedia', media=media, features=features)
+
     def run(self, script: str) -> Any:
         """Return what a piece of JavaScript gives, as JSON."""
         found = self._call('Runtime.evaluate', expression=script, returnByValue=True)

@@ -14,7 +14,7 @@ from shipdrag_ros.cli import VERBS, main, parser
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIP = ROOT / 'config' / 'vitus_bering.yaml'
-DESK, PHONE = 1280, 412  # width of the window [pixels]
+DESK, PHONE, PAPER = 1280, 412, 680  # width of the window [pixels]; A4 within its margins
 
 # what a page is made of, by the bag it needs and the command that writes it to {page}
 PAGES = {
@@ -81,6 +81,33 @@ EMPTY_AXES = """
 NOT_LOADED = (
     '[...document.images].filter(i => !(i.complete && i.naturalWidth > 0)).map(i => i.alt)'
 )
+# charts stack on a phone: in how many columns they stand
+BESIDE = """
+new Set([...document.querySelectorAll('figure')].map(f => f.getBoundingClientRect().left)).size
+"""
+# charts and tables without a caption
+UNTOLD = """
+[...document.querySelectorAll('figure, .table')].filter(part => {
+  const caption = part.matches('figure') ? part.querySelector('figcaption')
+    : document.getElementById(part.getAttribute('aria-labelledby'));
+  return !caption || caption.textContent.trim().length < 10;
+}).map(part => part.textContent.slice(0, 50))
+"""
+CONTRAST = """
+(() => {
+  const light = text => {
+    const [r, g, b] = text.match(/[0-9.]+/g).map(v => v / 255)
+      .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const paper = light(getComputedStyle(document.body).backgroundColor);
+  const ratios = [...document.querySelectorAll('h1, h2, p, li, td, th, figcaption')].map(part => {
+    const ink = light(getComputedStyle(part).color);
+    return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
+  });
+  return {paper, least: Math.min(...ratios)};
+})()
+"""
 TOO_WIDE = 'document.documentElement.scrollWidth - document.documentElement.clientWidth'
 
 
@@ -112,14 +139,32 @@ def test_a_page_opens_and_no_picture_is_without_data(
     page = tmp_path / 'page.html'
     line = PAGES[kind].format_map(words).split()
     assert main([*line, '--report', str(page)]) == 0
-    for width in (PHONE, DESK):
+    for width, media in ((PHONE, ''), (PAPER, 'print'), (DESK, '')):
+        browser.show_as(media)
         browser.open(page, width=width)
         assert browser.problems == []
         assert browser.run(NOT_LOADED) == []
-        assert browser.run(TOO_WIDE) == 0
+        assert browser.run(TOO_WIDE) == 0, (width, media)
+        assert browser.run(BESIDE) <= (1 if width == PHONE else 2)
+        assert browser.run(UNTOLD) == []
     found = browser.run(EMPTY_AXES)
     assert found['empty'] == []
     assert found['axes'] >= found['pictures'] >= ('no coastdown' not in kind)
+
+
+@pytest.mark.parametrize(('scheme', 'darkest', 'lightest'), [('light', 0.9, 1), ('dark', 0, 0.1)])
+def test_a_page_is_read_by_day_and_by_night(
+    browser: Any, tmp_path: Path, scheme: str, darkest: float, lightest: float
+) -> None:
+    page = tmp_path / 'page.html'
+    line = f'cable --length 50 --diameter 0.1 --speed 3 --report {page}'
+    assert main(line.split()) == 0
+    browser.show_as(scheme=scheme)
+    browser.open(page, width=DESK)
+    found = browser.run(CONTRAST)
+    browser.show_as()
+    assert darkest <= found['paper'] <= lightest
+    assert found['least'] >= 4.5  # WCAG AA
 
 
 def test_every_verb_that_writes_a_page_is_among_them() -> None:
@@ -154,7 +199,7 @@ def test_the_check_knows_empty_axes(
 ) -> None:
     from matplotlib.figure import Figure
 
-    from shipdrag_ros.report.document import Picture
+    from shipdrag_ros.report.drawing import data_uri
 
     figure = Figure(figsize=(4.0, 3.0))
     axis = figure.subplots()
@@ -162,7 +207,7 @@ def test_the_check_knows_empty_axes(
     axis.secondary_xaxis('top')
     axis.set_title('a title')
     page = tmp_path / 'page.html'
-    page.write_text(f'<html><body><img src="{Picture.of(figure, "").uri}" alt="it"></body></html>')
+    page.write_text(f'<html><body><img src="{data_uri(figure)}" alt="it"></body></html>')
     browser.open(page, width=DESK)
     found = browser.run(EMPTY_AXES)
     assert (found['axes'], len(found['empty'])) == (1, empty)

@@ -271,3 +271,10 @@ def test_round_trip_is_exact(name, length, volume, value, sd, effect):
     )
     assert ship.length_m == length
     assert Ship.from_yaml(ship.to_yaml(), subject='again') == ship
+
+
+def test_a_ship_is_one_line(cargo: Ship) -> None:
+    assert cargo.summary() == 'Vitus Bering: length 150 m, displacement 20200 m³ (20,705 t)'
+    model = replace(cargo, name='', length_m=1.1, displaced_volume_m3=0.0142)
+    assert model.summary().startswith('a ship without a name: ')
+    assert model.summary().endswith('displacement 0.0142 m³ (14.56 kg)')

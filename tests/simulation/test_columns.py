@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.errors import ShipdragError, SimulationError
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Channel
-from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline, Uncertain
+from shipdrag_ros.ship import Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import (
     Action,
     EngineOrder,
@@ -48,7 +49,7 @@ def drawn(name: str, seed: int) -> tuple[Action, StatedEffect]:
     """Draw the values of an effect from its priors."""
     rng = np.random.default_rng(seed)
     values = {}
-    for quantity in LIBRARY[name].quantities(CARGO):
+    for quantity in LIBRARY[name].parameters_of(CARGO):
         value = quantity.prior.draw(rng)
         while not quantity.accepts(value):
             value = quantity.prior.draw(rng)
@@ -58,7 +59,7 @@ def drawn(name: str, seed: int) -> tuple[Action, StatedEffect]:
         # between steps the truth is interpolated more coarsely
         values['start_s'] = round(min(values['start_s'], 300.0))
         values['duration_s'] = round(min(values['duration_s'], 350.0))
-    stated = StatedEffect(name, {key: Uncertain(value, 0.0) for key, value in values.items()})
+    stated = StatedEffect(name, {key: Parameter(value, 0.0) for key, value in values.items()})
     return LIBRARY[name].action(FRAME, *values.values()), stated
 
 
@@ -110,7 +111,7 @@ def test_readings_are_those_of_sensors(name):
     size=st.floats(0.05, 1.0),
 )
 def test_more_drag_makes_a_slower_ship(name, size):
-    rest = [quantity.default for quantity in LIBRARY[name].quantities(CARGO)[1:]]
+    rest = [quantity.value for quantity in LIBRARY[name].parameters_of(CARGO)[1:]]
     small, large = (LIBRARY[name].action(FRAME, value, *rest) for value in (size, 1.5 * size))
     clean, little, much = simulate_columns(
         CARGO, SCENARIO, [Action(), small, large], TIME_S
@@ -153,7 +154,7 @@ def test_several_orders_and_no_run_down_agree_too():
         times = np.arange(0.0, 900.0, 10.0)
         columns = simulate_columns(ship, scenario, [Action(), residual], times, step_s=0.25)
         stated = StatedEffect(
-            'residual_thrust', {'decay_s': Uncertain(80.0, 0.0), 'fraction': Uncertain(0.3, 0.0)}
+            'residual_thrust', {'decay_s': Parameter(80.0, 0.0), 'fraction': Parameter(0.3, 0.0)}
         )
         for i, effects in enumerate([(), (stated,)]):
             truth = simulate(ship, scenario, effects=effects, step_s=0.25).at(times)
@@ -183,7 +184,7 @@ def test_nuisances_are_actions_and_speeds():
 
 
 def test_the_effects_of_the_ship_act_in_every_column():
-    stated = StatedEffect('current', {'along_track_m_s': Uncertain(0.5, 0.0)})
+    stated = StatedEffect('current', {'along_track_m_s': Parameter(0.5, 0.0)})
     ship = replace(CARGO, effects=(stated,))
     offset = Action(log_offset_m_s=0.1)
     columns = simulate_columns(

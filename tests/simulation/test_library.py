@@ -13,16 +13,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipdrag_ros.errors import SimulationError
+from shipdrag_ros.parameter import Parameter, Prior, Shape
 from shipdrag_ros.samples import INPUTS
-from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
+from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import (
     STANDARD_SD,
     Action,
     Frame,
-    Prior,
     Scenario,
     Scope,
-    Shape,
     sense,
     simulate,
     simulate_columns,
@@ -80,8 +79,8 @@ SEEN = {
 
 def typical(name: str, ship: Ship = CARGO) -> list[float]:
     """Return values of all parameters at which the effect is plain to see."""
-    first, *others = LIBRARY[name].quantities(ship)
-    return [SEEN.get(name, first.prior.first), *(other.default for other in others)]
+    first, *others = LIBRARY[name].parameters_of(ship)
+    return [SEEN.get(name, first.prior.first), *(other.value for other in others)]
 
 
 def readings(action: Action) -> dict[str, np.ndarray]:
@@ -104,11 +103,11 @@ def test_every_module_of_the_folder_is_an_effect_of_its_name():
 
 def test_one_new_module_is_a_new_effect(tmp_path, monkeypatch):
     (tmp_path / 'ice.py').write_text(
-        'from shipdrag_ros.simulation import Action, Effect, Quantity, Scope\n'
-        'from shipdrag_ros.simulation.effect import half_normal\n'
+        'from shipdrag_ros.parameter import Parameter, half_normal\n'
+        'from shipdrag_ros.simulation import Action, Effect, Scope\n'
         'EFFECT = Effect(name="ice", scope=Scope.EARTH, formula="F", source="a test", parameters=('
-        'Quantity(name="force_n", unit="N", meaning="ice", prior=half_normal(1.0), low=0, high=1e9'
-        '),), act=lambda frame, force: Action(resistance=(lambda v: 0 * v + force,)))\n'
+        'Parameter(name="force_n", unit="N", meaning="ice", prior=half_normal(1.0), low=0, '
+        'high=1e9),), act=lambda frame, force: Action(resistance=(lambda v: 0 * v + force,)))\n'
     )
     monkeypatch.setattr(library, '__path__', [*library.__path__, str(tmp_path)])
     monkeypatch.setattr(library, 'LIBRARY', {found.name: found for found in library._found()})
@@ -125,18 +124,18 @@ def test_a_declaration_is_whole(name):
     assert effect.source
     assert set(effect.struck_out_by) <= set(INPUTS)
     assert set(effect.confounders) <= set(LIBRARY) - {name}
-    assert effect.parameters[0].default is None
-    for quantity in effect.quantities(CARGO):
+    assert not effect.parameters[0].is_given
+    for quantity in effect.parameters_of(CARGO):
         assert quantity.meaning
-        if quantity is not effect.parameters[0] and quantity.default is not None:
-            assert quantity.accepts(quantity.default)
+        if quantity is not effect.parameters[0] and quantity.is_given:
+            assert quantity.accepts(quantity.value)
 
 
 @EACH
 def test_a_prior_lies_in_what_is_accepted(name):
     # N = 500, seed 2: 95 % at least, and none with density 0
     rng = np.random.default_rng(2)
-    for quantity in LIBRARY[name].quantities(CARGO):
+    for quantity in LIBRARY[name].parameters_of(CARGO):
         draws = [quantity.prior.draw(rng) for _ in range(500)]
         assert np.mean([quantity.accepts(value) for value in draws]) > 0.95
         assert all(np.isfinite(quantity.prior.log_density(value)) for value in draws)
@@ -159,7 +158,7 @@ def test_whatever_looks_alike_does_so_both_ways_and_only_mass_is_never_told():
 def test_every_parameter_changes_a_reading(name):
     values = typical(name)
     before = readings(LIBRARY[name].action(FRAME, *values))
-    for i, quantity in enumerate(LIBRARY[name].quantities(CARGO)):
+    for i, quantity in enumerate(LIBRARY[name].parameters_of(CARGO)):
         changed = list(values)
         changed[i] = -values[i] if quantity.words else 1.3 * values[i] or 0.5
         after = readings(LIBRARY[name].action(FRAME, *changed))
@@ -172,7 +171,7 @@ def test_every_effect_leaves_the_speed_steady_until_the_stop(name):
     stated = StatedEffect(
         name,
         {
-            quantity.name: Uncertain(value, 0.0)
+            quantity.name: Parameter(value, 0.0)
             for quantity, value in zip(LIBRARY[name].parameters, typical(name))
         },
     )
@@ -189,7 +188,7 @@ def test_every_effect_leaves_the_speed_steady_until_the_stop(name):
 @EACH
 def test_what_strikes_an_effect_out_reads_it(name):
     stated = [
-        StatedEffect(name, {LIBRARY[name].parameters[0].name: Uncertain(typical(name)[0], 0)})
+        StatedEffect(name, {LIBRARY[name].parameters[0].name: Parameter(typical(name)[0], 0)})
     ]
     inputs = [channel.input for channel in STANDARD_SD]
     sensors = standard_sensors(noise=0.0, inputs=inputs, rate_hz=0.2)
@@ -258,7 +257,7 @@ def test_priors_draw_what_their_density_says(prior, mean, sd):
 @given(data=st.data())
 def test_what_is_written_is_read(name, data):
     values = []
-    for quantity in LIBRARY[name].quantities(CARGO):
+    for quantity in LIBRARY[name].parameters_of(CARGO):
         if quantity.words:
             values.append(data.draw(st.sampled_from(sorted(quantity.words.values()))))
         else:
@@ -266,7 +265,7 @@ def test_what_is_written_is_read(name, data):
     names = [quantity.name for quantity in LIBRARY[name].parameters]
     rest = ''.join(f',{key}={value!r}' for key, value in zip(names[1:], values[1:]))
     stated = parse(f'{name}={values[0]!r}{rest}')
-    assert stated == StatedEffect(name, {k: Uncertain(v, 0.0) for k, v in zip(names, values)})
+    assert stated == StatedEffect(name, {k: Parameter(v, 0.0) for k, v in zip(names, values)})
     action = action_of(FRAME, [stated])
     expected = LIBRARY[name].action(FRAME, *values)
     assert replace(action, resistance=()) == replace(expected, resistance=())
@@ -299,11 +298,11 @@ def test_all_impossible_effects_are_told_at_once():
     bare = Ship(length_m=150.0, displaced_volume_m3=20200.0)
     stated = [
         StatedEffect('barnacles', {}),
-        StatedEffect('wind', {'head_m_s': Uncertain(5.0, 0.0)}),
-        StatedEffect('current', {'along_track_m_s': Uncertain(9.0, 0.0)}),
-        StatedEffect('log_scale', {'scale': Uncertain(9.0, 0.0)}),
-        StatedEffect('log_lag', {'lag_s': Uncertain(np.nan, 0.0)}),
-        StatedEffect('log_lag', {'lag_s': Uncertain(1.0, 0.0)}),
+        StatedEffect('wind', {'head_m_s': Parameter(5.0, 0.0)}),
+        StatedEffect('current', {'along_track_m_s': Parameter(9.0, 0.0)}),
+        StatedEffect('log_scale', {'scale': Parameter(9.0, 0.0)}),
+        StatedEffect('log_lag', {'lag_s': Parameter(np.nan, 0.0)}),
+        StatedEffect('log_lag', {'lag_s': Parameter(1.0, 0.0)}),
     ]
     with pytest.raises(SimulationError) as told:
         action_of(Frame(bare, SCENARIO, 0.0), stated)

@@ -15,7 +15,8 @@ from pkgutil import iter_modules
 from types import MappingProxyType
 
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.ship import Ship, StatedEffect, Uncertain
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 
@@ -111,15 +112,15 @@ def parse(text: str) -> StatedEffect:
     """
     name, separator, rest = text.partition('=')
     effect = find(name.strip())
-    form = ','.join(f'{quantity.name}=VALUE' for quantity in effect.parameters[1:])
+    form = ','.join(f'{parameter.name}=VALUE' for parameter in effect.parameters[1:])
     usage = f'write {effect.name}=VALUE' + (f'[,{form}]' if form else '')
     if not separator:
         raise SimulationError(f'effect {text!r} has no value; {usage}')
     first, *others = rest.split(',')
     given = [(effect.parameters[0].name, first)]
     given += [(key.strip(), value) for key, _, value in (item.partition('=') for item in others)]
-    known = {quantity.name: quantity for quantity in effect.parameters}
-    values: dict[str, Uncertain] = {}
+    known = {parameter.name: parameter for parameter in effect.parameters}
+    values: dict[str, Parameter] = {}
     for key, word in given:
         if key not in known or key in values:
             what = 'is given twice' if key in values else 'is not known'
@@ -132,7 +133,7 @@ def parse(text: str) -> StatedEffect:
                 f'effect {text!r}: {key} is {word!r}, expected '
                 f'{" or ".join(known[key].words) or "a number"} ({known[key].meaning})'
             ) from error
-        values[key] = Uncertain(value, 0.0)
+        values[key] = Parameter(value, 0.0)
     return StatedEffect(effect.name, values)
 
 
@@ -170,19 +171,20 @@ def _problems(effect: Effect, stated: StatedEffect, frame: Frame) -> Iterator[st
     if missing:
         yield f'{effect.name} needs {", ".join(missing)} in the ship file'
         return
-    known = {quantity.name: quantity for quantity in effect.quantities(frame.ship)}
+    known = {parameter.name: parameter for parameter in effect.parameters_of(frame.ship)}
     for key in stated.parameters:
         if key not in known:
             yield f'{effect.name}: parameter {key!r} is not known; known are {", ".join(known)}'
-    for quantity in known.values():
-        given = stated.parameters.get(quantity.name)
+    for parameter in known.values():
+        given = stated.parameters.get(parameter.name)
         if given is None:
-            if quantity.default is None:
-                yield f'{effect.name}: {quantity.name} is missing, expected {quantity.expectation}'
-        elif not quantity.accepts(given.value):
+            if not parameter.is_given:
+                expected = parameter.expectation
+                yield f'{effect.name}: {parameter.name} is missing, expected {expected}'
+        elif not parameter.accepts(given.value):
             yield (
-                f'{effect.name}: {quantity.name} is {given.value!r}, '
-                f'expected {quantity.expectation}'
+                f'{effect.name}: {parameter.name} is {given.value!r}, '
+                f'expected {parameter.expectation}'
             )
 
 
@@ -191,9 +193,7 @@ def values_of(stated: StatedEffect, ship: Ship) -> dict[str, float]:
     Return all parameters of an effect that was checked, defaults included.
     """
     values = {}
-    for quantity in find(stated.name).quantities(ship):
-        given = stated.parameters.get(quantity.name)
-        value = quantity.default if given is None else given.value
-        assert value is not None  # it was checked
-        values[quantity.name] = value
+    for parameter in find(stated.name).parameters_of(ship):
+        given = stated.parameters.get(parameter.name)
+        values[parameter.name] = parameter.value if given is None else given.value
     return values

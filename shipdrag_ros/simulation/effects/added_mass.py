@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, half_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, half_normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Scope
 
 
 def _act(frame: Frame, n_r_change: float) -> Action:
@@ -15,7 +16,7 @@ EFFECT = Effect(
     name='added_mass',
     scope=Scope.HULL,
     parameters=(
-        Quantity(
+        Parameter(
             name='n_r_change',
             unit='',
             meaning='added to n_r at every speed',

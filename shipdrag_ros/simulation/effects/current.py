@@ -3,16 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    WithoutBaseline,
-    normal,
-)
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, along_track_m_s: float, cross_track_m_s: float) -> Action:
@@ -23,7 +16,7 @@ EFFECT = Effect(
     name='current',
     scope=Scope.EARTH,
     parameters=(
-        Quantity(
+        Parameter(
             name='along_track_m_s',
             unit='m/s',
             meaning='velocity of the water along the heading of the first run',
@@ -31,14 +24,14 @@ EFFECT = Effect(
             low=-5.0,
             high=5.0,
         ),
-        Quantity(
+        Parameter(
             name='cross_track_m_s',
             unit='m/s',
             meaning='and to port of it',
             prior=normal(0.3),
             low=-5.0,
             high=5.0,
-            default=0.0,
+            value=0.0,
         ),
     ),
     formula='velocity over ground = velocity through water + current; the air drag feels it too',

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
 
 
 def _act(frame: Frame, change_m_s: float) -> Action:
@@ -15,7 +16,7 @@ EFFECT = Effect(
     name='current_change',
     scope=Scope.EARTH,
     parameters=(
-        Quantity(
+        Parameter(
             name='change_m_s',
             unit='m/s',
             meaning='what the velocity of the water along the heading of the first run gains, '

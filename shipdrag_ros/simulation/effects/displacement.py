@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import DENIES, Effect, Frame, Scope
 
 
 def _act(frame: Frame, fraction: float) -> Action:
@@ -15,7 +16,7 @@ EFFECT = Effect(
     name='displacement',
     scope=Scope.HULL,
     parameters=(
-        Quantity(
+        Parameter(
             name='fraction',
             unit='',
             meaning="by which the mass is larger; the resistance [N] stays the baseline's",
@@ -29,4 +30,5 @@ EFFECT = Effect(
     formula_sd=0.05,
     odds=0.01,
     act=_act,
+    facts={'draughts_read': DENIES},
 )

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Said, Scope
 from shipdrag_ros.simulation.hydrodynamics import friction_n
+
+_FOULS_S = 2.0 * 365.25 * 86400.0  # until a clean hull is fouled, mostly
 
 
 def _act(frame: Frame, friction_factor: float) -> Action:
@@ -20,7 +23,7 @@ EFFECT = Effect(
     name='fouling',
     scope=Scope.HULL,
     parameters=(
-        Quantity(
+        Parameter(
             name='friction_factor',
             unit='',
             meaning='fraction added to C_F (1 + k)',
@@ -40,4 +43,5 @@ EFFECT = Effect(
         'added_mass': (Measure.CLEAN_HULL,),
         'displacement': (Measure.DRAUGHT, Measure.CLEAN_HULL),
     },
+    facts={'hull_cleaned': Said(fades_s=_FOULS_S)},
 )

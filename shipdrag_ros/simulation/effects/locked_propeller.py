@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from math import inf
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Said, Scope
 from shipdrag_ros.simulation.hydrodynamics import disc_area_m2, drag_n
 
 
@@ -24,7 +25,7 @@ EFFECT = Effect(
     name='locked_propeller',
     scope=Scope.HULL,
     parameters=(
-        Quantity(
+        Parameter(
             name='drag_coefficient',
             unit='',
             meaning='on disc area and ship speed, on top of what the baseline holds; 0.65 on the '
@@ -46,4 +47,5 @@ EFFECT = Effect(
         'displacement': (Measure.DRAUGHT, Measure.SHAFT),
     },
     needs=('propeller',),
+    facts={'shaft': Said(('locked',))},
 )

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
 
 
 def _act(frame: Frame, speed_m_s: float) -> Action:
@@ -15,7 +16,7 @@ EFFECT = Effect(
     name='log_dead_band',
     scope=Scope.SENSOR,
     parameters=(
-        Quantity(
+        Parameter(
             name='speed_m_s',
             unit='m/s',
             meaning='speed below which it under-reads',

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
 
 
 def _act(frame: Frame, lag_s: float) -> Action:
@@ -15,7 +16,7 @@ EFFECT = Effect(
     name='log_lag',
     scope=Scope.SENSOR,
     parameters=(
-        Quantity(
+        Parameter(
             name='lag_s',
             unit='s',
             meaning='time constant of a first-order filter',

@@ -3,16 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    WithoutBaseline,
-    normal,
-)
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, offset_m_s: float) -> Action:
@@ -23,7 +16,7 @@ EFFECT = Effect(
     name='log_offset',
     scope=Scope.SENSOR,
     parameters=(
-        Quantity(
+        Parameter(
             name='offset_m_s',
             unit='m/s',
             meaning='reading = speed through water + offset',

@@ -3,16 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    WithoutBaseline,
-    normal,
-)
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, factor: float) -> Action:
@@ -23,7 +16,7 @@ EFFECT = Effect(
     name='log_scale',
     scope=Scope.SENSOR,
     parameters=(
-        Quantity(
+        Parameter(
             name='factor',
             unit='',
             meaning='reading = (1 + factor) times the speed through water',

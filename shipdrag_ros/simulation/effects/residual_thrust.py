@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Quantity, Scope, log_normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Said, Scope
 
 
 def _act(frame: Frame, decay_s: float, fraction: float) -> Action:
@@ -15,7 +16,7 @@ EFFECT = Effect(
     name='residual_thrust',
     scope=Scope.RUN,
     parameters=(
-        Quantity(
+        Parameter(
             name='decay_s',
             unit='s',
             meaning='time constant of what remains',
@@ -23,14 +24,14 @@ EFFECT = Effect(
             low=1e-3,
             high=1e6,
         ),
-        Quantity(
+        Parameter(
             name='fraction',
             unit='',
             meaning='of the steady thrust; the rest ends as the ship file says',
             prior=log_normal(0.2, 0.6),
             low=0.0,
             high=1.0,
-            default=0.2,
+            value=0.2,
         ),
     ),
     formula='T = T0 [(1 - fraction) exp(-t/run_down) + fraction exp(-t/decay)], shaft speed alike',
@@ -45,4 +46,5 @@ EFFECT = Effect(
         'time_offset': (Measure.SHAFT,),
         'added_mass': (Measure.SHAFT, Measure.ANOTHER_RUN),
     },
+    facts={'shaft': Said(('driven',))},
 )

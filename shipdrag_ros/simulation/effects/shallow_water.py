@@ -7,18 +7,11 @@ import math
 
 import numpy as np
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    DRAUGHTS,
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    log_normal,
-)
+from shipdrag_ros.simulation.effect import DENIES, DRAUGHTS, Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.hydrodynamics import viscous_n
 
 _DEEP_LENGTHS = 0.3  # of depth: no sinkage is added from there on
@@ -79,7 +72,7 @@ EFFECT = Effect(
     name='shallow_water',
     scope=Scope.EARTH,
     parameters=(
-        Quantity(
+        Parameter(
             name='depth_m',
             unit='m',
             meaning='depth of the water, from the surface',
@@ -102,4 +95,5 @@ EFFECT = Effect(
         'towed_cable': (Measure.DEPTH, Measure.DEEP_WATER, Measure.WITHOUT_CABLE),
     },
     needs=('breadth_m', 'draught_m'),
+    facts={'deep_water': DENIES},
 )

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Quantity, Scope, normal
+from shipdrag_ros.simulation.effect import Effect, Frame, Scope
 
 
 def _act(frame: Frame, offset_s: float) -> Action:
@@ -15,7 +16,7 @@ EFFECT = Effect(
     name='time_offset',
     scope=Scope.SENSOR,
     parameters=(
-        Quantity(
+        Parameter(
             name='offset_s',
             unit='s',
             meaning='log later than radar: what is stamped t was true at t - offset',

@@ -3,16 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    AREAS,
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    log_normal,
-)
+from shipdrag_ros.simulation.effect import AREAS, DENIES, Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.hydrodynamics import ROPES, QuadraticDrag
 
 
@@ -25,7 +18,7 @@ EFFECT = Effect(
     name='towed_cable',
     scope=Scope.HULL,
     parameters=(
-        Quantity(
+        Parameter(
             name='drag_area_m2',
             unit='m^2',
             meaning='C0 l d of length and diameter (`shipdrag cable`); '
@@ -44,4 +37,5 @@ EFFECT = Effect(
         'added_mass': (Measure.WITHOUT_CABLE,),
         'displacement': (Measure.DRAUGHT, Measure.WITHOUT_CABLE),
     },
+    facts={'no_towed_cable': DENIES},
 )

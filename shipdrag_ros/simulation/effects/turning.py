@@ -5,18 +5,9 @@ from __future__ import annotations
 
 from math import copysign
 
+from shipdrag_ros.parameter import Parameter, either_sign, log_normal, uniform
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    AREAS,
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    either_sign,
-    log_normal,
-    uniform,
-)
+from shipdrag_ros.simulation.effect import AREAS, DENIES, Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.scenario import Turn
 
 _RUDDER_RAD = 0.17  # 10 degrees, to the side she turns to
@@ -49,7 +40,7 @@ EFFECT = Effect(
     name='turning',
     scope=Scope.RUN,
     parameters=(
-        Quantity(
+        Parameter(
             name='drag_area_m2',
             unit='m^2',
             meaning='of the resistance that drift, yaw and rudder add',
@@ -58,25 +49,25 @@ EFFECT = Effect(
             high=1.0,
             measured_in=AREAS,
         ),
-        Quantity(
+        Parameter(
             name='start_s',
             unit='s',
             meaning='after the stop, where the drag begins to grow',
             prior=uniform(0.0, 1500.0),
             low=0.0,
             high=1e5,
-            default=200.0,
+            value=200.0,
         ),
-        Quantity(
+        Parameter(
             name='duration_s',
             unit='s',
             meaning='until the drag has gone',
             prior=log_normal(200.0, 0.8),
             low=0.0,
             high=1e5,
-            default=150.0,
+            value=150.0,
         ),
-        Quantity(
+        Parameter(
             name='rate_rad_s',
             unit='rad/s',
             meaning='yaw rate meanwhile, anticlockwise positive; 0 where helm and counter-helm '
@@ -85,7 +76,7 @@ EFFECT = Effect(
             prior=either_sign(0.0015, 1.1),
             low=-0.2,
             high=0.2,
-            default=0.003,
+            value=0.003,
         ),
     ),
     formula='0.5 rho drag_area v^2 from start to start + duration, growing and falling in an '
@@ -98,4 +89,5 @@ EFFECT = Effect(
         'windmilling_propeller': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
         'current_change': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
     },
+    facts={'helm_amidships': DENIES},
 )

@@ -5,19 +5,17 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
+from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal
 from shipdrag_ros.ship import GRAVITY_M_S2
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import (
+    DENIES,
     WEIGHTS,
     Effect,
     Frame,
     Measure,
-    Prior,
-    Quantity,
     Scope,
-    Shape,
     WithoutBaseline,
-    log_normal,
 )
 
 _LENGTHS = 0.5  # of a wave, in lengths of the ship: shorter ones than those that heave her
@@ -35,7 +33,7 @@ EFFECT = Effect(
     name='waves',
     scope=Scope.EARTH,
     parameters=(
-        Quantity(
+        Parameter(
             name='force_n',
             unit='N',
             meaning='mean force on the ship at rest; STAWAVE-1 gives '
@@ -45,14 +43,14 @@ EFFECT = Effect(
             high=0.02,
             measured_in=WEIGHTS,
         ),
-        Quantity(
+        Parameter(
             name='from',
             unit='',
             meaning='the side of the first run that they come from',
             prior=Prior(Shape.CHOICE, 1.0, -1.0),
             low=-1.0,
             high=1.0,
-            default=1.0,
+            value=1.0,
             words={'ahead': 1.0, 'astern': -1.0},
         ),
     ),
@@ -68,4 +66,5 @@ EFFECT = Effect(
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.SHAFT),
     },
     without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
+    facts={'no_waves': DENIES, 'calm': DENIES},
 )

@@ -3,16 +3,9 @@
 
 from __future__ import annotations
 
+from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    WithoutBaseline,
-    normal,
-)
+from shipdrag_ros.simulation.effect import DENIES, Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, head_m_s: float, cross_m_s: float) -> Action:
@@ -23,7 +16,7 @@ EFFECT = Effect(
     name='wind',
     scope=Scope.EARTH,
     parameters=(
-        Quantity(
+        Parameter(
             name='head_m_s',
             unit='m/s',
             meaning='true wind over ground from ahead of the first run',
@@ -31,14 +24,14 @@ EFFECT = Effect(
             low=-60.0,
             high=60.0,
         ),
-        Quantity(
+        Parameter(
             name='cross_m_s',
             unit='m/s',
             meaning='and from her port side',
             prior=normal(5.0),
             low=-60.0,
             high=60.0,
-            default=0.0,
+            value=0.0,
         ),
     ),
     formula='air drag 0.5 rho_air A C_X |W| W_x, W the wind relative to the ship, W_x its '
@@ -55,4 +48,5 @@ EFFECT = Effect(
     },
     needs=('air',),
     without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
+    facts={'calm': DENIES},
 )

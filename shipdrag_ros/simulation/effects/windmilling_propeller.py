@@ -5,17 +5,10 @@ from __future__ import annotations
 
 from scipy.special import expit
 
+from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import (
-    SPEEDS,
-    Effect,
-    Frame,
-    Measure,
-    Quantity,
-    Scope,
-    log_normal,
-)
+from shipdrag_ros.simulation.effect import SPEEDS, Effect, Frame, Measure, Said, Scope
 from shipdrag_ros.simulation.hydrodynamics import disc_area_m2, drag_n
 
 _LOCKED = 0.42  # 0.65 on the speed behind a wake of 0.2
@@ -38,7 +31,7 @@ EFFECT = Effect(
     name='windmilling_propeller',
     scope=Scope.HULL,
     parameters=(
-        Quantity(
+        Parameter(
             name='drag_coefficient',
             unit='',
             meaning='while it turns, on disc area and ship speed, on top of what the baseline '
@@ -47,14 +40,14 @@ EFFECT = Effect(
             low=0.0,
             high=3.0,
         ),
-        Quantity(
+        Parameter(
             name='stall_speed_m_s',
             unit='m/s',
             meaning='speed through water below which it stands still',
             prior=log_normal(0.08, 0.4),
             low=1e-4,
             high=1.0,
-            default=0.08,
+            value=0.08,
             measured_in=SPEEDS,
         ),
     ),
@@ -70,4 +63,5 @@ EFFECT = Effect(
     struck_out_by=('shaft',),
     confounders={'towed_cable': (Measure.WITHOUT_CABLE, Measure.SHAFT)},
     needs=('propeller',),
+    facts={'shaft': Said(('free',))},
 )

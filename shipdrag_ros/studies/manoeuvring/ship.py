@@ -17,19 +17,20 @@ from typing import Any
 
 import numpy as np
 
-from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ShipFileError
-from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship.fields import (
+from shipdrag_ros.fields import (
     Kind,
     Problems,
     declare,
+    keys_of,
     named,
     number,
+    parse,
     read_keys,
     section,
     text,
 )
+from shipdrag_ros.samples import Float64
 
 # powers of the change of speed u, sway v, yaw rate r and rudder d, as the names spell them
 FORM = (
@@ -119,8 +120,9 @@ class SteeredShip:
         ShipFileError
             Naming every problem of the text at once.
         """
-        data, problems = strict_yaml.load(content)
-        accepted = read_keys(cls, data, '', problems)
+        problems: list[str] = []
+        data = parse(content, subject=subject, error=ShipFileError)
+        accepted = read_keys(keys_of(cls), data, '', problems)
         if problems:
             raise ShipFileError(subject, problems)
         return cls(**accepted)

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.parameter import Prior, Shape
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import Action, Effect, Frame, Prior, Shape
+from shipdrag_ros.simulation import Action, Effect, Frame
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.studies.sensitivity.coast import Coast
 from shipdrag_ros.studies.sensitivity.particulars import Particular
@@ -136,11 +137,11 @@ def _flat(readings: Float64) -> Float64:
 
 def _usual_values(effect: Effect, ship: Ship) -> tuple[float, ...]:
     """Return a usual size of an effect."""
-    quantities = effect.quantities(ship)
+    quantities = effect.parameters_of(ship)
     usual = [_usual(quantity.prior) for quantity in quantities]
     return (
         usual[0],
-        *(one if q.default is None else q.default for q, one in zip(quantities[1:], usual[1:])),
+        *(q.value if q.is_given else one for q, one in zip(quantities[1:], usual[1:])),
     )
 
 

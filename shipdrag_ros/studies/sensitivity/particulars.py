@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import (
     AddedMass,
     CoefficientBaseline,
@@ -21,7 +22,6 @@ from shipdrag_ros.ship import (
     StatedEffect,
     TableAddedMass,
     TableBaseline,
-    Uncertain,
 )
 
 _Change = Callable[[Ship, float], Ship]
@@ -161,7 +161,7 @@ def _effect(name: str, parameter: str) -> _Change:
         if effect.name != name:
             return effect
         stated = effect.parameters[parameter]
-        values = {**effect.parameters, parameter: Uncertain(factor * stated.value, stated.sd)}
+        values = {**effect.parameters, parameter: Parameter(factor * stated.value, stated.sd)}
         return replace(effect, parameters=values)
 
     return scaled

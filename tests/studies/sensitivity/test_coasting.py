@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.errors import SensitivityError
-from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline, Uncertain
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import simulate
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.studies.sensitivity.coast import coast_from
@@ -98,7 +99,7 @@ def test_wrong_values_look_like_effects_of_the_hull_not_of_the_instruments(found
 
 
 def test_an_effect_that_is_stated_is_a_value_and_no_longer_missing():
-    stated = StatedEffect('fouling', {'friction_factor': Uncertain(0.2, 0.05)})
+    stated = StatedEffect('fouling', {'friction_factor': Parameter(0.2, 0.05)})
     ship = replace(CARGO, effects=(stated,))
     found = study_coast(ship, coast_from(ship))
     assert 'effects.fouling.friction_factor' in found.losses.names

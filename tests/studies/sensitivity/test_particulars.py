@@ -9,14 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.ship import (
-    ConstantAddedMass,
-    Propulsion,
-    Ship,
-    StatedEffect,
-    TableBaseline,
-    Uncertain,
-)
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.ship import ConstantAddedMass, Propulsion, Ship, StatedEffect, TableBaseline
 from shipdrag_ros.studies.sensitivity.particulars import particulars
 
 CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
@@ -96,8 +90,8 @@ def test_added_mass_of_any_model_is_a_factor_of_n_r(model):
 def test_a_table_has_one_value_and_effects_have_theirs():
     table = TableBaseline((0.0, 5.0, 9.0), (0.0, 1e5, 4e5), 0.03)
     effects = (
-        StatedEffect('fouling', {'friction_factor': Uncertain(0.2, 0.05)}),
-        StatedEffect('current', {'along_track_m_s': Uncertain(0.0, 0.1)}),
+        StatedEffect('fouling', {'friction_factor': Parameter(0.2, 0.05)}),
+        StatedEffect('current', {'along_track_m_s': Parameter(0.0, 0.1)}),
     )
     ship = replace(CARGO, baseline=table, effects=effects, air=None, propulsion=None)
     found = listed(ship)
@@ -109,7 +103,7 @@ def test_a_table_has_one_value_and_effects_have_theirs():
         1.1 * ship.resistance_n(6.0),
     )
     changed = found['effects.fouling.friction_factor'].scaled(ship, 2.0)
-    assert changed.effects[0].parameters['friction_factor'] == Uncertain(0.4, 0.05)
+    assert changed.effects[0].parameters['friction_factor'] == Parameter(0.4, 0.05)
     assert changed.effects[1] == effects[1]
 
 

@@ -16,8 +16,7 @@ from fractions import Fraction
 from math import isfinite
 from pathlib import Path
 
-import yaml
-
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import (
     ATTACHMENT,
@@ -356,4 +355,4 @@ def _provenance(
         'rate_hz': rate_hz,
         'where': dict(where),
     }
-    return yaml.safe_dump(about, sort_keys=False, allow_unicode=True)
+    return strict_yaml.dump(about)

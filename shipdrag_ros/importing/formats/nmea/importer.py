@@ -15,9 +15,9 @@ from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
 
-import yaml
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import ATTACHMENT, BATCH_SAMPLES, Rejected, new_bag
 from shipdrag_ros.importing.formats.nmea.clock import Clock
@@ -156,7 +156,7 @@ def import_nmea(
         result = _result(log, survey, record, clock, attached=text_of_log is not None)
         about = {'source': source.name, 'date': day, 'transducer_m': transducer_m}
         about |= {'checksum': checksum.value, **asdict(result)}
-        bag.attach(ATTACHMENT, yaml.safe_dump(about, sort_keys=False, allow_unicode=True))
+        bag.attach(ATTACHMENT, strict_yaml.dump(about))
     return result
 
 

@@ -6,8 +6,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from shipdrag_ros.display import Table
-from shipdrag_ros.report.document import Picture, Section, write_sections
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.report.document import write_page
+from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.studies.cable.drag import (
     PUBLISHED_RANGE,
     Cable,
@@ -119,27 +120,27 @@ def write_cable(path: Path, cable: Cable, tangent: Tangent, *, tolerance: float)
     tolerance
         Relative error that a line may have.
     """
-    coefficient = Picture.of(
+    coefficient = picture(
         cable_pictures.coefficient_picture(cable),
         'Drag coefficient of cylinders along the flow, where it was measured.',
     )
-    lines = Picture.of(
+    lines = picture(
         cable_pictures.tangent_picture(tangent, tolerance),
         'The drag and two lines in place of it, and by how much these err; shaded: where the '
         f'tangent errs by {100.0 * tolerance:.3g} % at most.',
     )
     tables = (
-        ('The cable', facts(cable, tangent, tolerance)),
+        ('Figures of the cable', facts(cable, tangent, tolerance)),
         ('Errors of the lines: each over the drag, less one', errors(tangent, tolerance)),
     )
-    write_sections(
+    write_page(
         path,
+        'Drag of a towed cable, and a line in place of it',
         [
             Section(pictures=(lines,), tables=tables),
             Section('Before it is used', lines=notes(cable)),
             Section(pictures=(coefficient,)),
         ],
-        title='Drag of a towed cable, and a line in place of it',
         sentence=f'{sentence(cable, tangent)} {line(tangent, tolerance)}',
         foot=_FORMULAS,
     )

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Section, Table
 from shipdrag_ros.regression import Prediction
-from shipdrag_ros.report.document import Picture, Section, write_sections
+from shipdrag_ros.report.document import write_page
+from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import ResidualFit, leave_hulls_out
 from shipdrag_ros.studies.surface.face import cells as fit_cells
@@ -95,7 +96,7 @@ def write_residual(
         tables.insert(0, ('Predictions', fit_cells.predictions(predictions)))
     fitted = values - found.fit.residuals
     pictures = [
-        Picture.of(
+        picture(
             fit_pictures.residual_picture(fitted, values, target),
             'What the form leaves of its own data.',
         )
@@ -103,7 +104,7 @@ def write_residual(
     error, _, leverage = leave_hulls_out(found.form, found.hulls, values)
     if np.any(np.isfinite(error)):
         pictures.append(
-            Picture.of(
+            picture(
                 fit_pictures.left_out_picture(error, leverage, target),
                 'Each hull foretold from the others: the error to expect of a new one, within '
                 'the leverages of the data and beyond.',
@@ -113,10 +114,10 @@ def write_residual(
         Section(_NOTES if found.notes else '', lines=found.notes),
         Section(pictures=pictures, tables=tables),
     ]
-    write_sections(
+    write_page(
         path,
+        f'{target} by ratios of the hull',
         shown,
-        title=f'{target} by ratios of the hull',
         source=source,
         sentence=sentence(found, target, predictions),
     )

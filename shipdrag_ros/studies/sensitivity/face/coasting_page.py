@@ -6,9 +6,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from shipdrag_ros.display import Table
-from shipdrag_ros.replay import words
-from shipdrag_ros.report.document import Picture, Section, write_sections
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.report.document import write_page
+from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.face import pictures as pictures
@@ -154,7 +154,7 @@ def write_coasting(path: Path, found: CoastStudy) -> None:
     parts = (
         (
             'What must be known well',
-            Picture.of(
+            picture(
                 pictures.particulars_picture(found),
                 'Change of the record by 10 per cent of each value, and by its stated standard '
                 'deviation.',
@@ -164,7 +164,7 @@ def write_coasting(path: Path, found: CoastStudy) -> None:
         ),
         (
             'What a wrong value is taken for',
-            Picture.of(
+            picture(
                 pictures.mimic_picture(found),
                 'What is left of each effect when the value that looks most like it is blamed: 0, '
                 'no record tells the two apart.',
@@ -174,14 +174,13 @@ def write_coasting(path: Path, found: CoastStudy) -> None:
         ),
     )
     sections = [Section(lines=notes(found))]
-    for heading, picture, caption, table in parts:
-        drawn = () if picture is None else (picture,)
-        sections.append(Section(heading, pictures=drawn, tables=((caption, table),)))
-    write_sections(
+    for heading, drawing, caption, table in parts:
+        sections.append(Section(heading, pictures=(drawing,), tables=((caption, table),)))
+    write_page(
         path,
+        'Which particulars matter' + (f': {found.ship.name}' if found.ship.name else ''),
         sections,
-        title='Which particulars matter' + (f': {found.ship.name}' if found.ship.name else ''),
-        source=words.ship_line(found.ship),
+        source=found.ship.summary(),
         sentence=sentence(found),
     )
 

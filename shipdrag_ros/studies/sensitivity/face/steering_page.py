@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from shipdrag_ros.display import Table
-from shipdrag_ros.report.document import Picture, Section, write_sections
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.report.document import write_page
+from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.studies.sensitivity.face import pictures as pictures
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
@@ -175,7 +176,7 @@ def write_steering(path: Path, found: SteeringStudy, shown: Experiment) -> None:
     parts = (
         (
             'How much each matters',
-            Picture.of(
+            picture(
                 pictures.ranking_picture(found),
                 'Mean loss of each derivative by both norms; the line is the threshold.',
             ),
@@ -184,13 +185,13 @@ def write_steering(path: Path, found: SteeringStudy, shown: Experiment) -> None:
         ),
         (
             'The model without the others',
-            Picture.of(pictures.check_picture(found), names),
+            picture(pictures.check_picture(found), names),
             CHECK,
             check_table(found),
         ),
         (
             'Which manoeuvre to sail',
-            Picture.of(
+            picture(
                 pictures.design_picture(shown),
                 'Loss of 10 per cent of each derivative in each manoeuvre: the darker, the better '
                 'it is seen.',
@@ -200,13 +201,12 @@ def write_steering(path: Path, found: SteeringStudy, shown: Experiment) -> None:
         ),
     )
     sections = [Section(lines=notes(found))]
-    for heading, picture, caption, table in parts:
-        drawn = () if picture is None else (picture,)
-        sections.append(Section(heading, pictures=drawn, tables=((caption, table),)))
-    write_sections(
+    for heading, drawing, caption, table in parts:
+        sections.append(Section(heading, pictures=(drawing,), tables=((caption, table),)))
+    write_page(
         path,
+        f'Which derivatives matter: {found.ship.name}',
         sections,
-        title=f'Which derivatives matter: {found.ship.name}',
         source=found.ship.source,
         sentence=sentence(found),
     )

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from shipdrag_ros.display import Section
 from shipdrag_ros.regression import Prediction, Surface
-from shipdrag_ros.report.document import Picture, Section, write_sections
+from shipdrag_ros.report.document import write_page
+from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.surface.face import cells as fit_cells
 from shipdrag_ros.studies.surface.face import pictures as fit_pictures
@@ -63,19 +65,19 @@ def write_surface(
     if predictions:
         tables.append(('Predictions', fit_cells.predictions(predictions)))
     pictures = [
-        Picture.of(
+        picture(
             fit_pictures.degree_picture(surface),
             'Residual standard deviation against the degree; the lowest degree on the plateau '
             'is chosen.',
         ),
-        Picture.of(
+        picture(
             fit_pictures.residual_picture(surface.polynomial(points), values, target),
             'What the surface leaves of the data.',
         ),
     ]
     if len(surface.inputs) == 2:
         pictures.append(
-            Picture.of(
+            picture(
                 fit_pictures.contour_picture(surface, points, target),
                 'The surface; dots are the data.',
             )
@@ -86,10 +88,10 @@ def write_surface(
         ),
         Section(pictures=pictures, tables=tables),
     ]
-    write_sections(
+    write_page(
         path,
+        f'Surface of {target} over {", ".join(surface.inputs)}',
         shown,
-        title=f'Surface of {target} over {", ".join(surface.inputs)}',
         source=source,
         sentence=sentence(surface, target),
     )

@@ -12,8 +12,8 @@ import pytest
 
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.replay.hulls import rank
+from shipdrag_ros.replay.page import write_report
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.report.page import write_report
 
 ReadPage = Callable[[Path], Any]
 
@@ -26,14 +26,14 @@ def page(simulated: RunResult, tmp_path: Path, read_page: ReadPage) -> Any:
 
 def test_the_page_needs_no_network(page: Any) -> None:
     assert page.links == []
-    assert len(page.images) == 3
+    assert len(page.images) == 5
     assert all(image.startswith('data:image/svg+xml;base64,') for image in page.images)
 
 
 @pytest.mark.parametrize(
     'words',
     [
-        'Resistance from coastdowns: Vitus Bering',
+        'Resistance from coastdowns: test ship',
         'sea trial.mcap',
         'the specific resistance is 0.01587 ± 0.00083 m/s²',
         'the minimum speed was reached',
@@ -89,7 +89,7 @@ def test_without_a_table_of_orders_none_is_drawn(
     averaged = replace(coastdown, estimate=replace(coastdown.estimate, order=None, orders=()))
     write_report(tmp_path / 'report.html', [replace(run, coastdowns=(averaged,))])
     page = read_page(tmp_path / 'report.html')
-    assert len(page.images) == 2
+    assert len(page.images) == 4
     assert 'number of coefficients' not in page.text
     assert 'averaged over models' in page.text
 
@@ -99,7 +99,7 @@ def test_hulls_compared_come_first(run: RunResult, tmp_path: Path, read_page: Re
     write_report(tmp_path / 'report.html', [run, other], ranking=rank([run, other]))
     page = read_page(tmp_path / 'report.html')
     assert page.text.index('Hulls compared') < page.text.index('sea trial.mcap')
-    assert len(page.images) == 7
+    assert len(page.images) == 11
 
 
 def test_coastdowns_of_one_ship_are_shown_together(
@@ -109,7 +109,7 @@ def test_coastdowns_of_one_ship_are_shown_together(
     page = read_page(tmp_path / 'report.html')
     assert page.text.index('All coastdowns together') < page.text.index('sea trial.mcap')
     assert 'run to run' in page.text
-    assert len(page.images) == 7
+    assert len(page.images) == 12
     write_report(tmp_path / 'one.html', [run])
     assert 'All coastdowns together' not in read_page(tmp_path / 'one.html').text
 

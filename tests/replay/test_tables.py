@@ -5,51 +5,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, NotCoastdown
-from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.replay import tables as cells
 from shipdrag_ros.replay.hulls import rank
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.truth import TrueCurve
-
-
-def test_a_curve_is_shown_at_its_own_points_from_end_to_end(estimate: Estimate) -> None:
-    table = cells.curve_table(estimate.valid_curve)
-    speeds = [row[0] for row in table.rows]
-    assert len(speeds) == 10
-    assert speeds[0] == f'{estimate.valid_curve.speed_m_s[0]:.2f}'
-    assert speeds[-1] == f'{estimate.valid_curve.speed_m_s[-1]:.2f}'
-    assert set(speeds) <= {f'{speed:.2f}' for speed in estimate.valid_curve.speed_m_s}
-    assert len(cells.curve_table(estimate.valid_curve, count=4).rows) == 4
-
-
-def test_a_short_curve_repeats_no_point(estimate: Estimate) -> None:
-    low = float(estimate.curve.froude[40])
-    assert len(cells.curve_table(estimate.curve.between(low, low)).rows) == 1
-    assert cells.curve_table(estimate.curve.between(0.5, 0.6)).rows == ()
-
-
-def test_every_row_has_as_many_decimals(estimate: Estimate) -> None:
-    table = cells.curve_table(estimate.valid_curve)
-    # the smallest sigma is 0.02 * 1.95^2 / 3000 + 1e-4 = 0.00013
-    assert {len(row[3].partition('.')[2]) for row in table.rows} == {5}
-    assert table.rows[0][3:] == ('0.00127', '0.00013')
-    exact = replace(estimate.valid_curve, sigma_m_s2=0.0 * estimate.valid_curve.sigma_m_s2)
-    assert cells.curve_table(exact).rows[0][3:] == ('0.001267', '0.000000')
-
-
-def test_the_truth_is_not_known_above_its_curve(estimate: Estimate, truth: TrueCurve) -> None:
-    short = TrueCurve(truth.speed_m_s[:50], truth.resistance_m_s2[:50], {})
-    assert cells.curve_table(estimate.valid_curve, truth=short).rows[-1][-2:] == ('-', '-')
-
-
-def test_the_truth_adds_its_error(estimate: Estimate, truth: TrueCurve) -> None:
-    table = cells.curve_table(estimate.valid_curve, truth=truth)
-    assert table.columns[-1] == 'error [%]'
-    # r = v^2 / 3000 against v^2 / 3100
-    np.testing.assert_allclose([float(row[-1]) for row in table.rows], 3.3, atol=0.11)
 
 
 def test_facts_leave_out_what_is_not_known(coastdown: Coastdown) -> None:
@@ -79,8 +38,8 @@ def test_rejections_are_shown_with_their_reason_and_zeros_are_not(run: RunResult
 def test_a_ranking_starts_with_the_best(run: RunResult) -> None:
     other = replace(run, bag='b.mcap')
     assert [row[0] for row in cells.ranking_table(rank([run, other])).rows] == [
-        '1. Vitus Bering sea trial.mcap',
-        '2. Vitus Bering b.mcap',
+        '1. test ship sea trial.mcap',
+        '2. test ship b.mcap',
     ]
 
 
@@ -91,3 +50,24 @@ def test_a_coastdown_is_confirmed_after_it_seemed_to_begin_though_that_was_cut()
         77 * second, 900 * second, 12 * second, EndedBy.SPEED, None, 'no figure', cuts=(cut,)
     )
     assert ('confirmed after', '12 s') in cells.facts(coastdown).rows
+
+
+def test_coastdowns_are_a_line_each(run: RunResult) -> None:
+    (coastdown,) = run.coastdowns
+    failed = replace(coastdown, estimate=None, failure='too few samples')
+    table = cells.coastdowns_table([replace(run, coastdowns=(coastdown, failed))])
+    first, second = table.rows
+    assert first[0] == '2023-11-14 22:13:20 UTC'
+    assert first[2].endswith('knots')
+    assert first[3].endswith('kN')
+    assert first[4].endswith('kW')
+    assert second[2:] == ('-', '-', '-', '-', 'too few samples')
+    assert run.table() == cells.coastdowns_table([run])
+
+
+def test_a_record_without_coastdown_says_so(run: RunResult) -> None:
+    none = replace(run, coastdowns=(), steady_lead_s=345.0)
+    (line,) = none.summary()
+    assert line.startswith('No coastdown found: longest steady sailing 345 s')
+    assert none.table().rows == ()
+    assert run.summary()[0].startswith('At ')

@@ -11,14 +11,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import Advice, Candidate, CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.diagnosis import (
+    Advice,
+    Candidate,
+    CoastRun,
+    Diagnosis,
+    EffectEstimate,
+    Verdict,
+    diagnose,
+    pictures,
+)
 from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.page import write_diagnosis
+from shipdrag_ros.diagnosis.result import ToldFact
 from shipdrag_ros.diagnosis.score import Score
-from shipdrag_ros.estimation import Window
+from shipdrag_ros.display import M_S_PER_KNOT
+from shipdrag_ros.estimation import Window, estimate_final
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.report import diagnosis_pictures
-from shipdrag_ros.report.diagnosis_page import write_diagnosis
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.simulation import STANDARD_INPUTS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import parse
 
@@ -37,7 +48,8 @@ def found() -> Diagnosis:
     first = int(block.stamp_ns.min())
     stop = first + 1800 * 10**9
     window = Window.from_block(block, stop, int(block.stamp_ns.max()), before_ns=first)
-    return diagnose([CoastRun('<outward>', window)], SHIP, Parameters())
+    found = diagnose([CoastRun('<outward>', window)], SHIP, Parameters())
+    return replace(found, estimates=(estimate_final(window, SHIP, Parameters()),))
 
 
 @pytest.fixture
@@ -55,7 +67,7 @@ def test_the_page_says_all_and_needs_no_network(
     assert found.verdict is Verdict.NAMED
     page = written(found)
     assert page.links == []
-    assert len(page.images) == 3  # probabilities, the run, what is left
+    assert len(page.images) == 8  # probabilities, two curves, the run, what is left
     assert all(image.startswith('data:image/svg+xml;base64,') for image in page.images)
     said = (
         diagnosis_words.sentence(found),
@@ -67,6 +79,9 @@ def test_the_page_says_all_and_needs_no_network(
         'model tests; friction ± 4 %, wave ± 20 %',
         'learnt from steady sailing before the stop (30 min)',
         'not scored',
+        'What she needs today',
+        'over the clean hull',
+        'effective power',
     )
     for words in said:
         assert words in page.text, words
@@ -83,7 +98,11 @@ def test_the_score_of_the_method_stands_on_the_page(
 
 
 def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., Any]) -> None:
-    candidates = (Candidate(('current',), 0.6), Candidate(('log_offset',), 0.395))
+    offset = EffectEstimate('log_offset', 0.395, {'offset_m_s': Parameter(0.4321, 0.02)})
+    candidates = (
+        Candidate(('current',), 0.6, found.effects),
+        Candidate(('log_offset',), 0.395, (offset,)),
+    )
     decide = (Advice('a run on the reciprocal heading', 0.93), Advice('a speed log', None))
     page = written(
         replace(
@@ -96,19 +115,39 @@ def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., A
     )
     assert 'Missing is one of these: current (60.0 %), log offset (39.5 %).' in page.text
     assert 'a run on the reciprocal heading; decides with probability 93.0 %' in page.text
-    assert 'Of the most probable candidate' in page.text
+    assert 'Of each candidate, were it the one' in page.text
+    assert 'log offset 39.5 % offset_m_s 0.432 0.020' in page.text
+    assert 'u + offset' in page.text
 
 
-def test_what_is_unknown_has_no_size(found: Diagnosis, written: Callable[..., Any]) -> None:
+def test_what_is_unknown_is_none_of_the_candidates(
+    found: Diagnosis, written: Callable[..., Any]
+) -> None:
     page = written(replace(found, verdict=Verdict.UNKNOWN, effects=()))
-    assert 'How large it is' not in page.text
+    assert 'Of each candidate, were it the one' in page.text
     assert 'none of the known effects' in page.text
+
+
+def test_a_fact_that_the_data_contradict_stands_on_the_page(
+    found: Diagnosis, written: Callable[..., Any]
+) -> None:
+    told = (
+        ToldFact(Fact('deep_water'), '', 0.97, ('shallow_water',)),
+        ToldFact(Fact('shaft', 'free'), 'out', 0.01),
+    )
+    page = written(replace(found, facts=told))
+    assert 'The data contradict the fact `deep_water`' in page.text
+    assert 'wrong with probability 97.0 %, most probably shallow water' in page.text
+    assert 'contradict the fact `shaft' not in page.text
+    assert 'shaft=free out after the stop the shaft was free 1.0 %' in page.text
 
 
 def test_a_record_without_coastdown_has_a_page_without_traces(
     found: Diagnosis, written: Callable[..., Any]
 ) -> None:
-    sailing = replace(found, traces=(), baseline='none', notes=('compared on 40 legs',))
+    sailing = replace(
+        found, traces=(), baseline='none', notes=('compared on 40 legs',), estimates=()
+    )
     page = written(sailing, ship=None)
     assert len(page.images) == 1
     assert 'compared on 40 legs' in page.text
@@ -123,28 +162,31 @@ def test_a_record_without_coastdown_has_a_page_without_traces(
 def test_pictures_show_what_they_are_given(found: Diagnosis) -> None:
     (trace,) = found.traces
     log, position, _ = trace.compared
-    figure = diagnosis_pictures.motion_picture(trace, after='with current')
-    assert len(figure.axes) == 4
+    drawn = pictures.motion_pictures(trace, after='with current', mass_kg=SHIP.mass_kg)
+    assert [len(figure.axes) for figure in drawn] == [2, 2]
     speed, place = (
-        {line.get_label(): np.asarray(line.get_ydata()) for line in axis.get_lines()}
-        for axis in figure.axes[:2]
+        {line.get_label(): np.asarray(line.get_ydata()) for line in figure.axes[0].get_lines()}
+        for figure in drawn
     )
+    assert drawn[0].axes[0].get_ylabel() == '[knots]'
     shown = log.time_s >= -300.0
-    np.testing.assert_array_equal(speed['measured'], log.measured[shown])
-    np.testing.assert_array_equal(speed['model as stated'], log.before[shown])
-    np.testing.assert_array_equal(speed['with current'], log.after[shown])
+    np.testing.assert_array_equal(speed['measured'], log.measured[shown] / M_S_PER_KNOT)
+    np.testing.assert_array_equal(speed['model as stated'], log.before[shown] / M_S_PER_KNOT)
+    np.testing.assert_array_equal(speed['with current'], log.after[shown] / M_S_PER_KNOT)
     # distances count from the stop, and the model as stated falls behind
     assert abs(np.interp(0.0, position.time_s[shown], place['measured'])) < 20.0
     assert place['measured'][-1] - place['model as stated'][-1] > 1000.0
 
-    left = diagnosis_pictures.residual_picture(found.traces, after='with current')
-    assert len(left.axes) == 6
-    by_time = {line.get_label(): np.asarray(line.get_ydata()) for line in left.axes[2].get_lines()}
+    _, left, _ = pictures.residual_pictures(
+        found.traces, after='with current', mass_kg=SHIP.mass_kg
+    )
+    by_time = {line.get_label(): np.asarray(line.get_ydata()) for line in left.axes[0].get_lines()}
     np.testing.assert_array_equal(by_time['model as stated'], position.white_before)
     np.testing.assert_array_equal(by_time['with current'], position.white_after)
-    assert len(left.axes[3].get_lines()[0].get_ydata()) == (position.time_s >= 0.0).sum()
+    assert len(left.axes[1].get_lines()[0].get_ydata()) == (position.time_s >= 0.0).sum()
+    assert left.axes[1].get_xlabel() == 'speed through water [knots]'
 
-    bars = diagnosis_pictures.probability_picture(diagnosis_words.answers(found)).axes[0]
+    bars = pictures.probability_picture(diagnosis_words.answers(found)).axes[0]
     widths = [bar.get_width() for bar in bars.patches]
     assert widths[0] == max(widths) == found.candidates[0].probability
     assert sum(widths) <= 1.0 + 1e-9

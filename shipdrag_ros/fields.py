@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Fields of a ship file, each with what it may hold.
+The one way to check a mapping: keys, each with what it may hold.
 
-A section is a dataclass whose fields are declared with a reader; reading a
-mapping collects every problem in it, with its dotted path, before giving up.
+Ship files, parameters and the node's settings are read here. A section is a
+dataclass whose fields are declared with a reader; reading a mapping collects
+every problem in it, with its dotted path, before giving up.
 """
 
 from __future__ import annotations
 
 import difflib
 import reprlib
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from os import PathLike
+from pathlib import Path
 from typing import Any
+
+from shipdrag_ros import strict_yaml
+from shipdrag_ros.errors import ProblemsError
 
 Problems = list[str]
 Reader = Callable[[object, str, Problems], Any]
@@ -31,18 +37,61 @@ INVALID = _Invalid()
 
 @dataclass(frozen=True)
 class Kind:
-    """A reader and what it expects, in words."""
+    """
+    A reader and what it expects.
+
+    Attributes
+    ----------
+    read
+        From value, path and the list that problems are added to.
+    expectation
+        In words.
+    unit, low, high
+        Of numbers; '' for a pure one.
+    choices
+        Of words.
+    """
 
     read: Reader
     expectation: str
+    unit: str = ''
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Key:
+    """
+    A key of a mapping.
+
+    Attributes
+    ----------
+    kind
+    text
+        What it means.
+    default
+        Where it is not given; MISSING: it must be.
+    """
+
+    kind: Kind
+    text: str
+    default: Any = MISSING
 
 
 def declare(kind: Kind, text: str, *, default: Any = MISSING, hashed: bool = True) -> Any:
     """
-    Declare a dataclass field of a ship file.
+    Declare a dataclass field that is read from a mapping.
     """
-    metadata = {'kind': kind, 'text': text}
+    metadata = {'key': Key(kind, text, default)}
     return field(default=default, metadata=metadata, hash=None if hashed else False)
+
+
+def keys_of(cls: type[Any]) -> dict[str, Key]:
+    """
+    Return the declared fields of a dataclass, by name.
+    """
+    return {item.name: item.metadata['key'] for item in fields(cls) if 'key' in item.metadata}
 
 
 def number(low: float, high: float, unit: str = '') -> Kind:
@@ -62,7 +111,36 @@ def number(low: float, high: float, unit: str = '') -> Kind:
             return INVALID
         return float(value)
 
-    return Kind(read, expectation)
+    return Kind(read, expectation, unit, low, high)
+
+
+def whole_number(low: int, high: int, unit: str = '') -> Kind:
+    """
+    Expect a whole number in low..high.
+    """
+    expectation = f'a whole number, {low:g}..{high:g} {unit}'.rstrip()
+
+    def read(value: object, path: str, problems: Problems) -> int | _Invalid:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            problems.append(f'{path}: {show(value)}, expected {expectation}')
+            return INVALID
+        return value
+
+    return Kind(read, expectation, unit, low, high)
+
+
+def flag() -> Kind:
+    """
+    Expect true or false.
+    """
+
+    def read(value: object, path: str, problems: Problems) -> bool | _Invalid:
+        if isinstance(value, bool):
+            return value
+        problems.append(f'{path}: {show(value)}, expected true or false')
+        return INVALID
+
+    return Kind(read, 'true or false')
 
 
 def numbers(
@@ -111,7 +189,7 @@ def choice(*values: str) -> Kind:
     """
     Expect one of some words.
     """
-    expectation = f'one of {", ".join(values)}'
+    expectation = f'one of {", ".join(value for value in values if value)}'
 
     def read(value: object, path: str, problems: Problems) -> str | _Invalid:
         if isinstance(value, str) and value in values:
@@ -119,18 +197,22 @@ def choice(*values: str) -> Kind:
         problems.append(f'{path}: {show(value)}, expected {expectation}')
         return INVALID
 
-    return Kind(read, expectation)
+    return Kind(read, expectation, choices=values)
 
 
-def section(cls: type[Any]) -> Kind:
+def section(cls: type[Any], *, required: Collection[str] = ()) -> Kind:
     """
-    Expect the keys of a dataclass.
+    Expect the keys of a dataclass; those required even where it has a default.
     """
-    expectation = f'the keys {", ".join(item.name for item in fields(cls))}'
+    keys = {
+        name: replace(key, default=MISSING) if name in required else key
+        for name, key in keys_of(cls).items()
+    }
+    expectation = f'the keys {", ".join(keys)}'
 
     def read(value: object, path: str, problems: Problems) -> Any:
         before = len(problems)
-        accepted = read_keys(cls, value, path, problems)
+        accepted = read_keys(keys, value, path, problems)
         return INVALID if len(problems) > before else cls(**accepted)
 
     return Kind(read, expectation)
@@ -170,11 +252,28 @@ def named(kind: Kind) -> Kind:
     return Kind(read, expectation)
 
 
-def read_keys(cls: type[Any], value: object, path: str, problems: Problems) -> dict[str, Any]:
+def read_keys(
+    known: Mapping[str, Key], value: object, path: str, problems: Problems
+) -> dict[str, Any]:
     """
-    Read the fields of a dataclass; return those that are valid.
+    Check a mapping against the keys that are known; return what is given and valid.
+
+    Parameters
+    ----------
+    known
+        All keys, by name.
+    value
+        What should be a mapping.
+    path
+        Of the mapping in its file, '' for the file itself.
+    problems
+        Each finding is added, with the key it is about.
+
+    Returns
+    -------
+    dict
+        What is not given is left out, default or not.
     """
-    known = {item.name: item for item in fields(cls)}
     if not isinstance(value, dict):
         found = 'empty' if value is None else show(value)
         problems.append(f'{path or "the file"}: {found}, expected the keys {", ".join(known)}')
@@ -185,18 +284,66 @@ def read_keys(cls: type[Any], value: object, path: str, problems: Problems) -> d
             hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
             problems.append(f'{dotted(path, str(key))}: unknown key; {hint}')
     accepted = {}
-    for name, item in known.items():
-        kind: Kind = item.metadata['kind']
+    for name, key in known.items():
         if name in value:
-            result = kind.read(value[name], dotted(path, name), problems)
+            result = key.kind.read(value[name], dotted(path, name), problems)
             if result is not INVALID:
                 accepted[name] = result
-        elif item.default is MISSING:
+        elif key.default is MISSING:
             problems.append(
-                f'{dotted(path, name)}: missing, expected {kind.expectation} '
-                f'({item.metadata["text"]})'
+                f'{dotted(path, name)}: missing, expected {key.kind.expectation} ({key.text})'
             )
     return accepted
+
+
+def parse(text: str, *, subject: str, error: type[ProblemsError]) -> Any:
+    """
+    Return the data of a YAML text.
+
+    Raises
+    ------
+    ProblemsError
+        Of the kind given, if it cannot be read.
+    """
+    try:
+        return strict_yaml.load(text)
+    except ValueError as wrong:
+        raise error(subject, [str(wrong)]) from wrong
+
+
+def text_of(path: str | PathLike[str], *, what: str, error: type[ProblemsError]) -> str:
+    """
+    Return the text of a file that a user has written.
+
+    Parameters
+    ----------
+    path
+    what
+        It should be, for the message.
+    error
+        To be raised.
+
+    Raises
+    ------
+    ProblemsError
+        Of the kind given, if it is no regular file of text, or too large.
+    """
+    file = Path(path)
+    try:
+        about = file.stat()
+        if not (file.is_file() or file.is_dir()):  # a device or a pipe would never end
+            raise error(str(path), [f'cannot be read: no regular file; give the path of {what}'])
+        if about.st_size > strict_yaml.LARGEST:
+            raise error(
+                str(path),
+                [f'has {about.st_size} bytes, too many for {what} ({strict_yaml.LARGEST})'],
+            )
+        return file.read_text(encoding='utf-8-sig')
+    except OSError as wrong:
+        problem = f'cannot be read: {wrong.strerror or wrong}; give the path of {what}'
+        raise error(str(path), [problem]) from wrong
+    except ValueError as wrong:
+        raise error(str(path), [f'is not a text file: {wrong}; save it as UTF-8']) from wrong
 
 
 def plain(value: Any) -> Any:
@@ -205,9 +352,9 @@ def plain(value: Any) -> Any:
     """
     if is_dataclass(value):
         return {
-            item.name: plain(getattr(value, item.name))
-            for item in fields(value)
-            if getattr(value, item.name) is not None
+            name: plain(getattr(value, name))
+            for name in keys_of(type(value)) or [item.name for item in fields(value)]
+            if getattr(value, name) is not None
         }
     if isinstance(value, tuple):
         return [plain(item) for item in value]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.report.spreadsheet import write_curves
+from shipdrag_ros.replay.spreadsheet import write_curves
 
 
 def test_the_valid_curve_round_trips(run: RunResult, tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a stretch was cut and why, on the time axis."""
+"""Pictures of a replay: what of a stretch was cut and why, hulls compared."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -11,17 +12,30 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import blended_transform_factory
 
 from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.display import speed_unit
+from shipdrag_ros.estimation.pictures import LINES
+from shipdrag_ros.estimation.result import ResistanceCurve
 from shipdrag_ros.replay.cuts import Span, inside, stretch
-from shipdrag_ros.report.drawing import BLUE, STYLE
+from shipdrag_ros.replay.hulls import Hull
+from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE
 
 _HATCHES = ('///', '\\\\\\', 'xxx', '...')  # told apart in print too
 _NARROW = 0.02  # of the time axis: no room for a label
 
 
-def cut_picture(coastdown: Coastdown, span_ns: Span | None) -> Figure:
+def cut_picture(coastdown: Coastdown, span_ns: Span | None, mass_kg: float) -> Figure:
     """
     Draw the speed of the whole stretch, with what was cut of it hatched and named.
+
+    Parameters
+    ----------
+    coastdown
+    span_ns
+        Of the record, from whose start times are counted.
+    mass_kg
+        Of the ship: speeds are in knots, those of a model in m/s.
     """
+    unit, unit_name = speed_unit(mass_kg)
     zero_ns = stretch(coastdown)[0]
     from_start = inside(zero_ns, span_ns)
     if span_ns is not None and from_start:
@@ -31,10 +45,10 @@ def cut_picture(coastdown: Coastdown, span_ns: Span | None) -> Figure:
         return (time_ns - zero_ns) * 1e-9
 
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 3.0), layout='constrained')
+        figure = Figure(figsize=SIZE, layout='constrained')
         axis = figure.subplots()
         time_s = np.array([seconds(time_ns) for time_ns, _ in coastdown.stretch])
-        axis.plot(time_s, [speed for _, speed in coastdown.stretch], color=BLUE)
+        axis.plot(time_s, [speed / unit for _, speed in coastdown.stretch], color=BLUE)
         places = blended_transform_factory(axis.transData, axis.transAxes)
         first, last = (seconds(each) for each in stretch(coastdown))
         reasons = list(dict.fromkeys(cut.reason for cut in coastdown.cuts))
@@ -64,7 +78,7 @@ def cut_picture(coastdown: Coastdown, span_ns: Span | None) -> Figure:
                 )
         axis.set_xlim(first, last)
         axis.set_xlabel(f'time [s] from the start of the {"record" if from_start else "stretch"}')
-        axis.set_ylabel('speed [m/s]')
+        axis.set_ylabel(f'speed [{unit_name}]')
     return figure
 
 
@@ -84,3 +98,32 @@ def _labels(
         else:
             found[same] = (found[same][0], max(end, found[same][1]), reason)
     return found
+
+
+def comparison_picture(hulls: Sequence[Hull]) -> Figure:
+    """
+    Draw r(Fr) of several hulls, each inside its valid range.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=SIZE, layout='constrained')
+        axis = figure.subplots()
+        for number, hull in enumerate(hulls):
+            color, style = LINES[number % len(LINES)]
+            curve = hull.curve
+            axis.fill_between(curve.froude, *_band(curve), color=color, alpha=0.15, linewidth=0)
+            axis.plot(
+                curve.froude, curve.resistance_m_s2, color=color, linestyle=style, label=hull.label
+            )
+            at_top = np.interp(hull.froude_max, curve.froude, curve.resistance_m_s2)
+            axis.plot([hull.froude_max], [at_top], 'o', color=color)
+        axis.set_xlabel('Froude number [-]; the dot is Fr_max')
+        axis.set_ylabel('specific resistance r [m/s² = N/kg]')
+        axis.legend(loc='upper left')
+    return figure
+
+
+def _band(curve: ResistanceCurve) -> tuple[Any, Any]:
+    return (
+        curve.resistance_m_s2 - 2.0 * curve.sigma_m_s2,
+        curve.resistance_m_s2 + 2.0 * curve.sigma_m_s2,
+    )

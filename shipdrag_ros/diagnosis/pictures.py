@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.diagnosis import Compared, Trace
 from shipdrag_ros.diagnosis.words import Answer, probability
-from shipdrag_ros.display import TRACK_LABELS
-from shipdrag_ros.report.drawing import BLUE, STYLE, VERMILION
+from shipdrag_ros.display import TRACK_LABELS, speed_unit
+from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE, VERMILION
 
-_ALONG = ('speed_through_water', 'speed_over_ground', 'position')
+ALONG = ('speed_through_water', 'speed_over_ground', 'position')
 _MEASURED: dict[str, Any] = {
     'linestyle': 'none',
     'marker': '.',
@@ -30,9 +30,9 @@ _BAND_LABEL = '±2 sd of the noise'
 _STEADY_SHOWN_S = 300.0  # before the stop, where the ship only sails on
 
 
-def motion_picture(trace: Trace, *, after: str) -> Figure:
+def motion_pictures(trace: Trace, *, after: str, mass_kg: float) -> tuple[Figure, ...]:
     """
-    Draw a run as measured and as simulated, over the difference.
+    Draw a run as measured and as simulated, over the difference; a picture each quantity.
 
     Parameters
     ----------
@@ -40,42 +40,51 @@ def motion_picture(trace: Trace, *, after: str) -> Figure:
         The run.
     after
         What the better model has, for the legend.
+    mass_kg
+        Of the ship: speeds are in knots, those of a model in m/s.
     """
-    shown = [each for each in trace.compared if each.quantity in _ALONG]
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 5.0), layout='constrained')
-        axes = figure.subplots(2, len(shown), squeeze=False, height_ratios=(3, 2))
-        for column, compared in enumerate(shown):
-            _draw_motion(axes[0, column], compared, after)
-            _draw_difference(axes[1, column], compared)
-        _legend(figure, axes[0, 0], axes[1, 0])
-    return figure
+    figures = []
+    for compared in trace.compared:
+        if compared.quantity not in ALONG:
+            continue
+        with matplotlib.rc_context(STYLE):
+            figure = Figure(figsize=(SIZE[0], 4.6), layout='constrained')
+            top, bottom = figure.subplots(2, 1, sharex=False, height_ratios=(3, 2))
+            label, unit = TRACK_LABELS[compared.quantity]
+            scale = speed_unit(mass_kg) if unit == 'm/s' else (1.0, unit)
+            _draw_motion(top, compared, after, scale)
+            _draw_difference(bottom, compared, scale)
+            top.set_title(label, loc='left', fontsize=10)
+            _legend(figure, top, bottom)
+        figures.append(figure)
+    return tuple(figures)
 
 
-def _draw_motion(axis: Axes, compared: Compared, after: str) -> None:
-    label, unit = TRACK_LABELS[compared.quantity]
+def _draw_motion(axis: Axes, compared: Compared, after: str, scale: tuple[float, str]) -> None:
     part = compared.time_s >= -_STEADY_SHOWN_S
     minutes = compared.time_s[part] / 60.0
     start = 0.0
     if compared.quantity == 'position':  # distances count from where the engine stopped
         start = float(np.interp(0.0, compared.time_s, compared.measured))
-    axis.plot(minutes, compared.measured[part] - start, label='measured', **_MEASURED)
-    axis.plot(minutes, compared.before[part] - start, label='model as stated', **_BEFORE)
-    axis.plot(minutes, compared.after[part] - start, label=after, **_AFTER)
-    axis.set_title(label, loc='left', fontsize=10)
-    axis.set_ylabel(unit)
+    for values, label, style in (
+        (compared.measured, 'measured', _MEASURED),
+        (compared.before, 'model as stated', _BEFORE),
+        (compared.after, after, _AFTER),
+    ):
+        axis.plot(minutes, (values[part] - start) / scale[0], label=label, **style)
+    axis.set_ylabel(f'[{scale[1]}]')
     axis.axvline(0.0, color='#777777', linewidth=0.8)
 
 
-def _draw_difference(axis: Axes, compared: Compared) -> None:
+def _draw_difference(axis: Axes, compared: Compared, scale: tuple[float, str]) -> None:
     minutes = compared.time_s / 60.0
-    spread = 2.0 * compared.sd
+    spread = 2.0 * compared.sd / scale[0]
     axis.fill_between(minutes, -spread, spread, color=_BAND, linewidth=0, label=_BAND_LABEL)
-    axis.plot(minutes, compared.measured - compared.before, **_BEFORE)
-    axis.plot(minutes, compared.measured - compared.after, **_AFTER)
+    axis.plot(minutes, (compared.measured - compared.before) / scale[0], **_BEFORE)
+    axis.plot(minutes, (compared.measured - compared.after) / scale[0], **_AFTER)
     axis.axvline(0.0, color='#777777', linewidth=0.8)
     axis.set_title('measured - model', loc='left', fontsize=9)
-    axis.set_ylabel(TRACK_LABELS[compared.quantity][1])
+    axis.set_ylabel(f'[{scale[1]}]')
     axis.set_xlabel('minutes after the engine stop')
 
 
@@ -84,39 +93,52 @@ def _legend(figure: Figure, *axes: Axes) -> None:
     handles: dict[str, Any] = {}
     for axis in axes:
         handles |= {label: handle for handle, label in zip(*axis.get_legend_handles_labels())}
-    figure.legend(
-        list(handles.values()), list(handles), loc='outside upper center', ncols=len(handles)
-    )
+    figure.legend(list(handles.values()), list(handles), loc='outside upper left', ncols=2)
 
 
-def residual_picture(traces: Sequence[Trace], *, after: str) -> Figure:
+def residual_pictures(
+    traces: Sequence[Trace], *, after: str, mass_kg: float
+) -> tuple[Figure, ...]:
     """
     Draw what each model leaves, in units of the noise, by time and by speed.
 
-    All runs together, one row a quantity.
+    Parameters
+    ----------
+    traces
+        All runs together; a picture each quantity.
+    after
+        What the better model has, for the legend.
+    mass_kg
+        Of the ship: speeds are in knots, those of a model in m/s.
     """
-    quantities = list(dict.fromkeys(each.quantity for trace in traces for each in trace.compared))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 0.6 + 1.7 * len(quantities)), layout='constrained')
-        axes = figure.subplots(len(quantities), 2, squeeze=False, sharey='row')
-        for row, quantity in zip(axes, quantities):
+    unit, unit_name = speed_unit(mass_kg)
+    quantities = dict.fromkeys(each.quantity for trace in traces for each in trace.compared)
+    figures = []
+    for quantity in quantities:
+        with matplotlib.rc_context(STYLE):
+            figure = Figure(figsize=(SIZE[0], 4.6), layout='constrained')
+            axes = figure.subplots(2, 1, sharey=True)
             parts = [
                 each for trace in traces for each in trace.compared if each.quantity == quantity
             ]
-            _draw_residuals(row[0], row[1], parts, after)
-            row[0].set_ylabel('sd of the noise')
-            for axis, of in zip(row, ('by time', 'by speed, after the stop')):
+            _draw_residuals(axes, parts, after, unit)
+            for axis, of in zip(axes, ('by time', 'by speed, after the stop')):
                 axis.axhspan(-2.0, 2.0, color=_BAND, linewidth=0, zorder=0, label=_BAND_LABEL)
                 axis.set_title(f'{TRACK_LABELS[quantity][0]}, {of}', loc='left', fontsize=9)
-        axes[-1, 0].set_xlabel('minutes after the engine stop')
-        axes[-1, 1].set_xlabel('speed through water [m/s]')
-        _legend(figure, axes[0, 0])
-    return figure
+                axis.set_ylabel('sd of the noise')
+            axes[0].set_xlabel('minutes after the engine stop')
+            axes[1].set_xlabel(f'speed through water [{unit_name}]')
+            _legend(figure, axes[0])
+        figures.append(figure)
+    return tuple(figures)
 
 
-def _draw_residuals(by_time: Axes, by_speed: Axes, parts: Sequence[Compared], after: str) -> None:
+def _draw_residuals(
+    axes: Sequence[Axes], parts: Sequence[Compared], after: str, unit: float
+) -> None:
+    by_time, by_speed = axes
     time_s = np.concatenate([part.time_s for part in parts])
-    speed = np.concatenate([part.speed_m_s for part in parts])
+    speed = np.concatenate([part.speed_m_s for part in parts]) / unit
     dots: dict[str, Any] = {'linestyle': 'none', 'markersize': 3}
     for label, color, marker, values in (
         ('model as stated', VERMILION, 'x', [part.white_before for part in parts]),
@@ -133,7 +155,7 @@ def probability_picture(answers: Sequence[Answer]) -> Figure:
     Draw how probable each answer is, as bars, the first on top.
     """
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 0.5 + 0.32 * len(answers)), layout='constrained')
+        figure = Figure(figsize=(7.2, 0.5 + 0.32 * len(answers)), layout='constrained')
         axis = figure.subplots()
         places = np.arange(len(answers))[::-1]
         shares = [each.probability for each in answers]

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+An estimate in sentences, the same in the terminal and on the page.
+
+Written for a chief engineer: what was found, what it can be used for, what
+this record cannot show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from shipdrag_ros.display import plus_minus, ship_speed, speed_text, utc
+from shipdrag_ros.estimation.estimators import named
+from shipdrag_ros.estimation.force import Force, no_clean_text, usual_speed_m_s
+from shipdrag_ros.estimation.result import Estimate, FroudeMax
+from shipdrag_ros.ship import Ship
+
+_AROUND = 5  # readings, of which two may be bad
+
+FROUDE_MAX_BY = {
+    FroudeMax.INFLECTION: 'the steepest rise of r, beyond which it falls significantly',
+    FroudeMax.BRANCH_TOP: 'the highest speed of the fit; no steepest rise was found',
+}
+NOTHING_VALID = 'No speed of this record lies inside the range where r(v) may be used.'
+
+
+def speed_name(estimate: Estimate) -> str:
+    """
+    Name the speed that a curve is given against.
+    """
+    through_water = 'speed_through_water' in estimate.samples
+    return f'speed {"through water" if through_water else "over ground"}'
+
+
+def estimator(name: str) -> str:
+    """
+    Name an estimator, with what it is.
+    """
+    return f'{name}: {named(name).meaning}'
+
+
+def summary(estimate: Estimate, ship: Ship | None = None) -> tuple[str, ...]:
+    """
+    Say what an estimate gave: in the engineer's units, then in m/s and m/s².
+
+    Parameters
+    ----------
+    estimate
+    ship
+        For force, power and the clean hull; None: without them.
+    """
+    curve = estimate.valid_curve
+    if not len(curve):
+        return (NOTHING_VALID,)
+    engineer = () if ship is None else in_service([estimate], ship)
+    return (*engineer, specific(estimate))
+
+
+def in_service(estimates: Sequence[Estimate], ship: Ship) -> tuple[str, ...]:
+    """
+    Say what the ship needs at her usual speed, a line each coastdown.
+
+    Parameters
+    ----------
+    estimates
+        Of one ship; those without a speed in their valid range are passed over.
+    ship
+        For force, power and the clean hull.
+
+    Returns
+    -------
+    tuple of str
+        Dated where there are several; at the end why nothing is said of the
+        clean hull, where that is so.
+    """
+    usable = [each for each in estimates if len(each.valid_curve)]
+    if not usable:
+        return ()
+    usual = usual_speed_m_s(usable)
+    lines, missing = [], ''
+    for each in usable:
+        curve = each.valid_curve
+        force = Force.of(curve, ship)
+        low, high = (ship_speed(float(curve.speed_m_s[end]), ship.mass_kg) for end in (0, -1))
+        low = low.partition(' ')[0]  # the unit stands behind the other end
+        date = f'{utc(each.start_ns)}: ' if len(usable) > 1 else ''
+        lines.append(
+            f'{date}{force.at(force.near(usual))} Known from {low} to {high}; ± is two standard '
+            'deviations.'
+        )
+        missing = missing or no_clean_text(ship, force)
+    return (*lines, missing) if missing else tuple(lines)
+
+
+def specific(estimate: Estimate) -> str:
+    """
+    Say where r(v) is known, and its value where it is known best.
+    """
+    curve = estimate.valid_curve
+    low, high = float(curve.speed_m_s[0]), float(curve.speed_m_s[-1])
+    # where it is known best: the ends of the range are the weakest part of any fit
+    best = int(np.argmin(curve.sigma_m_s2 / np.abs(curve.resistance_m_s2)))
+    speed = float(curve.speed_m_s[best])
+    r, sigma = float(curve.resistance_m_s2[best]), float(curve.sigma_m_s2[best])
+
+    def shown(speed_m_s: float) -> str:
+        return speed_text(speed_m_s, highest_m_s=high)
+
+    return (
+        f'In SI: r(v) is known from {shown(low)} to {shown(high)} m/s, best at {shown(speed)} '
+        f'm/s: there the specific resistance is {plus_minus(r, 2.0 * sigma)} m/s² (two standard '
+        'deviations).'
+    )
+
+
+def notes(estimate: Estimate) -> tuple[str, ...]:
+    """
+    Say what a record can and cannot show, a sentence each; the estimator's own come first.
+    """
+    return (
+        *estimate.notes,
+        *_range_notes(estimate),
+        *_residual_notes(estimate),
+        *_astern_notes(estimate),
+        *_method_notes(estimate),
+    )
+
+
+def _range_notes(estimate: Estimate) -> list[str]:
+    curve = estimate.valid_curve
+    found = []
+    if len(curve):
+        fastest = float(estimate.curve.speed_m_s[-1])
+        low, high, top = (
+            speed_text(float(speed), highest_m_s=fastest)
+            for speed in (curve.speed_m_s[0], curve.speed_m_s[-1], fastest)
+        )
+        found.append(
+            f'Nothing is said outside {low} to {high} m/s; the fit ends at {top} m/s'
+            f'{_fastest_reading(estimate, fastest)}.'
+        )
+    found.append(
+        f'The upper end, Fr {estimate.froude_valid[1]:.3f}, is '
+        f'{FROUDE_MAX_BY[estimate.froude_max_by]}.'
+    )
+    if estimate.froude_max_by is FroudeMax.BRANCH_TOP:
+        found.append(
+            'So it depends on the starting speed; hulls compared, it is only a lower bound.'
+        )
+    return found
+
+
+def _fastest_reading(estimate: Estimate, fastest_m_s: float) -> str:
+    """Tell the largest speed that was read, but for single bad readings."""
+    for name in ('speed_through_water', 'speed_over_ground'):
+        track = estimate.tracks.get(name)
+        if track is not None and len(track.measured) >= _AROUND:
+            around = np.lib.stride_tricks.sliding_window_view(track.measured, _AROUND)
+            read = float(np.median(around, axis=1).max())
+            text = speed_text(read, highest_m_s=fastest_m_s)
+            return f', {name} (medians of {_AROUND} readings) at {text} m/s'
+    return ''
+
+
+def _residual_notes(estimate: Estimate) -> list[str]:
+    """Tell of residuals that are not the independent scatter that the band counts on."""
+    if named(estimate.estimator).learns_noise:
+        return []  # slow disturbances are learnt, or a note says that they are not
+    found = []
+    for name, track in estimate.tracks.items():
+        residual = track.measured - track.fitted
+        energy = float(np.sum(residual**2))
+        if energy == 0.0:
+            continue
+        correlation = float(np.sum(residual[1:] * residual[:-1])) / energy
+        # of independent ones 1 / sqrt(n) is the standard deviation of this
+        if correlation > max(0.1, 4.0 / math.sqrt(len(residual))):
+            found.append(
+                f'What the fit leaves of {name} does not scatter: the correlation of neighbours '
+                f'is {correlation:.2f}. The sensor, the sea or the fit errs slowly, and the band '
+                'is too narrow for that.'
+            )
+    speed = estimate.tracks.get('speed_through_water')
+    if speed is not None and 'position' in estimate.tracks and estimate.current_m_s is None:
+        residual = speed.measured - speed.fitted
+        mean, spread = float(np.mean(residual)), float(np.std(residual))
+        if abs(mean) > max(0.2 * spread, 4.0 * spread / math.sqrt(len(residual))):
+            found.append(
+                f'The log reads {abs(mean):.2g} m/s {"more" if mean > 0.0 else "less"} on average '
+                'than the position moves: a current, or a log that reads wrong.'
+            )
+    return found
+
+
+def _astern_notes(estimate: Estimate) -> list[str]:
+    """Tell of a ship that drag alone would have left at rest."""
+    speed = estimate.tracks.get('speed_through_water')
+    if speed is None:
+        return []
+    lowest = float(np.min(speed.fitted))
+    if lowest >= -2.0 * estimate.noise_sd['speed_through_water']:
+        return []
+    return [
+        f'The speed goes through zero, to {lowest:.2g} m/s: no drag does that. A constant force '
+        '(wind, a propeller) or a current acts in this record and is part of r, most of it at '
+        'the lowest speeds; one run cannot tell which it is.'
+    ]
+
+
+def _method_notes(estimate: Estimate) -> list[str]:
+    found = []
+    if 'speed_through_water' not in estimate.samples and estimate.current_m_s is None:
+        found.append(
+            'Only the motion over ground was measured, on one run: a current along the track is '
+            'not separated and shifts the speed scale; a run on the opposite heading would tell.'
+        )
+    elif 'position' in estimate.samples and estimate.current_m_s is None:
+        found.append(
+            'The joint fit takes log and position to show the same speed: a current, or a log '
+            'that reads wrong by a factor, bends r(v).'
+        )
+    method = named(estimate.estimator)
+    if estimate.order is not None and estimate.order == method.constant_order:
+        found.append(
+            f'{estimate.order} coefficients make r the same at every speed: these samples show '
+            'its mean, not its shape, and the band holds for the mean alone.'
+        )
+    if method.caveat:
+        found.append(method.caveat)
+    return found

@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a replay: for whoever runs the ship first, for whoever checks it below."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from shipdrag_ros import display
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.display import Picture, Section, Table
+from shipdrag_ros.estimation import pictures as estimate_pictures
+from shipdrag_ros.estimation import tables as estimate_tables
+from shipdrag_ros.estimation import words as estimate_words
+from shipdrag_ros.estimation.force import Force
+from shipdrag_ros.replay import pictures, tables, words
+from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.hulls import Ranking
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import together
+from shipdrag_ros.report.document import write_page
+from shipdrag_ros.report.drawing import picture
+
+HOW_TO_READ = Section(
+    'How to read the band',
+    lines=(
+        'The line is the resistance: the force that holds the ship back. Over the mass of the '
+        'ship it is the specific resistance r (the scale on the right). Effective power is '
+        'resistance times speed: what the hull needs, not what the engine gives.',
+        'The band is two standard deviations to each side. Were it complete, the truth would lie '
+        'outside it at one speed in twenty. It holds only what the notes of each coastdown say '
+        'that it holds.',
+        'Neighbouring speeds err together: the whole line may lie high or low within the band.',
+        'Outside the shaded range, the resistance is not known from this record, however smooth '
+        'the dotted line looks.',
+        'The share over the clean hull counts the band of this record and what the ship file '
+        'says of its baseline. It is fouling only where wind, waves, depth and draught were those '
+        'of the baseline; `shipdrag diagnose` looks for what else it may be.',
+        'To follow fouling, compare low speeds, where friction rules, of coastdowns made at the '
+        'same draught in calm, deep water; the part of the band that comes from the added mass '
+        'is the same each time and does not hide a trend.',
+    ),
+)
+
+
+def write_report(path: Path, runs: Sequence[RunResult], *, ranking: Ranking | None = None) -> None:
+    """
+    Write the result of one or several bags as one HTML file.
+
+    Parameters
+    ----------
+    path
+        The file; an existing one is replaced.
+    runs
+        What each bag gave.
+    ranking
+        The hulls compared, where that was asked for.
+    """
+    names = dict.fromkeys(run.ship.name or 'a ship without a name' for run in runs)
+    sections: list[Section] = []
+    if ranking is not None:
+        sections.append(_hulls(ranking))
+    elif sum(len(run.coastdowns) for run in runs) > 1:
+        sections.append(_all(runs))
+    for run in runs:
+        sections.extend(_run(run, tables.common_speed_m_s(runs)))
+    write_page(
+        path,
+        'Resistance from coastdowns: ' + ', '.join(names),
+        [*sections, HOW_TO_READ],
+    )
+
+
+def _run(run: RunResult, speed_m_s: float) -> Iterator[Section]:
+    """Tell of one bag, its coastdowns in their order."""
+    yield Section(
+        run.bag,
+        quiet=run.ship.summary(),
+        text=[f'Warning: {warning}' for warning in run.warnings],
+        lead=() if run.coastdowns else run.summary(),
+        entry='' if run.coastdowns else f'{run.bag}: {run.summary()[0]}',
+    )
+    for number, coastdown in enumerate(run.coastdowns, start=1):
+        yield _coastdown(number, coastdown, run, speed_m_s)
+        if coastdown.estimate is not None:
+            yield Section(
+                'What this record can and cannot show',
+                level=4,
+                lines=estimate_words.notes(coastdown.estimate),
+            )
+    rest: list[tuple[str, Table]] = []
+    if run.dismissed:
+        rest.append(('What is no coastdown, and why', tables.not_coastdowns_table(run.dismissed)))
+    rest.append(('Messages read', tables.inputs_table(run.inputs)))
+    yield Section(
+        'What was read', level=3, text=[words.recorded_sentence(run.recorded)], tables=rest
+    )
+
+
+def _coastdown(number: int, coastdown: Coastdown, run: RunResult, speed_m_s: float) -> Section:
+    estimate = coastdown.estimate
+    found: list[tuple[str, Table]] = []
+    if estimate is not None:
+        truth = None if run.truth is None else run.truth.at
+        curve = estimate.valid_curve
+        if len(curve):
+            found.append((estimate_tables.FORCE, estimate_tables.force_table(curve, run.ship)))
+            found.append(
+                (estimate_tables.SPECIFIC, estimate_tables.curve_table(curve, truth=truth))
+            )
+    found.append(('How it was found', tables.facts(coastdown)))
+    cuts = cut_lines(coastdown, run.span_ns)
+    told = words.summary(coastdown, run.ship)
+    return Section(
+        f'Coastdown {number}: {display.utc(coastdown.start_ns)}',
+        level=3,
+        lead=(*cuts[:1], told[0]),
+        text=told[1:],
+        lines=cuts[1:],
+        pictures=tuple(_pictures(coastdown, run)),
+        tables=found,
+        entry=f'{display.utc(coastdown.start_ns)}, {run.bag}: {_line(coastdown, run, speed_m_s)}',
+    )
+
+
+def _line(coastdown: Coastdown, run: RunResult, speed_m_s: float) -> str:
+    """Say what a coastdown gave in one line."""
+    estimate = coastdown.estimate
+    if estimate is None or not len(estimate.valid_curve):
+        return words.summary(coastdown)[0]
+    force = Force.of(estimate.valid_curve, run.ship)
+    return force.at(force.near(speed_m_s))
+
+
+def _pictures(coastdown: Coastdown, run: RunResult) -> Iterator[Picture]:
+    """Draw what there are data for."""
+    if coastdown.stretch:
+        yield picture(
+            pictures.cut_picture(coastdown, run.span_ns, run.ship.mass_kg),
+            'Speed over the whole stretch. Hatched: what was cut, and why; only the rest is '
+            'taken for a coastdown.',
+        )
+    estimate = coastdown.estimate
+    if estimate is None:
+        return
+    clean = run.ship.baseline is not None
+    true = run.truth
+    truth = None if true is None else (true.speed_m_s, true.resistance_m_s2)
+    if len(estimate.curve):
+        beside = ', over that of the clean hull: the gap is what she has gained' if clean else ''
+        yield picture(
+            estimate_pictures.resistance_picture(estimate, run.ship, truth=truth),
+            f'Resistance against speed{beside}. Blue band: two standard deviations; shaded: '
+            'where the curve may be used.',
+        )
+    if len(estimate.valid_curve):
+        yield picture(
+            estimate_pictures.power_picture(estimate.valid_curve, run.ship),
+            'Effective power against speed: resistance times speed. Read off what a knot more '
+            f'costs{" and what the clean hull would need" if clean else ""}.',
+        )
+    for name, drawn in zip(
+        estimate.tracks, estimate_pictures.track_pictures(estimate, run.ship.mass_kg), strict=True
+    ):
+        yield picture(
+            drawn,
+            f'{display.TRACK_LABELS.get(name, (name, ""))[0]} as measured and as fitted, and what '
+            'is left. Good: the dots below scatter about zero. Left-overs that wave slowly are '
+            'not in the band.',
+        )
+    if estimate.orders:  # where orders are averaged none is chosen, and there is no table of them
+        yield picture(
+            estimate_pictures.order_picture(estimate),
+            'Residual variance against the number of coefficients: it falls to a plateau, and '
+            'the smallest number on the plateau is chosen.',
+        )
+
+
+def _all(runs: Sequence[RunResult]) -> Section:
+    """Tell of all coastdowns: a line each, their curves, and the one curve where there is one."""
+    found = together(runs)
+    lines, lead = [], []
+    shown = [('All coastdowns, a line each', tables.coastdowns_table(runs))]
+    ship = runs[0].ship
+    if found.combined is not None:
+        force = Force.of(found.combined, ship)
+        lead.append(
+            f'{found.combined.runs} coastdowns together. '
+            f'{force.at(force.near(tables.common_speed_m_s(runs)))}'
+        )
+        lines = list(words.combined_notes(found.combined))
+        shown += [
+            (estimate_tables.FORCE, estimate_tables.force_table(found.combined, ship)),
+            (estimate_tables.SPECIFIC, estimate_tables.combined_table(found.combined)),
+        ]
+    elif found.why_not:
+        lead.append(f'Not combined: {found.why_not}.')
+    dated = [
+        (f'{display.utc(part.start_ns)}', part.estimate.valid_curve)
+        for run in runs
+        for part in run.coastdowns
+        if part.estimate is not None and len(part.estimate.valid_curve)
+    ]
+    whole = ', all together with their band' if found.combined is not None else ''
+    drawn: list[Picture] = []
+    if dated and len({run.ship for run in runs}) == 1:
+        drawn.append(
+            picture(
+                estimate_pictures.curves_picture(dated, ship, combined=found.combined),
+                f'Resistance of each coastdown by its date{whole}. Curves that rise from date to '
+                'date show a hull that fouls; curves of one day that differ show wind, sea or '
+                'current.',
+            )
+        )
+        if found.combined is not None:
+            drawn.append(
+                picture(
+                    estimate_pictures.power_picture(found.combined, ship),
+                    'Effective power of all coastdowns together, with two standard deviations.',
+                )
+            )
+    title = 'All coastdowns' + (' together' if found.combined is not None else '')
+    return Section(title, lead=lead, lines=lines, pictures=drawn, tables=shown, entry=title)
+
+
+def _hulls(ranking: Ranking) -> Section:
+    return Section(
+        'Hulls compared',
+        lines=ranking.notes,
+        pictures=[
+            picture(
+                pictures.comparison_picture(ranking.hulls),
+                'Specific resistance against Froude number, each hull inside its valid range. The '
+                'further right the dot, the later that hull makes wave.',
+            )
+        ],
+        tables=[('The higher Fr_max, the later a hull makes wave', tables.ranking_table(ranking))],
+        entry='Hulls compared',
+    )

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sentences say what the figures say, in the engineer's units first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.estimation import words
+from shipdrag_ros.estimation.result import Estimate, FroudeMax
+from shipdrag_ros.ship import Ship, TableBaseline
+
+
+def test_every_rule_has_words() -> None:
+    assert set(words.FROUDE_MAX_BY) == set(FroudeMax)
+
+
+def test_the_summary_gives_knots_and_kilowatts_first(estimate: Estimate, ship: Ship) -> None:
+    first, missing, last = estimate.summary(ship)
+    # 0.75 of 8.2 m/s: r = 6.15^2 / 3000 over 20705 t, sigma = 0.02 r + 1e-4
+    speed = float(estimate.valid_curve.speed_m_s[84])
+    force = 20705.0 * speed**2 / 3000.0
+    assert abs(speed - 6.15) < 0.03
+    assert first == (
+        f'At {speed / 0.5144444:.1f} knots: resistance {force:.0f} ± '
+        f'{2.0 * (0.02 * force + 2.0705):.0f} kN, effective power {force * speed:.0f} ± '
+        f'{2.0 * (0.02 * force + 2.0705) * speed:.0f} kW. Known from 3.8 to 13.4 knots; ± is two '
+        'standard deviations.'
+    )
+    assert 'states no baseline' in missing
+    assert '1.95 to 6.90 m/s' in last
+    # sigma / r = 0.02 + 1e-4 / r falls with r: best at the top
+    assert 'best at 6.90 m/s: there the specific resistance is 0.01587 ± 0.00083' in last
+    assert estimate.summary() == (last,)
+
+
+def test_the_summary_says_what_is_over_the_clean_hull(estimate: Estimate, ship: Ship) -> None:
+    speed = np.linspace(1.0, 9.0, 30)
+    clean = ship.mass_kg * speed**2 / 3600.0  # the ship needs a fifth more
+    baseline = TableBaseline(tuple(speed), tuple(clean), 0.03)
+    first, last = estimate.summary(replace(ship, baseline=baseline))
+    assert '20.0 ± 9.8 % over the clean hull. Known' in first
+    assert 'specific resistance' in last
+    high = TableBaseline((8.5, 9.0), (1e5, 2e5), 0.03)
+    _, why, _ = estimate.summary(replace(ship, baseline=high))
+    assert 'from 16.5 knots to 17.5 knots and this curve is outside' in why
+
+
+def test_a_model_ship_is_told_in_newtons_and_millimetres(estimate: Estimate, ship: Ship) -> None:
+    curve = estimate.curve
+    slow = replace(estimate, curve=replace(curve, speed_m_s=0.1 * curve.speed_m_s))
+    model = replace(ship, displaced_volume_m3=14.0 / 1025.0)
+    first, _, last = slow.summary(model)
+    assert first.startswith('At 0.615 m/s: resistance 0.1765 ± 0.0099 N, effective power 0.1086 ')
+    assert 'from 0.195 to 0.690 m/s' in last
+
+
+def test_several_coastdowns_are_told_by_their_dates(estimate: Estimate, ship: Ship) -> None:
+    later = replace(estimate, start_ns=estimate.start_ns + 86400 * 10**9)
+    first, second, missing = words.in_service([estimate, later], ship)
+    assert first.startswith('2023-11-14 22:13:20 UTC: At 1')
+    assert second.startswith('2023-11-15 22:13:20 UTC: At 1')
+    assert 'states no baseline' in missing
+    assert words.in_service([replace(estimate, froude_valid=(0.3, 0.3))], ship) == ()
+
+
+def test_the_top_of_the_fit_is_not_told_for_the_largest_reading(estimate: Estimate) -> None:
+    name = 'speed_through_water'
+    track = estimate.tracks[name]
+    read = np.minimum(track.fitted, 6.5)  # the fit overshoots what was read
+    read[100] = 30.0  # one bad reading
+    tracks = {name: replace(track, measured=read)}
+    notes = ' '.join(words.notes(replace(estimate, tracks=tracks)))
+    assert 'the fit ends at 8.20 m/s, speed_through_water (medians of 5 readings) at 6.50 m/s' in (
+        notes
+    )
+    bare = ' '.join(words.notes(replace(estimate, tracks={})))
+    assert 'the fit ends at 8.20 m/s.' in bare
+    assert 'record itself reaches' not in notes + bare
+
+
+def test_an_empty_range_promises_nothing(estimate: Estimate, ship: Ship) -> None:
+    assert replace(estimate, froude_valid=(0.3, 0.3)).summary(ship) == (words.NOTHING_VALID,)
+
+
+def test_notes_say_what_the_record_cannot_show(estimate: Estimate) -> None:
+    notes = ' '.join(words.notes(estimate))
+    assert 'A note of the estimator' in notes
+    assert 'Nothing is said outside 1.95 to 6.90 m/s' in notes
+    assert 'not the error of the polynomial' in notes
+    assert 'a current, or a log that reads wrong' in notes
+
+    ground = replace(
+        estimate,
+        estimator='s1_position',
+        samples={'position': 1500},
+        froude_max_by=FroudeMax.BRANCH_TOP,
+    )
+    notes = ' '.join(words.notes(ground))
+    assert 'a run on the opposite heading would tell' in notes
+    assert 'only a lower bound' in notes
+
+
+def test_residuals_that_do_not_scatter_are_told(estimate: Estimate) -> None:
+    # white residuals, N = 1500, seed 5: a correlation above 0.1 has a chance of 1e-4
+    assert not any('does not scatter' in note for note in words.notes(estimate))
+    assert not any('on average' in note for note in words.notes(estimate))
+
+    speed = estimate.tracks['speed_through_water']
+    slow = 0.05 * np.sin(np.arange(len(speed.fitted)) / 50.0)
+
+    def notes_with(measured: np.ndarray) -> str:
+        tracks = {**estimate.tracks, 'speed_through_water': replace(speed, measured=measured)}
+        other = replace(estimate, tracks=tracks)
+        return ' '.join(words.notes(other))
+
+    assert 'leaves of speed_through_water does not scatter' in notes_with(speed.measured + slow)
+    assert 'The log reads 0.2 m/s more' in notes_with(speed.fitted + 0.2)
+    assert 'm/s more on average' in notes_with(speed.measured + 0.1)
+    assert 'm/s less on average' in notes_with(speed.measured - 0.1)
+    assert 'scatter' not in notes_with(speed.fitted)
+
+
+def test_a_ship_that_drifts_astern_is_told(estimate: Estimate) -> None:
+    assert not any('through zero' in note for note in words.notes(estimate))
+    speed = estimate.tracks['speed_through_water']
+    noise = estimate.noise_sd['speed_through_water']
+    for lowest, told in ((-1.9 * noise, False), (-2.1 * noise, True)):
+        lower = lowest - float(speed.fitted.min())
+        moved = replace(speed, measured=speed.measured + lower, fitted=speed.fitted + lower)
+        tracks = {**estimate.tracks, 'speed_through_water': moved}
+        notes = words.notes(replace(estimate, tracks=tracks))
+        assert any('through zero' in note for note in notes) is told
+
+
+@pytest.mark.parametrize(
+    ('estimator', 'order', 'told'),
+    [
+        ('s1_speed', 2, True),
+        ('s1_speed', 3, False),
+        ('s1_position', 3, True),
+        ('s1_joint', 3, True),
+        ('s1_joint', 4, False),
+        ('log_time', 3, False),
+        ('ode_fit', None, False),
+    ],
+)
+def test_a_constant_r_is_told_to_be_a_mean(
+    estimate: Estimate, estimator: str, order: int | None, told: bool
+) -> None:
+    other = replace(estimate, estimator=estimator, order=order)
+    notes = words.notes(other)
+    assert any('its mean, not its shape' in note for note in notes) is told
+
+
+def test_a_curve_over_ground_is_named_so(estimate: Estimate) -> None:
+    assert words.speed_name(estimate) == 'speed through water'
+    ground = replace(estimate, samples={'position': 3})
+    assert words.speed_name(ground) == 'speed over ground'
+
+
+def test_an_estimator_is_named_and_explained() -> None:
+    assert words.estimator('s1_speed') == 's1_speed: orthogonal polynomial, speed alone'
+    assert words.estimator('warped').endswith(words.estimator('log_time').partition(': ')[2])

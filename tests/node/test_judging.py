@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is said of an input, by what became of its readings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from shipdrag_ros.node.judging import (
+    Counts,
+    InputFacts,
+    Level,
+    Recently,
+    behind_others,
+    judge,
+)
+
+WELL = InputFacts(
+    'speed_through_water',
+    needed=True,
+    type='geometry_msgs/msg/TwistStamped',
+    senders=('/log',),
+    age_s=0.1,
+    recent=Counts(300, 300),
+    seconds=30.0,
+    offset_s=0.2,
+)
+
+
+def counts(used: int, **rejected: int) -> Counts:
+    return Counts(used + sum(rejected.values()), used, rejected)
+
+
+def test_what_is_well_is_receiving() -> None:
+    assert (judge(WELL).level, judge(WELL).text) == (Level.OK, 'receiving')
+
+
+@pytest.mark.parametrize(
+    ('changed', 'level', 'said'),
+    [
+        ({'recent': counts(0, nan=300)}, Level.ERROR, 'none of 300 readings used in 30 s'),
+        ({'recent': counts(0, nan=300)}, Level.ERROR, ': 300 nan; the sensor'),
+        ({'recent': counts(0, frozen=300)}, Level.ERROR, 'it is stuck'),
+        ({'recent': counts(100, outlier=200)}, Level.ERROR, '33% of 300'),
+        ({'recent': counts(285, absurd=15)}, Level.WARN, '95% of 300'),
+        ({'recent': counts(299, absurd=1)}, Level.OK, 'receiving'),
+        (
+            {'recent': counts(0, future=300), 'offset_s': -3600.0},
+            Level.ERROR,
+            'its clock is 3600.0 s ahead of that of this computer',
+        ),
+        ({'recent': Counts(300, 1, {'duplicate': 299}, 0, 300)}, Level.ERROR, 'holds no time'),
+        ({'recent': Counts(300, 300, {}, 7)}, Level.WARN, '7 messages lost in 30 s'),
+        ({'recent': counts(3)}, Level.WARN, '0.1 Hz is too slow'),
+        ({'behind': ('position', 6.0)}, Level.WARN, '6.0 s behind those of position'),
+        ({'behind': ('position', 1.0)}, Level.OK, 'receiving'),
+        ({'offset_s': 8.0}, Level.WARN, '8.0 s behind that of this computer'),
+        ({'senders': ('/a', '/a', '/b')}, Level.WARN, '3 publishers, /a 2 times, /b'),
+        ({'age_s': None}, Level.WARN, 'no data'),
+        ({'age_s': 99.0}, Level.STALE, 'no data for 99 s'),
+        ({'age_s': 99.0, 'senders': ()}, Level.STALE, 'no publisher any more'),
+        ({'type': None, 'age_s': None, 'senders': ()}, Level.WARN, 'no publisher'),
+        (
+            {'type': None, 'age_s': None, 'senders': (), 'needed': False},
+            Level.OK,
+            'no publisher',
+        ),
+        ({'misfit': 'DURABILITY'}, Level.WARN, 'its DURABILITY QoS does not fit'),
+        ({'direction': 'it is off'}, Level.WARN, 'it is off'),
+    ],
+)
+def test_what_is_wrong_is_said(changed: dict[str, Any], level: Level, said: str) -> None:
+    found = judge(replace(WELL, **changed))
+    assert found.level is level
+    assert said in found.text
+
+
+def test_context_may_be_worse_than_motion() -> None:
+    rudder = replace(WELL, name='rudder', needed=False)
+    assert judge(replace(rudder, recent=counts(100, nan=200))).level is Level.WARN
+    assert judge(replace(rudder, recent=counts(0, nan=200))).level is Level.ERROR
+
+
+def test_the_gravest_comes_first_and_none_is_left_out() -> None:
+    found = judge(replace(WELL, senders=('/a', '/b'), recent=counts(0, nan=30)))
+    assert found.level is Level.ERROR
+    assert found.text.startswith('none of 30')
+    assert '2 publishers' in found.text
+
+
+def test_only_what_came_lately_counts() -> None:
+    recently = Recently()
+    for second in range(100):
+        bad = max(second - 50, 0)
+        recently.add(float(second), Counts(10 * second, 10 * (second - bad), {'nan': 10 * bad}))
+    assert recently.counts == Counts(300, 0, {'nan': 300})
+    assert recently.seconds == 30.0
+    assert recently.rate_hz == pytest.approx(10.0)
+
+
+def test_counts_that_begin_anew_are_no_loss() -> None:
+    recently = Recently()
+    recently.add(0.0, Counts(100, 100))
+    recently.add(1.0, Counts(110, 5))
+    recently.add(2.0, Counts(120, 15))
+    assert recently.counts == Counts(10, 10)
+
+
+def test_the_one_with_the_least_lag_is_the_measure() -> None:
+    offsets = {'speed_through_water': 6.2, 'position': 0.2, 'rudder': 99.0}
+    assert behind_others(offsets) == {'speed_through_water': ('position', 6.0)}
+    assert behind_others({'position': 5.0, 'speed_over_ground': None}) == {}

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Coastdowns of one state of the hull become one curve; those of two states stay apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import together
+
+DAY_NS = 86_400 * 1_000_000_000
+
+
+def later(run: RunResult, *, days: float, factor: float, bag: str = 'later.mcap') -> RunResult:
+    """The same coastdown some days on, with more resistance."""
+    (coastdown,) = run.coastdowns
+    estimate = coastdown.estimate
+    assert estimate is not None
+    shift = round(days * DAY_NS)
+    moved = replace(
+        estimate,
+        start_ns=estimate.start_ns + shift,
+        end_ns=estimate.end_ns + shift,
+        curve=replace(estimate.curve, resistance_m_s2=factor * estimate.curve.resistance_m_s2),
+    )
+    start, end = coastdown.start_ns + shift, coastdown.end_ns + shift
+    there = replace(coastdown, start_ns=start, end_ns=end, estimate=moved)
+    return replace(run, bag=bag, coastdowns=(there,))
+
+
+def test_months_later_more_resistance_is_another_state(run: RunResult) -> None:
+    found = together([run, later(run, days=90.0, factor=1.25)])
+    assert found.combined is None
+    assert found.why_not.startswith('these runs differ at 12.0 knots (2023-11-14: 2')
+    assert '2024-02-12: 3' in found.why_not
+    assert 'one state of the hull does not fit all' in found.why_not
+
+
+def test_months_later_the_same_resistance_is_the_same_state(run: RunResult) -> None:
+    # the bands are 1.6 % each; with 2 % from run to run, 5 % more is 1.4 standard deviations
+    found = together([run, later(run, days=90.0, factor=1.05)])
+    assert found.combined is not None
+    assert found.combined.runs == 2
+
+
+def test_runs_of_one_day_show_wind_and_sea(run: RunResult) -> None:
+    found = together([run, later(run, days=0.1, factor=1.25)])
+    assert found.combined is not None

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run file stands beside its bag, and overrides the ship file for that run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.errors import ShipFileError
+from shipdrag_ros.ship import Fact, RunSheet, Ship
+from shipdrag_ros.ship.run_sheet import find, kinematic_viscosity
+
+SHIP = Ship(length_m=80.0, displaced_volume_m3=4000.0, breadth_m=13.0, draught_m=5.5)
+SHEET = """
+facts: [calm]
+draught_m: 6.0
+displaced_volume_m3: 4400
+water: {temperature_c: 25, density: 1010}
+"""
+
+
+def test_what_is_stated_of_a_run_overrides_the_ship_file() -> None:
+    sheet = RunSheet.from_yaml(SHEET, subject='run.yaml')
+    assert sheet.facts == (Fact('calm'),)
+    ship = sheet.of(SHIP, subject='run.yaml')
+    assert (ship.draught_m, ship.displaced_volume_m3) == (6.0, 4400.0)
+    assert ship.water.density_kg_m3 == 1010.0
+    assert ship.water.kinematic_viscosity_m2_s == kinematic_viscosity(25.0, 1010.0)
+    assert replace(ship, draught_m=5.5, displaced_volume_m3=4000.0, water=SHIP.water) == SHIP
+    assert RunSheet().of(SHIP, subject='none') == SHIP
+
+
+@pytest.mark.parametrize(
+    ('temperature_c', 'density', 'expected'),
+    # ITTC 7.5-02-01-03: fresh and sea water
+    [(15.0, 999.1, 1.1386e-6), (15.0, 1026.0, 1.1892e-6), (5.0, 1027.7, 1.5617e-6)],
+)
+def test_viscosity_is_that_of_the_tables(
+    temperature_c: float, density: float, expected: float
+) -> None:
+    assert kinematic_viscosity(temperature_c, density) == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ('text', 'wrong'),
+    [
+        ('{speed: 3}', 'speed: unknown key'),
+        ('{draught_m: deep}', "draught_m: 'deep', expected a number"),
+        ('{facts: [fog]}', "'fog' is no known fact"),
+        ('{water: {density: 1000, density_kg_m3: 1025}}', 'keep one'),
+        ('[1]', 'expected the keys'),
+        ('{', 'not YAML'),
+    ],
+)
+def test_a_wrong_run_file_says_what_is_wrong(text: str, wrong: str) -> None:
+    with pytest.raises(ShipFileError) as refused:
+        RunSheet.from_yaml(text, subject='run.yaml')
+    assert wrong in str(refused.value)
+
+
+def test_a_volume_that_cannot_be_hers_is_refused() -> None:
+    with pytest.raises(ShipFileError, match=r'run\.yaml'):
+        RunSheet(displaced_volume_m3=40.0).of(SHIP, subject='run.yaml')
+
+
+def touched(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch()
+    return path
+
+
+@pytest.mark.parametrize('name', ['a.mcap.run.yaml', 'a.run.yaml'])
+def test_the_run_file_of_a_bag_has_its_name(name: str, tmp_path: Path) -> None:
+    bag, _ = touched(tmp_path / 'a.mcap'), touched(tmp_path / 'b.mcap')
+    assert find((bag,)) is None
+    touched(tmp_path / 'run.yaml')  # of which of the two it is, nobody knows
+    assert find((bag,)) is None
+    sheet = touched(tmp_path / name)
+    assert find((bag,)) == sheet
+
+
+@pytest.mark.parametrize('name', ['run.yaml', 'bag/run.yaml', 'bag.run.yaml'])
+def test_the_run_file_of_a_folder_is_in_it_or_beside_it(name: str, tmp_path: Path) -> None:
+    bag = touched(tmp_path / 'bag' / 'bag_0.mcap')
+    touched(tmp_path / 'bag' / 'metadata.yaml')
+    sheet = touched(tmp_path / name)
+    assert find((bag,)) == sheet
+
+
+def test_two_run_files_are_one_too_many(tmp_path: Path) -> None:
+    bag = touched(tmp_path / 'a.mcap')
+    touched(tmp_path / 'run.yaml')
+    touched(tmp_path / 'a.run.yaml')
+    with pytest.raises(ShipFileError, match='two run files'):
+        find((bag,))
