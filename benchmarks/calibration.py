@@ -27,8 +27,9 @@ from shipdrag_ros.estimation import Window, ode_fit
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, EXTRAS, LOG_LAG, V0, integrate, predict
 from shipdrag_ros.estimation.ode_fit.families import POWERS, Humps
 from shipdrag_ros.estimation.ode_fit.law import Law, shape_table
-from shipdrag_ros.inference.learning import SIZE, Settings, noise_of, of_steady, settings_at
+from shipdrag_ros.inference.learning import of_steady, settings_at
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.inference.settings import SIZE, Settings, noise_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship

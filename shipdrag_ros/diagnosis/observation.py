@@ -25,9 +25,10 @@ from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.learning import learn, noise_of, of_steady
+from shipdrag_ros.inference.learning import learn, of_steady
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
 from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, Rows, bin_means
+from shipdrag_ros.inference.settings import noise_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship

@@ -6,17 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.learning import (
-    KEPT,
-    NoisePosterior,
-    Seen,
-    learn,
-    noise_of,
-    of_steady,
-    prior,
-)
+from shipdrag_ros.inference.learning import KEPT, learn, of_steady, prior
 from shipdrag_ros.inference.noise import whiten
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.inference.sampling import Seen
+from shipdrag_ros.inference.settings import NoisePosterior, noise_of
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.noise import GaussMarkov
 
@@ -74,14 +68,17 @@ def test_a_longer_record_leaves_less_doubt() -> None:
     assert long < 0.7 * short
 
 
-def test_a_short_record_teaches_nothing_and_says_so() -> None:
+def test_a_short_record_chooses_among_settings_of_the_prior_and_says_so() -> None:
     time_s = np.arange(0.0, 280.0, 10.0)
-    value = 8.0 + 3.0 * np.random.default_rng(0).standard_normal(len(time_s))
+    value = 8.0 + 0.02 * np.random.default_rng(0).standard_normal(len(time_s))
     seen = steady(value, time_s, 0.02)
     found, before = learn(seen, SPEED), prior(seen, SPEED)
     assert not found.learnt
-    np.testing.assert_array_equal(found.settings.slow, before.settings.slow)
-    assert len(found.settings.weight) > 10
+    assert not before.learnt
+    known = {tuple(line) for line in before.settings.slow.tolist()}
+    assert all(tuple(line) in known for line in found.settings.slow.tolist())
+    # sizes that a quiet record makes impossible weigh little
+    assert found.slow.log_m_s < before.slow.log_m_s
 
 
 def test_what_no_setting_explains_is_given_the_settings_of_the_prior() -> None:

@@ -80,7 +80,11 @@ class Slow:
         rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
         inertia = 1.0 + float(ship.n_r(speed_m_s))
         variance = record.steady_variance()[keep]
-        found = learn(of_steady(rows, variance, 2.0 / coast_s, inertia), speed_m_s).typical
+        learnt = learn(of_steady(rows, variance, 2.0 / coast_s, inertia), speed_m_s)
+        if not learnt.learnt:
+            return None
+        # the nearest single setting: an average over all would cost each update ten times as much
+        found = learnt.typical
         white = {input_.key: float(found.white[0, input_]) for input_ in Input}
         sizes = {name: sd * white[name] for name, sd in record.white_sd.items()}
         return cls(

@@ -19,9 +19,9 @@ from shipdrag_ros.estimation.ode_fit.families import Priors
 from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.solve import whitened_equations
 from shipdrag_ros.inference.gaussian import average as mix
-from shipdrag_ros.inference.learning import Settings, noise_of
 from shipdrag_ros.inference.noise import Noise
 from shipdrag_ros.inference.rows import Rows
+from shipdrag_ros.inference.settings import Settings, noise_of
 from shipdrag_ros.samples import Float64, Int64
 
 _ROUNDS, _WHOLE_ROUNDS = 16, 3  # the later ones go half the way: a late onset may oscillate

@@ -32,8 +32,9 @@ from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.learning import LEAST_S as LEARN_S
-from shipdrag_ros.inference.learning import NoisePosterior, learn, of_steady, prior
+from shipdrag_ros.inference.learning import learn, of_steady, prior
 from shipdrag_ros.inference.rows import CODES, LOG, Rows
+from shipdrag_ros.inference.settings import NoisePosterior
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -126,10 +127,14 @@ def _at_first(record: Record, problem: Problem, run_down: RunDown, guess: Guess)
 
 def _noise_notes(noise: NoisePosterior, record: Record) -> list[str]:
     if not noise.learnt:
-        return [
-            'the record is too short to learn slow disturbances from '
-            f'({LEARN_S:g} s are needed): the band holds what is usual at sea'
-        ]
+        length_s = record.steady_s + float(np.ptp(record.coast.time_s))
+        why = (
+            f'{length_s:.0f} s of record are too short to learn slow disturbances from '
+            f'({LEARN_S:g} s are needed)'
+        )
+        if length_s >= LEARN_S:
+            why = 'no size of slow disturbances explains the record'
+        return [f'{why}: the band holds what is usual at sea']
     slow = noise.slow
     found = [
         f'a force of {slow.gust_m_s2:.2g} m/s² over {slow.gust_s:.0f} s (the engine is taken to '

@@ -31,9 +31,10 @@ from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.solve import fit
-from shipdrag_ros.inference.learning import SENSORS_ALONE, Seen, Settings, noise_of
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.inference.sampling import Seen
+from shipdrag_ros.inference.settings import SENSORS_ALONE, Settings, noise_of
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 

@@ -11,9 +11,9 @@ from shipdrag_ros.estimation.ode_fit.coast import EXTRAS, V0, predict
 from shipdrag_ros.estimation.ode_fit.families import Priors
 from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.solve import fit
-from shipdrag_ros.inference.learning import SENSORS_ALONE, Settings
 from shipdrag_ros.inference.noise import WHITE, GaussMarkovNoise, Noise
 from shipdrag_ros.inference.rows import LOG, Rows
+from shipdrag_ros.inference.settings import SENSORS_ALONE, Settings
 from shipdrag_ros.samples import Float64
 
 POWERS = np.array([1, 2, 3, 4])
