@@ -30,7 +30,7 @@ LEAST_S = 300.0  # of record from which noise can be learnt; from less the prior
 # slowed: the speed is damped 1 to 2 times as much as the hull's resistance says.
 _TYPICAL_HOLD = 1.4
 # standard deviation of the logarithms, and medians of those that have a unit of their own
-_SD_OF_SIZE = (0.8, 0.8, 1.0, 1.6)
+_SD_OF_SIZE = (1.0, 0.8, 1.0, 1.6)
 _SD_OF_TIME = (0.9, 0.8, 1.1, 1.2)
 _SD_OF_WHITE, _SD_OF_HOLD = (0.6, 0.6, 0.4), 0.25
 _WHITE = (1.3, 1.3, 1.0)  # samples behind a filter err alike: their means scatter more

@@ -91,7 +91,7 @@ def test_a_car_accelerates_coasts_and_brakes(window_s: tuple[float, float]) -> N
     r, band = resistance(found, 7.0)
     assert abs(r - 0.82) < np.hypot(0.01, band)
     # some seconds teach nothing of gusts: what is usual is in the band
-    assert band < 0.075
+    assert band < 0.09
 
 
 def blueboat(number: int) -> dict[Channel, NDArray[np.float64]]:
@@ -148,7 +148,7 @@ def test_a_ferry_with_motors_running_in_the_window() -> None:
     r, band = resistance(found, 0.116)
     assert abs(r - 0.0053) < np.hypot(0.0009, band)
     # of ten seconds: noise of which nothing can be learnt is in the band
-    assert band < 2.4 * 0.0009
+    assert band < 2.7 * 0.0009
 
 
 def esso_osaka(name: str) -> tuple[NDArray[np.float64], dict[Channel, NDArray[np.float64]]]:
