@@ -9,12 +9,13 @@ STAMP := $(VENV)/installed
 # all traffic of demo and tests stays on this machine
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
-.PHONY: help env demo test lint types tests peers lock clean
+.PHONY: help env warm demo test lint types tests peers lock clean
 
 help:
 	@echo 'make demo   simulated ship -> ROS topics -> node -> bag -> replay -> report'
 	@echo 'make test   lint, types, tests'
 	@echo 'make env    only the environment, in $(VENV)'
+	@echo 'make warm   compile now what a first start would compile (a minute)'
 	@echo 'make peers  what benchmarks compare with, into the same environment'
 	@echo 'make lock   resolve the dependencies anew into requirements.lock (needs uv)'
 
@@ -30,6 +31,9 @@ $(STAMP): requirements.lock setup.py setup.cfg pyproject.toml
 
 demo: env
 	$(BIN)/shipdrag demo --out demo
+
+warm: env
+	$(BIN)/python deploy/warm.py
 
 test: lint types tests
 

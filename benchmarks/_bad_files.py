@@ -66,8 +66,8 @@ SHIPS = (
         'a list for a mapping',
         '- length_m: 150.0\n- displaced_volume_m3: 20200.0\n',
         1,
-        "the file: [{'length_m': 150.0}",
-        'expected the keys name, length_m',
+        'is no ship file, none of its keys is known',
+        'length_m',
     ),
     _ship(
         'a length in feet',

@@ -40,9 +40,9 @@ from shipdrag_ros.studies.manoeuvring.manoeuvre import (
 )
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 from shipdrag_ros.studies.manoeuvring.simulate import steer
+from shipdrag_ros.studies.sensitivity import coasting_words, steering_words
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
-from shipdrag_ros.studies.sensitivity.face import coasting_page, steering_page
 from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, partial_contribution
 from shipdrag_ros.studies.sensitivity.steering import (
@@ -373,11 +373,11 @@ def page(
         '',
         '## Losses',
         '',
-        steering_page.LOSSES + '.',
+        steering_words.LOSSES + '.',
         '',
         '![Mean loss of each derivative](pictures/s3_ranking.png)',
         '',
-        *lines_of(steering_page.loss_table(found)),
+        *lines_of(steering_words.loss_table(found)),
         '',
         '## What 24 means',
         '',
@@ -390,7 +390,7 @@ def page(
         f'{len(found.group_derivatives)} derivatives, and overshoots '
         f'{grouped[0]:.2f} / {grouped[1]:.2f} instead of {both[1][0]:.2f} / {both[1][1]:.2f} deg.',
         '',
-        *lines_of(steering_page.check_table(found)),
+        *lines_of(steering_words.check_table(found)),
         '',
         '![25/25 zigzag of the full and of the reduced models](pictures/s3_check.png)',
         '',
@@ -421,21 +421,21 @@ def page(
         '',
         '![Loss of each derivative in each manoeuvre](pictures/s3_design.png)',
         '',
-        steering_page.DESIGN + '.',
+        steering_words.DESIGN + '.',
         '',
-        *lines_of(steering_page.design_table(shown)),
+        *lines_of(steering_words.design_table(shown)),
         '',
         '## The same for a ship file',
         '',
-        f'{coasting_page.sentence(coast)}',
+        f'{coasting_words.sentence(coast)}',
         '',
-        *(f'- {note}' for note in coasting_page.notes(coast)),
+        *(f'- {note}' for note in coasting_words.notes(coast)),
         '',
         '![Change of the record by each value of the ship file](pictures/s3_particulars.png)',
         '',
-        coasting_page.LOSSES + '.',
+        coasting_words.LOSSES + '.',
         '',
-        *lines_of(coasting_page.loss_table(coast)),
+        *lines_of(coasting_words.loss_table(coast)),
         '',
         f'A ship that is {heavier.size:.0%} heavier than her file says is one whose '
         f'{heavier.particular.key} is wrong by {heavier.error:+.0%}, but for {heavier.left:.1%} '
@@ -444,9 +444,9 @@ def page(
         '',
         '![What is left of each effect when a value is blamed](pictures/s3_mimics.png)',
         '',
-        coasting_page.MIMICS + '.',
+        coasting_words.MIMICS + '.',
         '',
-        *lines_of(coasting_page.mimic_table(coast)),
+        *lines_of(coasting_words.mimic_table(coast)),
         '',
         'And what `diagnose` says of a ship of which nothing but one value of the file is wrong: '
         f'two reciprocal coastdowns of {COAST_S:.0f} s from {SPEED_M_S:g} m/s,',

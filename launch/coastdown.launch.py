@@ -24,6 +24,7 @@ ARGUMENTS = (
         'parameters of the node; the arguments here override it',
     ),
     ('use_sim_time', 'false', 'take the time from /clock'),
+    ('autostart', 'true', 'configure and activate without being asked to'),
     ('namespace', '', 'namespace of the node and of its inputs'),
 )
 
@@ -49,6 +50,7 @@ def generate_launch_description():
                 'output_directory': ParameterValue(
                     LaunchConfiguration('output_directory'), value_type=str
                 ),
+                'autostart': ParameterValue(LaunchConfiguration('autostart'), value_type=bool),
                 'use_sim_time': ParameterValue(
                     LaunchConfiguration('use_sim_time'), value_type=bool
                 ),

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 M_S_PER_KNOT = 1852.0 / 3600.0
+# what `float` takes besides, 1_000 or nan or infinity, is no measured number
+NUMBER = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
 """Below it a ship is told in kg and N, above in t and kN."""
 
@@ -39,10 +42,13 @@ class Picture:
         The picture, as `data:`.
     caption
         What it shows, and what a reader should see in it.
+    wide
+        Whether it needs the whole width of a page; on a phone it scrolls in its box.
     """
 
     uri: str
     caption: str
+    wide: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,16 @@ class Section:
     entry: str = ''
 
 
+def spreadsheet_text(text: str) -> str:
+    """
+    Return a text that no spreadsheet takes for a formula.
+
+    A file name may begin with `=`; a quote before it makes it text. Numbers are
+    written as numbers and need none.
+    """
+    return f"'{text}" if text.startswith(('=', '+', '-', '@', '\t', '\r')) else text
+
+
 def utc(time_ns: int) -> str:
     """
     Return a time in a form to read, in whole seconds of UTC.
@@ -95,6 +111,13 @@ def utc(time_ns: int) -> str:
     if moment.year < 1980:
         return f'{seconds} s'
     return moment.strftime('%Y-%m-%d %H:%M:%S UTC')
+
+
+def day(time_ns: int) -> str:
+    """
+    Return the day of a time, UTC, in ISO 8601.
+    """
+    return datetime.fromtimestamp(time_ns // 1_000_000_000, UTC).strftime('%Y-%m-%d')
 
 
 def duration(seconds: float) -> str:

@@ -68,3 +68,7 @@ class DiagnosisError(ShipdragError):
 
 class SensitivityError(ShipdragError):
     """A question of what matters that cannot be answered."""
+
+
+class FleetError(ShipdragError):
+    """A folder of bags, or a store of what they gave, that cannot be used."""

@@ -14,11 +14,11 @@ import reprlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ProblemsError
+from shipdrag_ros.plain_file import read_small_text
 
 Problems = list[str]
 Reader = Callable[[object, str, Problems], Any]
@@ -328,17 +328,8 @@ def text_of(path: str | PathLike[str], *, what: str, error: type[ProblemsError])
     ProblemsError
         Of the kind given, if it is no regular file of text, or too large.
     """
-    file = Path(path)
     try:
-        about = file.stat()
-        if not (file.is_file() or file.is_dir()):  # a device or a pipe would never end
-            raise error(str(path), [f'cannot be read: no regular file; give the path of {what}'])
-        if about.st_size > strict_yaml.LARGEST:
-            raise error(
-                str(path),
-                [f'has {about.st_size} bytes, too many for {what} ({strict_yaml.LARGEST})'],
-            )
-        return file.read_text(encoding='utf-8-sig')
+        return read_small_text(path, most_bytes=strict_yaml.LARGEST)
     except OSError as wrong:
         problem = f'cannot be read: {wrong.strerror or wrong}; give the path of {what}'
         raise error(str(path), [problem]) from wrong

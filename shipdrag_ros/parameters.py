@@ -202,10 +202,26 @@ class Parameters:
         """
         Build from names and values; what is not named keeps its default.
 
+        Parameters
+        ----------
+        values
+            By name, in the unit that each name ends in.
+        subject
+            Names the values in errors, a path for instance.
+
+        Returns
+        -------
+        Parameters
+            Checked.
+
         Raises
         ------
         ParameterError
             Naming every unknown key and every bad value at once.
+
+        Notes
+        -----
+        Source: config/parameters.yaml lists all of them with meaning, unit and default.
 
         Examples
         --------

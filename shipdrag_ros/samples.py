@@ -19,6 +19,7 @@ Int64 = NDArray[np.int64]
 UInt8 = NDArray[np.uint8]
 Float64 = NDArray[np.float64]
 
+SECOND_NS = 1_000_000_000
 FUTURE_NS = 2_000_000_000  # a stamp this far after its arrival is not a measurement
 BACKWARD_JUMP_NS = 10_000_000_000  # a stamp this far back means that the clock was set
 ABSURD_SPEED_M_S = 40.0  # faster than any displacement ship
@@ -191,6 +192,20 @@ class Block:
             Time of arrival [ns]; the stamps where it is not given.
         variance : scalar, (n,) or (n, 2)
             Variance of the value; NaN where unknown.
+
+        Returns
+        -------
+        Block
+            Of n samples, in the order given.
+
+        Raises
+        ------
+        ValueError
+            If the sizes differ.
+
+        Notes
+        -----
+        Source: docs/architecture.md, one sequence of samples in arrival order.
 
         Examples
         --------

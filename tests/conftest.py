@@ -25,6 +25,8 @@ from shipdrag_ros.estimation.result import (
     ResistanceCurve,
     Track,
 )
+from shipdrag_ros.fleet.rows import FROUDE, BagResult
+from shipdrag_ros.fleet.store import Store, bag_schema, coastdown_schema
 from shipdrag_ros.replay import InputCounts, Recorded
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.truth import TrueCurve
@@ -176,3 +178,47 @@ def truth() -> TrueCurve:
 @pytest.fixture
 def simulated(run: RunResult, truth: TrueCurve) -> RunResult:
     return replace(run, truth=truth)
+
+
+def fleet_result(number: int, added: float, *, error: str | None = None) -> BagResult:
+    """A bag of one coastdown, as the fleet writes it."""
+    speed = FROUDE * 28.0
+    clean = 1e-3 * speed**2
+    common = {'content_hash': f'{number:064x}', 'bag': f'{number}.mcap'}
+    row = dict.fromkeys(coastdown_schema().names) | {
+        **common,
+        'time_ns': _START_NS + number * 15 * 86_400 * _SECOND_NS,
+        'froude': FROUDE,
+        'speed_m_s': speed,
+        'resistance_m_s2': (1.0 + added) * clean,
+        'sigma_m_s2': 0.03 * clean,
+        'sigma_repeatable_m_s2': 0.01 * clean,
+        'clean_m_s2': clean,
+        'speed_at_stop_m_s': 8.0,
+        'length_m': 80.0,
+        'displaced_volume_m3': 1000.0,
+        'water_density_kg_m3': 1025.0,
+        'software_version': '1',
+    }
+    bag = dict.fromkeys(bag_schema().names) | {
+        **common,
+        'root': 'r',
+        'ship': None if error else 'Test <b>ship</b>',
+        'software_version': '1',
+        'coastdowns': 0 if error else 1,
+        'messages': 1,
+        'warnings': [],
+        'error': error,
+    }
+    return BagResult(bag, () if error else (row,))
+
+
+@pytest.fixture(scope='session')
+def fleet_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of one ship with twelve runs and one bag that could not be read."""
+    made = Store(tmp_path_factory.mktemp('fleet') / 'store')
+    for number in range(12):
+        made.write(fleet_result(number, 0.01 * number))
+    made.write(fleet_result(99, 0.0, error='no bag: 3 bytes of text'))
+    made.keep_ship('Test <b>ship</b>', {'events.csv': 'date,kind\n2024-02-01,cleaning\n'})
+    return made.path

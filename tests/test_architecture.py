@@ -18,7 +18,7 @@ PACKAGE = ROOT / 'shipdrag_ros'
 
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
-    ('errors', 'samples', 'display', 'compiled', 'strict_yaml'),
+    ('errors', 'samples', 'display', 'compiled', 'strict_yaml', 'plain_file'),
     ('fields',),
     ('parameter',),
     ('parameters', 'ship', 'report'),
@@ -27,9 +27,11 @@ PICTURE = (
     ('estimation', 'simulation'),
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
-    ('bags',),
+    ('bags', 'nmea'),
     ('bags.salvage',),
-    ('node', 'replay', 'importing', 'fleet'),
+    ('node', 'replay', 'importing'),
+    ('fleet',),
+    ('trend',),
     ('live',),
     ('cli',),
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none
@@ -39,9 +41,12 @@ ESTIMATING = {'coastdown', 'estimation', 'diagnosis', 'simulation'}
 NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags': ESTIMATING | {'studies'},
     'bags.salvage': ESTIMATING | {'studies'},
-    **{name: {'studies'} for name in ('messages', 'replay', 'importing', 'node', 'report')},
+    **{
+        name: {'studies'}
+        for name in ('messages', 'nmea', 'replay', 'importing', 'node', 'fleet', 'trend', 'report')
+    },
 }
-GROUND = {'errors', 'compiled', 'strict_yaml'}  # known by the modules that need them
+GROUND = {'errors', 'compiled', 'strict_yaml', 'plain_file'}  # known by the modules that need them
 ROS = {
     'rclpy',
     'lifecycle_msgs',
@@ -57,7 +62,13 @@ ROS = {
     'ament_index_python',
 }
 FILES = {'bags', 'bags.salvage'}
-ONLY_IN = {'mcap': FILES, 'rosbags': {'messages', *FILES}, **{name: {'node'} for name in ROS}}
+FLEET = ('dask', 'distributed', 'pyarrow', 'fsspec', 's3fs')
+ONLY_IN = {
+    'mcap': FILES,
+    'rosbags': {'messages', *FILES},
+    **{name: {'node'} for name in ROS},
+    **{name: {'fleet', 'trend'} for name in FLEET},  # no other verb pays for them
+}
 SOURCES = sorted(PACKAGE.rglob('*.py'))
 
 

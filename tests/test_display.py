@@ -37,3 +37,10 @@ def test_a_long_time_is_also_given_in_minutes() -> None:
 def test_a_slow_ship_is_told_to_the_millimetre() -> None:
     assert display.speed_text(4.5678, highest_m_s=8.0) == '4.57'
     assert display.speed_text(0.5678, highest_m_s=0.9) == '0.568'
+
+
+@pytest.mark.parametrize('first', ['=', '+', '-', '@', '\t', '\r'])
+def test_no_text_is_a_formula(first: str) -> None:
+    assert display.spreadsheet_text(f'{first}1+1') == f"'{first}1+1"
+    assert display.spreadsheet_text(f'run {first}1') == f'run {first}1'
+    assert display.spreadsheet_text('') == ''

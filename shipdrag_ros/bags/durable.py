@@ -8,6 +8,7 @@ that fails for a while loses nothing that memory can hold.
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -27,6 +28,7 @@ SYNC_S = 0.5  # to the disk: survives the end of the power
 RETRY_S = 1.0
 CHUNK_BYTES = 1 << 20
 EARLIER_AT_ONCE = 4096
+KEPT_BEFORE = 100  # messages that wait for a first that makes a file
 QUEUE_BYTES = 64 * 1024 * 1024
 _MESSAGE_BYTES = 400  # of Python, around the content
 
@@ -55,8 +57,10 @@ class RecordingProgress:
 
     Attributes
     ----------
+    directory
+        Where the parts are written.
     path
-        File of the part being written, or of the last.
+        File of the part being written, or of the last; None before the first.
     part
         Its number, from 0.
     messages, size_bytes
@@ -73,6 +77,7 @@ class RecordingProgress:
         Finished parts that could not be made compact; they are whole.
     """
 
+    directory: Path
     path: Path | None
     part: int
     messages: int
@@ -102,6 +107,8 @@ class DurableRecording:
         Messages to begin with; read in the thread that writes.
     queue_bytes
         Memory for what waits for the disk; what finds no room is counted.
+    at_once
+        Whether a file is made before there is a message.
     """
 
     def __init__(
@@ -113,6 +120,7 @@ class DurableRecording:
         limits: PartLimits,
         earlier: Iterable[EncodedMessage] = (),
         queue_bytes: int = QUEUE_BYTES,
+        at_once: bool = True,
     ) -> None:
         self._directory = directory
         self._stem = stem
@@ -120,6 +128,7 @@ class DurableRecording:
         self._limits = limits
         self._earlier: Iterator[EncodedMessage] | None = iter(earlier)
         self._queue_bytes = queue_bytes
+        self._wanted = at_once  # a file
         self._recording_id = uuid4().hex
         self._part = 0
         self._file: LiveFile | None = None
@@ -143,12 +152,25 @@ class DurableRecording:
         self._thread = threading.Thread(target=self._run, name='recording', daemon=True)
         self._thread.start()
 
-    def put(self, message: EncodedMessage) -> None:
+    def put(self, message: EncodedMessage, *, begins: bool = True) -> None:
         """
         Hand a message over; returns at once, whatever the disk does.
+
+        Parameters
+        ----------
+        message
+            What to write.
+        begins
+            Whether it is worth a file; of those that are not, the latest
+            `KEPT_BEFORE` wait for one that is.
         """
         size = _held_bytes([message])
         with self._lock:
+            if begins and not self._wanted:
+                self._wanted, self._oldest_s = True, monotonic()
+            elif not self._wanted and len(self._queue) >= KEPT_BEFORE:
+                self._held_bytes -= _held_bytes([self._queue.pop(0)])
+                self._accepted -= 1
             if self._held_bytes + size > self._queue_bytes:
                 self._lost += 1
                 return
@@ -182,8 +204,9 @@ class DurableRecording:
         Return how the recording stands; asks no disk.
         """
         with self._lock:
-            waiting = self._accepted - self._safe
+            waiting = self._accepted - self._safe if self._wanted else 0
             return RecordingProgress(
+                directory=self._directory,
                 path=self._path,
                 part=self._part,
                 messages=self._safe,
@@ -194,6 +217,14 @@ class DurableRecording:
                 error=self._error,
                 uncompacted=len(self._uncompacted),
             )
+
+    def files(self) -> set[Path]:
+        """
+        Return the files that are being written, or will be rewritten.
+        """
+        with self._lock:
+            open_now = set() if self._file is None else {self._file.path}
+        return open_now | {path for path, _ in tuple(self._uncompacted)}
 
     def _run(self) -> None:
         while True:
@@ -218,15 +249,21 @@ class DurableRecording:
             with self._lock:
                 self._accepted += len(self._due)
                 self._held_bytes += _held_bytes(self._due)
-            if not self._due:
+            if self._due:
+                self._wanted = True
+            else:
                 self._earlier = None
-        if self._earlier is None:
+        if self._earlier is None and self._wanted:
             with self._lock:
                 self._due += self._queue
                 self._queue = []
                 self._taken_s = monotonic()
 
     def _write(self) -> None:
+        if not self._wanted:
+            self._make_directory()
+            self._tried.set()
+            return
         file = self._file or self._open()
         while self._due:
             fitting = self._fitting(file)
@@ -265,8 +302,8 @@ class DurableRecording:
         self._error = ''
 
     def _open(self) -> LiveFile:
+        self._make_directory()
         try:
-            self._directory.mkdir(parents=True, exist_ok=True)
             path = self._free_path()
         except OSError as error:
             raise BagError(f'{str(error.filename)!r}: {error.strerror}') from error
@@ -281,6 +318,17 @@ class DurableRecording:
         self._file = file
         self._tried.set()
         return file
+
+    def _make_directory(self) -> None:
+        try:
+            self._directory.mkdir(mode=0o750, parents=True, exist_ok=True)
+            real = self._directory.resolve()
+        except OSError as error:
+            raise BagError(f'{str(error.filename)!r}: {error.strerror}') from error
+        if self._directory.is_absolute() and real != self._directory:
+            raise BagError(f'{str(self._directory)!r} has become a link to {str(real)!r}')
+        if not os.access(self._directory, os.W_OK | os.X_OK):
+            raise BagError(f'{str(self._directory)!r}: Permission denied')
 
     def _free_path(self) -> Path:
         name = f'{self._stem}_{self._part:03d}'
@@ -324,7 +372,8 @@ class DurableRecording:
             except BagError as error:
                 self._fail(error)
         with self._lock:
-            self._lost += self._accepted - self._safe
+            if self._wanted:
+                self._lost += self._accepted - self._safe
             self._accepted = self._safe
         if self._compactor is not None:
             self._compactor.join()

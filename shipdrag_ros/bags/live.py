@@ -30,7 +30,7 @@ from mcap.records import (
 from shipdrag_ros.bags import declarations
 from shipdrag_ros.bags.declarations import LIBRARY, PROFILE, as_bytes
 from shipdrag_ros.bags.records import MAGIC
-from shipdrag_ros.bags.writer import METADATA
+from shipdrag_ros.bags.writer import METADATA, private_opener
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 
@@ -75,7 +75,7 @@ class LiveFile:
         self._declared_at = 0
         try:
             # unbuffered: what could not be written must not be tried again on closing
-            self._file = path.open('xb', buffering=0)
+            self._file = open(path, 'xb', buffering=0, opener=private_opener)  # noqa: SIM115
         except FileExistsError:
             raise BagError(f'{str(path)!r} exists') from None
         except OSError as error:

@@ -36,6 +36,18 @@ METADATA = 'shipdrag_ros'
 """Name of the metadata record that tells which recording a file is part of."""
 
 
+def private_opener(path: str, flags: int) -> int:
+    """
+    Open a file that is made: not readable by everybody, and never through a link.
+
+    Parameters
+    ----------
+    path, flags
+        As `open` hands them to its `opener`.
+    """
+    return os.open(path, flags | os.O_NOFOLLOW, 0o640)
+
+
 class Compression(Enum):
     """How the chunks of a file are compressed."""
 
@@ -86,7 +98,7 @@ class BagWriter:
         self._schemas: dict[str, int] = {}
         self._channels: dict[tuple[str, str], int] = {}
         try:
-            self._file = self.path.open('xb')
+            self._file = open(self.path, 'xb', opener=private_opener)  # noqa: SIM115
         except FileExistsError:
             raise BagError(f'{str(path)!r} exists; choose another name or remove it') from None
         except OSError as error:

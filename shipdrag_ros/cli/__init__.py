@@ -39,6 +39,7 @@ VERBS = (
     Verb('node', '.node', 'the onboard node: estimates live and records'),
     Verb('replay', '.replay', 'the same estimator over bags, without ROS'),
     Verb('simulate', '.simulate', 'simulated coastdown with sensors, as a bag'),
+    Verb('simulate-fleet', '.simulate_fleet', 'months of a few ships, as a folder of bags'),
     Verb(
         'baseline',
         '.baseline',
@@ -49,6 +50,8 @@ VERBS = (
         '.diagnose',
         'where model and data disagree, and which effect is missing',
     ),
+    Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
+    Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
     Verb('import', '.import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
     Verb('info', '.info', 'what is in a bag'),
     Verb('check', '.check', 'is a bag sound'),

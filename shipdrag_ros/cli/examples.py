@@ -21,10 +21,16 @@ EXAMPLES = {
         'shipdrag simulate --ship ship.yaml -o fouled.mcap --effect fouling=0.3 '
         '--effect current=0.4,cross_track_m_s=0.1',
     ),
+    'simulate-fleet': ('shipdrag simulate-fleet -o fleet --ships 1 --months 1 --seed 4',),
     'baseline': ('shipdrag baseline clean_1.mcap clean_2.mcap --ship ship.yaml -o learnt.yaml',),
     'diagnose': (
         'shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml',
         'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
+    ),
+    'fleet': ('shipdrag fleet records -o store --workers 1',),
+    'trend': (
+        'shipdrag trend store --json trend.json',
+        "shipdrag trend store --sql 'select ship, count(*) from coastdowns group by ship'",
     ),
     'import': (
         'shipdrag import LOG.nmea.gz -o log.mcap --ship ship.yaml',

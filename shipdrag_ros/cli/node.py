@@ -4,14 +4,20 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Iterator, MutableMapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.cli.arguments import number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.nmea.address import parse_addresses
 from shipdrag_ros.ship import Ship
+
+RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
+LOCAL_ONLY = 'ROS_LOCALHOST_ONLY'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +33,33 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar='DIR',
         help='where recordings are written; made if missing, nothing there is overwritten',
+    )
+    parser.add_argument(
+        '--nmea',
+        action='append',
+        default=[],
+        metavar='SOURCE',
+        help='hear NMEA 0183 besides topics: udp://ADDRESS:PORT, tcp://HOST:PORT or '
+        'serial:DEVICE:BAUD; may be given several times',
+    )
+    parser.add_argument(
+        '--keep-days',
+        type=number(0.0),
+        metavar='N',
+        help='remove recordings that are older, unless they hold a coastdown (default: keep all)',
+    )
+    parser.add_argument(
+        '--keep-bytes',
+        type=number(0.0),
+        metavar='N',
+        help='remove the oldest recordings when all are larger together, those that hold a '
+        'coastdown last, for instance 2e10 (default: keep all)',
+    )
+    parser.add_argument(
+        '--network',
+        action='store_true',
+        help='be found by ROS on the whole network; without it, and without a ROS environment '
+        'variable that says so, on this machine alone',
     )
     parser.add_argument(
         '--ros-args',
@@ -50,7 +83,59 @@ def run(options: argparse.Namespace) -> int:
         from shipdrag_ros.node import main
     except ModuleNotFoundError as error:
         raise no_ros(error) from error
-    return main.run(options.ship, options.out, ros_arguments=options.ros_args)
+    output.log(discovery(os.environ, network=options.network))
+    return main.run(
+        options.ship,
+        options.out,
+        settings=stated_settings(options),
+        ros_arguments=options.ros_args,
+    )
+
+
+def stated_settings(options: argparse.Namespace) -> dict[str, object]:
+    """
+    Return the parameters of the node that the command line states.
+
+    Raises
+    ------
+    ShipdragError
+        If a source of NMEA is none.
+    """
+    stated: dict[str, object] = {}
+    if options.nmea:
+        stated['nmea'] = ' '.join(str(each) for each in parse_addresses(' '.join(options.nmea)))
+    if options.keep_days is not None:
+        stated['keep_days'] = float(options.keep_days)
+    if options.keep_bytes is not None:
+        stated['keep_bytes'] = int(options.keep_bytes)
+    return stated
+
+
+def discovery(environment: MutableMapping[str, str], *, network: bool) -> str:
+    """
+    Settle who can find the node, and say it.
+
+    Parameters
+    ----------
+    environment
+        Of this process; set where it says nothing.
+    network
+        Whether `--network` was given.
+    """
+    if network:
+        environment[RANGE] = 'SUBNET'
+        environment.pop(LOCAL_ONLY, None)
+        return (
+            'the node is found on the whole network, by anybody (--network); see docs/security.md'
+        )
+    for name in (RANGE, LOCAL_ONLY):
+        if name in environment:
+            return f'who finds the node: {name}={environment[name]}, as the environment says'
+    environment[RANGE] = 'LOCALHOST'
+    return (
+        f'the node is found on this machine alone; --network, or {RANGE}=SUBNET, opens it to '
+        'drivers elsewhere on the network, and to everybody else there'
+    )
 
 
 def overruled(ros_arguments: Sequence[str], *, ship: Path, out: Path) -> list[str]:

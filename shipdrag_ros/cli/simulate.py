@@ -7,6 +7,7 @@ import argparse
 import math
 from collections import Counter
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import (
     STANDARD_INPUTS,
     STANDARD_SD,
+    START_NS,
     Scenario,
     sense,
     simulate,
@@ -32,6 +34,8 @@ from shipdrag_ros.simulation.effects import LIBRARY, parse, values_of
 _AT_ONCE = 1000  # messages between two looks at the progress
 _TRUE_POINTS = 201
 _TRUE_MARGIN = 1.05
+_FIRST_YEAR, _LAST_YEAR = 1980, 2037  # the stamp of a message has 31 bits of seconds
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _SPEED_FRACTION = 0.8  # of what the baseline reaches
 _RESISTANCE = (
     'what depends on the speed through water alone: the baseline and what effects add to it as '
@@ -54,6 +58,7 @@ class Settings:
     inputs: tuple[str, ...] = STANDARD_INPUTS
     effects: tuple[StatedEffect, ...] = ()
     first_heading_rad: float | None = None
+    start_ns: int = START_NS
 
     def stated(self, ship: Ship) -> dict[str, object]:
         """
@@ -136,6 +141,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='heading of the first run [rad], to which current, wind and waves are stated; give '
         'it to simulate another run of the same day (default: this run is the first)',
     )
+    parser.add_argument(
+        '--start',
+        type=moment_ns,
+        metavar='DATE',
+        help='date of the first stamp, ISO 8601, UTC unless it says otherwise: 2026-03-01 or '
+        '2026-03-01T06:30:00+01:00 (default: 2026-06-01T08:00:00)',
+    )
     _add_sensors(parser)
     add_json(parser)
 
@@ -193,6 +205,7 @@ def run(options: argparse.Namespace) -> int:
         inputs=options.inputs,
         effects=tuple(parse(text) for text in options.effect),
         first_heading_rad=options.first_heading,
+        start_ns=START_NS if options.start is None else options.start,
     )
     block, truth = make(ship, settings)
     write_bag(options.out, block, ship, truth, output)
@@ -242,6 +255,7 @@ def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
         motion,
         standard_sensors(rate_hz=settings.rate_hz, noise=settings.noise, inputs=settings.inputs),
         seed=settings.seed,
+        start_ns=settings.start_ns,
     )
     # the fit starts a little above or below the true speed
     highest = min(_TRUE_MARGIN * settings.speed_m_s, _highest_speed(ship))
@@ -300,3 +314,21 @@ def _seed(text: str) -> int:
     if not text.isdecimal():
         raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number, 0 or more')
     return int(text)
+
+
+def moment_ns(text: str) -> int:
+    """
+    Read a date or a time of ISO 8601 [ns since the epoch].
+    """
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        moment = _EPOCH
+    # a clock that starts near zero is taken for one that does not know the date
+    if not _FIRST_YEAR <= moment.year <= _LAST_YEAR:
+        raise argparse.ArgumentTypeError(
+            f'{text!r}, expected a date of ISO 8601 from {_FIRST_YEAR} to {_LAST_YEAR}, as '
+            '2026-03-01 or 2026-03-01T06:30:00Z'
+        )
+    utc = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    return (utc - _EPOCH) // timedelta(microseconds=1) * 1000

@@ -26,9 +26,9 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
 
-SECOND_NS = 1_000_000_000
 LEAST_READINGS = 8  # of the speed, or positions, in what is kept
 LEAST_FALL = 0.05  # of the speed, from the first to the last tenth of what is kept
 _ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are told

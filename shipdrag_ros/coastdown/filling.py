@@ -27,9 +27,9 @@ from shipdrag_ros.coastdown.bins import (
     mean_place,
     smoothing,
 )
-from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS
+from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import ABSURD_SPEED_M_S, Channel, Int64
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, SECOND_NS, Channel, Int64
 
 _GEODETIC = int(Channel.POSITION_GEODETIC)
 _HEADING = int(Channel.HEADING)

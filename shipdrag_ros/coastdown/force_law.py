@@ -18,6 +18,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown.events import Dismissal
 from shipdrag_ros.coastdown.readings import binned
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.samples import Float64
 
 _LEAST = 8  # bins in which a law can be told from another
@@ -249,7 +250,7 @@ def _more_of_it(last: Cut, t: Float64, cut: Cut | None) -> Cut | None:
 def _rise(t: Float64, v: Float64) -> Cut | None:
     """Cut what is before the highest speed, where the speed rises to it."""
     top = int(np.argmax(v))
-    noise = 1.4826 * float(np.median(np.abs(np.diff(v, 2)))) / 6.0**0.5
+    noise = MAD_TO_SD * float(np.median(np.abs(np.diff(v, 2)))) / 6.0**0.5
     rise = float(v[top] - v[0])
     if top == 0 or rise < max(_SURE * noise, _RISE * float(v[top])):
         return None

@@ -12,11 +12,11 @@ from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
 from shipdrag_ros.coastdown.readings import binned, clean_readings, readings, seconds
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
-SECOND_NS = 1_000_000_000
 _RUDDER_RAD = 0.17
 _ASTERN = 0.1  # of the highest speed: less is drift
 _OPPOSED = -0.7  # cosine of heading and course
@@ -125,7 +125,7 @@ def _course(window: Window, count: int) -> tuple[Float64, Float64, Float64, floa
         return None
     way = np.column_stack([np.diff(east), np.diff(north)])
     bend = np.diff(track.value, 2, axis=0)
-    noise_m = 1.4826 * float(np.median(np.abs(bend))) / math.sqrt(6.0 * len(track) / count)
+    noise_m = MAD_TO_SD * float(np.median(np.abs(bend))) / math.sqrt(6.0 * len(track) / count)
     speed = np.hypot(way[:, 0], way[:, 1]) / np.diff(t)
     return 0.5 * (t[1:] + t[:-1]), speed, np.arctan2(way[:, 1], way[:, 0]), noise_m
 

@@ -24,7 +24,6 @@ from shipdrag_ros.coastdown.validate import (
     ARRIVAL_JUMPED_BACK,
     CHANNEL_CODES,
     NEVER,
-    SECOND_NS,
     STAMP_JUMPED_BACK,
     STAMPS,
     VALUES,
@@ -35,7 +34,7 @@ from shipdrag_ros.coastdown.validate import (
     remember,
 )
 from shipdrag_ros.compiled import Signature, compiled
-from shipdrag_ros.samples import Channel, Float64, Int64, Reason, UInt8
+from shipdrag_ros.samples import SECOND_NS, Channel, Float64, Int64, Reason, UInt8
 
 # A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
 SHAFT_TURNING_RAD_S = 0.5

@@ -39,12 +39,12 @@ from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
-from shipdrag_ros.coastdown.validate import NEVER, SECOND_NS, Limits, alive_ns
+from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
 from shipdrag_ros.ship import Ship
 
 Estimator = Callable[[Window, Ship, Parameters], Estimate]
@@ -73,6 +73,9 @@ class Monitor:
 
     Notes
     -----
+    Source: docs/architecture.md, the main job. It raises nothing: what is wrong with a sample
+    is a counted rejection.
+
     Memory is bounded: `history_ns` of samples, at most `ring.CAPACITY` of them.
 
     Examples

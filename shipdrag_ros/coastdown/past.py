@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, Channel, Float64, Int64
 
 MOTION = int(Channel.POSITION_GEODETIC) + 1  # the channels before it are judged
@@ -32,7 +33,6 @@ REPEATS = 2  # among the readings kept: a sensor that repeats more often does so
 _NEVER = -(2**62)
 _LEARN_NS = 128_000_000_000
 _WITNESSES = 16  # readings before a run of repeats that tell whether it is natural
-_OF_MEDIAN = 0.6745  # median of the size of a normal variable, in standard deviations
 _OF_QUARTILE = 1.1503  # its upper quartile
 _OF_PLANE = 1.1774  # median of the length of a normal vector of the plane
 # A step of 0.1 knots, the resolution of many logs, is never an outlier; and 2 % are not worth it.
@@ -269,7 +269,7 @@ def _learn_speed(past: Past, channel: int, count: int, kept: int) -> None:
         _insert(scratch, i, abs(value[one, 0] - value[other, 0]))
     known = kept - 1
     # the quartile too: more than half of the readings of a coarse log repeat
-    spread = max(scratch[known // 2] / _OF_MEDIAN, scratch[3 * known // 4] / _OF_QUARTILE)
+    spread = max(scratch[known // 2] * MAD_TO_SD, scratch[3 * known // 4] / _OF_QUARTILE)
     near = abs(median(past, channel, count, 0, 0.0))
     past.gate[channel] = max(_FLOOR_M_S + _FLOOR_PART * near, SD * spread)
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.samples import Float64
 
 _BINS = 48  # of a stretch; a change in it is found to within one of them
@@ -34,7 +35,7 @@ def clean_readings(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
     at = np.clip(np.arange(n), _NEIGHBOURS, n - 1 - _NEIGHBOURS)
     near = value[at[:, None] + np.arange(-_NEIGHBOURS, _NEIGHBOURS + 1)]
     away = np.abs(value - np.median(near, axis=1))
-    scale = 1.4826 * float(np.median(away))
+    scale = MAD_TO_SD * float(np.median(away))
     # a fall over the ends of the neighbourhood is none of noise
     fall = np.ptp(np.sort(near, axis=1)[:, 1:-1], axis=1)
     keep = away <= _HAMPEL * scale + fall

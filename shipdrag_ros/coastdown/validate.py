@@ -47,6 +47,7 @@ from shipdrag_ros.samples import (
     ABSURD_SPEED_M_S,
     BACKWARD_JUMP_NS,
     FUTURE_NS,
+    SECOND_NS,
     Block,
     Channel,
     Float64,
@@ -57,7 +58,6 @@ from shipdrag_ros.samples import (
 
 CHANNELS = len(Channel)
 NEVER = -(2**62)  # a stamp before all stamps that leaves room for subtraction
-SECOND_NS = 1_000_000_000
 
 # not reasons of a sample: the clock was set, everything starts afresh
 STAMP_JUMPED_BACK = -1

@@ -40,6 +40,7 @@ def diagnose(
     parameters: Parameters,
     *,
     facts: Sequence[Fact] = (),
+    advise: bool = True,
 ) -> Diagnosis:
     """
     Name the effect that is missing in a ship's model.
@@ -54,6 +55,8 @@ def diagnose(
         For the noise of the sensors and the convention of the heading.
     facts
         That a log book knows of all runs, whatever the ship file and the runs say.
+    advise
+        Whether to work out what would decide, which takes as long as all the rest.
 
     Returns
     -------
@@ -69,6 +72,9 @@ def diagnose(
 
     Notes
     -----
+    Source: Bayesian comparison of models by their evidence, MacKay (2003), *Information Theory,
+    Inference, and Learning Algorithms*, chapter 28.
+
     A run that has too little of either is left out, and a note says so.
 
     Examples
@@ -110,7 +116,7 @@ def diagnose(
     distrusted = any(run.log_ground_discrepancy for run in seen) and not _of_the_ship(found)
     judged = judge(found, held_out=predicted, distrusted=distrusted)
     would_decide: tuple[Advice, ...] = ()
-    if judged.verdict is Verdict.ONE_OF:
+    if advise and judged.verdict is Verdict.ONE_OF:
         would_decide = advice(model, judged.posterior, judged.candidates)
     as_stated = frozen(model)
     explained = best if judged.missing else found.nothing

@@ -21,6 +21,7 @@ import numpy as np
 
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, Int64
@@ -35,7 +36,6 @@ _NEAR_S = 10.0  # of a time are the positions that tell where the vessel was
 _STOPPED = 0.25  # of the usual speed
 _UNSTEADY = 0.15  # of the speed, between the halves of a leg
 _OUTLIER = 5.0  # robust standard deviations
-_MAD_TO_SD = 1.4826
 
 
 class Left(StrEnum):
@@ -329,7 +329,7 @@ class _Timed:
         """Return the mean of all, and of each half, without outliers."""
         value = np.asarray(self.value, np.float64)
         away = np.abs(value - np.median(value))
-        keep = away <= _OUTLIER * _MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
+        keep = away <= _OUTLIER * MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
         edges = np.array([-np.inf, middle_s, np.inf])
         halves = bin_means(self.time_s[keep], value[keep], edges)[1]
         return float(value[keep].mean()), float(halves[0]), float(halves[-1])

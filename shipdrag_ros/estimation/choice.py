@@ -48,10 +48,19 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     parameters
         `estimator` among them; `auto` is `log_time`.
 
+    Returns
+    -------
+    Estimate
+        r(v) [m/s^2] with its standard deviation, its valid range and notes.
+
     Raises
     ------
     EstimationError
         If the window does not hold a coastdown that can be estimated.
+
+    Notes
+    -----
+    Source: S1 for `s1_*`; docs/accuracy.md for `log_time`.
 
     Examples
     --------

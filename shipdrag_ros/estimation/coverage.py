@@ -6,9 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.samples import MOTION_INPUTS
+from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS
 
-_SECOND_NS = 1_000_000_000
 _GAP_S = 10.0  # without a sample, and more than _GAP_STEPS usual steps: a gap
 _GAP_STEPS = 5.0
 _WORTH_SAYING = 0.1  # of the window
@@ -31,9 +30,9 @@ def missing_s(series: Series, start_ns: int, end_ns: int) -> float:
         Sum of the gaps [s].
     """
     if not len(series):
-        return (end_ns - start_ns) / _SECOND_NS
+        return (end_ns - start_ns) / SECOND_NS
     edges = np.concatenate([[start_ns], series.time_ns, [end_ns]])
-    steps = np.diff(edges) / _SECOND_NS
+    steps = np.diff(edges) / SECOND_NS
     usual = float(np.median(steps))
     return float(steps[steps > max(_GAP_S, _GAP_STEPS * usual)].sum())
 
@@ -53,7 +52,7 @@ def coverage_notes(window: Window) -> tuple[str, ...]:
         A sentence for each input of the motion that says nothing of a tenth of it.
     """
     before = window if window.before is None else window.before
-    length = (window.end_ns - window.start_ns) / _SECOND_NS
+    length = (window.end_ns - window.start_ns) / SECOND_NS
     missing = {}
     for name in MOTION_INPUTS:
         series: Series = getattr(window, name)

@@ -38,10 +38,19 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
         estimate, or that of one input alone, and a note says why. Any other is
         used as during the coastdown.
 
+    Returns
+    -------
+    Estimate
+        r(v) [m/s^2] with its standard deviation, its valid range and notes.
+
     Raises
     ------
     EstimationError
         If the window does not hold a coastdown that can be estimated.
+
+    Notes
+    -----
+    Source: docs/accuracy.md; the equation of motion is (1 + n_r) dv/dt = -r(v), S1 (1).
 
     Examples
     --------

@@ -45,6 +45,7 @@ LINES = (
 )
 
 _CLEAN: dict[str, Any] = {'color': VERMILION, 'linestyle': '--'}
+_DATED = LINES[2:]  # not those of the clean hull and of all together
 _BAND_LABEL = '±2 standard deviations'
 _NAMED = 12  # curves that a legend has room for
 _MANY_POINTS = 500  # above this dots are drawn as pixels, or the page grows by megabytes
@@ -234,7 +235,7 @@ def curves_picture(
     Parameters
     ----------
     dated
-        A label and a curve each; those beyond the sixth share the look of the first.
+        A label and a curve each; those beyond the fourth share the look of the first.
     ship
         For force, and for the clean hull.
     combined
@@ -247,7 +248,7 @@ def curves_picture(
         highest = max(float(curve.speed_m_s[-1]) for _, curve in dated)
         _draw_clean(axis, ship, scale, np.linspace(0.02 * highest, highest, 101))
         for number, (label, curve) in enumerate(dated):
-            color, style = LINES[(number + 1) % len(LINES)]
+            color, style = _DATED[number % len(_DATED)]
             force = Force.of(curve, ship)
             if len(dated) == 1:
                 _draw_force(axis, force, scale, label=label)

@@ -150,6 +150,11 @@ class Window:
         before_ns
             Where the record before the window starts [ns]; None: not taken.
 
+        Returns
+        -------
+        Window
+            With a series of each input: stamps [ns], values [m/s, m or rad], variances.
+
         Raises
         ------
         ValueError

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from shipdrag_ros.bags.writer import BagWriter
+from shipdrag_ros.samples import SECOND_NS
 
-SECOND_NS = 1_000_000_000
 LIMIT_NS = 2**31 * SECOND_NS
 """Of the stamp of a message."""
 

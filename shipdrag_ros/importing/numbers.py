@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import DataError, ImportDataError
-from shipdrag_ros.importing.table import NUMBER, Table
+from shipdrag_ros.importing.table import Table
 from shipdrag_ros.samples import Float64
 
 _SHOWN = 20  # cells that are told one by one

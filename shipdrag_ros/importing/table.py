@@ -5,17 +5,15 @@ from __future__ import annotations
 
 import codecs
 import csv
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import NamedTuple
 
+from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 
 DELIMITERS = ',;\t'
-# what `float` takes besides, 1_000 or nan or infinity, is no measured number
-NUMBER = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,4})?')
 
 
 class Row(NamedTuple):

@@ -72,6 +72,18 @@ def decode(source: Source, payloads: Sequence[bytes], receive_ns: ArrayLike) -> 
     receive_ns : (n,) integers
         Time of arrival of each [ns].
 
+    Returns
+    -------
+    Decoded
+            The samples (n,), the place of each among the messages, and how many messages could
+        not be
+        read: a message that is damaged is counted, not raised.
+
+    Raises
+    ------
+    KeyError
+        If the type is none that the input accepts.
+
     Notes
     -----
     Variances follow the columns of the value; those of `POSITION_GEODETIC`

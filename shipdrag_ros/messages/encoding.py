@@ -55,6 +55,20 @@ def encode(block: Block, *, namespace: str = '') -> Iterator[EncodedMessage]:
     namespace
         Put before the name of the input, `/ship` for instance.
 
+    Returns
+    -------
+    iterator of EncodedMessage
+        One a sample: topic, type, CDR bytes, log time and stamp [ns].
+
+    Raises
+    ------
+    KeyError
+        If a channel has no message type.
+
+    Notes
+    -----
+    Source: ROS 2 message definitions, CDR little endian as in OMG DDS-XTypes.
+
     Examples
     --------
     >>> from shipdrag_ros.messages import encode

@@ -18,7 +18,7 @@ from numba import types as nb
 from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.messages.layout import Step
 from shipdrag_ros.messages.types import ENCAPSULATION_BYTES, PADDING_BYTES
-from shipdrag_ros.samples import Float64, Int64, UInt8
+from shipdrag_ros.samples import SECOND_NS, Float64, Int64, UInt8
 
 
 class Found(IntEnum):
@@ -141,7 +141,7 @@ def read_stamp(data: Any, start: int, end: int, i: Any, stamp_ns: Any) -> bool:
         return False
     big = data[_U(start + 1)] == 0
     seconds = np.int64(np.int32(word(data, body, big)))
-    stamp_ns[i] = seconds * 1_000_000_000 + np.int64(word(data, body + 4, big))
+    stamp_ns[i] = seconds * SECOND_NS + np.int64(word(data, body + 4, big))
     return True
 
 

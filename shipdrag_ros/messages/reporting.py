@@ -61,6 +61,7 @@ class EventKind(Enum):
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
+    FILES = 'files'  # recordings removed
     MESSAGE_LOST = 'message_lost'  # sent, and not heard
 
     @property
@@ -70,6 +71,7 @@ class EventKind(Enum):
             EventKind.NO_ESTIMATE,
             EventKind.RESET,
             EventKind.CLOCK_JUMP,
+            EventKind.FILES,
             EventKind.MESSAGE_LOST,
         )
 

@@ -17,6 +17,8 @@ from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from shipdrag_ros.samples import SECOND_NS
+
 ACCEL_WITH_COVARIANCE = 'geometry_msgs/msg/AccelWithCovarianceStamped'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
 IMU = 'sensor_msgs/msg/Imu'
@@ -29,6 +31,7 @@ POSE = 'geometry_msgs/msg/PoseStamped'
 POSE_WITH_COVARIANCE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
 QUATERNION = 'geometry_msgs/msg/QuaternionStamped'
 RANGE = 'sensor_msgs/msg/Range'
+STRING = 'std_msgs/msg/String'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 TWIST_WITH_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 
@@ -85,7 +88,7 @@ def header(stamp_ns: int, frame_id: str) -> Any:
     """
     Build a std_msgs/Header.
     """
-    seconds, nanoseconds = divmod(int(stamp_ns), 1_000_000_000)
+    seconds, nanoseconds = divmod(int(stamp_ns), SECOND_NS)
     stamp = make('builtin_interfaces/msg/Time', sec=seconds, nanosec=nanoseconds)
     return make('std_msgs/msg/Header', stamp=stamp, frame_id=frame_id)
 
@@ -95,7 +98,7 @@ def stamp_ns(message: Any) -> int:
     Return the time in the header of a message [ns].
     """
     stamp = message.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+    return int(stamp.sec) * SECOND_NS + int(stamp.nanosec)
 
 
 def serialize(type_name: str, message: Any) -> bytes:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
+STALE = DiagnosticStatus.STALE
 
 
 def label(
@@ -146,7 +147,17 @@ def input_status(state: InputState) -> DiagnosticStatus:
         if readings:
             values['share used lately [1]'] = state.recent.used / readings
     level = bytes([state.finding.level])
-    return _status(f'input {topic.name}', level, state.finding.text, values)
+    said = f'{state.finding.text}, from {topic.fed_by}' if topic.fed_by else state.finding.text
+    return _status(f'input {topic.name}', level, said, values)
+
+
+def nmea_status(
+    address: str, level: bytes, message: str, values: Mapping[str, object]
+) -> DiagnosticStatus:
+    """
+    Say how one source of NMEA 0183 is doing.
+    """
+    return _status(f'nmea {address}', level, message, values)
 
 
 def recording_status(status: RecordingStatus) -> DiagnosticStatus:

@@ -127,7 +127,7 @@ class InputStates:
         facts = InputFacts(
             topic.name,
             needed=topic.name in MOTION_INPUTS and not any(fresh.get(name) for name in others),
-            type=topic.type,
+            type=topic.type or topic.fed_by or None,
             stamped=topic.type is None or is_stamped(topic.type),
             other_types=topic.other_types,
             accepted=topic.accepted,

@@ -90,6 +90,8 @@ class InputTopic:
         Messages that the middleware says it lost.
     unreadable
         Messages that gave no sample, by reason, and joints that have no place.
+    fed_by
+        What feeds the input instead of its topic, '' if nothing does.
     unstamped
         Readings whose header holds no time.
     """
@@ -118,6 +120,7 @@ class InputTopic:
         self.reported_lost = 0
         self.unstamped = 0
         self.unreadable: Counter[str] = Counter()
+        self.fed_by = ''
         if fixed:
             self._subscribe(fixed, reliable=True)
 
@@ -149,6 +152,14 @@ class InputTopic:
     def age_s(self) -> float | None:
         """Time since the last message [s, steady clock], None before the first."""
         return None if self._last_s is None else time.monotonic() - self._last_s
+
+    def feed(self, by: str) -> None:
+        """
+        Note a message that came another way than by the topic.
+        """
+        self.fed_by = by
+        self.received += 1
+        self._last_s = time.monotonic()
 
     @property
     def lost(self) -> int:

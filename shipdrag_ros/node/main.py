@@ -16,7 +16,7 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -55,20 +55,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
 
 
-def run(ship_file: Path, output_directory: Path, *, ros_arguments: Sequence[str] = ()) -> int:
+def run(
+    ship_file: Path,
+    output_directory: Path,
+    *,
+    settings: Mapping[str, object] | None = None,
+    ros_arguments: Sequence[str] = (),
+) -> int:
     """
     Run the node on a ship file, recording into a directory.
 
     Parameters
     ----------
+    settings
+        More parameters by name.
     ros_arguments
-        More of what may follow `--ros-args`, for instance `['-p', 'window_s:=600.0']`; the
-        two paths hold whatever is said of them there.
+        More of what may follow `--ros-args`, for instance `['-p', 'window_s:=600.0']`; what
+        is given here holds whatever is said of it there.
     """
     # the value of -p is YAML, and a JSON string is a YAML string whatever is in it
-    given = [f'ship_file:={json.dumps(str(ship_file))}']
-    given += [f'output_directory:={json.dumps(str(output_directory))}']
-    flags = [word for assignment in given for word in ('-p', assignment)]
+    paths = {'ship_file': str(ship_file), 'output_directory': str(output_directory)}
+    given = {**(settings or {}), **paths}
+    assignments = [f'{name}:={json.dumps(value)}' for name, value in given.items()]
+    flags = [word for assignment in assignments for word in ('-p', assignment)]
     # of several values of a parameter ROS takes the last
     return main(['coastdown_node', '--ros-args', *ros_arguments, *flags])
 

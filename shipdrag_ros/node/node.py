@@ -16,13 +16,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from shipdrag_ros.bags.durable import PartLimits
+from shipdrag_ros.bags.retention import Keep
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
@@ -32,8 +32,10 @@ from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.health import InputStates, candidates, candidates_text
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.mailbox import Mailbox
+from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder, RecordingState
+from shipdrag_ros.node.service_guard import guard_services
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.samples import MOTION_INPUTS
@@ -75,11 +77,11 @@ class CoastdownNode(LifecycleNode):
         self._diagnosing: Diagnosing | None = None
         self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
+        self._nmea: NmeaFeed | None = None
         self._input_states = InputStates()
         self._mailbox = Mailbox((), ahead=False)
         self._lost: dict[str, int] = {}
         self._outputs: dict[str, Publisher] = {}
-        self._survive_illegal_transitions()
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
@@ -90,6 +92,7 @@ class CoastdownNode(LifecycleNode):
             ('reset', self._reset),
         ):
             self.create_service(Trigger, f'~/{name}', action)
+        guard_services(self.services, self._service_change_state, self.get_logger().warning)
 
     def start(self) -> None:
         """
@@ -112,7 +115,7 @@ class CoastdownNode(LifecycleNode):
         End what is running and destroy the node; ROS may be gone already.
         """
         self._deactivate('the process ends')
-        self._end_diagnosing()
+        self._end_what_runs_beside()
         self.destroy_node()
 
     # lifecycle
@@ -154,27 +157,14 @@ class CoastdownNode(LifecycleNode):
             return TransitionCallbackReturn.ERROR
         return TransitionCallbackReturn.SUCCESS
 
-    def _survive_illegal_transitions(self) -> None:
-        """Refuse what any peer may ask for; rclpy would raise it out of the executor."""
-        service = self._service_change_state
-        change_state = service.callback
-
-        def refuse_or_change(request: Any, response: Any) -> Any:
-            try:
-                return change_state(request, response)
-            except rclpy_implementation.RCLError as error:
-                self.get_logger().warning(f'transition refused: {error}')
-                response.success = False
-                return response
-
-        service.callback = refuse_or_change
-
     def _configure(self) -> None:
         settings = self._node_parameters.settings()
         if not settings.ship_file:
             raise ShipFileError('ship_file', ["is '', expected the path of a ship file"])
+        _, directory = settings.paths()
         self._ship = Ship.load(settings.ship_file)
         self._settings = settings
+        self.get_logger().info(f'recordings are written to {directory}')
         self._diagnosing = Diagnosing(self._ship, settings.parameters, enabled=settings.diagnose)
         self._outputs = {
             topic.under(self.get_fully_qualified_name()): self._publisher(topic)
@@ -193,6 +183,8 @@ class CoastdownNode(LifecycleNode):
         self._input_states = InputStates()
         self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
         self._lost = {}
+        self._nmea = NmeaFeed(self, settings.nmea, session=lambda: self._session)
+        self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
         effective = ', '.join(f'{name}={value!r}' for name, value in settings.to_mapping().items())
         self.get_logger().info(f'configured: {effective}')
@@ -201,6 +193,8 @@ class CoastdownNode(LifecycleNode):
         assert self._ship is not None
         assert self._settings is not None
         assert self._diagnosing is not None
+        assert self._nmea is not None
+        self._nmea.renew()
         monitor = Monitor(self._ship, self._settings.parameters)
         self._recorder = Recorder(
             Path(self._settings.output_directory),
@@ -209,6 +203,7 @@ class CoastdownNode(LifecycleNode):
             parameters=self._settings.parameters,
             history_ns=monitor.history_ns,
             limits=PartLimits(self._settings.part_size_bytes, self._settings.part_duration_s),
+            keep=Keep(self._settings.keep_days, self._settings.keep_bytes),
         )
         self._session = Session(
             monitor,
@@ -232,14 +227,16 @@ class CoastdownNode(LifecycleNode):
             session.finish()
             self.get_logger().info(f'{why}; {session.recorder.status().text}')
 
-    def _end_diagnosing(self) -> None:
+    def _end_what_runs_beside(self) -> None:
         if self._diagnosing is not None:
             self._diagnosing.close()
-            self._diagnosing = None
+        if self._nmea is not None:
+            self._nmea.close()
+        self._diagnosing = self._nmea = None
 
     def _release(self) -> None:
         self._deactivate('released')
-        self._end_diagnosing()
+        self._end_what_runs_beside()
         for topic in self._input_topics:
             topic.close()
         for publisher in self._outputs.values():
@@ -280,6 +277,8 @@ class CoastdownNode(LifecycleNode):
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
                 topic.unused += 1
                 continue
+            if self._nmea is not None and not self._nmea.admits(topic):
+                continue
             assert topic.type is not None
             topic.count(self._session.receive(Source(topic.name, topic.type), data, now_ns))
 
@@ -295,6 +294,7 @@ class CoastdownNode(LifecycleNode):
         session = self._session
         if session is not None and now_ns:
             session.watch_clock(now_ns)  # also while nothing arrives
+            session.note_removed(now_ns, self.get_logger().warning)
         states = self._input_states.tick(
             self._input_topics,
             {} if session is None else session.monitor.health(),
@@ -304,6 +304,8 @@ class CoastdownNode(LifecycleNode):
         standing = self._standing(now_ns)
         statuses = [diagnostics.state_status(standing, states)]
         statuses += map(diagnostics.input_status, states)
+        if self._nmea is not None:
+            statuses += self._nmea.statuses()
         if self._recorder is not None:
             statuses.append(diagnostics.recording_status(self._recorder.status()))
             self._announcer.status(statuses[-1])

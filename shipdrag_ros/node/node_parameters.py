@@ -73,7 +73,7 @@ class NodeParameters:
         return {setting.name: self._node.get_parameter(setting.name).value for setting in SETTINGS}
 
     def _on_set(self, changes: list[Parameter]) -> SetParametersResult:
-        ours = {setting.name for setting in SETTINGS}
+        ours = {setting.name for setting in SETTINGS} | {'use_sim_time'}
         changed = {change.name: change.value for change in changes if change.name in ours}
         if not changed:
             return SetParametersResult(successful=True)
@@ -82,6 +82,7 @@ class NodeParameters:
                 successful=False,
                 reason=f'{", ".join(changed)}: read-only while configured; clean up first',
             )
+        changed.pop('use_sim_time', None)
         try:
             NodeSettings.from_mapping({**self._values(), **changed}, subject=SUBJECT)
         except ParameterError as error:
@@ -94,7 +95,10 @@ def _descriptor(setting: Setting) -> ParameterDescriptor:
     descriptor = ParameterDescriptor(
         name=setting.name,
         description=about,
-        additional_constraints='read-only while configured',
+        additional_constraints=(
+            'set at the start alone' if setting.start_only else 'read-only while configured'
+        ),
+        read_only=setting.start_only,
     )
     if setting.choices:
         allowed = ', '.join(choice for choice in setting.choices if choice)

@@ -21,12 +21,12 @@ from rosgraph_msgs.msg import Clock
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import encode, input_type
 from shipdrag_ros.node.inputs import message_class
-from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
 QOS = QoSProfile(depth=1000)
 TIMEOUT_S = 10.0
 DISCOVERY_S = 0.5  # by which a listener knows its publisher after the publisher knew it
-STEP_NS = 1_000_000_000  # data and clock advance together by this much
+STEP_NS = SECOND_NS  # data and clock advance together by this much
 
 
 class Player:
@@ -88,7 +88,7 @@ class Player:
             )
             self._wait_for_listeners(TIMEOUT_S)
         message = Clock()
-        message.clock.sec, message.clock.nanosec = divmod(int(time_ns), 1_000_000_000)
+        message.clock.sec, message.clock.nanosec = divmod(int(time_ns), SECOND_NS)
         self._clock.publish(message)
 
     def play(

@@ -15,7 +15,9 @@ from pathlib import Path
 from time import monotonic
 
 from shipdrag_ros.bags.durable import DurableRecording, PartLimits, RecordingProgress
+from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.messages import EncodedMessage, OutputMessage
+from shipdrag_ros.node.housekeeping import Housekeeping
 from shipdrag_ros.node.ring import RawMessage, RawRing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -26,6 +28,7 @@ BEGIN_S = 0.5  # an answer to a start waits so long for the disk
 CLOSE_S = 5.0
 SLOW_S = 2.0
 DEFAULT_LIMITS = PartLimits()
+EVERYTHING = Keep()
 
 
 class RecordingState(Enum):
@@ -73,7 +76,8 @@ class RecordingStatus:
         elif self.slow:
             text = f'the disk is slow, {self.progress.oldest_s:.0f} s are in memory only'
         else:
-            text = f'recording to {self.progress.path or "no file yet"}'
+            none_yet = f'{self.progress.directory}, where the first input makes a file'
+            text = f'recording to {self.progress.path or none_yet}'
         return f'{text}, {lost}' if self.lost else text
 
     @property
@@ -84,7 +88,7 @@ class RecordingStatus:
 
 class Recorder:
     """
-    Writes bags, one after the other.
+    Writes bags, one after the other; none before an input is heard.
 
     Parameters
     ----------
@@ -98,6 +102,8 @@ class Recorder:
         begins with it.
     limits
         When a recording goes on in a new file.
+    keep
+        When old files are removed.
     """
 
     def __init__(
@@ -109,8 +115,9 @@ class Recorder:
         parameters: Parameters,
         history_ns: int,
         limits: PartLimits = DEFAULT_LIMITS,
+        keep: Keep = EVERYTHING,
     ) -> None:
-        self._directory = directory
+        self._directory = directory.resolve()  # a link made later is not followed
         self._namespace = namespace
         self._attachments = {
             'ship.yaml': ship.to_yaml(),
@@ -121,6 +128,7 @@ class Recorder:
         self._recording: DurableRecording | None = None
         self._ended: list[DurableRecording] = []
         self._lost = 0  # by recordings that are no longer kept
+        self._housekeeping = Housekeeping(self._directory, keep, self._files)
 
     def start(self) -> None:
         """
@@ -146,6 +154,7 @@ class Recorder:
         End the recording and wait for the disk, a few seconds at most.
         """
         self.stop()
+        self._housekeeping.close()
         end_s = monotonic() + CLOSE_S
         for recording in self._ended:
             recording.wait_ended(max(end_s - monotonic(), 0.0))
@@ -180,8 +189,15 @@ class Recorder:
             self._recording.put(
                 EncodedMessage(
                     message.topic, message.type, message.payload, receive_ns, message.stamp_ns
-                )
+                ),
+                begins=False,
             )
+
+    def removed(self) -> list[Removed]:
+        """
+        Return what was removed since the last time, for want of room or by age.
+        """
+        return self._housekeeping.removed()
 
     def status(self) -> RecordingStatus:
         """
@@ -197,6 +213,10 @@ class Recorder:
             state = RecordingState.OFF if self._recording is None else RecordingState.RECORDING
         return RecordingStatus(state, progress, lost, self._ring.cut)
 
+    def _files(self) -> set[Path]:
+        recordings = [*self._ended, *filter(None, [self._recording])]
+        return set().union(*(it.files() for it in recordings))
+
     def _begin(self) -> DurableRecording:
         stamp = datetime.now(UTC).strftime('%Y%m%dT%H%M%SZ')
         self._recording = DurableRecording(
@@ -205,6 +225,7 @@ class Recorder:
             attachments=self._attachments,
             limits=self._limits,
             earlier=map(self._encoded, self._ring),
+            at_once=False,
         )
         return self._recording
 

@@ -18,7 +18,7 @@ from shipdrag_ros.messages import DEFAULT_NODE
 from shipdrag_ros.messages.topics import RESISTANCE, SPEED
 from shipdrag_ros.node.inputs import message_class
 from shipdrag_ros.node.player import Player
-from shipdrag_ros.samples import Block
+from shipdrag_ros.samples import SECOND_NS, Block
 
 
 @dataclass(frozen=True)
@@ -140,4 +140,4 @@ class Rehearsal:
 
 def _stamp_ns(message: Any) -> int:
     stamp = message.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+    return int(stamp.sec) * SECOND_NS + int(stamp.nanosec)

@@ -92,6 +92,13 @@ class Session:
         self._report(self.monitor.update(decoded.block))
         return decoded
 
+    def keep(self, source: Source, payload: bytes, now_ns: int) -> None:
+        """
+        Record one message that feeds no input by itself.
+        """
+        arrival_ns = self.watch_clock(now_ns)
+        self.recorder.input(RawMessage(source.input, source.type, payload, arrival_ns, arrival_ns))
+
     def watch_clock(self, now_ns: int) -> int:
         """
         Return the time of arrival [ns], which never falls within a recording.
@@ -120,6 +127,15 @@ class Session:
         """
         self.watch_clock(now_ns)
         self._note(EventKind.LIFECYCLE, text)
+
+    def note_removed(self, now_ns: int, warn: Callable[[str], object]) -> None:
+        """
+        Publish, record and log which recordings were removed since the last time.
+        """
+        self.watch_clock(now_ns)
+        for part in self.recorder.removed():
+            warn(part.text)
+            self._note(EventKind.FILES, part.text)
 
     def note_lost(self, text: str, now_ns: int) -> None:
         """

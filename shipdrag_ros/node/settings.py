@@ -12,9 +12,10 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from shipdrag_ros.bags.durable import PartLimits
-from shipdrag_ros.errors import ParameterError
+from shipdrag_ros.errors import ParameterError, ShipdragError
 from shipdrag_ros.fields import (
     Key,
     Kind,
@@ -27,6 +28,8 @@ from shipdrag_ros.fields import (
     whole_number,
 )
 from shipdrag_ros.messages import TOPICS
+from shipdrag_ros.nmea.address import FORMS as NMEA_FORMS
+from shipdrag_ros.nmea.address import parse_addresses
 from shipdrag_ros.parameters import Parameters
 
 Value = bool | int | float | str
@@ -43,6 +46,7 @@ class Setting:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+    start_only: bool = False  # nobody on the network may say which files or lines are touched
 
     @property
     def key(self) -> Key:
@@ -65,12 +69,19 @@ class Setting:
 
 
 OWN: tuple[Setting, ...] = (
-    Setting('ship_file', '', 'path of the ship file (YAML); required'),
+    Setting('ship_file', '', 'path of the ship file (YAML); required', start_only=True),
     Setting('record', True, 'record inputs, outputs and events while active'),
     Setting(
         'output_directory',
         '.',
         'where recordings are written; made if missing, nothing there is ever overwritten',
+        start_only=True,
+    ),
+    Setting(
+        'nmea',
+        '',
+        f'where NMEA 0183 is heard, besides topics: any of {NMEA_FORMS}, separated by blanks',
+        start_only=True,
     ),
     Setting(
         'part_size_bytes',
@@ -88,6 +99,32 @@ OWN: tuple[Setting, ...] = (
         unit='s',
         low=1.0,
         high=604800.0,
+    ),
+    Setting(
+        'keep_days',
+        0.0,
+        'parts of a recording that are older are removed, unless they hold a coastdown; 0: none',
+        unit='d',
+        low=0.0,
+        high=36500.0,
+        start_only=True,
+    ),
+    Setting(
+        'keep_bytes',
+        0,
+        'when all recordings are larger together, the oldest parts are removed, those that hold '
+        'a coastdown last; 0: no limit',
+        unit='B',
+        low=0,
+        high=1e15,
+        start_only=True,
+    ),
+    Setting(
+        'path_roots',
+        '',
+        'folders, separated by colons, in which ship_file and output_directory must lie; empty: '
+        'any',
+        start_only=True,
     ),
     Setting('autostart', True, 'configure and activate without being asked to'),
     Setting(
@@ -138,8 +175,12 @@ class NodeSettings:
     ship_file: str
     record: bool
     output_directory: str
+    nmea: str
     part_size_bytes: int
     part_duration_s: float
+    keep_days: float
+    keep_bytes: int
+    path_roots: str
     autostart: bool
     diagnose: bool
     types: Mapping[str, str]
@@ -158,6 +199,7 @@ class NodeSettings:
         problems: list[str] = []
         keys = {setting.name: setting.key for setting in SETTINGS}
         given = read_keys(keys, dict(values), '', problems)
+        problems += _nmea_problems(given.get('nmea', ''))
         if problems:
             raise ParameterError(subject, problems)
         chosen = {name: given.get(name, key.default) for name, key in keys.items()}
@@ -166,6 +208,26 @@ class NodeSettings:
             types={name: chosen[f'{name}.type'] for name in TOPICS if chosen[f'{name}.type']},
             parameters=Parameters(**{name: chosen[name] for name in keys_of(Parameters)}),
         )
+
+    def paths(self) -> tuple[Path, Path]:
+        """
+        Return the ship file and the folder of recordings, links resolved.
+
+        Raises
+        ------
+        ParameterError
+            If one lies outside of `path_roots`.
+        """
+        roots = [Path(root).resolve() for root in self.path_roots.split(':') if root]
+        found = (Path(self.ship_file).resolve(), Path(self.output_directory).resolve())
+        problems = [
+            f'{name}: {str(path)!r} lies outside of path_roots {self.path_roots!r}'
+            for name, path in zip(('ship_file', 'output_directory'), found)
+            if roots and not any(path.is_relative_to(root) for root in roots)
+        ]
+        if problems:
+            raise ParameterError('node parameters', problems)
+        return found
 
     def to_mapping(self) -> dict[str, Value]:
         """
@@ -179,6 +241,14 @@ class NodeSettings:
                 owner = self if hasattr(self, setting.name) else self.parameters
                 values[setting.name] = getattr(owner, setting.name)
         return values
+
+
+def _nmea_problems(sources: object) -> list[str]:
+    try:
+        parse_addresses(str(sources))
+    except ShipdragError as error:
+        return [f'nmea: {error}']
+    return []
 
 
 def parameters_file() -> str:
@@ -198,6 +268,8 @@ def parameters_file() -> str:
             about += f' [{setting.unit}]'
         if setting.low is not None:
             about += f'; {setting.low:g} to {setting.high:g}'
+        if setting.start_only:
+            about += '; set at the start alone'
         if setting.choices:
             about += f'; one of {", ".join(choice for choice in setting.choices if choice)}'
         lines += textwrap.wrap(about, 99, initial_indent='    # ', subsequent_indent='    # ')

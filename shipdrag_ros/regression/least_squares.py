@@ -129,6 +129,11 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
     values : (n,)
         Measured.
 
+    Returns
+    -------
+    LinearFit
+        Coefficients (p,), their covariance, residuals (n,) and rank.
+
     Raises
     ------
     ValueError
@@ -136,6 +141,8 @@ def least_squares(columns: Float64, values: Float64) -> LinearFit:
 
     Notes
     -----
+    Source: Golub, Van Loan, *Matrix Computations*, 5.3 and 5.5.
+
     QR of the columns scaled to length 1, then singular values of the small
     triangle; the normal equations, which square the condition, are not formed.
 

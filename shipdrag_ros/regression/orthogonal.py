@@ -121,10 +121,20 @@ class OrthogonalBasis:
         weight : (n,), optional
             Weights > 0; all 1 where not given.
 
+        Returns
+        -------
+        OrthogonalBasis
+            Of polynomials that are orthonormal on the times, under the weights.
+
         Raises
         ------
         ValueError
             If there is no time, or `order` < 1.
+
+        Notes
+        -----
+        Source: S1, after Forsythe (1957), J. SIAM 5, 74-88: a three-term recurrence,
+        orthogonalised once more where digits were lost.
 
         Examples
         --------

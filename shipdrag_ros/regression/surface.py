@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression.domain import Domain, Prediction
 from shipdrag_ros.regression.least_squares import LinearFit, least_squares
@@ -62,6 +63,27 @@ class Surface:
     fit: LinearFit
     domain: Domain
     notes: tuple[str, ...]
+
+    def summary(self, target: str = 'the value') -> tuple[str, ...]:
+        """
+        Say what was fitted, and what a reader must know of it.
+
+        Parameters
+        ----------
+        target
+            Name of what was measured.
+        """
+        from shipdrag_ros.regression import words  # it tells what this module holds
+
+        return (words.sentence(self, target), *self.notes)
+
+    def coefficient_table(self) -> Table:
+        """
+        Show the coefficients of raw powers of the inputs.
+        """
+        from shipdrag_ros.regression import words
+
+        return words.coefficients(self)
 
     @cached_property
     def coefficients(self) -> Float64:
@@ -154,6 +176,11 @@ def fit_surface(
         Names of the variables.
     max_degree
         Highest degree to try, 2 or more.
+
+    Returns
+    -------
+    Surface
+        Of the lowest degree on the plateau of the residual variance.
 
     Raises
     ------

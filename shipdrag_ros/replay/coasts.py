@@ -16,10 +16,9 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.playback import InputCounts, ReplayResult
-from shipdrag_ros.samples import MOTION_INPUTS, Block, Reason, concatenate
+from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Block, Reason, concatenate
 from shipdrag_ros.ship import Ship
 
-_SECOND_NS = 1_000_000_000
 _SET_CLOCK_S = 10.0
 _CLOCKS_APART_S = 600.0  # what comes late, since the clocks differ, is to be diagnosed
 _MOST = 0.5  # of the messages of an input
@@ -100,15 +99,15 @@ def _refuse(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
 
 def _arrived_later(block: Block) -> Block:
     """Return samples for which a stamp of a fast clock is not from the future."""
-    return replace(block, receive_ns=block.receive_ns + round(_CLOCKS_APART_S * _SECOND_NS))
+    return replace(block, receive_ns=block.receive_ns + round(_CLOCKS_APART_S * SECOND_NS))
 
 
 def _window(result: ReplayResult, coastdown: Coastdown, apart: bool) -> Window:
     parameters = replace(result.parameters, late_s=_CLOCKS_APART_S)
-    before_ns = round(parameters.steady_s * _SECOND_NS)
+    before_ns = round(parameters.steady_s * SECOND_NS)
     # the validation looks back; stamps may differ from times of arrival
     margin_s = parameters.frozen_s + parameters.late_s + _SET_CLOCK_S
-    margin_ns = round(margin_s * _SECOND_NS)
+    margin_ns = round(margin_s * SECOND_NS)
     start_ns, after_steady = _start(coastdown, result.ship)
     first_ns = max(start_ns - before_ns - margin_ns, 0)
     inputs = result.run.inputs(start_ns=first_ns, end_ns=coastdown.end_ns + margin_ns)
@@ -135,5 +134,5 @@ def _start(coastdown: Coastdown, ship: Ship) -> tuple[int, bool]:
     cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
     first_ns = min(cut.start_ns for cut in cuts)
     if all(cut.reason is Dismissal.THRUST for cut in cuts):
-        return max(first_ns, coastdown.start_ns - round(gone_s(ship) * _SECOND_NS)), True
+        return max(first_ns, coastdown.start_ns - round(gone_s(ship) * SECOND_NS)), True
     return coastdown.start_ns, False

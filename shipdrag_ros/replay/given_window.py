@@ -16,10 +16,9 @@ from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, rep103_yaw
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Block, Channel, Float64, Reason, UInt8, concatenate
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, Float64, Reason, UInt8, concatenate
 from shipdrag_ros.ship import Ship
 
-SECOND_NS = 1_000_000_000
 _SET_CLOCK_NS = 10 * SECOND_NS
 
 

@@ -7,6 +7,7 @@ import csv
 from collections.abc import Sequence
 from pathlib import Path
 
+from shipdrag_ros.display import spreadsheet_text
 from shipdrag_ros.replay.run_result import RunResult
 
 COLUMNS = (
@@ -33,4 +34,4 @@ def write_curves(path: Path, runs: Sequence[RunResult]) -> None:
                     continue
                 curve = coastdown.estimate.valid_curve
                 for values in zip(*(getattr(curve, name).tolist() for name in COLUMNS)):
-                    writer.writerow((run.bag, number, *values))
+                    writer.writerow((spreadsheet_text(run.bag), number, *values))

@@ -25,7 +25,7 @@ BLUE, VERMILION, GREEN, ORANGE, SKY, PURPLE = (
 )
 SIZE = (5.4, 3.7)
 """Of a picture [inches]: two beside each other fill a page, one a phone."""
-WIDE = 9.0  # inches, of the few that need the whole width
+_BROAD = 1.4  # times that width: a picture takes a page for itself
 STYLE: dict[Any, Any] = {
     'font.family': 'DejaVu Sans',  # comes with matplotlib: the same picture everywhere
     'font.size': 9,
@@ -46,7 +46,7 @@ def picture(figure: Figure, caption: str) -> Picture:
     """
     Draw a figure for a page.
     """
-    return Picture(data_uri(figure), caption)
+    return Picture(data_uri(figure), caption, wide=figure.get_figwidth() > _BROAD * SIZE[0])
 
 
 def data_uri(figure: Figure) -> str:

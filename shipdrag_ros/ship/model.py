@@ -36,7 +36,7 @@ from shipdrag_ros.ship.consistency import (
     slenderness,
 )
 from shipdrag_ros.ship.facts import Fact, fact_list
-from shipdrag_ros.ship.sections import Air, Propeller, Propulsion, StatedEffect, Water
+from shipdrag_ros.ship.sections import Air, Economics, Propeller, Propulsion, StatedEffect, Water
 
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.225
@@ -73,6 +73,9 @@ class Ship:
     effects: tuple[StatedEffect, ...] = declare(
         list_of(section(StatedEffect)), 'effects on top of the baseline', default=()
     )
+    economics: Economics | None = declare(
+        section(Economics), 'prices, for a trend over months', default=None
+    )
     facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
 
     @classmethod
@@ -80,10 +83,24 @@ class Ship:
         """
         Read a ship file.
 
+        Parameters
+        ----------
+        path
+            Of a YAML file in UTF-8, in SI units.
+
+        Returns
+        -------
+        Ship
+            Checked: every value in its range, and all consistent.
+
         Raises
         ------
         ShipFileError
             Naming every problem of the file at once.
+
+        Notes
+        -----
+        Source: the keys and their units are those that `declare` states in this package.
 
         Examples
         --------
@@ -103,10 +120,26 @@ class Ship:
         """
         Read the text of a ship file; `subject` names it in errors.
 
+        Parameters
+        ----------
+        content
+            YAML, in SI units.
+        subject
+            Names the text in errors, a path for instance.
+
+        Returns
+        -------
+        Ship
+            Checked: every value in its range, and all consistent.
+
         Raises
         ------
         ShipFileError
             Naming every problem of the text at once.
+
+        Notes
+        -----
+        Source: the keys and their units are those that `declare` states in this package.
 
         Examples
         --------
@@ -119,6 +152,10 @@ class Ship:
         data = parse(content, subject=subject, error=ShipFileError)
         problems: list[str] = []
         keys = keys_of(cls)
+        if data and not (isinstance(data, dict) and keys.keys() & data.keys()):
+            # nothing of it is repeated: it may be any file, and messages go to everybody
+            needed = 'a ship file has length_m and displaced_volume_m3'
+            raise ShipFileError(subject, [f'is no ship file, none of its keys is known; {needed}'])
         accepted = read_keys(keys, data, '', problems)
         # a section that was refused is not checked as if it were the default
         given = data if isinstance(data, dict) else {}

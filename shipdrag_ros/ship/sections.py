@@ -64,3 +64,21 @@ class StatedEffect:
     parameters: Mapping[str, Parameter] = declare(
         named(section(Parameter, required=('value', 'sd'))), 'its parameters', hashed=False
     )
+
+
+@dataclass(frozen=True)
+class Economics:
+    """
+    Prices and efficiencies, by which a trend says what fouling costs and when cleaning pays.
+    """
+
+    fuel_usd_per_t: float = declare(number(1.0, 1e5, 'USD/t'), 'price of the fuel')
+    sfoc_g_per_kwh: float = declare(number(50.0, 1000.0, 'g/kWh'), 'fuel for a brake kWh')
+    propulsive_efficiency: float = declare(number(0.05, 1.0), 'effective power over brake power')
+    days_at_sea_per_year: float = declare(number(0.0, 366.0, 'd'), 'days under way in a year')
+    cleaning_usd: float = declare(
+        number(0.0, 1e8, 'USD'), 'price of a cleaning, off-hire included'
+    )
+    service_speed_m_s: float | None = declare(
+        number(0.1, 40.0, 'm/s'), 'speed at which runs are compared', default=None
+    )

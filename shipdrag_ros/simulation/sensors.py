@@ -128,10 +128,20 @@ def sense(
     start_ns
         Time of the start of the record [ns since the epoch].
 
+    Returns
+    -------
+    Block
+        Of n samples, in arrival order.
+
     Raises
     ------
     SimulationError
         If a sensor is impossible.
+
+    Notes
+    -----
+    Source: white noise and slow disturbances as each `Sensor` declares them, drawn by numpy's
+    PCG64.
 
     Examples
     --------

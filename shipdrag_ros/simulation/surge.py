@@ -140,6 +140,11 @@ def simulate(
         Longest step from the first order or turn on; found from the ship
         where it is not given.
 
+    Returns
+    -------
+    Truth
+        The motion: times [s], speeds [m/s], places [m], forces [N].
+
     Raises
     ------
     SimulationError

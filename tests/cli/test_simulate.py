@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -249,3 +250,31 @@ def test_an_impossible_value_is_wrong_usage(
     with pytest.raises(SystemExit) as end:
         main(line)
     assert end.value.code == 2
+
+
+@pytest.mark.parametrize(
+    ('given', 'first'),
+    [
+        ('2025-03-01', '2025-03-01T00:00:00+00:00'),
+        ('2025-03-01T06:30:00+01:00', '2025-03-01T05:30:00+00:00'),
+        ('2025-03-01T06:30:00.25Z', '2025-03-01T06:30:00.250000+00:00'),
+    ],
+)
+def test_the_stamps_begin_at_the_date_given(simulate, given: str, first: str) -> None:
+    bag = simulate('--start', given, '--noise', '0')
+    moment_ns = round(datetime.fromisoformat(first).timestamp() * 1000) * 1_000_000
+    assert bag.block.stamp_ns[0] == moment_ns
+    assert bag.settings['start_ns'] == moment_ns
+    # the same motion, at another time
+    np.testing.assert_array_equal(bag.block.value, simulate('--noise', '0').block.value)
+
+
+@pytest.mark.parametrize('given', ['yesterday', '2026-13-01', '1970-01-01', '2100-01-01'])
+def test_a_date_that_is_none_is_refused(
+    ship_file: Path, tmp_path: Path, given: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ['simulate', '--ship', str(ship_file), '-o', str(tmp_path / 'a.mcap')]
+    with pytest.raises(SystemExit) as ended:
+        main([*line, '--start', given])
+    assert ended.value.code == 2
+    assert f'{given!r}, expected a date of ISO 8601' in capsys.readouterr().err

@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.importing.formats.nmea.importer import NmeaResult, import_nmea
-from shipdrag_ros.importing.formats.nmea.log import Checksum
+from shipdrag_ros.nmea.framing import Checksum
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
 
 KNOT = 1852 / 3600

@@ -207,8 +207,8 @@ def test_a_format_is_one_package_and_is_found(
     (package / 'face.py').write_text(
         'from dataclasses import dataclass\n'
         'from shipdrag_ros.cli.log_format import LogFormat\n'
-        'from shipdrag_ros.importing.bag import SECOND_NS, new_bag\n'
-        'from shipdrag_ros.samples import Block, Channel\n'
+        'from shipdrag_ros.importing.bag import new_bag\n'
+        'from shipdrag_ros.samples import SECOND_NS, Block, Channel\n'
         '@dataclass\n'
         'class Result:\n'
         '    lines: int\n'

@@ -71,6 +71,15 @@ class NodeProcess:
             assert time.monotonic() < end, f'no {text!r} in\n{self.log}'
             time.sleep(0.05)
 
+    def wait_for_file(self, directory: Path) -> None:
+        """
+        Return once a recording is there, which is after the first input.
+        """
+        end = time.monotonic() + ANSWER_S
+        while not any(directory.glob('*.mcap')):
+            assert time.monotonic() < end, f'no recording in {directory}'
+            time.sleep(0.05)
+
     def wait(self) -> int:
         return self._process.wait(timeout=START_S)
 

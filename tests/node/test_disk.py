@@ -78,6 +78,8 @@ def test_killed_it_leaves_what_it_said_and_started_anew_it_overwrites_nothing(
     assert list(run.attachments) == ['ship.yaml', 'parameters.yaml']
 
     node = start_node()
+    ship.sent = 0
+    ship.send(1)
     assert node.stop() == 0
     assert first.read_bytes() == left
     assert len(ship.bags()) == 2

@@ -45,6 +45,7 @@ def test_a_bad_ship_file_ends_the_process(start_node: Any) -> None:
             "window_s: 'long', expected a number without quotes or unit, 60..21600 s",
         ),
         ('window_s', 1.0, 'window_s: 1.0, expected 60..21600 s'),
+        ('nmea', 'udp://here', "NMEA source 'udp://here': expected udp://ADDRESS:PORT"),
         ('record', 1, 'record: 1, expected true or false'),
         ('depth.type', 'std_msgs/msg/Float64', 'expected one of sensor_msgs/msg/Range'),
         ('ship_file', '', 'expected the path of a ship file'),
@@ -113,9 +114,13 @@ def test_signal_handlers_are_given_back() -> None:
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_with_a_readable_bag(
-    start_node: Any, tmp_path: Path, number: signal.Signals
+    start_node: Any, peer: Any, tmp_path: Path, number: signal.Signals
 ) -> None:
     node = start_node()
+    publisher = peer.advertise('/depth', 'sensor_msgs/msg/Range')
+    peer.wait_for_listener(publisher)
+    publisher.publish(b'\x00\x01\x00\x00 one input')
+    node.wait_for_file(tmp_path / 'bags')
     assert node.stop(number) == 0
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
     assert list(attachments(bag)) == ['ship.yaml', 'parameters.yaml']
@@ -123,33 +128,50 @@ def test_a_signal_ends_it_with_a_readable_bag(
         summary = make_reader(stream).get_summary()
     assert summary is not None
     assert summary.statistics is not None
-    assert summary.statistics.message_count == 2
+    assert summary.statistics.message_count == 3  # two events besides
+
+
+def test_without_an_input_it_leaves_no_file(start_node: Any, tmp_path: Path) -> None:
+    node = start_node()
+    assert f'recordings are written to {tmp_path / "bags"}' in node.log
+    assert 'where the first input makes a file' in node.log
+    assert node.stop() == 0
+    assert list((tmp_path / 'bags').iterdir()) == []
 
 
 def test_starts_from_a_call_with_any_path(tmp_path: Path, ship_file: Path) -> None:
     ship = ship_file.rename(tmp_path / "ship: 'no 1' #.yaml")
     code = (
         'import sys; from shipdrag_ros.node.main import run\n'
-        f'sys.exit(run({str(ship)!r}, "123", ros_arguments=["-p", "window_s:=600.0"]))'
+        f'sys.exit(run({str(ship)!r}, "123", settings={{"keep_days": 2.0}}, '
+        'ros_arguments=["-p", "window_s:=600.0", "-p", "keep_days:=1.0"]))'
     )
-    with subprocess.Popen([sys.executable, '-c', code], cwd=tmp_path) as process:
+    log = tmp_path / 'log'
+    with (
+        log.open('w') as file,
+        subprocess.Popen(
+            [sys.executable, '-c', code], cwd=tmp_path, stdout=file, stderr=subprocess.STDOUT
+        ) as process,
+    ):
         end = time.monotonic() + START_S
-        while not list(tmp_path.glob('123/*.mcap')):
+        while 'active;' not in log.read_text():
             assert time.monotonic() < end
             time.sleep(0.1)
         process.send_signal(signal.SIGINT)
         assert process.wait(30.0) == 0
-    (bag,) = tmp_path.glob('123/*.mcap')
-    assert 'window_s: 600.0' in attachments(bag)['parameters.yaml']
+    said = log.read_text()
+    assert f'recording to {tmp_path / "123"}' in said
+    assert 'window_s=600.0' in said
+    assert 'keep_days=2.0' in said
 
 
 def test_the_bag_is_closed_also_when_ros_is_gone(tmp_path: Path, ship_file: Path) -> None:
     context = rclpy.Context()
     line = ['--ros-args', '-p', f'ship_file:={ship_file}', '-p', f'output_directory:={tmp_path}']
+    line += ['-p', 'nmea:=udp://127.0.0.1:10110']
     rclpy.init(args=line, context=context)
     node = CoastdownNode(context=context, arguments=line)
     node.start()
     rclpy.shutdown(context=context)
     node.close()
-    (bag,) = tmp_path.glob('*.mcap')
-    assert list(attachments(bag)) == ['ship.yaml', 'parameters.yaml']
+    assert list(tmp_path.glob('*.mcap')) == []

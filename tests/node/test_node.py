@@ -258,6 +258,10 @@ def test_obeys_transitions_and_refuses_illegal_ones(
 
     for transition in ('cleanup', 'configure', 'activate'):
         assert peer.change_state(transition)
+    assert len(list((tmp_path / 'bags').glob('*.mcap'))) == 1  # nothing heard, no file
+    peer.player.connect(speeds())
+    peer.player.publish(speeds())
+    diagnostics.wait_for('recording', '6', value='messages')
     assert len(list((tmp_path / 'bags').glob('*.mcap'))) == 2
     assert peer.change_state('shutdown')
     assert peer.state() == 'finalized'
@@ -353,3 +357,32 @@ def test_a_clock_that_goes_back_begins_a_new_bag(
     with bags[1].open('rb') as stream:
         messages = make_reader(stream).iter_messages(topics=['/coastdown_node/events'])
         assert kinds([message.data for _, _, message in messages])[0] is EventKind.CLOCK_JUMP
+
+
+def test_nobody_on_the_network_chooses_files_or_clock(
+    start_node: Any, peer: Any, tmp_path: Path
+) -> None:
+    from rcl_interfaces.srv import SetParameters
+    from rclpy.parameter import Parameter
+
+    def refusals(**values: object) -> list[str]:
+        request = SetParameters.Request()
+        request.parameters = [
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
+        ]
+        answer = peer.call('/coastdown_node/set_parameters', request, SetParameters)
+        assert not any(one.successful for one in answer.results)
+        return [one.reason for one in answer.results]
+
+    secret = tmp_path / 'secret.yaml'
+    secret.write_text('password: hunter2\n')
+    paths = {'ship_file': str(secret), 'output_directory': '/tmp/elsewhere', 'nmea': 'tcp://a:1'}
+    node = start_node()
+    assert 'read-only while configured' in refusals(use_sim_time=True)[0]
+    refusals(**paths)
+    for transition in ('deactivate', 'cleanup'):
+        assert peer.change_state(transition)
+    refusals(**paths)
+    assert peer.change_state('configure')
+    assert 'hunter2' not in node.log
+    assert peer.state() == 'inactive'

@@ -15,9 +15,11 @@ from mcap.reader import make_reader
 
 from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.retention import Keep, Removed
+from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EventKind, EventNote, OutputMessage, event_message
-from shipdrag_ros.node.recorder import DEFAULT_LIMITS, Recorder, RecordingState
+from shipdrag_ros.node.recorder import DEFAULT_LIMITS, EVERYTHING, Recorder, RecordingState
 from shipdrag_ros.node.ring import RawMessage
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -27,7 +29,9 @@ PARAMETERS = Parameters(window_s=60.0, steady_s=60.0)
 WITHIN_S = 20.0
 
 
-def recorder(directory: Path, *, limits: PartLimits = DEFAULT_LIMITS) -> Recorder:
+def recorder(
+    directory: Path, *, limits: PartLimits = DEFAULT_LIMITS, keep: Keep = EVERYTHING
+) -> Recorder:
     return Recorder(
         directory,
         namespace='/ship',
@@ -35,6 +39,7 @@ def recorder(directory: Path, *, limits: PartLimits = DEFAULT_LIMITS) -> Recorde
         parameters=PARAMETERS,
         history_ns=10**9,
         limits=limits,
+        keep=keep,
     )
 
 
@@ -78,6 +83,7 @@ def test_writes_inputs_and_outputs_in_order(tmp_path: Path) -> None:
     it.input(received(100))
     it.output(sent(7), 100)
     assert it.status().state is RecordingState.RECORDING
+    wait_until(lambda: it.status().text.endswith('.mcap'))
     assert it.status().text == f'recording to {path_of(it)}'
     it.close()
     assert it.status().state is RecordingState.OFF
@@ -107,8 +113,71 @@ def test_forgets_on_a_reset(tmp_path: Path) -> None:
     it.input(received(1))
     it.forget()
     it.start()
+    it.input(received(2))
     it.close()
-    assert rows(path_of(it)) == []
+    assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [2]
+
+
+def test_without_an_input_no_file_is_left(tmp_path: Path) -> None:
+    it = recorder(tmp_path / 'bags')
+    it.start()
+    for stamp_ns in range(300):
+        it.output(sent(stamp_ns), 7)
+    assert it.status().state is RecordingState.RECORDING
+    assert it.status().text == (
+        f'recording to {tmp_path / "bags"}, where the first input makes a file'
+    )
+    assert not it.status().slow
+    it.new_part()
+    it.close()
+    assert list((tmp_path / 'bags').iterdir()) == []
+    assert it.status().lost == 0
+
+
+def test_what_was_said_before_the_first_input_is_recorded(tmp_path: Path) -> None:
+    it = recorder(tmp_path)
+    it.start()
+    for stamp_ns in range(300):
+        it.output(sent(stamp_ns), 7)
+    it.input(received(8))
+    it.close()
+    times = [publish_ns for _, _, publish_ns in rows(path_of(it))]
+    assert times == [*range(200, 300), 5]  # the latest hundred, and the input
+
+
+def test_files_are_not_for_everybody(tmp_path: Path) -> None:
+    it = recorder(tmp_path)
+    it.start()
+    it.input(received(1))
+    wait_until(lambda: it.status().text.endswith('.mcap'))
+    assert path_of(it).stat().st_mode & 0o137 == 0  # while it grows
+    it.close()
+    assert path_of(it).stat().st_mode & 0o137 == 0
+
+
+def test_a_folder_that_became_a_link_is_not_followed(tmp_path: Path) -> None:
+    bags, elsewhere = tmp_path / 'bags', tmp_path / 'elsewhere'
+    elsewhere.mkdir()
+    it = recorder(bags)
+    bags.symlink_to(elsewhere)
+    it.start()
+    it.input(received(1))
+    wait_until(lambda: it.status().state is RecordingState.FAILED)
+    assert 'has become a link' in it.status().text
+    it.close()
+    assert list(elsewhere.iterdir()) == []
+
+
+def test_old_recordings_make_room(tmp_path: Path) -> None:
+    for hour in range(3):
+        (tmp_path / f'coastdown_20260101T0{hour}0000Z_000.mcap').write_bytes(b'')
+    with BagWriter(tmp_path / 'coastdown_20260101T040000Z_000.mcap'):
+        pass
+    it = recorder(tmp_path, keep=Keep(size_bytes=3 * 4096))
+    removed: list[Removed] = []
+    wait_until(lambda: bool(removed.extend(it.removed())) or bool(removed))
+    it.close()
+    assert [part.path.name[10:25] for part in removed] == ['20260101T040000']
 
 
 def test_never_overwrites(tmp_path: Path) -> None:
@@ -127,6 +196,8 @@ def test_start_while_recording_and_stop_while_not_change_nothing(tmp_path: Path)
     it = recorder(tmp_path)
     it.stop()
     it.start()
+    it.input(received(1))
+    wait_until(lambda: it.status().text.endswith('.mcap'))
     first = path_of(it)
     it.start()
     assert path_of(it) == first
@@ -140,9 +211,10 @@ def test_a_new_part_only_while_recording(tmp_path: Path) -> None:
     it.new_part()
     assert it.status().state is RecordingState.OFF
     it.start()
+    it.input(received(1))
     it.new_part()
     it.close()
-    assert len(list(tmp_path.glob('*.mcap'))) == 2
+    assert len(list(tmp_path.glob('*.mcap'))) == 2  # the second begins with what came before
 
 
 def test_the_limits_of_a_part_are_those_given(tmp_path: Path) -> None:
@@ -161,6 +233,7 @@ def test_a_place_that_cannot_be_written_is_reported_until_it_can(tmp_path: Path)
     it.start()
     it.input(received(1))
     it.output(sent(1), 1)
+    wait_until(lambda: '2 kept' in it.status().text)
     status = it.status()
     assert status.state is RecordingState.FAILED
     assert 'recording failed, 0 message(s) lost, 2 kept in memory: ' in status.text
@@ -207,6 +280,8 @@ def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
 ) -> None:
     it = recorder(tmp_path)
     it.start()
+    it.input(received(0))
+    wait_until(lambda: it.status().text.endswith('.mcap'))
     sync = LiveFile.sync
     freed = Event()
 
@@ -223,7 +298,7 @@ def test_a_disk_that_hangs_holds_nobody_up_and_is_told(
         assert not freed.is_set()
         freed.set()
     it.close()
-    assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [1, 2]
+    assert [log_ns for _, log_ns, _ in rows(path_of(it))] == [0, 1, 2]
     assert not it.status().slow
 
 
@@ -232,6 +307,8 @@ def test_a_full_disk_is_told_with_the_file(
 ) -> None:
     it = recorder(tmp_path)
     it.start()
+    it.input(received(0))
+    wait_until(lambda: it.status().text.endswith('.mcap'))
     path = path_of(it)
 
     def full(*_: object) -> None:

@@ -81,6 +81,13 @@ def speeds(arrival_s: list[float]) -> Block:
     return Block.of(Channel.SPEED_THROUGH_WATER, arrival_ns - 10**7, values, receive_ns=arrival_ns)
 
 
+def test_a_message_that_feeds_nothing_is_recorded_and_makes_no_estimate(desk: Desk) -> None:
+    desk.session.keep(Source('nmea', 'std_msgs/msg/String'), b'as heard', START_NS)
+    (bag,) = desk.bags()
+    assert bag == [Row('/nmea', START_NS, b'as heard')]
+    assert desk.published == []
+
+
 def test_records_bytes_as_received_with_both_times(desk: Desk) -> None:
     block = speeds([0, 1, 2])
     desk.feed(block)
@@ -144,11 +151,15 @@ def test_what_is_not_understood_is_recorded_too(desk: Desk) -> None:
 def test_every_output_is_recorded_as_published(desk: Desk) -> None:
     desk.session.note_lifecycle('active', START_NS)
     desk.session.reset('asked for', START_NS)
+    desk.feed(speeds([0]))
     (bag,) = desk.bags()
-    assert [row.payload for row in bag] == [it.payload for it in desk.published]
+    outputs = [row.payload for row in bag if row.topic.startswith(NODE)]
+    assert outputs == [it.payload for it in desk.published]
 
 
 def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
     desk.session.note_lifecycle('active', 0)
     assert desk.kinds() == [EventKind.LIFECYCLE]
-    assert desk.bags() == [[]]
+    desk.feed(speeds([0]))
+    (bag,) = desk.bags()
+    assert [row.topic for row in bag] == ['/speed_through_water']

@@ -58,8 +58,47 @@ def test_the_file_holds_every_default() -> None:
     assert values == settings().to_mapping()
 
 
+def test_paths_stay_inside_their_roots(tmp_path: Path) -> None:
+    inside, outside = tmp_path / 'inside', tmp_path / 'outside'
+    inside.mkdir()
+    outside.mkdir()
+    (inside / 'link').symlink_to(outside)
+    fits = {'ship_file': str(inside / 'ship.yaml'), 'output_directory': str(inside / 'bags')}
+    roots = f'{tmp_path / "other"}:{inside}'
+    assert settings(**fits, path_roots=roots).paths() == (
+        inside / 'ship.yaml',
+        inside / 'bags',
+    )
+    assert settings(**fits | {'ship_file': str(outside / 'x')}).paths()[0] == outside / 'x'
+    for name, path in (
+        ('ship_file', outside / 'ship.yaml'),
+        ('ship_file', inside / '..' / 'outside' / 'ship.yaml'),
+        ('output_directory', inside / 'link' / 'bags'),
+    ):
+        with pytest.raises(ParameterError, match=f'{name}: .*outside of path_roots'):
+            settings(**fits | {name: str(path), 'path_roots': roots}).paths()
+
+
+def test_sources_of_nmea_are_checked() -> None:
+    with pytest.raises(ParameterError, match='nmea: NMEA source'):
+        settings(nmea='udp://0.0.0.0:10110 ttyUSB0')
+
+
+def test_no_path_or_line_can_be_set_over_a_service() -> None:
+    fixed = {setting.name for setting in SETTINGS if setting.start_only}
+    assert fixed == {
+        'ship_file',
+        'output_directory',
+        'nmea',
+        'keep_days',
+        'keep_bytes',
+        'path_roots',
+    }
+
+
 def test_the_launch_file_parses_and_sets_known_parameters() -> None:
     tree = ast.parse((ROOT / 'launch' / 'coastdown.launch.py').read_text())
     dicts = [node for node in ast.walk(tree) if isinstance(node, ast.Dict)]
     names = {key.value for node in dicts for key in node.keys if isinstance(key, ast.Constant)}
     assert names - {'use_sim_time'} <= {setting.name for setting in SETTINGS}
+    assert {'ship_file', 'output_directory', 'autostart'} <= names

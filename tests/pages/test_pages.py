@@ -29,6 +29,7 @@ PAGES = {
     'diagnose, stated baseline': 'diagnose {coast} {back}',
     'diagnose, fitted baseline': 'diagnose {coast} --ship {plain}',
     'diagnose, no coastdown': 'diagnose {steady}',
+    'trend': 'trend {store}',
     'cable': 'cable --length 50 --diameter 0.1 --speed 3',
     'sensitivity, steering': 'sensitivity --manoeuvre zigzag:15 --keep 24',
     'sensitivity, coasting': 'sensitivity --ship {ship} --manoeuvre coastdown:8',
@@ -112,10 +113,10 @@ TOO_WIDE = 'document.documentElement.scrollWidth - document.documentElement.clie
 
 
 @pytest.fixture(scope='module')
-def words(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def words(tmp_path_factory: pytest.TempPathFactory, fleet_store: Path) -> dict[str, str]:
     """What stands for the words in braces: bags and files."""
     folder = tmp_path_factory.mktemp('pages')
-    found = {'ship': str(SHIP), 'root': str(ROOT)}
+    found = {'ship': str(SHIP), 'root': str(ROOT), 'store': str(fleet_store)}
     for name, options in (
         ('coast', ('--lead-in', '600')),
         ('back', ('--lead-in', '600', '--heading', '3.1416', '--first-heading', '0')),

@@ -30,3 +30,14 @@ def test_the_valid_curve_round_trips(run: RunResult, tmp_path: Path) -> None:
         'froude',
     ):
         np.testing.assert_array_equal([float(row[name]) for row in rows], getattr(curve, name))
+
+
+def test_a_name_that_is_a_formula_is_text_and_numbers_are_numbers(
+    run: RunResult, tmp_path: Path
+) -> None:
+    named = replace(run, bag='=HYPERLINK("http://x","y").mcap')
+    write_curves(tmp_path / 'curves.csv', [named])
+    with (tmp_path / 'curves.csv').open(newline='') as file:
+        rows = list(csv.DictReader(file))
+    assert {row['bag'] for row in rows} == {'\'=HYPERLINK("http://x","y").mcap'}
+    assert all(float(row['speed_m_s']) > 0.0 for row in rows)

@@ -163,6 +163,7 @@ class SalvagedBag:
             self._file = NamedTemporaryFile(  # noqa: SIM115 (closed by discard)
                 dir=self.path.parent, prefix=f'.{self.path.name}.', suffix='.part'
             )
+            os.fchmod(self._file.fileno(), 0o640)  # as recordings are: the group may read
             self._writer = IndexedFile(self._file, profile=self.profile)
         return self._writer
 

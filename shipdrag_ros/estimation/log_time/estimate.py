@@ -29,12 +29,13 @@ from shipdrag_ros.estimation.log_time.model import (
     quadratic_coast,
 )
 from shipdrag_ros.estimation.log_time.prior import FREE, coast_priors
-from shipdrag_ros.estimation.log_time.robust import GROSS, robust_fit
+from shipdrag_ros.estimation.log_time.robust import robust_fit
 from shipdrag_ros.estimation.log_time.slow import Slow
 from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.gaussian import average, condense, deviations, root
+from shipdrag_ros.inference.robust import GROSS
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Input
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64

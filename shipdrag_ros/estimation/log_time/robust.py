@@ -10,13 +10,12 @@ import numpy as np
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.estimation.log_time.model import combine
 from shipdrag_ros.inference.gaussian import condense, posterior
+from shipdrag_ros.inference.robust import GROSS, MAD_TO_SD, huber_square, huber_weight
 from shipdrag_ros.samples import Float64, Int64
 
 HUBER = 2.0  # standard deviations: 99 % efficient in Gaussian noise
-GROSS = 8.0  # this many from the fit is no measurement of it
 _SPIKE = 6.0
-_OF_MEDIAN = 0.6745  # median of |noise|, in standard deviations
-_OF_HUBER = 0.9205  # mean of min(noise, HUBER)^2, in Gaussian noise of variance 1
+_OF_HUBER = huber_square(HUBER)
 _PASSES = 2
 _LAGS = 5  # of the samples; noise that is slower cannot be told from the motion
 
@@ -37,7 +36,7 @@ def _spread(value: Float64, root: Float64) -> float:
         of_three = 1.0 / root[i] ** 2 + 4.0 / root[i + 1] ** 2 + 1.0 / root[i + 2] ** 2
         second[i] = value[i + 2] - 2.0 * value[i + 1] + value[i]
         second[i] *= math.sqrt(6.0 / of_three)
-    spread = np.median(np.abs(second)) / _OF_MEDIAN
+    spread = np.median(np.abs(second)) * MAD_TO_SD
     if spread == 0.0:  # readings repeat, being rounded
         spread = math.sqrt(np.mean(second * second))
     return float(max(spread / math.sqrt(6.0), _rounding(value)))
@@ -66,17 +65,15 @@ def despike(value: Float64) -> Float64:
 
 @compiled('f8(f8)')
 def _weight(size: float) -> float:
-    """Huber's weight of a residual in standard deviations."""
-    if size <= HUBER:
-        return 1.0
-    return HUBER / size if size <= GROSS else 0.0
+    """Huber's weight of a residual in standard deviations; none of a gross one."""
+    return huber_weight(size, HUBER) if size <= GROSS else 0.0
 
 
 @compiled('f8(f8[::1])')
 def _robust_sd(residual: Float64) -> float:
     """Huber's proposal 2, from the median on."""
     size = np.abs(residual)
-    sd = max(np.median(size) / _OF_MEDIAN, 1e-3 * math.sqrt(np.mean(size * size)))
+    sd = max(np.median(size) * MAD_TO_SD, 1e-3 * math.sqrt(np.mean(size * size)))
     for _ in range(3):
         total = 0.0
         for i in range(len(size)):

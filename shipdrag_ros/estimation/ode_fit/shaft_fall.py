@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.estimation.window import Series, Window
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.samples import Float64
 
 _BAND = (0.08, 0.92)  # of the fall of the shaft speed from which its decay is found
@@ -22,7 +23,6 @@ _SLOWEST = 0.05  # of her first speed: below it the readings are noise
 _LONGEST = 0.15  # of the window: what falls more slowly falls with the ship
 STANDS_RAD_S = 0.5  # no propeller of a ship drives at less
 _SLOWED, _ALIKE = 0.85, 0.2  # a ship has slowed down; a shaft has, as much
-_MAD_TO_SD = 1.4826
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def find_fall(
     if not low < _FALLEN * high:
         return None
     scatter = np.abs(steady - high) if has_before else np.abs(np.diff(shaft)) / np.sqrt(2.0)
-    noise = float(np.median(scatter)) * _MAD_TO_SD / (high - low)
+    noise = float(np.median(scatter)) * MAD_TO_SD / (high - low)
     kept = _kept_up(time_s, shaft, high, low)
     fall = (shaft - kept) / (high - kept)
     # the last stay at full speed ends where the fall begins

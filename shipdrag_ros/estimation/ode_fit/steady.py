@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.samples import Float64, Int64
 
 BIN_S = 30.0  # a steady record is condensed to its means over this
@@ -22,7 +23,6 @@ _BLOCK_S = 60.0
 _UNSTEADY = 0.06  # of the speed: a block that differs by more ends the steady record
 _TURNED_RAD = 0.15  # a block on another course does too
 _OUTLIER = 5.0  # robust standard deviations
-_MAD_TO_SD = 1.4826
 
 
 def white_sd(value: Float64) -> float:
@@ -80,7 +80,7 @@ def weighted_white_sd(value: Float64, weight: Float64) -> float:
     second = value[2:] - 2.0 * value[1:-1] + value[:-2]
     spread = (1.0 / weight[2:] + 4.0 / weight[1:-1] + 1.0 / weight[:-2]) / 6.0
     size = np.abs(second) / np.sqrt(spread)
-    typical = _MAD_TO_SD * np.median(size)
+    typical = MAD_TO_SD * np.median(size)
     if typical > 0.0:
         size = size[size < 4.0 * typical]
     return float(np.sqrt(np.mean(size * size) / 6.0))
@@ -172,7 +172,7 @@ def condense(
     near = np.interp(time_s, block_medians(time_s, edges), block_medians(value, edges))
     away = np.abs(value - near)
     # of a coarse display most readings are the median itself: that does not tell the scatter
-    scatter = max(_MAD_TO_SD * np.median(away), weighted_white_sd(value, np.ones(len(value))))
+    scatter = max(MAD_TO_SD * np.median(away), weighted_white_sd(value, np.ones(len(value))))
     keep = away <= _OUTLIER * scatter
     time_s, value, weight = time_s[keep], value[keep], weight[keep]
     split = len(time_s)

@@ -6,14 +6,13 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.inference.robust import GROSS, MAD_TO_SD, huber_square, huber_weight
 from shipdrag_ros.inference.rows import KIND_COUNT
 from shipdrag_ros.samples import Float64, Int64
 
 _HUBER = 2.5  # whitened residuals beyond it count by their size only
-GROSS = 8.0  # this many from the fit, though they be counted in the noise, is no measurement
 _LOST = 1e-6  # its weight: none, but finite
-_OF_MEDIAN = 0.6745  # median of |z| of a standard normal z
-_HUBER_SQUARE = 0.9775  # mean of min(z, 2.5)^2 of a standard normal z
+_HUBER_SQUARE = huber_square(_HUBER)
 
 
 @compiled
@@ -30,7 +29,7 @@ def drop_gross(residual: Float64, kind: Int64, weight: Float64) -> None:
     for of_kind in range(KIND_COUNT):
         chosen = np.flatnonzero(kind == of_kind)
         if len(chosen):
-            limit = GROSS / _OF_MEDIAN * np.median(np.abs(residual[chosen]))
+            limit = GROSS * MAD_TO_SD * np.median(np.abs(residual[chosen]))
             for i in chosen:
                 if abs(residual[i]) > limit:
                     weight[i] = _LOST
@@ -77,4 +76,4 @@ def weigh(
         base[i] *= growth
         # means of the steady record are off by the fit, not by themselves
         gross = i >= steady and size[i] > GROSS * np.sqrt(max(growth, 1.0))
-        weight[i] = _LOST if gross else _HUBER / max(size[i], _HUBER)
+        weight[i] = _LOST if gross else huber_weight(size[i], _HUBER)

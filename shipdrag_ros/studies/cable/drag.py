@@ -16,6 +16,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shipdrag_ros.display import Table
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.hydrodynamics import ROPES, QuadraticDrag
@@ -73,35 +74,6 @@ def drag_coefficient(slenderness: ArrayLike, surface: Surface) -> Float64:
     return 0.25 * math.pi * zeta0 / np.asarray(slenderness, np.float64)
 
 
-def body_axes(
-    along: ArrayLike, across: ArrayLike, angle_rad: ArrayLike
-) -> tuple[Float64, Float64]:
-    """
-    Turn forces on an element, or their coefficients, into its own axes.
-
-    Parameters
-    ----------
-    along
-        Along the flow: drag R_x or C_x.
-    across
-        Across it, in the plane of flow and element: lift R_y or C_y.
-    angle_rad
-        From the flow to the element.
-
-    Returns
-    -------
-    normal, tangential
-        Across the element and along it.
-
-    Notes
-    -----
-    S2 (6).
-    """
-    x, y = np.asarray(along, np.float64), np.asarray(across, np.float64)
-    sin, cos = np.sin(angle_rad), np.cos(angle_rad)
-    return x * sin + y * cos, x * cos - y * sin
-
-
 @dataclass(frozen=True)
 class Cable:
     """
@@ -119,6 +91,10 @@ class Cable:
     SimulationError
         Naming every value that is impossible; for a surface also if l/d is
         not above 20.
+
+    Notes
+    -----
+    Source: S2, Akhmedov, Naumov: R = 0.5 rho C0 l d V^2 along the flow.
 
     Examples
     --------
@@ -203,6 +179,32 @@ class Tangent:
     drag: QuadraticDrag
     speed_m_s: float
 
+    def summary(self, tolerance: float = 0.1) -> tuple[str, ...]:
+        """
+        Say which line may replace the drag, and where.
+
+        Parameters
+        ----------
+        tolerance
+            Relative error that it may have.
+        """
+        from shipdrag_ros.studies.cable import words  # it tells of this module
+
+        return (words.line(self, tolerance),)
+
+    def table(self, tolerance: float = 0.1) -> Table:
+        """
+        Show what the lines err at speeds about V0.
+
+        Parameters
+        ----------
+        tolerance
+            Relative error that the tangent may have.
+        """
+        from shipdrag_ros.studies.cable import words
+
+        return words.errors(self, tolerance)
+
     def __post_init__(self) -> None:
         if not 0.0 < self.speed_m_s < math.inf:
             raise SimulationError(
@@ -263,6 +265,15 @@ def tangent_range(tolerance: float) -> tuple[float, float]:
     low, high
         1/(1 + s) and 1/(1 - s), s = sqrt(tolerance). The error tends to -1 as
         u grows, so from a tolerance of 1 on there is no upper end: inf.
+
+    Raises
+    ------
+    SimulationError
+        If the tolerance is not above 0.
+
+    Notes
+    -----
+    Source: S2; the relative error of the tangent is -(1 - 1/u)^2.
 
     Examples
     --------

@@ -142,6 +142,36 @@ class SteeredShip:
         )
 
 
+_FORCES = {'X': 'surge force', 'Y': 'sway force', 'N': 'yaw moment'}
+_MOTIONS = {'u': 'change of speed', 'v': 'sway', 'r': 'turning', 'd': 'rudder'}
+
+
+def meaning(name: str) -> str:
+    """
+    Say in words what a derivative of the form is.
+
+    Parameters
+    ----------
+    name
+        One of `FORM`: the force, and the powers of the motions that it grows with.
+
+    Examples
+    --------
+    >>> from shipdrag_ros.studies.manoeuvring.ship import meaning
+    >>> meaning('Yvvr')
+    'sway force by sway² x turning'
+    """
+    force, motions = _FORCES[name[0]], name[1:].removeprefix('0')
+    powers = {letter: motions.count(letter) for letter in dict.fromkeys(motions)}
+    told = ' x '.join(
+        _MOTIONS[letter] + {1: '', 2: '²', 3: '³'}[power] for letter, power in powers.items()
+    )
+    if name[1:2] != '0':
+        return f'{force} by {told}'
+    straight = f'{force} with the rudder amidships, sailing straight'
+    return f'{straight}, by {told}' if told else straight
+
+
 @cache
 def mariner() -> SteeredShip:
     """

@@ -34,6 +34,8 @@ def steer(
     ship
         What they have in common; they begin in steady sailing at its speed.
     manoeuvre
+        Rudder angles [rad], and the headings [rad] at which they are ordered.
+        Rudder angles [rad] and headings [rad] at which they are ordered.
     derivatives : (k, 40), optional
         In the order of `FORM`; those of the ship alone by default.
     sample_s, samples

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression import Domain, LinearFit, Prediction, least_squares
 from shipdrag_ros.samples import Float64
@@ -61,6 +62,27 @@ class ResidualFit:
     spread: float
     left_out: float
     notes: tuple[str, ...]
+
+    def summary(self, target: str = 'c_R') -> tuple[str, ...]:
+        """
+        Say what was fitted, how well the data determine it, and what must be known of it.
+
+        Parameters
+        ----------
+        target
+            Name of what was measured.
+        """
+        from shipdrag_ros.studies.residual import words  # it tells what this module holds
+
+        return (words.sentence(self, target, ()), words.technical(self), *self.notes)
+
+    def table(self) -> Table:
+        """
+        Show the coefficients, by the terms that they stand before.
+        """
+        from shipdrag_ros.studies.residual import words
+
+        return words.coefficients(self)
 
     @property
     def coefficient_sd(self) -> Float64:

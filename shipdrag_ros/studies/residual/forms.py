@@ -23,6 +23,8 @@ class Form:
         Of the form.
     columns
         From n hulls to (n, p), one column a coefficient b0, b1, ..
+    terms
+        What each column is; psi is the slenderness L / V^(1/3).
     variables
         Ratios of `Hulls` that tell its hulls apart, Fr included.
     froude_max
@@ -31,6 +33,7 @@ class Form:
 
     name: str
     columns: Callable[[Hulls], Float64]
+    terms: tuple[str, ...]
     variables: tuple[str, ...]
     froude_max: float = float('inf')
 
@@ -95,7 +98,29 @@ def _sirotina(hulls: Hulls) -> Float64:
     return np.column_stack(terms)
 
 
+_SAKHNOVSKY_TERMS = (
+    *('1', 'L/B', '(B/T) C_B', 'C_B', 'Fr', 'lcb', '(L/B)²', '((B/T) C_B lcb)²', '(C_B psi)²'),
+    *('Fr²', 'lcb²', 'psi', 'psi²', 'C_B Fr', '((B/T) psi)²'),
+)
+# Fr_V = v / sqrt(g V^(1/3)); the others about the middle of the series
+_SIROTINA = ('Fr_V', '(L/B - 7.88)', '(2 B/T - 8.42)', '(10 C_B - 8.19)')
+_SIROTINA_TERMS = (
+    '1',
+    *_SIROTINA,
+    *(
+        f'{one}²' if one == other else f'{one} {other}'
+        for i, one in enumerate(_SIROTINA)
+        for other in _SIROTINA[i:]
+    ),
+)
+
 # S4 (1) and (2)
-SAKHNOVSKY = Form('sakhnovsky', _sakhnovsky, ('L_B', 'B_T', 'C_B', 'lcb', 'Fr'), froude_max=0.14)
-SIROTINA = Form('sirotina', _sirotina, ('L_B', 'B_T', 'C_B', 'Fr'))
+SAKHNOVSKY = Form(
+    'sakhnovsky',
+    _sakhnovsky,
+    _SAKHNOVSKY_TERMS,
+    ('L_B', 'B_T', 'C_B', 'lcb', 'Fr'),
+    froude_max=0.14,
+)
+SIROTINA = Form('sirotina', _sirotina, _SIROTINA_TERMS, ('L_B', 'B_T', 'C_B', 'Fr'))
 FORMS = {form.name: form for form in (SAKHNOVSKY, SIROTINA)}

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -104,6 +105,24 @@ class CoastStudy:
     importance: tuple[Importance, ...]
     mimics: tuple[Mimic, ...]
     check: CoastCheck
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what matters most, what was done and what it means, a paragraph each.
+        """
+        from shipdrag_ros.studies.sensitivity import (
+            coasting_words as words,  # it tells of this module
+        )
+
+        return (words.sentence(self), *words.notes(self))
+
+    def table(self) -> Table:
+        """
+        Show what each value does, the most important first.
+        """
+        from shipdrag_ros.studies.sensitivity import coasting_words as words
+
+        return words.loss_table(self)
 
     @property
     def mean(self) -> Float64:

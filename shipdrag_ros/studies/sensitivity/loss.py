@@ -165,15 +165,25 @@ def vary(simulate: Simulator, names: Sequence[str], values: Float64, steps: Floa
     names
         Of the p parameters.
     values : (p,)
+        Of the parameters, each in its own unit.
     steps : (p, c)
         What is added to each value, one after the other; a step that is NaN
         is not made, and its differences are NaN.
+
+    Returns
+    -------
+    Responses
+        What each of the p c changes does to what the simulator gives.
 
     Raises
     ------
     SensitivityError
         If the numbers do not fit each other, or the unchanged parameters
         cannot be simulated.
+
+    Notes
+    -----
+    Source: S3, one-at-a-time sensitivity.
 
     Examples
     --------

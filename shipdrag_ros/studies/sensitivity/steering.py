@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.display import Table
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, overshoots_rad, turn, zigzag
 from shipdrag_ros.studies.manoeuvring.motion import Motion
@@ -139,6 +140,22 @@ class SteeringStudy:
     groups: Losses
     group_selection: Selection
     group_check: Check
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what is kept, what was done and what it means, a paragraph each.
+        """
+        from shipdrag_ros.studies.sensitivity import steering_words as words  # it tells of this
+
+        return (words.sentence(self), *words.notes(self))
+
+    def table(self) -> Table:
+        """
+        Show the losses, the most important derivative first.
+        """
+        from shipdrag_ros.studies.sensitivity import steering_words as words
+
+        return words.loss_table(self)
 
     @property
     def independent(self) -> int:

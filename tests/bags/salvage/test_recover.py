@@ -6,6 +6,7 @@ from __future__ import annotations
 import multiprocessing
 import random
 import resource
+import stat
 import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -64,6 +65,8 @@ def test_a_directory_of_rosbag2(
     assert result.messages_recovered == 300
     assert result.damage == ()
     assert result.quarantine is None
+    # not 0600, as temporary files are: the group may read it
+    assert stat.S_IMODE(Path(result.output).stat().st_mode) == 0o640
     (run,) = open_runs([result.output])
     assert_same(read_samples(run), block[:300])
     # cut off, as a loss of power leaves it

@@ -18,7 +18,6 @@ from shipdrag_ros.studies.cable.drag import (
     Surface,
     Tangent,
     base_coefficient,
-    body_axes,
     compare_errors,
     drag_coefficient,
     naive_error,
@@ -105,35 +104,6 @@ def test_a_stated_coefficient_is_taken_as_it_is():
     np.testing.assert_allclose(drag.force_n(np.array([0.0, 3.0])), [0.0, 180.0], rtol=1e-14)
     np.testing.assert_allclose(
         cable.in_water(1025.0).force_n(np.array([3.0])), [184.5], rtol=1e-14
-    )
-
-
-@FEW
-@given(
-    along=st.floats(-9.0, 9.0),
-    across=st.floats(-9.0, 9.0),
-    angle=st.floats(-4.0, 4.0),
-    more=st.floats(-4.0, 4.0),
-)
-def test_components_rotate(along, across, angle, more):
-    normal, tangential = body_axes(along, across, angle)
-    np.testing.assert_allclose(
-        np.hypot(normal, tangential), np.hypot(along, across), rtol=1e-12, atol=1e-12
-    )
-    # back by the opposite angle; and two angles, one after the other, are their sum
-    back = body_axes(tangential, normal, -angle)
-    np.testing.assert_allclose(back, (across, along), rtol=0.0, atol=1e-12)
-    twice = body_axes(tangential, normal, more)
-    np.testing.assert_allclose(twice, body_axes(along, across, angle + more), rtol=0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ('angle', 'normal', 'tangential'),
-    [(0.0, 3.0, 2.0), (np.pi / 2, 2.0, -3.0), (np.pi / 6, 1.0 + 1.5 * 3**0.5, 3**0.5 - 1.5)],
-)
-def test_components_at_known_angles(angle, normal, tangential):
-    np.testing.assert_allclose(
-        body_axes(2.0, 3.0, angle), (normal, tangential), rtol=1e-14, atol=1e-14
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from shipdrag_ros.studies.cable import words
 from shipdrag_ros.studies.cable.drag import Cable, Surface, Tangent, tangent_range
 from shipdrag_ros.studies.cable.face import page as cable_page
 from shipdrag_ros.studies.cable.face import pictures as cable_pictures
@@ -28,10 +29,10 @@ def test_the_page_stands_alone(tmp_path: Path, read_page: Callable[[Path], Any])
 
 
 def test_an_open_range_is_told() -> None:
-    rows = dict(cable_page.facts(CABLE, TANGENT, 4.0).rows)
+    rows = dict(words.facts(CABLE, TANGENT, 4.0).rows)
     assert rows['tangent within 400 %, u = V/V0'] == 'above 0.33333'
     assert rows['tangent within 400 %, V'] == 'above 0.66667 m/s'
-    assert 'without upper end' in cable_page.line(TANGENT, 4.0)
+    assert 'without upper end' in words.line(TANGENT, 4.0)
 
 
 def test_the_picture_shows_the_lines_and_the_range() -> None:

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from shipdrag_ros.studies.residual.forms import FORMS
+from shipdrag_ros.studies.residual.forms import FORMS, Form
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 
@@ -41,3 +42,17 @@ def test_sirotina() -> None:
     np.testing.assert_allclose(form.columns(hull())[0], expected, rtol=1e-12)
     assert not form.needs_lcb
     np.testing.assert_array_equal(form.place(hull()), [[8.0, 4.5, 0.85, 0.13]])
+
+
+@pytest.mark.parametrize('form', FORMS.values(), ids=lambda form: form.name)
+def test_terms_in_words_are_the_columns(form: Form) -> None:
+    values = {'L_B': 6.5, 'B_T': 3.1, 'C_B': 0.7, 'Fr': 0.13, 'lcb': 0.02, 'psi': 5.6}
+    one = {name: np.array([value]) for name, value in values.items()}
+    hulls = Hulls(one['L_B'], one['B_T'], one['C_B'], one['psi'], one['Fr'], one['lcb'])
+    known = {**values, 'Fr_V': values['Fr'] * values['psi'] ** 0.5}
+
+    def worth(term: str) -> float:
+        text = term.replace('L/B', 'L_B').replace('B/T', 'B_T').replace(' - ', '-')
+        return float(eval(text.replace(' ', '*').replace('²', '**2'), {}, known))
+
+    np.testing.assert_allclose([worth(term) for term in form.terms], form.columns(hulls)[0])

@@ -61,7 +61,7 @@ def test_json_to_the_letter(
     assert 0.0 < found['F'] < (0.02 * 2e-3) ** 2
     assert 10.0 < found['condition'] < 1e4
     assert found['F'] ** 0.5 < found['left_out_rms'] < 0.1 * 2e-3
-    assert f'left out are missed by {found["left_out_rms"]:.2g} (rms)' in shown.err
+    assert f'left out is missed by {found["left_out_rms"]:.2g} (rms)' in shown.err
     assert found['domain']['Fr'] == [0.08, 0.2]
     assert list(found['domain']) == ['L_B', 'B_T', 'C_B', 'Fr']
     good, bad = found['predictions']

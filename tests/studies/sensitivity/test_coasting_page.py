@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.studies.sensitivity import coasting_words as words
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import study_coast
-from shipdrag_ros.studies.sensitivity.face import coasting_page as page
 
 SHIP = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
 
@@ -22,9 +22,9 @@ def found():
 
 def test_words_hold_the_figures(found):
     assert 'matter most are displaced_volume_m3, wetted_surface_m2, baseline.C_V' in (
-        page.sentence(found)
+        words.sentence(found)
     )
-    seen = ' '.join(page.notes(found))
+    seen = ' '.join(words.notes(found))
     assert 'from 8.20 m/s' in seen
     assert f'off by {found.check.speed_m_s:.3f} m/s' in seen
     assert 'fouling like' in seen
@@ -33,7 +33,7 @@ def test_words_hold_the_figures(found):
 
 
 def test_a_row_a_value_with_dashes_where_nothing_is_known(found):
-    table = page.loss_table(found)
+    table = words.loss_table(found)
     rows = {row[0]: row for row in table.rows}
     assert list(rows) == [*found.selection.kept, *found.selection.dropped]
     assert all(len(row) == len(table.columns) for row in table.rows)
@@ -43,7 +43,7 @@ def test_a_row_a_value_with_dashes_where_nothing_is_known(found):
 
 
 def test_a_row_an_effect(found):
-    table = page.mimic_table(found)
+    table = words.mimic_table(found)
     assert [row[0] for row in table.rows] == [mimic.effect.name for mimic in found.mimics]
     row = next(row for row in table.rows if row[0] == 'locked_propeller')
     assert row[4] == 'at least -50%'

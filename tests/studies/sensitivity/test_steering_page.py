@@ -7,7 +7,7 @@ import pytest
 
 from shipdrag_ros.studies.manoeuvring.manoeuvre import turn, zigzag
 from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.sensitivity.face import steering_page as page
+from shipdrag_ros.studies.sensitivity import steering_words as words
 from shipdrag_ros.studies.sensitivity.steering import experiment, study
 
 SHIP = mariner()
@@ -19,18 +19,18 @@ def found():
 
 
 def test_words_hold_the_figures(found):
-    assert 'of 40 derivatives 24' in page.sentence(found)
-    seen = ' '.join(page.notes(found))
+    assert 'of 40 derivatives 24' in words.sentence(found)
+    seen = ' '.join(words.notes(found))
     assert '50 % costs 5.00 times 10 %' in seen
     assert 'it keeps the same 24' in seen
     assert '26 measurements: the 24 kept hold 18' in seen
     assert '5 of the dropped ones follow from a kept one' in seen
     assert 'the same 18 are 29 derivatives' in seen
-    assert 'not quite the same' in ' '.join(page.notes(study(SHIP, zigzag(15.0), keep=12)))
+    assert 'not quite the same' in ' '.join(words.notes(study(SHIP, zigzag(15.0), keep=12)))
 
 
 def test_losses_are_in_the_order_of_what_is_kept(found):
-    table = page.loss_table(found)
+    table = words.loss_table(found)
     assert [row[0] for row in table.rows] == list(found.losses.ranking)
     assert [row[-2] for row in table.rows] == ['yes'] * 24 + ['no'] * 16
     row = next(row for row in table.rows if row[0] == 'Nud')
@@ -40,18 +40,18 @@ def test_losses_are_in_the_order_of_what_is_kept(found):
 
 
 def test_the_check_has_a_row_a_model_even_where_one_does_not_turn(found):
-    full, kept, by_group = page.check_table(found).rows
+    full, kept, by_group = words.check_table(found).rows
     assert full[:5] == ('full', '40', '26', '8.85', '7.01')
     assert kept[:3] == ('kept', '24', '18')
     assert by_group[:3] == ('kept by measurement', '29', '18')
     assert float(by_group[-1]) < float(kept[-1])
-    lone = page.check_table(study(SHIP, zigzag(15.0), keep=1)).rows[1]
+    lone = words.check_table(study(SHIP, zigzag(15.0), keep=1)).rows[1]
     assert len(lone) == len(full)
 
 
 def test_the_design_names_the_best_manoeuvre_of_each():
     shown = experiment(SHIP, (zigzag(10.0), turn(35.0)))
-    table = page.design_table(shown)
+    table = words.design_table(shown)
     assert table.columns[1:3] == ('zigzag:10', 'turn:35')
     for row in table.rows:
         larger = 'zigzag:10' if float(row[1]) > float(row[2]) else 'turn:35'

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.regression import Prediction, Surface, fit_surface
+from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.studies.residual import words
 from shipdrag_ros.studies.residual.face import page as residual_page
 from shipdrag_ros.studies.residual.fit import ResidualFit, fit_residual
 from shipdrag_ros.studies.residual.hulls import Hulls
-from shipdrag_ros.studies.surface.face import cells as fit_cells
 from shipdrag_ros.studies.surface.face import page as surface_page
 from shipdrag_ros.studies.surface.face import pictures as fit_pictures
 
@@ -43,15 +44,15 @@ def residual() -> tuple[ResidualFit, Float64]:
 
 def test_cells_of_a_surface() -> None:
     found, _ = surface(2)
-    degrees = fit_cells.degrees(found)
+    degrees = fit_words.degrees(found)
     assert degrees.rows[0][4:] == ('-', '-', '')
     assert [row[0] for row in degrees.rows if row[-1] == 'chosen'] == ['3']
-    terms = [row[0] for row in fit_cells.coefficients(found).rows]
+    terms = [row[0] for row in fit_words.coefficients(found).rows]
     assert terms[:6] == ['1', 'x0', 'x1', 'x0^2', 'x0 x1', 'x1^2']
 
 
 def test_cells_of_predictions() -> None:
-    rows = fit_cells.predictions([Prediction(0.25, 0.013, ()), REFUSED]).rows
+    rows = fit_words.predictions([Prediction(0.25, 0.013, ()), REFUSED]).rows
     assert rows[0] == ('1', '0.25', '0.013', 'yes')
     assert rows[1] == ('2', '1.5', 'open', 'NO: x 9 is outside <0..1> of the data')
 
@@ -87,8 +88,8 @@ def test_page_of_a_regression(residual: tuple[ResidualFit, Float64], tmp_path: P
     assert text.count('data:image/svg+xml') == 2
     assert 'Of 1 predictions 0 may be used' in text
     assert '20 hulls, 120 rows' in text
-    assert residual_page.coefficients(found).rows[14][0] == 'b14'
-    assert residual_page.domain(found).rows[3] == ('Fr', '0.1', '0.2')
+    assert words.coefficients(found).rows[14][0] == '(10 C_B - 8.19)²'
+    assert words.domain(found).rows[3] == ('Fr', '0.1', '0.2')
 
 
 def test_hulls_that_others_leave_open_have_no_picture(
@@ -103,7 +104,7 @@ def test_hulls_that_others_leave_open_have_no_picture(
     )
     text = page.read_text()
     assert text.count('data:image/svg+xml') == 1
-    assert 'open' in [row[2] for row in residual_page.coefficients(nine).rows]
+    assert 'open' in [row[2] for row in words.coefficients(nine).rows]
 
 
 def test_pictures_show_the_data() -> None:

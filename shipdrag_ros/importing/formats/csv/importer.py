@@ -17,18 +17,18 @@ from math import isfinite
 from pathlib import Path
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import (
     ATTACHMENT,
     BATCH_SAMPLES,
     LIMIT_NS,
-    SECOND_NS,
     Rejected,
     new_bag,
 )
 from shipdrag_ros.importing.formats.csv.columns import InputColumns, TimeColumn
-from shipdrag_ros.importing.table import NUMBER, Row, Table
-from shipdrag_ros.samples import Block
+from shipdrag_ros.importing.table import Row, Table
+from shipdrag_ros.samples import SECOND_NS, Block
 
 BASE_NS = 946_684_800 * SECOND_NS
 """2000-01-01, where a time that counts from the start of a test begins."""

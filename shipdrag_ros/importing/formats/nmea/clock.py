@@ -13,8 +13,9 @@ from __future__ import annotations
 import re
 from datetime import date
 
-from shipdrag_ros.importing.bag import LIMIT_NS, SECOND_NS
-from shipdrag_ros.importing.formats.nmea.sentences import Fields, NoValue, has_fix
+from shipdrag_ros.importing.bag import LIMIT_NS
+from shipdrag_ros.nmea.sentences import Fields, NoValue, has_fix
+from shipdrag_ros.samples import SECOND_NS
 
 DAY_NS = 86_400 * SECOND_NS
 GAP_NS = 10 * SECOND_NS

@@ -14,7 +14,7 @@ from shipdrag_ros.cli.log_format import LogFormat
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.importing.formats.nmea.importer import NmeaResult, import_nmea
-from shipdrag_ros.importing.formats.nmea.log import Checksum
+from shipdrag_ros.nmea.framing import Checksum
 
 
 def _add_nmea(group: argparse._ArgumentGroup) -> None:

@@ -21,10 +21,11 @@ from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import ATTACHMENT, BATCH_SAMPLES, Rejected, new_bag
 from shipdrag_ros.importing.formats.nmea.clock import Clock
-from shipdrag_ros.importing.formats.nmea.log import Checksum, NmeaLog
+from shipdrag_ros.importing.formats.nmea.log import NmeaLog
 from shipdrag_ros.importing.formats.nmea.record import Record
-from shipdrag_ros.importing.formats.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
 from shipdrag_ros.importing.formats.nmea.survey import Survey
+from shipdrag_ros.nmea.framing import Checksum
+from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
 from shipdrag_ros.samples import INPUTS, Channel
 
 LOG_ATTACHMENT = 'log.nmea'

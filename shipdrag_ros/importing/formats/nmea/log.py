@@ -1,10 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
 A log of NMEA 0183 as sentences, and a count of what is none.
-
-Framing, checksum and the names of the fields are pynmeagps'. Its message
-objects are not used: they refuse a whole sentence for a bad field that is not
-needed here, and take `nan` and `1_0` for numbers.
 """
 
 from __future__ import annotations
@@ -15,16 +11,17 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
-from enum import Enum
 from fractions import Fraction
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
-from typing import IO, NamedTuple, cast
+from typing import IO, cast
 
-from pynmeagps.nmeahelpers import calc_checksum, get_parts
+from pynmeagps.nmeahelpers import calc_checksum
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.bag import LIMIT_NS, SECOND_NS, Rejected
+from shipdrag_ros.importing.bag import LIMIT_NS, Rejected
+from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
+from shipdrag_ros.samples import SECOND_NS
 
 _GZIP = b'\x1f\x8b'
 _UTF_16 = (b'\xff\xfe', b'\xfe\xff')
@@ -32,48 +29,12 @@ _UTF_8_MARK = '\xef\xbb\xbf'  # as it looks in the encoding below
 # every byte is a character, so that checksums are those of the bytes
 _ENCODING = 'latin-1'
 _LINE = 4096  # a sentence has 82 characters; some with a prefix have more
-_START = re.compile('[$!]')  # no sentence has either inside
-_ADDRESS = re.compile('[A-Z][A-Z0-9]{4}|P[A-Z0-9]{2,}')
 _TAG = re.compile(r'\\([^\\]*)\*([0-9A-Fa-f]{2})\\')
 _TAGS = re.compile(f'(?:{_TAG.pattern})+')
 _TAG_TIME = re.compile(r'(?:^|,)c:(\d{9,14})(?:,|$)')
 _EPOCH = re.compile(r'\[?(\d{9,10}|\d{13})(\.\d+)?\]?[\s,;:]*')
 _ISO = re.compile(r'\[?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)\]?[\s,;:]*')
 _MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past the year 5000
-
-
-class Checksum(Enum):
-    """Whether a sentence must have a checksum; one it has must be right."""
-
-    REQUIRED = 'required'
-    OPTIONAL = 'optional'
-
-
-class Sentence(NamedTuple):
-    """
-    A sentence whose checksum is right.
-
-    Attributes
-    ----------
-    line
-        Number of the line, from 1.
-    text
-        As it stands there.
-    talker, kind
-        Parts of its address, `GP` and `RMC` for instance; a proprietary
-        sentence is all talker.
-    fields
-        What follows the address.
-    receive_ns
-        When the logger received it [ns since the epoch]; None if it does not say.
-    """
-
-    line: int
-    text: str
-    talker: str
-    kind: str
-    fields: list[str]
-    receive_ns: int | None
 
 
 class NmeaLog:
@@ -177,7 +138,7 @@ class NmeaLog:
         if not line:
             return
         # a lost line end leaves two sentences in a line
-        prefix, *texts = _START.split(line)
+        prefix, *texts = START.split(line)
         if not texts:
             self._reject('no sentence', number, line)
             return
@@ -189,24 +150,9 @@ class NmeaLog:
             receive_ns = None
         for text in texts:
             try:
-                yield self._sentence(number, text.strip(), receive_ns)
+                yield parse(text.strip(), self._checksum, line=number, receive_ns=receive_ns)
             except ValueError as error:
                 self._reject(str(error), number, text)
-
-    def _sentence(self, number: int, text: str, receive_ns: int | None) -> Sentence:
-        complete = text
-        if '*' not in text:
-            if self._checksum is Checksum.REQUIRED:
-                raise ValueError('without checksum')
-            complete = f'{text}*{calc_checksum(text)}'
-        content, talker, kind, fields, checksum = get_parts(complete)
-        if calc_checksum(content) != checksum.upper():
-            raise ValueError('wrong checksum')
-        if not _ADDRESS.fullmatch(talker + kind):
-            raise ValueError('no address')
-        if talker == 'P':
-            talker, kind = talker + kind, ''
-        return Sentence(number, text, talker, kind, fields, receive_ns)
 
     def _reject(self, reason: str, number: int, text: str) -> None:
         self.rejected.setdefault(reason, Rejected()).add(number, text)

@@ -13,15 +13,15 @@ from dataclasses import dataclass, field
 
 from shipdrag_ros.importing.bag import Rejected
 from shipdrag_ros.importing.formats.nmea.clock import GAP_NS, Clock, Moment
-from shipdrag_ros.importing.formats.nmea.log import Sentence
-from shipdrag_ros.importing.formats.nmea.sentences import (
+from shipdrag_ros.nmea.framing import Sentence
+from shipdrag_ros.nmea.sentences import (
     TIMED,
     Fields,
     Measured,
     Mounting,
     NoValue,
 )
-from shipdrag_ros.importing.formats.nmea.survey import Source, read_values
+from shipdrag_ros.nmea.values import Source, read_values
 from shipdrag_ros.samples import Block, Channel
 
 _WAITING_SAMPLES = 16384  # in GAP_NS, of all inputs

@@ -9,59 +9,14 @@ from __future__ import annotations
 
 from collections import Counter
 from datetime import date
-from typing import NamedTuple
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.formats.nmea.clock import DAY_NS, Clock, Moment, days_of, rollover_days
-from shipdrag_ros.importing.formats.nmea.log import NmeaLog, Sentence
-from shipdrag_ros.importing.formats.nmea.sentences import (
-    READERS,
-    TIMED,
-    Fields,
-    Measured,
-    Mounting,
-    NoValue,
-)
+from shipdrag_ros.importing.formats.nmea.log import NmeaLog
+from shipdrag_ros.nmea.framing import Sentence
+from shipdrag_ros.nmea.sentences import TIMED, Fields, Mounting, NoValue
+from shipdrag_ros.nmea.values import Source, best, read_values
 from shipdrag_ros.samples import Channel
-
-_RANK = {kind: place for place, kind in enumerate(READERS)}
-
-
-class Source(NamedTuple):
-    """Who tells an input; the better source is the smaller."""
-
-    rank: int
-    detail: str
-    talker: str
-    kind: str
-
-    def __str__(self) -> str:
-        return f'{self.talker}{self.kind} {self.detail}'.strip()
-
-
-def read_values(
-    sentence: Sentence, mounting: Mounting
-) -> list[tuple[Channel, Source | None, Measured | NoValue]]:
-    """
-    Return what a sentence measures, or why it does not.
-    """
-    found: list[tuple[Channel, Source | None, Measured | NoValue]] = []
-    fields = Fields(sentence.kind, sentence.fields)
-    for told, read in READERS.get(sentence.kind, ()):
-        channel = told
-        try:
-            value = read(fields, mounting)
-        except NoValue as reason:
-            found.append((channel, None, reason))
-        else:
-            if value is None:
-                continue
-            if value.channel is not None:
-                channel = value.channel
-            rank = _RANK[sentence.kind]
-            source = Source(rank, value.detail, sentence.talker, sentence.kind)
-            found.append((channel, source, value))
-    return found
 
 
 class Survey:
@@ -110,15 +65,8 @@ class Survey:
     def chosen(self) -> dict[Channel, Source]:
         """
         Return the one source of each input.
-
-        The first in the order of `Source` of those with at least half as many
-        values as the most frequent: two instruments of different place or
-        scale are never mixed.
         """
-        return {
-            channel: min(source for source, n in counts.items() if 2 * n >= max(counts.values()))
-            for channel, counts in self.values.items()
-        }
+        return {channel: best(counts) for channel, counts in self.values.items()}
 
     def clock(self, log: NmeaLog, day: date | None) -> Clock:
         """

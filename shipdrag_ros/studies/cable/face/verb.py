@@ -8,6 +8,7 @@ from typing import Any
 
 from shipdrag_ros.cli.arguments import add_json, add_report, number
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.studies.cable import words
 from shipdrag_ros.studies.cable.drag import Cable, Surface, Tangent, compare_errors, tangent_range
 from shipdrag_ros.studies.cable.face import page as cable_page
 
@@ -96,12 +97,12 @@ def document(cable: Cable, tangent: Tangent, tolerance: float) -> dict[str, Any]
 
 
 def _show(output: Output, cable: Cable, tangent: Tangent, tolerance: float) -> None:
-    output.say(cable_page.sentence(cable, tangent))
-    output.say(cable_page.line(tangent, tolerance))
-    output.table(cable_page.facts(cable, tangent, tolerance))
+    output.say(words.sentence(cable, tangent))
+    output.say(words.line(tangent, tolerance))
+    output.table(words.facts(cable, tangent, tolerance))
     output.heading('Errors of the lines')
-    output.table(cable_page.errors(tangent, tolerance))
-    for note in cable_page.notes(cable):
+    output.table(words.errors(tangent, tolerance))
+    for note in words.notes(cable):
         output.say(note)
     area = tangent.drag.drag_area_m2
     output.say(f'On a ship: shipdrag simulate --effect towed_cable={area:.6g} ...')

@@ -14,13 +14,14 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.importing.numbers import read_numbers
 from shipdrag_ros.regression import Prediction
+from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.residual.baseline import with_residual
-from shipdrag_ros.studies.residual.face.page import coefficients, domain, sentence, write_residual
+from shipdrag_ros.studies.residual.face.page import write_residual
 from shipdrag_ros.studies.residual.fit import AUTO, ResidualFit, fit_residual
 from shipdrag_ros.studies.residual.forms import FORMS
 from shipdrag_ros.studies.residual.hulls import OPTIONAL, REQUIRED, Hulls
-from shipdrag_ros.studies.surface.face import cells as fit_cells
+from shipdrag_ros.studies.residual.words import coefficients, domain, sentence, technical
 from shipdrag_ros.studies.surface.face.verb import prediction_documents
 
 
@@ -126,6 +127,7 @@ def document(found: ResidualFit, predictions: Sequence[Prediction]) -> dict[str,
 
     return {
         'form': found.form.name,
+        'terms': {f'b{i}': term for i, term in enumerate(found.form.terms)},
         'coefficients': named(found.fit.coefficients.tolist()),
         'coefficient_sd': named(found.coefficient_sd.tolist()),
         'F': found.criterion,
@@ -149,12 +151,13 @@ def _show(
     output: Output, found: ResidualFit, target: str, predictions: Sequence[Prediction]
 ) -> None:
     output.say(sentence(found, target, predictions))
+    output.say(technical(found))
     output.heading('Coefficients')
     output.table(coefficients(found))
     output.heading('Ranges of the data')
     output.table(domain(found))
     if predictions:
         output.heading('Predictions')
-        output.table(fit_cells.predictions(predictions))
+        output.table(fit_words.predictions(predictions))
     for note in found.notes:
         output.say(f'NOTE: {note}')

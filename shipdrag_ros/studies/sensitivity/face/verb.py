@@ -14,6 +14,7 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.manoeuvring.manoeuvre import parse
 from shipdrag_ros.studies.manoeuvring.ship import mariner
+from shipdrag_ros.studies.sensitivity import coasting_words, steering_words
 from shipdrag_ros.studies.sensitivity.coast import KIND, SPEED_FRACTION, parse_coast
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting_page, steering_page
@@ -82,19 +83,20 @@ def _steering(options: argparse.Namespace, output: Output) -> None:
     manoeuvre = parse(_MANOEUVRE if options.manoeuvre is None else options.manoeuvre)
     found = study(ship, manoeuvre, keep=_KEEP if options.keep is None else options.keep)
     shown = experiment(ship)
-    page = steering_page
-    output.say(page.sentence(found))
-    for note in page.notes(found):
+    words = steering_words
+    output.say(words.sentence(found))
+    for note in words.notes(found):
         output.say(f'- {note}')
     for heading, table in (
-        (page.LOSSES, page.loss_table(found)),
-        (page.CHECK, page.check_table(found)),
-        (page.DESIGN, page.design_table(shown)),
+        (words.LOSSES, words.loss_table(found)),
+        (words.CHECK, words.check_table(found)),
+        (words.DESIGN, words.design_table(shown)),
+        (words.MEANINGS, words.meaning_table(found)),
     ):
         output.heading(heading)
         output.table(table)
     if options.report is not None:
-        page.write_steering(options.report, found, shown)
+        steering_page.write_steering(options.report, found, shown)
     output.json(steering_document(found, shown))
 
 
@@ -102,18 +104,18 @@ def _coasting(options: argparse.Namespace, output: Output) -> None:
     ship = Ship.load(options.ship)
     coast = parse_coast(ship, KIND if options.manoeuvre is None else options.manoeuvre)
     found = study_coast(ship, coast, keep=options.keep)
-    page = coasting_page
-    output.say(page.sentence(found))
-    for note in page.notes(found):
+    words = coasting_words
+    output.say(words.sentence(found))
+    for note in words.notes(found):
         output.say(f'- {note}')
     for heading, table in (
-        (page.LOSSES, page.loss_table(found)),
-        (page.MIMICS, page.mimic_table(found)),
+        (words.LOSSES, words.loss_table(found)),
+        (words.MIMICS, words.mimic_table(found)),
     ):
         output.heading(heading)
         output.table(table)
     if options.report is not None:
-        page.write_coasting(options.report, found)
+        coasting_page.write_coasting(options.report, found)
     output.json(coasting_document(found))
 
 

@@ -1,33 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of a fitted surface: its words, its pictures."""
+"""The page of a fitted surface."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from shipdrag_ros.display import Section
 from shipdrag_ros.regression import Prediction, Surface
+from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.surface.face import cells as fit_cells
 from shipdrag_ros.studies.surface.face import pictures as fit_pictures
 
 _NOTES = 'What these data can and cannot show'
-
-
-def sentence(surface: Surface, target: str) -> str:
-    """
-    Say in words what was found.
-    """
-    rmse = float(np.sqrt(surface.fit.variance))
-    return (
-        f'{target} is a polynomial of degree {surface.degree} in '
-        f'{", ".join(surface.inputs)}: {len(surface.polynomial.powers)} terms, RMSE {rmse:.4g}.'
-    )
 
 
 def write_surface(
@@ -59,11 +46,11 @@ def write_surface(
         Asked for besides; may be empty.
     """
     tables = [
-        ('Degrees tried; F and p of the step from the degree before', fit_cells.degrees(surface)),
-        ('Coefficients of raw powers', fit_cells.coefficients(surface)),
+        ('Degrees tried; F and p of the step from the degree before', fit_words.degrees(surface)),
+        ('Coefficients of raw powers', fit_words.coefficients(surface)),
     ]
     if predictions:
-        tables.append(('Predictions', fit_cells.predictions(predictions)))
+        tables.append(('Predictions', fit_words.predictions(predictions)))
     pictures = [
         picture(
             fit_pictures.degree_picture(surface),
@@ -93,5 +80,5 @@ def write_surface(
         f'Surface of {target} over {", ".join(surface.inputs)}',
         shown,
         source=source,
-        sentence=sentence(surface, target),
+        sentence=fit_words.sentence(surface, target),
     )

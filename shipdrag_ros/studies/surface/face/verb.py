@@ -16,9 +16,9 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.importing.numbers import read_numbers
 from shipdrag_ros.regression import Prediction, Surface, fit_surface
+from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.regression.surface import LOWEST, MAX_DEGREE
-from shipdrag_ros.studies.surface.face import cells as fit_cells
-from shipdrag_ros.studies.surface.face.page import sentence, write_surface
+from shipdrag_ros.studies.surface.face.page import write_surface
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -151,14 +151,14 @@ def prediction_documents(found: Sequence[Prediction]) -> list[dict[str, Any]]:
 
 
 def _show(output: Output, found: Surface, target: str, predictions: Sequence[Prediction]) -> None:
-    output.say(sentence(found, target))
+    output.say(fit_words.sentence(found, target))
     output.heading('Degrees tried')
-    output.table(fit_cells.degrees(found))
+    output.table(fit_words.degrees(found))
     output.heading('Coefficients of raw powers')
-    output.table(fit_cells.coefficients(found))
+    output.table(fit_words.coefficients(found))
     if predictions:
         output.heading('Predictions')
-        output.table(fit_cells.predictions(predictions))
+        output.table(fit_words.predictions(predictions))
     for note in found.notes:
         output.say(f'NOTE: {note}')
 

@@ -16,16 +16,16 @@ from typing import NamedTuple
 
 from pynmeagps.nmeatypes_get import NMEA_PAYLOADS_GET
 
-from shipdrag_ros.importing.table import NUMBER
+from shipdrag_ros.display import M_S_PER_KNOT, NUMBER
 from shipdrag_ros.samples import PITCHES, SHAFTS, Channel
 
-KNOT_M_S = 1852.0 / 3600.0
 _FOOT_M = 0.3048
 _FATHOM_M = 6.0 * _FOOT_M
-_WIND_UNITS = {'N': KNOT_M_S, 'K': 1.0 / 3.6, 'M': 1.0, 'S': 0.44704}
+_WIND_UNITS = {'N': M_S_PER_KNOT, 'K': 1.0 / 3.6, 'M': 1.0, 'S': 0.44704}
 _LATITUDE = re.compile(r'(\d{2})(\d{2}(?:\.\d+)?)')
 _LONGITUDE = re.compile(r'(\d{3})(\d{2}(?:\.\d+)?)')
 _NO_MEASUREMENT = {'N': 'no fix', 'E': 'dead reckoning', 'M': 'manual', 'S': 'simulated'}
+_NO_HEADING = {'E': 'estimated', 'M': 'manual', 'S': 'simulated', 'V': 'not valid'}
 _NO_FIX = {'0': 'no fix', '6': 'dead reckoning', '7': 'manual', '8': 'simulated'}
 MAGNETIC = 'magnetic'
 
@@ -119,29 +119,29 @@ Reader = Callable[[Fields, Mounting], Measured | None]
 
 
 def _water_vhw(fields: Fields, mounting: Mounting) -> Measured:
-    return Measured(fields.first(('spdN', KNOT_M_S), ('spdK', 1.0 / 3.6)))
+    return Measured(fields.first(('spdN', M_S_PER_KNOT), ('spdK', 1.0 / 3.6)))
 
 
 def _water_vbw(fields: Fields, mounting: Mounting) -> Measured:
     fields.check('waterspdstatus', allowed='A')
-    return Measured(fields.number('longwaterspd') * KNOT_M_S)
+    return Measured(fields.number('longwaterspd') * M_S_PER_KNOT)
 
 
 def _ground_vbw(fields: Fields, mounting: Mounting) -> Measured:
     fields.check('groundspdstatus', allowed='A')
     return Measured(
-        hypot(fields.number('longgroundspd'), fields.number('transgroundspd')) * KNOT_M_S
+        hypot(fields.number('longgroundspd'), fields.number('transgroundspd')) * M_S_PER_KNOT
     )
 
 
 def _ground_vtg(fields: Fields, mounting: Mounting) -> Measured:
     _check_mode(fields)
-    return Measured(fields.first(('sogn', KNOT_M_S), ('sogk', 1.0 / 3.6)))
+    return Measured(fields.first(('sogn', M_S_PER_KNOT), ('sogk', 1.0 / 3.6)))
 
 
 def _ground_rmc(fields: Fields, mounting: Mounting) -> Measured:
     _check_fix(fields)
-    return Measured(fields.number('spd') * KNOT_M_S)
+    return Measured(fields.number('spd') * M_S_PER_KNOT)
 
 
 def _position(fields: Fields, mounting: Mounting) -> Measured:
@@ -176,6 +176,13 @@ def _angle(
 
 def _yaw_hdt(fields: Fields, mounting: Mounting) -> Measured:
     return Measured(_yaw(fields.number('headingT')))
+
+
+def _yaw_ths(fields: Fields, mounting: Mounting) -> Measured:
+    mode = fields['mi']
+    if mode in _NO_HEADING:
+        raise NoValue(f'mode {mode}: {_NO_HEADING[mode]}', mode)
+    return Measured(_yaw(fields.number('headt')))
 
 
 def _yaw_hdg(fields: Fields, mounting: Mounting) -> Measured:
@@ -316,6 +323,7 @@ READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
     ),
     'VHW': ((Channel.SPEED_THROUGH_WATER, _water_vhw),),
     'HDT': ((Channel.HEADING, _yaw_hdt),),
+    'THS': ((Channel.HEADING, _yaw_ths),),
     'HDG': ((Channel.HEADING, _yaw_hdg),),
     'RPM': ((Channel.SHAFT, _shaft), (Channel.PITCH, _pitch)),
     'RSA': ((Channel.RUDDER, _rudder),),

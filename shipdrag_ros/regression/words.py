@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of a fit to measured numbers, the same in the terminal and on the page."""
+"""A fit to measured numbers in sentences and tables, the same in the terminal and on a page."""
 
 from __future__ import annotations
 
@@ -9,6 +9,17 @@ import numpy as np
 
 from shipdrag_ros.display import Table
 from shipdrag_ros.regression import Prediction, Surface
+
+
+def sentence(surface: Surface, target: str) -> str:
+    """
+    Say in words what was found.
+    """
+    rmse = float(np.sqrt(surface.fit.variance))
+    return (
+        f'{target} is a polynomial of degree {surface.degree} in '
+        f'{", ".join(surface.inputs)}: {len(surface.polynomial.powers)} terms, RMSE {rmse:.4g}.'
+    )
 
 
 def degrees(surface: Surface) -> Table:

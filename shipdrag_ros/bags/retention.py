@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which recordings are removed so that a disk never fills.
+
+The oldest parts go first. A part that holds a coastdown, and the one before it
+with its steady lead, is kept until nothing else is left.
+"""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Collection
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from shipdrag_ros.bags.mcap_file import McapFile
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE
+
+DAY_S = 86_400.0
+_PART = re.compile(r'(coastdown_\d{8}T\d{6}Z)_\d{3,}(_\d+)?\.mcap')
+_BLOCK_BYTES = 4096  # what even an empty file costs
+
+
+@dataclass(frozen=True)
+class Keep:
+    """
+    How much is kept; 0 is no limit.
+
+    Attributes
+    ----------
+    days
+        Age of a part, by its last change [d].
+    size_bytes
+        Of all parts together.
+    """
+
+    days: float = 0.0
+    size_bytes: int = 0
+
+    @property
+    def everything(self) -> bool:
+        """Whether nothing is ever removed."""
+        return not self.days and not self.size_bytes
+
+
+@dataclass(frozen=True)
+class Removed:
+    """A part that was removed, and whether it held a coastdown."""
+
+    path: Path
+    coastdown: bool
+    why: str
+
+    @property
+    def text(self) -> str:
+        """One sentence for a log."""
+        held = ' (it held a coastdown: nothing else was left to remove)' if self.coastdown else ''
+        return f'removed {self.path.name}: {self.why}{held}'
+
+
+@dataclass(frozen=True)
+class _Part:
+    path: Path
+    size_bytes: int
+    changed_s: float
+
+
+class Retention:
+    """
+    Keeps a directory of recordings within its limits.
+
+    Parameters
+    ----------
+    directory
+        Where the parts are; nothing else in it is touched, and no link followed.
+    keep
+        The limits.
+    """
+
+    def __init__(self, directory: Path, keep: Keep) -> None:
+        self._directory = directory
+        self._keep = keep
+        self._holds: dict[_Part, bool] = {}
+
+    def tidy(self, *, busy: Collection[Path], now_s: float) -> list[Removed]:
+        """
+        Remove what is too old or too much.
+
+        Parameters
+        ----------
+        busy
+            Files that are still written; never removed.
+        now_s
+            Present time [s since the epoch].
+        """
+        if self._keep.everything:
+            return []
+        parts = self._parts()
+        free = [part for part in parts if part.path not in busy]
+        worth = self._worth_keeping(parts)
+        removed = []
+        if self._keep.days:
+            limit_s = now_s - self._keep.days * DAY_S
+            for part in [it for it in free if it.changed_s < limit_s and it not in worth]:
+                removed += self._remove(part, f'older than {self._keep.days:g} days', False)
+                free.remove(part)
+                parts.remove(part)
+        if self._keep.size_bytes:
+            total = sum(part.size_bytes for part in parts)
+            order = [it for it in free if it not in worth] + [it for it in free if it in worth]
+            for part in order:
+                if total <= self._keep.size_bytes:
+                    break
+                why = f'recordings take more than {self._keep.size_bytes} bytes'
+                removed += self._remove(part, why, part in worth)
+                total -= part.size_bytes
+        return removed
+
+    def _parts(self) -> list[_Part]:
+        """Return the parts in the order of their recording."""
+        parts = []
+        with suppress(OSError):
+            for path in sorted(self._directory.iterdir()):
+                if _PART.fullmatch(path.name):
+                    about = path.lstat()
+                    if stat.S_ISREG(about.st_mode):
+                        size = max(about.st_size, _BLOCK_BYTES)
+                        parts.append(_Part(path, size, about.st_mtime))
+        return parts
+
+    def _worth_keeping(self, parts: list[_Part]) -> set[_Part]:
+        self._holds = {part: self._holds[part] for part in parts if part in self._holds}
+        worth = set()
+        before: _Part | None = None
+        for part in parts:
+            if part not in self._holds:
+                self._holds[part] = _holds_coastdown(part.path)
+            if self._holds[part]:
+                worth.add(part)
+                if before is not None and _recording(before.path) == _recording(part.path):
+                    worth.add(before)
+            before = part
+        return worth
+
+    def _remove(self, part: _Part, why: str, coastdown: bool) -> list[Removed]:
+        with suppress(OSError):  # tried again the next time
+            part.path.unlink()
+            return [Removed(part.path, coastdown, why)]
+        return []
+
+
+def _recording(path: Path) -> str:
+    found = _PART.fullmatch(path.name)
+    return found[1] if found else path.name
+
+
+def _holds_coastdown(path: Path) -> bool:
+    """Say whether figures were published in it; of a file that cannot be read, yes."""
+    try:
+        contents = McapFile(path).contents
+    except (BagError, OSError):
+        return True
+    return any(
+        channel.topic.rpartition('/')[2] in (RESISTANCE.name, RESISTANCE_CURVE.name)
+        and contents.counts[number] > 0
+        for number, channel in contents.channels.items()
+    )

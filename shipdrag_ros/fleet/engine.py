@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Many workers, by Dask: a cluster of this machine, or one that exists.
+
+A worker that dies takes nothing with it: what it was doing is done again by
+another. What was on hand whenever workers died is tried once more at the end,
+one at a time, so that only what kills its worker by itself is given up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from tempfile import TemporaryDirectory
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
+
+from shipdrag_ros import __version__
+from shipdrag_ros.errors import FleetError
+
+if TYPE_CHECKING:  # takes most of a second to import
+    from distributed import Client, Future
+
+Item = TypeVar('Item')
+Result = TypeVar('Result')
+DEATHS = 2
+"""Of workers that a bag may be on hand at, before it is put off."""
+
+DIED = 'its worker died'
+"""What the reason begins with where nothing came back."""
+
+_CONNECT_S = 30.0
+
+
+class Lost(NamedTuple):
+    """Nothing came back, and why."""
+
+    reason: str
+
+
+class Engine:
+    """
+    Workers of one thread each; a context manager.
+
+    Parameters
+    ----------
+    workers
+        How many, on this machine; one a core by default.
+    scheduler
+        Address of a cluster to use instead, `tcp://host:8786`.
+    at_most
+        More workers than this have nothing to do, and are not started.
+
+    Raises
+    ------
+    FleetError
+        If the cluster cannot be reached, or runs another version of this program.
+    """
+
+    def __init__(
+        self,
+        *,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        at_most: int | None = None,
+    ) -> None:
+        self._workers = workers
+        self._at_most = at_most
+        self._scheduler = scheduler
+        self._open = ExitStack()
+        self._client: Client | None = None
+
+    def __enter__(self) -> Self:
+        import dask
+        import distributed  # noqa: F401  # its own defaults first, or they are lost again
+
+        # only what this process starts is set here; a scheduler elsewhere has its own
+        self._open.enter_context(
+            dask.config.set(
+                {
+                    'distributed.scheduler.allowed-failures': DEATHS - 1,
+                    'distributed.comm.timeouts.connect': f'{_CONNECT_S:g}s',
+                }
+            )
+        )
+        try:
+            self._client = self._connected()
+            self._check_versions()
+        except BaseException:
+            self._open.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._open.close()
+
+    @property
+    def address(self) -> str:
+        """Of the scheduler, for other programs."""
+        assert self._client is not None
+        return str(self._client.scheduler_info()['address'])
+
+    def on_each(self, function: Callable[[], Result]) -> dict[str, Result]:
+        """
+        Call a function on each worker; return what it gives, by the worker's address.
+
+        A worker that dies meanwhile is left out.
+        """
+        assert self._client is not None
+        found: dict[str, Result] = self._client.run(function, on_error='ignore')
+        return found
+
+    def map(
+        self, function: Callable[[Item], Result], items: Mapping[str, Item]
+    ) -> Iterator[tuple[str, Result | Lost]]:
+        """
+        Apply a function to items; yield what comes as it comes.
+
+        Parameters
+        ----------
+        function
+            That can be done again without harm.
+        items
+            By a key of their own; they, and the results, travel.
+
+        Yields
+        ------
+        key, result
+            `Lost` where workers died of it again and again.
+        """
+        from distributed import as_completed
+
+        assert self._client is not None
+
+        futures = {self._submit(function, key, item): key for key, item in items.items()}
+        put_off = []
+        completed = as_completed(list(futures), loop=self._client.loop)
+        for future in completed:
+            key = futures.pop(future)
+            result = _result(future)
+            future.release()
+            if isinstance(result, Lost):
+                put_off.append(key)
+            else:
+                yield key, result
+        for key in sorted(put_off):
+            yield key, _result(self._submit(function, key, items[key], again=True))
+
+    def _submit(
+        self, function: Callable[[Item], Result], key: str, item: Item, *, again: bool = False
+    ) -> Future[Result]:
+        assert self._client is not None
+        name = f'{function.__name__}{"-again" if again else ""}-{key}'
+        return self._client.submit(function, item, key=name, pure=False)
+
+    def _connected(self) -> Client:
+        from dask.system import CPU_COUNT
+        from distributed import Client, LocalCluster
+
+        if self._scheduler is not None:
+            try:
+                client = Client(self._scheduler, timeout=_CONNECT_S, set_as_default=False)
+            except (OSError, ValueError) as error:
+                raise FleetError(
+                    f'--scheduler {self._scheduler!r} cannot be reached: {error}; start one with '
+                    '`dask scheduler` and `dask worker --nthreads 1`'
+                ) from error
+            return self._open.enter_context(client)
+        folder = self._open.enter_context(TemporaryDirectory(prefix='shipdrag-dask-'))
+        workers = self._workers or CPU_COUNT
+        if self._at_most is not None:
+            workers = max(1, min(workers, self._at_most))
+        cluster = self._open.enter_context(
+            LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host='127.0.0.1',
+                dashboard_address='127.0.0.1:0',
+                worker_dashboard_address='127.0.0.1:0',
+                local_directory=folder,
+                silence_logs=50,  # what becomes of each bag is said here
+            )
+        )
+        return self._open.enter_context(Client(cluster, set_as_default=False))
+
+    def _check_versions(self) -> None:
+        assert self._client is not None
+        if self._scheduler is None:
+            return
+        if not self._client.scheduler_info()['workers']:
+            raise FleetError(
+                f'--scheduler {self._scheduler!r} has no worker; start some with `dask worker '
+                f'{self._scheduler} --nthreads 1`'
+            )
+        try:
+            found: dict[str, str] = self._client.run(_version)
+        except Exception as error:  # whatever a worker without this package says
+            raise FleetError(
+                f'the workers of {self._scheduler!r} cannot run this program: {error}; install '
+                f'shipdrag_ros {__version__} on them'
+            ) from error
+        others = {address: version for address, version in found.items() if version != __version__}
+        if others:
+            raise FleetError(
+                f'workers run another version than {__version__}: {others}; install the same'
+            )
+
+
+def _version() -> str:
+    return __version__
+
+
+def _result(future: Future[Any]) -> Any:
+    from distributed import KilledWorker
+
+    try:
+        return future.result()
+    except KilledWorker:
+        return Lost(
+            f'{DIED} {DEATHS} times, and so it did when nothing else was being done: it '
+            'needs more memory than a worker has, or crashes it'
+        )

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+One bag to its rows: replayed, and each coastdown diagnosed by itself.
+
+What a worker does. The rows depend on the bag and on what lies beside it alone,
+so that it does not matter which worker makes them, or how often.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from shipdrag_ros import __version__
+from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose, diagnose_fitted
+from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.fleet.find import LOGS, RUN_FILE, SHIP_FILE, TABLES, Source
+from shipdrag_ros.fleet.local import fetched
+from shipdrag_ros.fleet.rows import BagResult, Row, coastdown_row
+from shipdrag_ros.fleet.sources import import_log, import_table
+from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
+from shipdrag_ros.replay.warnings import run_warnings
+from shipdrag_ros.ship import Fact, RunSheet, Ship
+
+UNNAMED = 'unnamed'
+
+
+class Job(NamedTuple):
+    """
+    A bag to do.
+
+    Attributes
+    ----------
+    sources
+        The parts of one recording; of most bags, one.
+    content_hash
+        What the rows depend on, see `local.content_hash`.
+    """
+
+    sources: tuple[Source, ...]
+    content_hash: str
+
+
+class _Hull(NamedTuple):
+    """The ship as she was in a run, and what is known of it."""
+
+    ship: Ship
+    facts: tuple[Fact, ...]
+    temperature_c: float | None
+    text: str
+    warnings: tuple[str, ...]
+
+
+def work(job: Job) -> BagResult:
+    """
+    Replay and diagnose a bag.
+
+    Parameters
+    ----------
+    job
+        From the search; read here, and nothing else.
+
+    Returns
+    -------
+    BagResult
+        With the reason in `error` where the bag could not be read.
+    """
+    try:
+        with _runs(job.sources) as runs:
+            return _result(job, runs)
+    except (ShipdragError, OSError) as error:
+        return _failed(job, str(error))
+    except Exception as error:  # one bag of thousands; the others go on
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return _failed(
+            job,
+            f'a defect of this program, please report it: {type(error).__name__}: {error} '
+            f'({Path(place.filename).name}:{place.lineno})',
+        )
+
+
+def _result(job: Job, runs: Sequence[Run]) -> BagResult:
+    source = job.sources[0]
+    rows: list[Row] = []
+    warnings: list[str] = []
+    messages = 0
+    hull: _Hull | None = None
+    for run in runs:
+        hull = _hull(source, run)
+        result = replay(run, ship=hull.ship)
+        messages += sum(topic.messages for topic in run.topics)
+        warnings += [*hull.warnings, *hull.ship.warnings, *run_warnings(result)]
+        found, told = _coastdowns(job, hull, result)
+        rows += found
+        warnings += told
+    assert hull is not None  # a bag without a run is an error
+    return BagResult(
+        _bag_row(job)
+        | {
+            'ship': _name(hull.ship, source),
+            'coastdowns': sum('withdrawn' not in row['flags'] for row in rows),
+            'messages': messages,
+            'warnings': list(dict.fromkeys(warnings)),
+        },
+        tuple({**row, 'ship': _name(hull.ship, source)} for row in rows),
+        hull.text,
+    )
+
+
+def _coastdowns(job: Job, hull: _Hull, result: ReplayResult) -> tuple[list[Row], list[str]]:
+    """Return a row for each coastdown, those withdrawn too, and what is to be said."""
+    context = {
+        'bag': job.sources[0].bag,
+        'content_hash': job.content_hash,
+        'software_version': __version__,
+        'water_temperature_c': hull.temperature_c,
+        'facts': [str(fact) for fact in (*hull.ship.facts, *hull.facts)],
+    }
+    shared = ['clocks_apart'] if clocks_apart(result) else []
+    if result.run.warnings:
+        shared.append('damaged')
+    rows, told = [], []
+    windows = coast_windows(result)
+    for coastdown, window in windows:
+        diagnosis, why = _diagnosis(result, hull, window)
+        if why:
+            told.append(f'the coastdown at {coastdown.start_ns} ns is not diagnosed: {why}')
+        rows.append(
+            coastdown_row(coastdown, hull.ship, diagnosis=diagnosis, context=context, flags=shared)
+        )
+    for event in result.events:
+        if isinstance(event, Coastdown) and event.withdrawn:
+            rows.append(
+                coastdown_row(event, hull.ship, diagnosis=None, context=context, flags=shared)
+            )
+    if not windows:
+        told.append(f'no coastdown was found: {why_no_coastdown(result)}')
+    return sorted(rows, key=lambda row: int(row['time_ns'])), told
+
+
+def _diagnosis(result: ReplayResult, hull: _Hull, window: Window) -> tuple[Diagnosis | None, str]:
+    """Diagnose one coastdown, or say why that cannot be."""
+    runs = [CoastRun(Path(result.run.name).name, window, hull.facts)]
+    try:
+        if hull.ship.baseline is None:
+            return diagnose_fitted(runs, hull.ship), ''
+        return diagnose(runs, hull.ship, result.parameters, advise=False), ''
+    except (DiagnosisError, EstimationError) as error:
+        return None, str(error)
+
+
+def _hull(source: Source, run: Run) -> _Hull:
+    """Return the ship as she was in a run: the file beside it or attached, and `run.yaml`."""
+    attached, beside = run.attachments.get(SHIP_FILE, ''), source.beside.ship
+    if not (attached or beside):
+        raise BagError(
+            f'no {SHIP_FILE} is attached, and none lies beside it or in a folder above; put one '
+            'there'
+        )
+    warnings: tuple[str, ...] = ()
+    text, subject = beside or attached, f'{SHIP_FILE} {"above" if beside else "attached"}'
+    if attached and beside:
+        own = Ship.from_yaml(attached, subject=f'{SHIP_FILE} attached')
+        above = Ship.from_yaml(beside, subject=f'{SHIP_FILE} above')
+        if own.name and own.name != (above.name or source.beside.ship_name):
+            # a recording knows best which ship it is of
+            text, subject = attached, f'{SHIP_FILE} attached'
+            warnings = (
+                f'the {SHIP_FILE} above is of {above.name!r}, the one attached of {own.name!r}, '
+                'which is used',
+            )
+    ship = Ship.from_yaml(text, subject=subject)
+    if not source.run:
+        return _Hull(ship, (), None, text, warnings)
+    sheet = RunSheet.from_yaml(source.run, subject=RUN_FILE)
+    temperature_c = None if sheet.water is None else sheet.water.temperature_c
+    return _Hull(sheet.of(ship, subject=RUN_FILE), sheet.facts, temperature_c, text, warnings)
+
+
+def _name(ship: Ship, source: Source) -> str:
+    return ship.name or source.beside.ship_name or UNNAMED
+
+
+def _bag_row(job: Job) -> Row:
+    return {
+        'root': job.sources[0].root,
+        'bag': job.sources[0].bag,
+        'content_hash': job.content_hash,
+        'software_version': __version__,
+        'ship': None,
+        'coastdowns': 0,
+        'messages': 0,
+        'warnings': [],
+        'error': None,
+    }
+
+
+def _failed(job: Job, why: str) -> BagResult:
+    return BagResult(_bag_row(job) | {'error': why})
+
+
+@contextmanager
+def _runs(sources: Sequence[Source]) -> Iterator[list[Run]]:
+    """Open the runs of a bag, whatever it is written in."""
+    if len(sources) == 1 and sources[0].bag.endswith((*LOGS, *TABLES)):
+        with fetched(sources[0]) as (path,), TemporaryDirectory(prefix='shipdrag-fleet-') as made:
+            bag = Path(made) / f'{path.name}.mcap'
+            make = import_log if sources[0].bag.endswith(LOGS) else import_table
+            make(path, bag)
+            yield open_runs([bag])
+        return
+    with _all_fetched(sources) as paths:
+        yield open_runs(paths)
+
+
+@contextmanager
+def _all_fetched(sources: Sequence[Source]) -> Iterator[list[Path]]:
+    if not sources:
+        yield []
+        return
+    with fetched(sources[0]) as files, _all_fetched(sources[1:]) as others:
+        own = [files[0].parent] if sources[0].folder else list(files)
+        yield [*own, *others]

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the store holds of a bag and of a coastdown: the columns, and one row of each.
+
+Curves stand on one grid of Froude numbers, the same in all rows, so that runs
+of years compare without a fit.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.diagnosis.result import Diagnosis, EffectEstimate, Verdict
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+FROUDE: Float64 = np.round(np.linspace(0.02, 0.40, 77), 3)
+"""Of every curve in the store."""
+
+SHORT_S = 300.0
+_ENDED = {
+    EndedBy.TURN: 'turned',
+    EndedBy.ENGINE: 'engine',
+    EndedBy.ASTERN: 'engine',
+    EndedBy.BRAKE: 'braked',
+    EndedBy.DATA_STOP: 'data_stop',
+    EndedBy.SILENCE: 'data_stop',
+    EndedBy.RESET: 'data_stop',
+}
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class BagResult:
+    """
+    What one bag gave.
+
+    Attributes
+    ----------
+    bag
+        The row of `bags`.
+    coastdowns
+        The rows of `coastdowns`.
+    ship_file
+        Text of the ship file that was used; '' without one.
+    """
+
+    bag: Row
+    coastdowns: tuple[Row, ...] = ()
+    ship_file: str = ''
+
+
+def coastdown_row(
+    coastdown: Coastdown,
+    ship: Ship,
+    *,
+    diagnosis: Diagnosis | None,
+    context: Mapping[str, Any],
+    flags: Sequence[str] = (),
+) -> Row:
+    """
+    Return the row of a coastdown.
+
+    Parameters
+    ----------
+    coastdown
+        As the replay found it.
+    ship
+        As she was in the run.
+    diagnosis
+        Of this coastdown alone; None where there is none.
+    context
+        Columns that all coastdowns of the bag share: `bag`, `content_hash`,
+        `software_version`, `water_temperature_c`, `facts`.
+    flags
+        What else a trend may weigh.
+    """
+    estimate = None if coastdown.withdrawn else coastdown.estimate
+    own_flags = (*flags, *_flags(coastdown), *(() if diagnosis else ('no_diagnosis',)))
+    return {
+        **context,
+        'time_ns': coastdown.start_ns,
+        'end_ns': coastdown.end_ns,
+        'ended_by': coastdown.ended_by.value,
+        'heading_rad': coastdown.heading_rad,
+        'froude': FROUDE,
+        'speed_m_s': ship.speed(FROUDE),
+        **_curve(estimate),
+        'clean_m_s2': clean(ship),
+        'length_m': ship.length_m,
+        'draught_m': ship.draught_m,
+        'displaced_volume_m3': ship.displaced_volume_m3,
+        'water_density_kg_m3': ship.water.density_kg_m3,
+        'verdict': None if diagnosis is None else diagnosis.verdict.value,
+        'effects': None if diagnosis is None else _json(_named(diagnosis.effects)),
+        'candidates': None if diagnosis is None else _candidates(diagnosis),
+        'flags': sorted(set(own_flags)),
+        'error': _error(coastdown),
+    }
+
+
+def clean(ship: Ship) -> Float64 | None:
+    """
+    Return r of the clean hull on the grid [m/s^2]; NaN outside the baseline's table.
+
+    None without a baseline.
+    """
+    if ship.baseline is None:
+        return None
+    low, high = ship.baseline_range_m_s
+    speed = ship.speed(FROUDE)
+    inside = (speed >= low) & (speed <= high)
+    found = np.full(len(FROUDE), np.nan)
+    found[inside] = ship.resistance_n(speed[inside]) / ship.mass_kg
+    return found
+
+
+def _curve(estimate: Estimate | None) -> Row:
+    names = ('resistance_m_s2', 'sigma_m_s2', 'sigma_repeatable_m_s2')
+    if estimate is None:
+        return {
+            'estimator': None,
+            'speed_at_stop_m_s': None,
+            **{name: np.full(len(FROUDE), np.nan) for name in names},
+            'froude_valid_min': None,
+            'froude_valid_max': None,
+        }
+    curve, (low, high) = estimate.curve, estimate.froude_valid
+    inside = (low <= FROUDE) & (high >= FROUDE)
+    on_grid = {}
+    for name in names:
+        value = np.interp(FROUDE, curve.froude, getattr(curve, name), left=np.nan, right=np.nan)
+        on_grid[name] = np.where(inside, value, np.nan)
+    return {
+        'estimator': estimate.estimator,
+        'speed_at_stop_m_s': float(curve.speed_m_s[-1]),
+        **on_grid,
+        'froude_valid_min': low,
+        'froude_valid_max': high,
+    }
+
+
+def _flags(coastdown: Coastdown) -> list[str]:
+    found = []
+    if coastdown.withdrawn:
+        found.append('withdrawn')
+    if coastdown.cuts:
+        found.append('cut')
+    if coastdown.ended_by in _ENDED:
+        found.append(_ENDED[coastdown.ended_by])
+    if coastdown.end_ns - coastdown.start_ns < SHORT_S * 1e9:
+        found.append('short')
+    if coastdown.estimate is None:
+        found.append('no_estimate')
+    return found
+
+
+def _error(coastdown: Coastdown) -> str | None:
+    if coastdown.withdrawn:
+        why = '; '.join(f'{cut.reason.value}: {cut.text}' for cut in coastdown.cuts)
+        return f'withdrawn: {why or "it turned out to be no coastdown"}'
+    if coastdown.estimate is None:
+        return coastdown.failure or 'no estimate was possible'
+    return None
+
+
+def _named(effects: Sequence[EffectEstimate]) -> list[Row]:
+    return [
+        {
+            'name': effect.name,
+            'probability': effect.probability,
+            'parameters': {
+                name: {'value': each.value, 'sd': each.sd}
+                for name, each in effect.parameters.items()
+            },
+        }
+        for effect in effects
+    ]
+
+
+def _candidates(diagnosis: Diagnosis) -> str:
+    found: list[Row] = [
+        {
+            'names': list(each.names) or ['none'],
+            'probability': each.probability,
+            'effects': _named(each.effects),
+        }
+        for each in diagnosis.candidates
+    ]
+    if diagnosis.verdict is Verdict.UNKNOWN:
+        unnamed = {'names': ['unknown'], 'probability': diagnosis.unnamed, 'effects': []}
+        found.insert(0, unnamed)
+    return _json(found)
+
+
+def _json(value: object) -> str:
+    return json.dumps(value, sort_keys=True)

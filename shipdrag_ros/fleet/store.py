@@ -1,0 +1,354 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The store: a Parquet data set that any tool reads.
+
+`coastdowns/ship=NAME/HASH.parquet` has one row a coastdown, `bags/HASH.parquet`
+one row a bag, `ships/ship=NAME/` the ship file and the known events. A file
+appears whole or not at all, that of `bags` last: what is listed there is done.
+The same rows give the same bytes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote, unquote
+
+from shipdrag_ros.errors import FleetError
+from shipdrag_ros.fleet.rows import BagResult, Row
+
+if TYPE_CHECKING:  # pyarrow takes long to import
+    import pyarrow as pa
+
+COASTDOWNS, BAGS, SHIPS = 'coastdowns', 'bags', 'ships'
+_PARTITION = 'ship='
+_ROWS_AT_ONCE = 1 << 16
+
+
+@dataclass(frozen=True)
+class Done:
+    """
+    A bag that is in the store.
+
+    Attributes
+    ----------
+    root, bag
+        Last part of the folder that was given, and the path below it.
+    software_version
+        That made its rows.
+    ship
+        None where the bag could not be read.
+    coastdowns
+        Number of them.
+    error
+        Why it could not be read; None where it could.
+    """
+
+    root: str
+    bag: str
+    software_version: str
+    ship: str | None
+    coastdowns: int
+    error: str | None
+
+
+class Store:
+    """
+    A store to write to.
+
+    Parameters
+    ----------
+    path
+        Its folder; made if missing.
+
+    Raises
+    ------
+    FleetError
+        If it cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            for name in (COASTDOWNS, BAGS, SHIPS):
+                (path / name).mkdir(parents=True, exist_ok=True)
+                for left in (path / name).glob('**/.new-*'):
+                    left.unlink()  # of a run that was killed
+        except OSError as error:
+            raise FleetError(
+                f'{str(path)!r} cannot be made: {error.strerror}; give one that may be written'
+            ) from error
+
+    def done(self) -> dict[str, Done]:
+        """
+        Return the bags that are in the store, by content hash.
+
+        Raises
+        ------
+        FleetError
+            If a file of the store cannot be read.
+        """
+        columns = [
+            'content_hash',
+            'root',
+            'bag',
+            'software_version',
+            'ship',
+            'coastdowns',
+            'error',
+        ]
+        rows = read_bags(self.path).select(columns).to_pylist()
+        return {row.pop('content_hash'): Done(**row) for row in rows}
+
+    def write(self, result: BagResult) -> None:
+        """
+        Write what a bag gave; what the store has of the same content is replaced.
+
+        Raises
+        ------
+        FleetError
+            If the disk does not take it.
+        """
+        digest = result.bag['content_hash']
+        try:
+            self._remove_rows(digest)
+            if result.coastdowns:
+                folder = self.path / COASTDOWNS / partition(result.bag['ship'])
+                schema = coastdown_schema(partitioned=True)
+                _write(folder / f'{digest}.parquet', list(result.coastdowns), schema)
+            _write(self.path / BAGS / f'{digest}.parquet', [result.bag], bag_schema())
+        except OSError as error:
+            raise FleetError(f'{str(self.path)!r} cannot be written: {error}') from error
+
+    def remove(self, digest: str) -> None:
+        """
+        Take a bag out of the store.
+        """
+        (self.path / BAGS / f'{digest}.parquet').unlink(missing_ok=True)
+        self._remove_rows(digest)
+
+    def keep_ship(self, name: str, files: Mapping[str, str]) -> None:
+        """
+        Keep what is known of a ship beside her rows.
+
+        Parameters
+        ----------
+        name
+            Of the ship.
+        files
+            Text by file name; an empty one is removed.
+        """
+        folder = self.path / SHIPS / partition(name)
+        folder.mkdir(parents=True, exist_ok=True)
+        for file, text in files.items():
+            if text:
+                _replace(folder / file, text.encode())
+            else:
+                (folder / file).unlink(missing_ok=True)
+
+    def _remove_rows(self, digest: str) -> None:
+        for path in (self.path / COASTDOWNS).glob(f'{_PARTITION}*/{digest}.parquet'):
+            path.unlink()
+
+
+def partition(ship: str) -> str:
+    """
+    Return the folder of a ship; whatever her name holds, it is one folder.
+    """
+    return f'{_PARTITION}{quote(ship, safe=" ")}'
+
+
+def read_coastdowns(store: Path) -> pa.Table:
+    """
+    Return the coastdowns of a store, by ship and time.
+
+    Parameters
+    ----------
+    store
+        Folder that `shipdrag fleet` has written.
+
+    Returns
+    -------
+    pyarrow.Table
+        Of `coastdown_schema()`; without rows where there are none.
+
+    Raises
+    ------
+    FleetError
+        If it is no store, or a file of it cannot be read.
+    """
+    import pyarrow as pa
+
+    tables = []
+    for path in sorted(_folder(store, COASTDOWNS).glob(f'{_PARTITION}*/*.parquet')):
+        table = _read(path, coastdown_schema(partitioned=True))
+        ship = unquote(path.parent.name.removeprefix(_PARTITION))
+        tables.append(table.add_column(0, 'ship', pa.array([ship] * len(table), pa.string())))
+    schema = coastdown_schema()
+    found = pa.concat_tables([table.cast(schema) for table in tables] or [schema.empty_table()])
+    return found.sort_by([('ship', 'ascending'), ('time_ns', 'ascending'), ('bag', 'ascending')])
+
+
+def read_bags(store: Path) -> pa.Table:
+    """
+    Return the bags of a store, by name.
+
+    Parameters
+    ----------
+    store
+        Folder that `shipdrag fleet` has written.
+
+    Returns
+    -------
+    pyarrow.Table
+        Of `bag_schema()`.
+
+    Raises
+    ------
+    FleetError
+        If it is no store, or a file of it cannot be read.
+    """
+    import pyarrow as pa
+
+    schema = bag_schema()
+    paths = sorted(_folder(store, BAGS).glob('*.parquet'))
+    found = pa.concat_tables([_read(path, schema) for path in paths] or [schema.empty_table()])
+    return found.sort_by([('root', 'ascending'), ('bag', 'ascending')])
+
+
+def ship_texts(store: Path) -> dict[str, dict[str, str]]:
+    """
+    Return the files kept of each ship: text by file name, by name of the ship.
+    """
+    return {
+        unquote(folder.name.removeprefix(_PARTITION)): {
+            path.name: path.read_text(encoding='utf-8') for path in sorted(folder.iterdir())
+        }
+        for folder in sorted(_folder(store, SHIPS).glob(f'{_PARTITION}*'))
+    }
+
+
+def coastdown_schema(*, partitioned: bool = False) -> pa.Schema:
+    """
+    Return the columns of a coastdown; `partitioned`: without the ship, which the folder tells.
+    """
+    import pyarrow as pa
+
+    curve = pa.list_(pa.float64())
+    columns: dict[str, Any] = {
+        'ship': pa.string(),
+        'bag': pa.string(),
+        'content_hash': pa.string(),
+        'software_version': pa.string(),
+        'time_ns': pa.int64(),
+        'end_ns': pa.int64(),
+        'ended_by': pa.string(),
+        'estimator': pa.string(),
+        'heading_rad': pa.float64(),
+        'speed_at_stop_m_s': pa.float64(),
+        'froude': curve,
+        'speed_m_s': curve,
+        'resistance_m_s2': curve,
+        'sigma_m_s2': curve,
+        'sigma_repeatable_m_s2': curve,
+        'clean_m_s2': curve,
+        'froude_valid_min': pa.float64(),
+        'froude_valid_max': pa.float64(),
+        'length_m': pa.float64(),
+        'draught_m': pa.float64(),
+        'displaced_volume_m3': pa.float64(),
+        'water_temperature_c': pa.float64(),
+        'water_density_kg_m3': pa.float64(),
+        'verdict': pa.string(),
+        'effects': pa.string(),
+        'candidates': pa.string(),
+        'facts': pa.list_(pa.string()),
+        'flags': pa.list_(pa.string()),
+        'error': pa.string(),
+    }
+    if partitioned:
+        del columns['ship']
+    return pa.schema(columns)
+
+
+def bag_schema() -> pa.Schema:
+    """
+    Return the columns of a bag.
+    """
+    import pyarrow as pa
+
+    return pa.schema(
+        {
+            'root': pa.string(),
+            'bag': pa.string(),
+            'content_hash': pa.string(),
+            'software_version': pa.string(),
+            'ship': pa.string(),
+            'coastdowns': pa.int64(),
+            'messages': pa.int64(),
+            'warnings': pa.list_(pa.string()),
+            'error': pa.string(),
+        }
+    )
+
+
+def _folder(store: Path, name: str) -> Path:
+    if not (store / name).is_dir():
+        raise FleetError(
+            f'{str(store)!r} is no store of a fleet; make one with `shipdrag fleet DIR -o STORE`'
+        )
+    return store / name
+
+
+def _read(path: Path, schema: pa.Schema) -> pa.Table:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    try:
+        with path.open('rb') as file:
+            return parquet.read_table(file).select(schema.names).cast(schema)
+    except (OSError, KeyError, ValueError, pa.ArrowException) as error:
+        raise FleetError(
+            f'{str(path)!r} cannot be read: {error}; remove it and run `shipdrag fleet` again'
+        ) from error
+
+
+def _write(path: Path, rows: list[Row], schema: pa.Schema) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    columns = {
+        name: pa.array([_plain(row[name]) for row in rows], schema.field(name).type)
+        for name in schema.names
+    }
+    sink = pa.BufferOutputStream()
+    parquet.write_table(
+        pa.table(columns, schema=schema), sink, compression='zstd', row_group_size=_ROWS_AT_ONCE
+    )
+    path.parent.mkdir(exist_ok=True)
+    _replace(path, sink.getvalue().to_pybytes())
+
+
+def _plain(value: Any) -> Any:
+    """Return text that UTF-8 can hold; a path may hold what is none."""
+    if isinstance(value, str):
+        return value.encode('utf-8', 'backslashreplace').decode()
+    if isinstance(value, list):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file that is there whole, or as it was before."""
+    new = path.with_name(f'.new-{os.getpid()}-{path.name[-80:]}')
+    try:
+        with new.open('xb') as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)

@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A store brought up to what lies below some folders.
+
+What is done already, by content and version of this program, is not done again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import posixpath
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from shipdrag_ros import __version__
+from shipdrag_ros.fleet.engine import DIED, Engine, Lost
+from shipdrag_ros.fleet.events import read_events, write_events
+from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, Found, Skipped, Source
+from shipdrag_ros.fleet.job import Job, work
+from shipdrag_ros.fleet.local import Identity, content_hash, identify
+from shipdrag_ros.fleet.rows import BagResult
+from shipdrag_ros.fleet.store import Done, Store
+
+Progress = Callable[[str, int, int], None]
+"""Told what is being done, how much of it is done, and of how much."""
+
+
+class Twin(NamedTuple):
+    """A bag with the content of another, which stands for both."""
+
+    bag: str
+    same_as: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """
+    What became of the bags.
+
+    Attributes
+    ----------
+    bags
+        All that are below the folders and in the store now, by content hash.
+    new
+        Number of bags that were replayed.
+    removed
+        Number of bags whose content has changed; their former rows are gone.
+    twins
+        Bags that are not in the store since another has their content.
+    skipped
+        Bags that could not be read, and why.
+    notes
+        What else is to be said, a sentence each.
+    """
+
+    bags: Mapping[str, Done]
+    new: int
+    removed: int
+    twins: tuple[Twin, ...]
+    skipped: tuple[Skipped, ...]
+    notes: tuple[str, ...]
+
+
+def update(found: Found, store: Store, engine: Engine, progress: Progress) -> Report:
+    """
+    Replay and diagnose what the store does not have.
+
+    Parameters
+    ----------
+    found
+        What lies below the folders.
+    store
+        To bring up to date.
+    engine
+        Running.
+    progress
+        Told how far it is.
+
+    Raises
+    ------
+    FleetError
+        If the store cannot be read or written.
+    """
+    jobs, twins, unread = _jobs(found.sources, engine, progress)
+    unread = [*found.skipped, *unread]
+    before = store.done()
+    names = {(part.root, part.bag) for job in jobs.values() for part in job.sources}
+    names |= {(each.root, each.bag) for each in unread}
+    stale = [
+        digest
+        for digest, done in before.items()
+        if digest not in jobs and (done.root, done.bag) in names
+    ]
+    for digest in stale:
+        store.remove(digest)
+    to_do = {key: job for key, job in jobs.items() if not _is_done(before.get(key))}
+    texts = _do(to_do, store, engine, progress)
+    for each in unread:
+        store.write(_unread(each))
+    after = store.done()
+    bags = {key: after[key] for key in jobs}
+    notes = [*found.notes, *_keep_ships(store, jobs, bags, texts)]
+    gone = sum((done.root, done.bag) not in names for key, done in before.items())
+    gone -= sum((done.root, done.bag) not in names for key, done in before.items() if key in jobs)
+    if gone:
+        notes.append(
+            f'{gone} bag(s) of the store are not below these folders; their rows stay in it'
+        )
+    skipped = [Skipped(done.root, done.bag, done.error) for done in bags.values() if done.error]
+    changed = sum(before[digest].error is None for digest in stale)
+    return Report(
+        bags,
+        len(to_do),
+        changed,
+        tuple(twins),
+        tuple(sorted([*skipped, *unread], key=lambda each: (each.root, each.bag))),
+        tuple(notes),
+    )
+
+
+def _jobs(
+    sources: Sequence[Source], engine: Engine, progress: Progress
+) -> tuple[dict[str, Job], list[Twin], list[Skipped]]:
+    """Return what is to be done by content hash, in the order of the search."""
+    known: dict[int, Identity] = {}
+    unread: list[Skipped] = []
+    items = {f'{number}': source for number, source in enumerate(sources)}
+    for key, found in engine.map(identify, items):
+        if isinstance(found, Identity):
+            known[int(key)] = found
+        else:
+            reason = found.reason if isinstance(found, Lost) else found
+            unread.append(Skipped(items[key].root, items[key].bag, reason))
+        progress('reading the bags', len(known) + len(unread), len(items))
+    jobs: dict[str, Job] = {}
+    twins: list[Twin] = []
+    for numbers in _recordings(sources, known):
+        parts = tuple(sources[number] for number in numbers)
+        digest = content_hash([known[number].digest for number in numbers], parts[0])
+        if digest in jobs:
+            twins.append(Twin(parts[0].bag, jobs[digest].sources[0].bag))
+        else:
+            jobs[digest] = Job(parts, digest)
+    return jobs, twins, unread
+
+
+def _recordings(sources: Sequence[Source], known: Mapping[int, Identity]) -> list[list[int]]:
+    """Put the parts of one recording together; a part that is there twice counts once."""
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for number in sorted(known):
+        source, identity = sources[number], known[number]
+        folder = posixpath.dirname(source.files[0])
+        key = (folder, identity.recording) if identity.recording else (str(number),)
+        group = groups.setdefault(key, [])
+        if all(known[other].digest != identity.digest for other in group):
+            group.append(number)
+    return list(groups.values())
+
+
+def _is_done(done: Done | None) -> bool:
+    return (
+        done is not None
+        and done.software_version == __version__
+        and not (done.error or '').startswith(DIED)
+    )
+
+
+def _do(
+    jobs: Mapping[str, Job], store: Store, engine: Engine, progress: Progress
+) -> dict[str, str]:
+    """Do what is to be done, and return the ship file of each, by content hash."""
+    texts: dict[str, str] = {}
+    for key, found in engine.map(work, jobs):
+        if isinstance(found, Lost):
+            result = _unread(Skipped('', '', found.reason), jobs[key])
+        else:
+            result = found
+        store.write(result)
+        texts[key] = result.ship_file
+        progress('replaying and diagnosing', len(texts), len(jobs))
+    return texts
+
+
+def _unread(skipped: Skipped, job: Job | None = None) -> BagResult:
+    """Return the row of a bag that could not be read."""
+    source = None if job is None else job.sources[0]
+    root, bag = (skipped.root, skipped.bag) if source is None else (source.root, source.bag)
+    digest = hashlib.sha256(f'unread\0{root}\0{bag}'.encode('utf-8', 'replace')).hexdigest()
+    return BagResult(
+        {
+            'root': root,
+            'bag': bag,
+            'content_hash': digest if job is None else job.content_hash,
+            'software_version': __version__,
+            'ship': None,
+            'coastdowns': 0,
+            'messages': 0,
+            'warnings': [],
+            'error': skipped.reason,
+        }
+    )
+
+
+def _keep_ships(
+    store: Store, jobs: Mapping[str, Job], bags: Mapping[str, Done], texts: Mapping[str, str]
+) -> list[str]:
+    """Keep the ship file and the known events of each ship; return what is odd about them."""
+    ship_files: dict[str, dict[str, None]] = defaultdict(dict)  # sets that keep the order
+    event_files: dict[str, dict[str, None]] = defaultdict(dict)
+    for key, job in sorted(jobs.items(), key=lambda item: item[1].sources[0].bag):
+        name, beside = bags[key].ship, job.sources[0].beside
+        if name is None:
+            continue
+        ship_file = texts.get(key) or beside.ship
+        if ship_file:
+            ship_files[name].pop(ship_file, None)  # the last bag says what she is
+            ship_files[name][ship_file] = None
+        if beside.events:
+            event_files[name][beside.events] = None
+        event_files.setdefault(name, {})
+    notes = []
+    for name in event_files:
+        files = list(ship_files[name])
+        if len(files) > 1:
+            notes.append(
+                f'{len(files)} different ship files are of {name!r}; each bag is replayed with '
+                f'its own, and {SHIP_FILE} of the last one is kept in the store'
+            )
+        events, problems = read_events('\n'.join(event_files[name]))
+        notes += [f'{name}: {problem}' for problem in problems]
+        kept = {EVENTS_FILE: write_events(events) if events else ''}
+        if files:
+            kept[SHIP_FILE] = files[-1]
+        store.keep_ship(name, kept)
+    return notes

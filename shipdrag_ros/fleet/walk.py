@@ -1,0 +1,254 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Folders on a disk and in an object store, walked alike.
+
+A folder is entered once however many links lead to it, and what is no regular
+file is told apart before anything reads it.
+"""
+
+from __future__ import annotations
+
+import os
+import posixpath
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from shipdrag_ros.errors import FleetError
+
+if TYPE_CHECKING:  # a verb that needs no folders does not import it
+    from fsspec import AbstractFileSystem
+
+LOCAL = 'file'
+TEXT_LIMIT_BYTES = 1 << 20
+_AT_MOST = 64  # folders inside each other
+
+
+@dataclass(frozen=True)
+class Entry:
+    """
+    A file of a folder.
+
+    Attributes
+    ----------
+    path
+        For the file system.
+    name
+        In its folder.
+    size
+        [bytes]
+    problem
+        Why it must not be read; '' for a regular file.
+    """
+
+    path: str
+    name: str
+    size: int
+    problem: str = ''
+
+
+@dataclass(frozen=True)
+class Folder:
+    """
+    A folder with its files, sorted by name.
+
+    Attributes
+    ----------
+    path
+        For the file system.
+    parts
+        Names of the folders from where the walk began.
+    files
+    problem
+        Why it could not be read; '' where it could.
+    """
+
+    path: str
+    parts: tuple[str, ...]
+    files: tuple[Entry, ...]
+    problem: str = ''
+
+
+class Tree:
+    """
+    What is below a folder that a user names.
+
+    Parameters
+    ----------
+    place
+        Folder or file: a path, or a URL that fsspec knows (`s3://bucket/folder`).
+
+    Attributes
+    ----------
+    protocol
+        `LOCAL`, or that of the URL.
+    root
+        The folder, for the file system.
+    name
+        Last part of it.
+    only
+        Name of the one file that was given; '' for a folder.
+
+    Raises
+    ------
+    FleetError
+        If there is nothing, or it cannot be reached.
+    """
+
+    def __init__(self, place: str) -> None:
+        self.place = place
+        self.protocol, _, _ = place.partition('://') if '://' in place else (LOCAL, '', '')
+        self._fs, root = _file_system(place)
+        self.only = ''
+        with _reached(place):
+            found = self._fs.exists(root)
+            if found and self._fs.isfile(root):
+                root, _, self.only = root.rpartition('/')
+        if not found:
+            raise FleetError(f'{place!r} does not exist; give a folder of bags')
+        self.root = root or '/'
+        self.name = posixpath.basename(self.root.rstrip('/')) or self.root
+
+    def folders(self) -> Iterator[Folder]:
+        """
+        Yield every folder from the top, sorted by name; each once.
+        """
+        seen: set[str] = set()
+        waiting: list[tuple[str, tuple[str, ...]]] = [(self.root, ())]
+        while waiting:
+            path, parts = waiting.pop()
+            real = os.path.realpath(path) if self.protocol == LOCAL else path
+            if real in seen:
+                continue
+            seen.add(real)
+            inside, folder = self._read(path, parts)
+            yield folder
+            if self.only or len(parts) >= _AT_MOST:
+                continue
+            waiting += [(child, (*parts, _name(child))) for child in sorted(inside, reverse=True)]
+
+    def text(self, path: str) -> str | None:
+        """
+        Return a small text file, or None where there is none.
+
+        Raises
+        ------
+        FleetError
+            If it is there and is no small text file.
+        """
+        try:
+            if not self._fs.isfile(path):
+                return None
+            with self._fs.open(path, 'rb') as file:
+                content = file.read(TEXT_LIMIT_BYTES + 1)
+        except Exception as error:  # each file system has errors of its own
+            raise FleetError(f'{path!r} cannot be read: {error}') from error
+        if len(content) > TEXT_LIMIT_BYTES:
+            raise FleetError(f'{path!r} is longer than {TEXT_LIMIT_BYTES} bytes')
+        try:
+            text: str = content.decode('utf-8-sig')
+        except UnicodeDecodeError as error:
+            raise FleetError(f'{path!r} is not UTF-8: {error}') from error
+        return text
+
+    def url(self, path: str) -> str:
+        """
+        Return what a worker opens: a path, or a URL.
+        """
+        if self.protocol == LOCAL:
+            return path
+        url: str = self._fs.unstrip_protocol(path)
+        return url
+
+    def _read(self, path: str, parts: tuple[str, ...]) -> tuple[list[str], Folder]:
+        """Return the folders in a folder, and itself."""
+        try:
+            listed = self._local(path) if self.protocol == LOCAL else self._remote(path)
+        except Exception as error:  # each file system has errors of its own
+            why = getattr(error, 'strerror', None) or error
+            return [], Folder(path, parts, (), f'cannot be read: {why}')
+        folders = [entry for entry, is_folder in listed if is_folder]
+        files = [entry for entry, is_folder in listed if not is_folder]
+        if self.only:
+            files = [entry for entry in files if entry.name == self.only]
+        files.sort(key=lambda entry: entry.name)
+        return [entry.path for entry in folders], Folder(path, parts, tuple(files))
+
+    def _remote(self, path: str) -> list[tuple[Entry, bool]]:
+        listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)
+        return [
+            (
+                Entry(each['name'], _name(each['name']), int(each.get('size') or 0)),
+                each['type'] == 'directory',
+            )
+            for each in listed
+            # an object store lists the folder itself where someone has made it by hand
+            if each['name'].rstrip('/') != path.rstrip('/')
+        ]
+
+    def _local(self, path: str) -> list[tuple[Entry, bool]]:
+        found = []
+        with os.scandir(path) as listed:
+            for each in listed:
+                place = posixpath.join(path, each.name)
+                try:
+                    about = os.stat(place)
+                except OSError as error:
+                    found.append((Entry(place, each.name, 0, _broken(error)), False))
+                    continue
+                problem = '' if stat.S_ISREG(about.st_mode) else _irregular(about.st_mode)
+                entry = Entry(place, each.name, about.st_size, problem)
+                found.append((entry, stat.S_ISDIR(about.st_mode)))
+        return found
+
+
+def _file_system(place: str) -> tuple[AbstractFileSystem, str]:
+    """Return the file system of a place, and the place in it."""
+    if '://' not in place:
+        from fsspec.implementations.local import LocalFileSystem
+
+        return LocalFileSystem(), os.path.abspath(place)
+    from fsspec.core import url_to_fs
+
+    with _reached(place):
+        fs, path = url_to_fs(place)
+    return fs, str(path).rstrip('/')
+
+
+class _reached:
+    """Turn whatever a file system raises into an error that a user can mend."""
+
+    def __init__(self, place: str) -> None:
+        self._place = place
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        if isinstance(error, Exception):
+            raise FleetError(
+                f'{self._place!r} cannot be reached: {str(error) or type(error).__name__}; check '
+                'the address, and for s3:// the usual AWS variables (AWS_ACCESS_KEY_ID, '
+                'AWS_ENDPOINT_URL)'
+            ) from error
+
+
+def _name(path: str) -> str:
+    return path.rstrip('/').rpartition('/')[2]
+
+
+def _broken(error: OSError) -> str:
+    return f'cannot be read: {error.strerror}'
+
+
+def _irregular(mode: int) -> str:
+    for is_kind, kind in (
+        (stat.S_ISFIFO, 'a pipe'),
+        (stat.S_ISSOCK, 'a socket'),
+        (stat.S_ISCHR, 'a device'),
+        (stat.S_ISBLK, 'a device'),
+    ):
+        if is_kind(mode):
+            return f'is {kind} and no file; it may have no end'
+    return 'is no regular file'

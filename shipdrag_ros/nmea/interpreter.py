@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Lines heard live to messages of the inputs, as a driver would send them.
+
+A value is stamped with the time at which its line was read: the clocks of a log
+and of a GNSS receiver are not the node's. Each input is fed by one source, so
+that two instruments of different place or scale are never mixed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from pynmeagps.nmeatypes_core import NMEA_TALKERS
+
+from shipdrag_ros.messages import EncodedMessage, encode, types
+from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
+from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting, NoValue
+from shipdrag_ros.nmea.values import Source, best, read_values
+from shipdrag_ros.samples import Block, Channel
+
+TOPIC = 'nmea'
+"""Where lines are recorded as they came."""
+
+SETTLE_NS = 3_000_000_000
+"""So long the sources of an input are compared, before one is chosen."""
+
+SILENT_NS = 60_000_000_000
+"""A chosen source that says nothing for so long gives way to another."""
+
+_KINDS = 50  # of unknown sentences are counted apart; a hostile talker may invent any number
+_OTHERS = 'others'
+
+# a source of an input, and the address it is heard on
+Heard = tuple[Source, str]
+
+
+def raw_message(text: str, *, receive_ns: int) -> EncodedMessage:
+    """
+    Return a line as the message that is recorded.
+
+    Parameters
+    ----------
+    text
+        The line.
+    receive_ns
+        When it was read [ns since the epoch].
+    """
+    payload = types.serialize(types.STRING, types.make(types.STRING, data=text))
+    return EncodedMessage(f'/{TOPIC}', types.STRING, payload, receive_ns, receive_ns)
+
+
+@dataclass
+class _Choice:
+    """Which source feeds a channel."""
+
+    since_ns: int
+    counts: Counter[Heard] = field(default_factory=Counter)
+    held: Heard | None = None
+    last_ns: int = 0
+
+    def takes(self, heard: Heard, now_ns: int) -> bool:
+        """Say whether a value of this source is used."""
+        # a clock that was set back must not make it wait
+        self.since_ns, self.last_ns = min(self.since_ns, now_ns), min(self.last_ns, now_ns)
+        if self.held not in (None, heard) and now_ns - self.last_ns > SILENT_NS:
+            self.held, self.since_ns = None, now_ns
+            self.counts.clear()
+        if len(self.counts) < _KINDS or heard in self.counts:
+            self.counts[heard] += 1
+        if self.held is None:
+            if now_ns - self.since_ns < SETTLE_NS:
+                return False
+            self.held = best(self.counts)
+        if heard != self.held:
+            return False
+        self.last_ns = now_ns
+        return True
+
+
+class Interpreter:
+    """
+    Makes messages of lines, and counts what gives none.
+
+    Parameters
+    ----------
+    mounting
+        What the sentences do not say about the ship.
+
+    Attributes
+    ----------
+    sentences
+        Whose checksum is right.
+    rejected
+        Lines that are no sentence, by reason.
+    unknown
+        Sentences that measure nothing that is used here, by address.
+    no_value
+        Values that a known sentence does not hold, by input and reason.
+    used, not_taken
+        Values by input; not taken are those of a source that was not chosen, and those that
+        came while it was being chosen.
+    """
+
+    def __init__(self, mounting: Mounting | None = None) -> None:
+        self.sentences = 0
+        self.rejected: Counter[str] = Counter()
+        self.unknown: Counter[str] = Counter()
+        self.no_value: Counter[str] = Counter()
+        self.used: Counter[str] = Counter()
+        self.not_taken: Counter[str] = Counter()
+        self._mounting = mounting or Mounting()
+        self._choices: dict[Channel, _Choice] = {}
+
+    def messages(self, text: str, address: str, stamp_ns: int) -> list[EncodedMessage]:
+        """
+        Return what a line says of the inputs.
+
+        Parameters
+        ----------
+        text
+            The line.
+        address
+            Where it was heard.
+        stamp_ns
+            When it was read [ns since the epoch].
+        """
+        # a lost line end leaves two sentences in a line
+        _, *texts = START.split(text)
+        if not texts:
+            self.rejected['no sentence'] += 1
+        found = []
+        for each in texts:
+            try:
+                sentence = parse(each.strip(), Checksum.REQUIRED)
+            except ValueError as error:
+                self.rejected[str(error)] += 1
+            else:
+                found += self._of_sentence(sentence, address, stamp_ns)
+        return found
+
+    def feeding(self) -> dict[str, str]:
+        """
+        Return by input the sources that are used.
+        """
+        told: dict[str, dict[str, None]] = {}
+        for channel, choice in sorted(self._choices.items()):
+            if choice.held is not None:
+                told.setdefault(channel.input, {})[str(choice.held[0])] = None
+        return {name: ', '.join(sources) for name, sources in told.items()}
+
+    def _of_sentence(
+        self, sentence: Sentence, address: str, stamp_ns: int
+    ) -> list[EncodedMessage]:
+        self.sentences += 1
+        if sentence.kind not in READERS:
+            if sentence.kind not in TIMED:
+                _count(self.unknown, sentence.talker + sentence.kind)
+            return []
+        if sentence.talker not in NMEA_TALKERS:
+            _count(self.unknown, f'talker {sentence.talker}')
+        messages: list[EncodedMessage] = []
+        for channel, source, value in read_values(sentence, self._mounting):
+            if isinstance(value, NoValue):
+                _count(self.no_value, f'{channel.input} {sentence.kind}: {value.reason}')
+                continue
+            assert source is not None
+            choice = self._choices.setdefault(channel, _Choice(stamp_ns))
+            if not choice.takes((source, address), stamp_ns):
+                self.not_taken[channel.input] += 1
+                continue
+            self.used[channel.input] += 1
+            sample = (int(channel), stamp_ns, stamp_ns, value.a, value.b)
+            messages += encode(Block.of_samples([sample]))
+        return messages
+
+
+def _count(counter: Counter[str], key: str) -> None:
+    counter[key if key in counter or len(counter) < _KINDS else _OTHERS] += 1

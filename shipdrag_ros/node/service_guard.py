@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a peer may ask of the node: no illegal transition ends it, no flood holds it up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from time import monotonic
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.service import Service
+
+CHANGES = (2.0, 20.0)  # a second in the long run, and at once
+TRIGGERS = (0.2, 10.0)  # each may make a file, or drop an hour of memory
+READS = (50.0, 200.0)
+REFUSED = 'refused: asked too often; ask again in some seconds'
+_LIMITS = {
+    'Trigger': TRIGGERS,
+    'ChangeState': CHANGES,
+    'SetParameters': CHANGES,
+    'SetParametersAtomically': CHANGES,
+}
+
+
+class RateLimit:
+    """
+    Allows a burst, and then so many a second.
+
+    Parameters
+    ----------
+    per_second
+        Allowed in the long run [1/s].
+    at_once
+        Allowed after a pause.
+    clock
+        Steady time [s].
+    """
+
+    def __init__(
+        self, per_second: float, at_once: float, *, clock: Callable[[], float] = monotonic
+    ) -> None:
+        self._per_second = per_second
+        self._at_once = at_once
+        self._clock = clock
+        self._left = at_once
+        self._asked_s = clock()
+
+    def allows(self) -> bool:
+        """
+        Say whether one more is allowed now.
+        """
+        now_s = self._clock()
+        self._left += (now_s - self._asked_s) * self._per_second
+        self._left = min(self._left, self._at_once)
+        self._asked_s = now_s
+        if self._left < 1.0:
+            return False
+        self._left -= 1.0
+        return True
+
+
+def guard_services(
+    services: Iterable[Service], change_state: Service, warn: Callable[[str], object]
+) -> None:
+    """
+    Guard all services of a managed node.
+
+    Parameters
+    ----------
+    services
+        Of the node.
+    change_state
+        The one that is asked for transitions, which rclpy does not list among them.
+    warn
+        Told what is refused.
+    """
+    _refuse_illegal(change_state, warn)
+    limit_services((*services, change_state), warn)
+
+
+def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
+    """Refuse transitions that are not there; rclpy would raise out of the executor."""
+    change = change_state.callback
+
+    def refuse_or_change(request: Any, response: Any) -> Any:
+        try:
+            return change(request, response)
+        except rclpy_implementation.RCLError as error:
+            warn(f'transition refused: {error}')
+            response.success = False
+            return response
+
+    change_state.callback = refuse_or_change
+
+
+def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
+    """
+    Let each service refuse what is asked too often.
+
+    Parameters
+    ----------
+    services
+        Of the node; those that change something have the narrower limit.
+    warn
+        Told once a burst which service refuses.
+    """
+    for service in services:
+        limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))
+        service.callback = _limited(service.callback, limit, service.srv_name, warn)
+
+
+def _limited(
+    answer: Callable[[Any, Any], Any],
+    limit: RateLimit,
+    name: str,
+    warn: Callable[[str], object],
+) -> Callable[[Any, Any], Any]:
+    refusing = False
+
+    def limited(request: Any, response: Any) -> Any:
+        nonlocal refusing
+        if limit.allows():
+            refusing = False
+            return answer(request, response)
+        if not refusing:
+            refusing = True
+            warn(f'{name}: asked too often, requests are refused')
+        return _refuse(request, response)
+
+    return limited
+
+
+def _refuse(request: Any, response: Any) -> Any:
+    """Say no in the words of the service; what only reads gives nothing."""
+    refusal = SetParametersResult(successful=False, reason=REFUSED)
+    if hasattr(response, 'success'):
+        response.success = False
+    if hasattr(response, 'message'):
+        response.message = REFUSED
+    if isinstance(response, SetParameters.Response):
+        response.results = [refusal for _ in request.parameters]
+    elif isinstance(response, SetParametersAtomically.Response):
+        response.result = refusal
+    return response

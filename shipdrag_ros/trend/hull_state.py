@@ -1,0 +1,341 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The state of one hull against time: a Gaussian process with steps.
+
+The added resistance x(t) of a hull, a fraction of the clean hull's, is modelled as
+
+    x(t) = level + growth t + wander(t) + sum of steps and changes of growth at events
+    y_i  = x(t_i) + covariates b + scatter + error of the run,
+
+wander an integrated Brownian motion (growth that changes slowly) and a plain one (growth in
+bursts, in port for instance), scatter and wander of unknown size. All of it is Gaussian once
+the three sizes are given; these are averaged over
+a grid by their posterior weight. A run far off is an outlier with a small prior
+probability and is given less weight, not removed. Steps at unknown times are found by
+their Bayes factors (`change_points`).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import lapack
+
+from shipdrag_ros.samples import Float64
+
+LEVEL_SD = 0.4  # a hull when its first run is seen: from clean to heavily fouled
+GROWTH_PER_YEAR = (0.10, 0.12)  # merchant hulls: 5 to 20 % a year between cleanings
+STEP_SD = 0.10  # a cleaning, a docking, a sudden growth in port
+GROWTH_CHANGE_SD = 0.10  # per year, after a step: new paint, another trade
+COVARIATE_SD = 1.0  # relative resistance for a relative change of displacement
+SCATTER = np.array([0.004, 0.008, 0.014, 0.022, 0.035, 0.06, 0.11])
+_SCATTER_MEDIAN, _SCATTER_LOG_SD = 0.03, 0.8
+WANDER = np.array([0.0, 0.06, 0.18])  # growth per year, per square root of a year
+_WANDER_PRIOR = np.array([0.4, 0.35, 0.25])
+WALK = np.array([0.0, 0.02, 0.05])  # of the level, per square root of a year: growth in bursts
+_WALK_PRIOR = np.array([0.6, 0.25, 0.15])
+_OUTLIER_PROBABILITY, _OUTLIER_SCALE = 0.02, 6.0
+_ROUNDS = 4
+_NEGLIGIBLE = 1e-4  # weight of a setting
+
+
+@dataclass(frozen=True)
+class Runs:
+    """
+    The runs of one ship, in the order of time.
+
+    Attributes
+    ----------
+    years : (n,)
+        Time since the first run [years of 365.25 days].
+    added, sd : (n,)
+        Added resistance over the clean hull's, and its repeatable standard deviation.
+    covariates : (n, k)
+        What else moves the resistance, each about 0 on average.
+    """
+
+    years: Float64
+    added: Float64
+    sd: Float64
+    covariates: Float64
+
+    def __len__(self) -> int:
+        return len(self.years)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Prior of the growth of added resistance per year: mean and standard deviation."""
+
+    mean: float = GROWTH_PER_YEAR[0]
+    sd: float = GROWTH_PER_YEAR[1]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """
+    Times at which the state of the hull may have jumped.
+
+    Attributes
+    ----------
+    years : (m,)
+        When; a run at that very time is after the step.
+    """
+
+    years: Float64 = field(default_factory=lambda: np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.years)
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Mean and standard deviation of quantities, averaged over the sizes of the noise."""
+
+    value: Float64
+    sd: Float64
+
+
+class HullState:
+    """
+    The posterior of a hull's state, given the times of its steps.
+
+    Parameters
+    ----------
+    runs
+        At least one.
+    steps
+        When the state may have jumped.
+    growth
+        Prior of the growth.
+    outlier : (n,)
+        Where to begin the search for outliers.
+
+    Attributes
+    ----------
+    weights : (g,)
+        Posterior weight of each setting of scatter and wander; they sum to 1.
+    log_evidence
+        Of the runs, the sizes integrated out.
+    outlier : (n,)
+        Posterior probability that a run is an outlier.
+    scatter
+        Posterior mean of the scatter from run to run.
+    """
+
+    def __init__(
+        self, runs: Runs, steps: Steps, growth: Growth, *, outlier: Float64 | None = None
+    ) -> None:
+        self.runs, self.steps, self.growth = runs, steps, growth
+        self.outlier = np.zeros(len(runs)) if outlier is None else outlier
+        grid = itertools.product(SCATTER.tolist(), WANDER.tolist(), WALK.tolist())
+        self._settings = list(grid)
+        prior = itertools.product(_scatter_prior(), _WANDER_PRIOR.tolist(), _WALK_PRIOR.tolist())
+        self._log_prior = np.log([math.prod(each) for each in prior])
+        mean, self._basis = self._prior(runs.years, runs.covariates)
+        self._residual = runs.added - mean
+        self._noise = [runs.sd**2 + scatter**2 for scatter, _, _ in self._settings]
+        self._precision = [np.zeros((0, 0))] * len(self._settings)
+        log_posterior = np.full(len(self._settings), -np.inf)
+        solved = list(range(len(self._settings)))
+        for _ in range(_ROUNDS):
+            for number in solved:
+                log_posterior[number] = self._solve(number)
+            self._weigh(log_posterior)
+            before, self.outlier = self.outlier, self._outliers()
+            if float(np.abs(self.outlier - before).max()) < 0.02:
+                break
+            # what weighs nothing says nothing of outliers
+            solved = np.flatnonzero(self.weights > _NEGLIGIBLE).tolist()
+        for number in range(len(self._settings)):
+            log_posterior[number] = self._solve(number)
+        self._weigh(log_posterior)
+        self.scatter = float(
+            self.weights @ np.array([scatter for scatter, _, _ in self._settings])
+        )
+
+    def _solve(self, number: int) -> float:
+        """Solve for a setting under the present probabilities of outliers; return its log
+        posterior, but for a constant.
+        """
+        runs, (_, *sizes) = self.runs, self._settings[number]
+        weight = 1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2
+        covariance = self._basis + _wander(runs.years, runs.years, *sizes)
+        covariance[np.diag_indices(len(runs))] += self._noise[number] / weight
+        # hundreds of runs: LAPACK's; `inference.gaussian` is for the few unknowns of a fit
+        factor, failed = lapack.dpotrf(covariance, lower=True)
+        assert not failed, 'noise is never 0'
+        half, _ = lapack.dpotri(factor, lower=True)
+        precision = np.tril(half) + np.tril(half, -1).T
+        self._precision[number] = precision
+        return float(
+            -0.5 * self._residual @ precision @ self._residual
+            - np.log(np.diag(factor)).sum()
+            # the weight stands for a wider normal: its own size is no evidence for it
+            - 0.5 * np.log(weight).sum()
+            + self._log_prior[number]
+        )
+
+    def _weigh(self, log_posterior: Float64) -> None:
+        """Set the weights of the settings, and the evidence."""
+        top = log_posterior.max()
+        raw = np.exp(log_posterior - top)
+        self.log_evidence = float(top + np.log(raw.sum()))
+        self.weights = raw / raw.sum()
+
+    def _outliers(self) -> Float64:
+        """Return how probable each run is an outlier, from what the others predict."""
+        found = np.zeros(len(self.runs))
+        for weight, precision, plain in zip(self.weights, self._precision, self._noise):
+            if weight < _NEGLIGIBLE:
+                continue
+            diagonal = np.diag(precision)
+            residual = (precision @ self._residual) / diagonal
+            used = plain / (1.0 - self.outlier + self.outlier / _OUTLIER_SCALE**2)
+            others = np.maximum(1.0 / diagonal - used, 0.0)
+            prior = _OUTLIER_PROBABILITY / (1.0 - _OUTLIER_PROBABILITY)
+            odds = prior * _normal(residual, others + plain * _OUTLIER_SCALE**2)
+            found += weight * odds / (odds + _normal(residual, others + plain))
+        return found
+
+    def _columns(self, years: Float64) -> Float64:
+        """Return level, growth, and of each step the jump and the change of growth."""
+        after = years[:, None] >= self.steps.years[None, :]
+        later = np.maximum(years[:, None] - self.steps.years[None, :], 0.0)
+        return np.hstack([np.ones((len(years), 1)), years[:, None], after, later])
+
+    def _sd(self) -> Float64:
+        """Return the prior standard deviations of the columns."""
+        many = len(self.steps)
+        return np.array([LEVEL_SD, self.growth.sd] + [STEP_SD] * many + [GROWTH_CHANGE_SD] * many)
+
+    def _prior(self, years: Float64, covariates: Float64) -> tuple[Float64, Float64]:
+        """Return the prior mean of the runs and their covariance without noise and wander."""
+        scaled = self._columns(years) * self._sd()
+        mean = self.growth.mean * years
+        return mean, scaled @ scaled.T + COVARIATE_SD**2 * covariates @ covariates.T
+
+    def _functional(self, columns: Float64, years: Float64, own: Float64) -> Mixture:
+        """
+        Return the posterior of linear functionals: columns and wander at years.
+
+        Parameters
+        ----------
+        columns : (m, p)
+            Weights of the columns.
+        years : (m,)
+            Where the wander counts; NaN: not at all.
+        own : (m,)
+            Divides the wander.
+        """
+        runs, sd = self.runs, self._sd()
+        prior_mean = columns[:, 1] * self.growth.mean
+        cross = (columns * sd**2) @ self._columns(runs.years).T
+        own_variance = ((columns * sd) ** 2).sum(axis=1)
+        wandering = np.isfinite(years)
+        at = np.where(wandering, years, 0.0)  # where it began it is 0
+        mean = np.zeros(len(columns))
+        second = np.zeros(len(columns))
+        for weight, (_, *sizes), precision in zip(self.weights, self._settings, self._precision):
+            if weight < _NEGLIGIBLE:
+                continue
+            all_cross = cross + _wander(at, runs.years, *sizes) / own[:, None]
+            gain = all_cross @ precision
+            value = prior_mean + gain @ self._residual
+            variance = (
+                own_variance
+                + np.diag(_wander(at, at, *sizes)) / own**2
+                - np.einsum('ij,ij->i', gain, all_cross)
+            )
+            mean += weight * value
+            second += weight * (value**2 + np.maximum(variance, 0.0))
+        return Mixture(mean, np.sqrt(np.maximum(second - mean**2, 0.0)))
+
+    def level(self, years: Float64) -> Mixture:
+        """
+        Return the added resistance at some times, covariates at their mean.
+
+        Parameters
+        ----------
+        years : (m,)
+            Since the first run, 0 or later.
+        """
+        return self._functional(self._columns(years), years, np.ones(len(years)))
+
+    def growth_per_year(self) -> Mixture:
+        """
+        Return the mean growth between cleanings: the rise less what steps took away, over time.
+
+        A step upwards is growth too: fouling in port, for instance.
+        """
+        end = max(float(self.runs.years[-1]), 1e-9)
+        columns = self._columns(np.array([end])) - self._columns(np.zeros(1))
+        many = len(self.steps)
+        if many:
+            columns[:, 2 : 2 + many] *= self.changes().value > 0.0
+        return self._functional(columns / end, np.array([end]), np.array([end]))
+
+    def growth_since_last_step(self) -> Mixture:
+        """
+        Return the growth now, by the law since the last step.
+        """
+        columns = np.zeros((1, 2 + 2 * len(self.steps)))
+        columns[0, 1] = 1.0
+        columns[0, 2 + len(self.steps) :] = 1.0
+        return self._functional(columns, np.array([np.nan]), np.ones(1))
+
+    def changes(self) -> Mixture:
+        """
+        Return the jump at each step.
+        """
+        many = len(self.steps)
+        columns = np.zeros((many, 2 + 2 * many))
+        columns[np.arange(many), 2 + np.arange(many)] = 1.0
+        return self._functional(columns, np.full(many, np.nan), np.ones(many))
+
+    def log_bayes_factors(self, after: Float64) -> Float64:
+        """
+        Return the log Bayes factor of one more step, for each of some step functions.
+
+        Parameters
+        ----------
+        after : (n, m)
+            1 where a run is after the step.
+
+        Returns
+        -------
+        (m,)
+            Under the settings' posterior weights without the step.
+        """
+        total = np.full(after.shape[1], -np.inf)
+        for weight, precision in zip(self.weights, self._precision):
+            # no setting is too improbable: what the step explains was scatter without it
+            solved = precision @ after
+            a = STEP_SD**2 * np.einsum('ij,ij->j', after, solved)
+            b = STEP_SD * (self._residual @ solved)
+            one = -0.5 * np.log1p(a) + 0.5 * b**2 / (1.0 + a)
+            total = np.logaddexp(total, np.log(max(weight, 1e-300)) + one)
+        return total
+
+
+def _scatter_prior() -> list[float]:
+    """Return the prior weight of each size of the scatter."""
+    apart = np.log(SCATTER / _SCATTER_MEDIAN) / _SCATTER_LOG_SD
+    return list(np.exp(-0.5 * apart**2))
+
+
+def _wander(one: Float64, other: Float64, wander: float, walk: float) -> Float64:
+    """Return the covariance of integrated and of plain Brownian motion of these strengths."""
+    first = np.minimum(one[:, None], other[None, :])
+    apart = np.abs(one[:, None] - other[None, :])
+    integrated = first**3 / 3.0 + 0.5 * apart * first**2
+    return np.asarray(wander**2 * integrated + walk**2 * first)
+
+
+def _normal(residual: Float64, variance: Float64) -> Float64:
+    """Return the normal density, far tails kept above zero."""
+    exponent = np.minimum(0.5 * residual**2 / variance, 600.0)
+    return np.asarray(np.exp(-exponent) / np.sqrt(variance))

@@ -1,0 +1,275 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The runs of one ship at one speed: added resistance over the clean hull's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shipdrag_ros.display import day
+from shipdrag_ros.samples import Float64
+
+SPEED_SHARE = 0.75  # of the speed at the stop: inside what nearly every run covers
+FIRST_MONTHS_NS = 90 * 86_400_000_000_000
+YEAR_NS = 365.25 * 86_400e9
+_ALONE_NS = YEAR_NS
+_MANY_RUNS = 5  # of fewer each may stand alone
+_EARLIEST_NS = 631_152_000_000_000_000  # 1990: before it a clock was not set
+_MOST_SHARED = 0.5  # a reference speed must lie inside the range of at least this many runs
+_NOMINAL_TEMPERATURE_C = 15.0
+_TEMPERATURE_SCALE = 0.02  # friction per 10 K, about: the unit in which its covariate counts
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Point:
+    """
+    One run: its added resistance, or why it is not used.
+
+    Attributes
+    ----------
+    value, sd
+        Over the clean hull's, and its standard deviation as a whole; NaN where not known.
+    sd_repeatable
+        Without the errors that all runs share.
+    covariates
+        Of displacement and of water temperature; 0 where not known.
+    """
+
+    time_ns: int
+    bag: str
+    value: float = np.nan
+    sd: float = np.nan
+    sd_repeatable: float = np.nan
+    covariates: tuple[float, float] = (0.0, 0.0)
+    reason: str | None = None
+
+    @property
+    def used(self) -> bool:
+        """Whether the trend is fitted to it."""
+        return self.reason is None
+
+
+@dataclass(frozen=True)
+class Series:
+    """
+    What is known of one ship's added resistance.
+
+    Attributes
+    ----------
+    name
+        Of the ship.
+    reference_speed_m_s
+        Where the resistance is compared; NaN where no run has any.
+    points
+        One a coastdown, in the order of time.
+    clean
+        What the clean hull is: 'ship file' or 'first months'.
+    clean_force_n
+        Its resistance at the reference speed [N].
+    sister
+        Ships with equal ones are sisters: length [m] and displaced volume [m^3].
+    notes
+        What a reader must know, a sentence each.
+    """
+
+    name: str
+    reference_speed_m_s: float
+    points: tuple[Point, ...]
+    clean: str
+    clean_force_n: float
+    sister: tuple[float, float]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def used(self) -> tuple[Point, ...]:
+        """The points that the trend is fitted to."""
+        return tuple(point for point in self.points if point.used)
+
+
+def series_of(name: str, rows: Sequence[Row], *, service_speed_m_s: float | None = None) -> Series:
+    """
+    Return the runs of one ship at its reference speed.
+
+    Parameters
+    ----------
+    name
+        Of the ship.
+    rows
+        Rows of the store's `coastdowns`, of this ship.
+    service_speed_m_s
+        Of its `economics`; without it 0.75 of the speed at the stop, the median over runs.
+    """
+    rows = sorted(rows, key=lambda row: (row['time_ns'], row['bag']))
+    speed, notes = _reference_speed(rows, service_speed_m_s)
+    with_baseline = [_at(row['clean_m_s2'], row, speed) for row in rows]
+    baseline = any(np.isfinite(value) for value in with_baseline)
+    points = [_point(row, speed, clean, baseline) for row, clean in zip(rows, with_baseline)]
+    points = _dated(points)
+    masses = [row['displaced_volume_m3'] * row['water_density_kg_m3'] for row in rows]
+    mass = float(np.median(masses)) if masses else np.nan
+    if baseline:
+        clean = float(np.nanmedian(with_baseline))
+    else:
+        points, clean, note = _over_first_months(points)
+        notes += (note,)
+    return Series(
+        name,
+        speed,
+        tuple(_with_covariates(points, rows)),
+        'ship file' if baseline else 'first months',
+        clean * mass,
+        (rows[0]['length_m'], rows[0]['displaced_volume_m3']) if rows else (np.nan, np.nan),
+        notes,
+    )
+
+
+def _reference_speed(rows: Sequence[Row], service: float | None) -> tuple[float, tuple[str, ...]]:
+    """Return the speed at which runs are compared, and what is to be said of it."""
+    ranges = [found for row in rows if (found := _range(row)) is not None]
+    if not ranges:
+        return np.nan, ('no run has an estimate',)
+    low, high = np.array(ranges).T
+    if service is not None:
+        share = float(np.mean((low <= service) & (service <= high)))
+        if share >= _MOST_SHARED:
+            return service, ()
+    stops = [row['speed_at_stop_m_s'] for row in rows if row['speed_at_stop_m_s']]
+    wished = SPEED_SHARE * float(np.median(stops)) if stops else float(np.median(high))
+    places = np.unique(np.concatenate([low, high, [wished]]))
+    covered = np.array([np.sum((low <= place) & (place <= high)) for place in places])
+    best = places[covered == covered.max()]
+    if covered[places == wished][0] >= 0.9 * covered.max():
+        best = np.array([wished])
+    chosen = float(best[np.abs(best - wished).argmin()])
+    if service is None:
+        return chosen, ()
+    return chosen, (
+        f'the service speed of {service:.2f} m/s lies outside the valid range of most runs; '
+        f'they are compared at {chosen:.2f} m/s',
+    )
+
+
+def _range(row: Row) -> tuple[float, float] | None:
+    """Return the lowest and highest speed at which a row has r."""
+    if row['resistance_m_s2'] is None or row['speed_m_s'] is None:
+        return None
+    speed, r = _floats(row['speed_m_s']), _floats(row['resistance_m_s2'])
+    known = np.isfinite(speed) & np.isfinite(r)
+    return (float(speed[known].min()), float(speed[known].max())) if known.any() else None
+
+
+def _point(row: Row, speed: float, clean: float, baseline: bool) -> Point:
+    """Return the point of a row; without a baseline its value is r itself."""
+    plain = Point(int(row['time_ns']), row['bag'])
+    if row['error']:
+        return replace(plain, reason=str(row['error']))
+    if plain.time_ns < _EARLIEST_NS:
+        return replace(plain, reason='its clock was not set: the date is before 1990')
+    found = _range(row)
+    r = _at(row['resistance_m_s2'], row, speed)
+    if found is None:
+        return replace(plain, reason='no estimate of r(v)')
+    if not np.isfinite(r):
+        return replace(
+            plain,
+            reason=f'r is known from {found[0]:.2f} to {found[1]:.2f} m/s, '
+            f'the reference speed is {speed:.2f} m/s',
+        )
+    if baseline and not np.isfinite(clean):
+        return replace(plain, reason='its ship file has no baseline at the reference speed')
+    unit = clean if baseline else 1.0
+    sd = _at(row['sigma_m_s2'], row, speed) / unit
+    repeatable = _at(row['sigma_repeatable_m_s2'], row, speed) / unit
+    return replace(
+        plain, value=r / unit - (1.0 if baseline else 0.0), sd=sd, sd_repeatable=repeatable
+    )
+
+
+def _dated(points: list[Point]) -> list[Point]:
+    """Leave out a run that stands alone, years from all others: its clock was wrong."""
+    times = np.array([point.time_ns for point in points if point.used])
+    if len(times) < _MANY_RUNS:
+        return points
+    found = []
+    for point in points:
+        apart_ns = np.sort(np.abs(times - point.time_ns))[1]  # the first is its own
+        if point.used and apart_ns > _ALONE_NS:
+            reason = (
+                f'its date, {day(point.time_ns)}, is {apart_ns / YEAR_NS:.1f} years from every '
+                'other run: a wrong clock'
+            )
+            point = replace(point, reason=reason)
+        found.append(point)
+    return found
+
+
+def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
+    """Put values over the mean of the first months, which stand for the clean hull."""
+    used = [point for point in points if point.used]
+    if not used:
+        return points, np.nan, 'no run can be used'
+    first = [point for point in used if point.time_ns <= used[0].time_ns + FIRST_MONTHS_NS]
+    values = np.array([point.value for point in first])
+    weight = 1.0 / np.array([point.sd_repeatable for point in first]) ** 2
+    clean = float(weight @ values / weight.sum())
+    scaled = [
+        replace(
+            point,
+            value=point.value / clean - 1.0,
+            sd=point.sd / clean,
+            sd_repeatable=point.sd_repeatable / clean,
+        )
+        if point.used
+        else point
+        for point in points
+    ]
+    note = (
+        f'the ship file has no baseline: the clean hull is the mean of the first {len(first)} '
+        'run(s), in 90 days; give a baseline, or one from clean runs (shipdrag baseline)'
+    )
+    return scaled, clean, note
+
+
+def _with_covariates(points: Sequence[Point], rows: Sequence[Row]) -> list[Point]:
+    """Set displacement and water temperature, each against its mean over the used runs."""
+    volume = np.array([np.log(row['displaced_volume_m3']) for row in rows])
+    temperature = np.array(
+        [
+            np.nan if row['water_temperature_c'] is None else row['water_temperature_c']
+            for row in rows
+        ],
+        float,
+    )
+    warmth = (temperature - _NOMINAL_TEMPERATURE_C) / 10.0 * _TEMPERATURE_SCALE
+    return [
+        replace(point, covariates=(each, other))
+        for point, each, other in zip(points, _centred(volume), _centred(warmth))
+    ]
+
+
+def _centred(values: Float64) -> Float64:
+    """Return values less their mean; 0 where not known."""
+    known = np.isfinite(values)
+    if not known.any():
+        return np.zeros(len(values))
+    return np.where(known, values - values[known].mean(), 0.0)
+
+
+def _at(values: Sequence[float] | None, row: Row, speed: float) -> float:
+    """Return what a curve of a row is at a speed; NaN outside of what is known."""
+    if values is None or row['speed_m_s'] is None or not np.isfinite(speed):
+        return np.nan
+    speeds, curve = _floats(row['speed_m_s']), _floats(values)
+    known = np.isfinite(speeds) & np.isfinite(curve)
+    if not known.any() or not speeds[known].min() <= speed <= speeds[known].max():
+        return np.nan
+    return float(np.interp(speed, speeds[known], curve[known]))
+
+
+def _floats(values: Sequence[float | None]) -> Float64:
+    return np.array([np.nan if value is None else value for value in values], float)

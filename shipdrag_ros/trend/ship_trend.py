@@ -1,0 +1,348 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The trend of each ship of a fleet, and which hull comes first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+import numpy as np
+
+from shipdrag_ros.fleet.events import HullEvent
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.sections import Economics
+from shipdrag_ros.trend.change_points import FoundStep, search
+from shipdrag_ros.trend.hull_state import Growth, HullState, Mixture, Runs, Steps
+from shipdrag_ros.trend.money import CleaningDate, cleaning_date, fuel_t_per_day, usd_per_year
+from shipdrag_ros.trend.series import YEAR_NS, Point, Row, Series, series_of
+
+_OUTLIER = 0.5
+_SISTER_SD = 0.05  # of growth per year, between ships of one drawing
+_SISTER_TOLERANCE = 0.01
+_CURVE_POINTS = 200
+_LEAST_RUNS = 3  # two runs are a difference, no trend
+_CLEANING = ('cleaning', 'docking', 'coating')
+UNKNOWN_KIND = 'unknown'
+
+
+@dataclass(frozen=True)
+class TrendEvent:
+    """
+    A step in the state of a hull.
+
+    Attributes
+    ----------
+    time_ns
+        When; of one that was found, the middle between the runs around it.
+    kind
+        As the log book has it; 'unknown' where it was found.
+    probability
+        That it happened about then; 1 for a known one.
+    change
+        Of the added resistance.
+    """
+
+    time_ns: int
+    kind: str
+    known: bool
+    probability: float
+    change: Parameter
+
+
+@dataclass(frozen=True)
+class LevelCurve:
+    """
+    The added resistance of the hull against time.
+
+    Attributes
+    ----------
+    time_ns : (m,) int64
+    value, sd : (m,)
+        Over the clean hull's.
+    """
+
+    time_ns: Int64
+    value: Float64
+    sd: Float64
+
+
+@dataclass(frozen=True)
+class Costs:
+    """
+    What the added resistance costs.
+
+    Attributes
+    ----------
+    fuel_t_per_day
+        At sea, now.
+    usd_per_year
+        At the present state.
+    usd_so_far
+        Since the first run.
+    """
+
+    fuel_t_per_day: float
+    usd_per_year: float
+    usd_so_far: float
+
+
+@dataclass(frozen=True)
+class ShipTrend:
+    """
+    Added resistance of one ship against time.
+
+    Attributes
+    ----------
+    series
+        The runs at the reference speed.
+    growth_per_year, now, power_kw
+        Of the hull between cleanings; at the last run; effective power that it takes.
+        None where the runs carry no trend.
+    outlier : by bag and time
+        Probability that a run is an outlier.
+    cleaning
+        When cleaning pays; None where that cannot be said, and `notes` say why.
+    rank
+        1: which hull first.
+    """
+
+    series: Series
+    events: tuple[TrendEvent, ...] = ()
+    growth_per_year: Parameter | None = None
+    now: Parameter | None = None
+    power_kw: Parameter | None = None
+    curve: LevelCurve | None = None
+    outlier: tuple[float, ...] = ()
+    scatter: float | None = None
+    costs: Costs | None = None
+    cleaning: CleaningDate | None = None
+    cleaning_from_ns: int | None = None
+    rank: int | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The runs, those the trend takes for outliers with the reason."""
+        used = iter(self.outlier)
+        found = []
+        for point in self.series.points:
+            share = next(used, 0.0) if point.used else 0.0
+            if share > _OUTLIER:
+                text = f'an outlier by {share:.0%}: given little weight, not removed'
+                point = replace(point, reason=text)
+            found.append(point)
+        return tuple(found)
+
+
+def fleet_trends(
+    rows: Sequence[Row], ships: Mapping[str, Ship], events: Mapping[str, Sequence[HullEvent]]
+) -> list[ShipTrend]:
+    """
+    Return the trend of every ship, the hull to be cleaned first in front.
+
+    Parameters
+    ----------
+    rows
+        Rows of the store's `coastdowns`.
+    ships
+        Ship files by name; prices are taken from them.
+    events
+        What is known to have been done to each hull, by name of the ship.
+    """
+    by_name = sorted(rows, key=lambda row: row['ship'])
+    known = []
+    for name, own in groupby(by_name, key=lambda row: row['ship']):
+        economics = None if name not in ships else ships[name].economics
+        speed = None if economics is None else economics.service_speed_m_s
+        series = series_of(name, list(own), service_speed_m_s=speed)
+        known.append((series, economics, events.get(name, ())))
+    alone = [ship_trend(*each) for each in known]
+    found = []
+    for place, each in enumerate(known):
+        growth = _from_sisters(alone, place)
+        found.append(alone[place] if growth is None else ship_trend(*each, growth=growth))
+    return _ranked(found)
+
+
+def ship_trend(
+    series: Series,
+    economics: Economics | None = None,
+    known: Sequence[HullEvent] = (),
+    *,
+    growth: Growth | None = None,
+) -> ShipTrend:
+    """
+    Return the trend of one ship.
+
+    Parameters
+    ----------
+    series
+        Its runs.
+    economics
+        Prices; without them no date of a cleaning is given.
+    known
+        Events of its log book.
+    growth
+        Prior of its growth, from sister ships for instance.
+    """
+    used = series.used
+    if len(used) < _LEAST_RUNS:
+        why = f'{len(used)} run(s) can be used, a trend needs {_LEAST_RUNS}: give more runs'
+        return ShipTrend(series, notes=(*series.notes, why))
+    first_ns = used[0].time_ns
+    runs = _runs(used)
+    inside = [event for event in known if first_ns < event.time_ns <= used[-1].time_ns]
+    steps = Steps(np.array([(event.time_ns - first_ns) / YEAR_NS for event in inside]))
+    state, found = search(runs, steps, growth or Growth())
+    shared = _shared_sd(used)
+    end = np.array([runs.years[-1]])
+    level = state.level(end)
+    now = Parameter(float(level.value[0]), float(np.hypot(level.sd[0], shared)))
+    kw = series.clean_force_n * series.reference_speed_m_s / 1000.0
+    years = np.linspace(0.0, runs.years[-1], _CURVE_POINTS)
+    curve = state.level(years)
+    slope = state.growth_per_year()
+    result = ShipTrend(
+        series,
+        _events(state, inside, found, first_ns),
+        Parameter(float(slope.value[0]), float(slope.sd[0])),
+        now,
+        Parameter(now.value * kw, now.sd * kw),
+        LevelCurve((first_ns + years * YEAR_NS).astype(np.int64), curve.value, curve.sd),
+        tuple(state.outlier.tolist()),
+        state.scatter,
+        notes=(*series.notes, *_outside(known, inside)),
+    )
+    return _with_costs(result, state, economics, used[-1].time_ns)
+
+
+def _runs(used: Sequence[Point]) -> Runs:
+    """Return the used points as the model takes them."""
+    times = np.array([point.time_ns for point in used])
+    return Runs(
+        (times - times[0]) / YEAR_NS,
+        np.array([point.value for point in used]),
+        np.array([point.sd_repeatable for point in used]),
+        np.array([point.covariates for point in used]),
+    )
+
+
+def _shared_sd(used: Sequence[Point]) -> float:
+    """Return the error that all runs share: it moves the level and no change."""
+    apart = [max(point.sd**2 - point.sd_repeatable**2, 0.0) for point in used]
+    return float(np.sqrt(np.median(apart)))
+
+
+def _events(
+    state: HullState, known: Sequence[HullEvent], found: Sequence[FoundStep], first_ns: int
+) -> tuple[TrendEvent, ...]:
+    """Return known and found steps with their changes, in the order of time."""
+    changes = state.changes()
+    events = []
+    for year, value, sd in zip(state.steps.years, changes.value, changes.sd):
+        time_ns = first_ns + round(float(year) * YEAR_NS)
+        change = Parameter(float(value), float(sd))
+        book = [event for event in known if abs(event.time_ns - time_ns) < 1_000_000_000]
+        if book:
+            events.append(TrendEvent(book[0].time_ns, book[0].kind, True, 1.0, change))
+        else:
+            [probability] = [each.probability for each in found if each.year == year]
+            events.append(TrendEvent(time_ns, UNKNOWN_KIND, False, probability, change))
+    return tuple(events)
+
+
+def _outside(known: Sequence[HullEvent], inside: Sequence[HullEvent]) -> tuple[str, ...]:
+    """Say which events of the log book no run can show."""
+    left = [event for event in known if event not in inside]
+    if not left:
+        return ()
+    return (f'{len(left)} event(s) of events.csv lie outside the time of the runs: not used',)
+
+
+def _with_costs(
+    result: ShipTrend, state: HullState, economics: Economics | None, last_ns: int
+) -> ShipTrend:
+    """Add what the added resistance costs, and when cleaning pays."""
+    if economics is None:
+        why = 'no date of a cleaning: the ship file has no `economics`'
+        return replace(result, notes=(*result.notes, why))
+    assert result.now is not None
+    assert result.power_kw is not None
+    assert result.curve is not None
+    series = result.series
+    per_unit = usd_per_year(economics, series.clean_force_n, series.reference_speed_m_s)
+    mean = float(np.trapezoid(result.curve.value, result.curve.time_ns / YEAR_NS))
+    costs = Costs(
+        fuel_t_per_day(economics, result.power_kw.value),
+        per_unit * result.now.value,
+        per_unit * mean,
+    )
+    since = _since_cleaning(result, state)
+    date = cleaning_date(economics, per_unit, since, state.growth_since_last_step())
+    if date is None:
+        why = 'no date of a cleaning: growth and state are not known well enough for one'
+        return replace(result, costs=costs, notes=(*result.notes, why))
+    from_ns = last_ns + round(date.years * YEAR_NS)
+    return replace(result, costs=costs, cleaning=date, cleaning_from_ns=from_ns)
+
+
+def _since_cleaning(result: ShipTrend, state: HullState) -> Mixture:
+    """Return what has been added since the last cleaning, or over the clean hull."""
+    end = state.runs.years[-1]
+    first_ns = result.series.used[0].time_ns
+    cleanings = [
+        event
+        for event in result.events
+        if event.kind in _CLEANING or (not event.known and event.change.value < 0.0)
+    ]
+    if not cleanings:
+        assert result.now is not None
+        return Mixture(np.array([result.now.value]), np.array([result.now.sd]))
+    after = (cleanings[-1].time_ns - first_ns) / YEAR_NS
+    both = state.level(np.array([after, end]))
+    # two times of one curve move together: their errors add at most
+    return Mixture(
+        np.array([both.value[1] - both.value[0]]), np.array([float(np.hypot(*both.sd))])
+    )
+
+
+def _from_sisters(alone: Sequence[ShipTrend], place: int) -> Growth | None:
+    """Return the prior of a ship's growth by what her sisters show, None without any."""
+    own = np.array(alone[place].series.sister)
+    known = [
+        each.growth_per_year
+        for number, each in enumerate(alone)
+        if number != place
+        and each.growth_per_year is not None
+        and np.allclose(each.series.sister, own, rtol=_SISTER_TOLERANCE)
+    ]
+    if not known:
+        return None
+    plain = Growth()
+    precision = np.array([1.0 / (each.sd**2 + _SISTER_SD**2) for each in known])
+    values = np.array([each.value for each in known])
+    total = precision.sum() + 1.0 / plain.sd**2
+    mean = float((precision @ values + plain.mean / plain.sd**2) / total)
+    return Growth(mean, float(np.sqrt(1.0 / total + _SISTER_SD**2)))
+
+
+def _ranked(trends: Sequence[ShipTrend]) -> list[ShipTrend]:
+    """Rank by what the fouling costs a year, else by the power it takes; unknown ones last."""
+    priced = all(each.costs is not None for each in trends if each.now is not None)
+
+    def burden(trend: ShipTrend) -> float:
+        if trend.now is None:
+            return -np.inf
+        if priced and trend.costs is not None:
+            return trend.costs.usd_per_year
+        assert trend.power_kw is not None
+        return trend.power_kw.value
+
+    ordered = sorted(trends, key=lambda trend: (-burden(trend), trend.series.name))
+    return [
+        replace(trend, rank=None if trend.now is None else place)
+        for place, trend in enumerate(ordered, start=1)
+    ]

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A trend in words and tables, the same in the terminal and on a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shipdrag_ros.display import M_S_PER_KNOT, Table, day
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.trend.series import YEAR_NS
+from shipdrag_ros.trend.ship_trend import ShipTrend
+
+_CLEAN = {
+    'ship file': 'the clean hull of the ship file',
+    'first months': 'the mean of the first months',
+}
+
+
+def ranking(trends: Sequence[ShipTrend]) -> Table:
+    """
+    Return a line a ship, the hull to be cleaned first on top.
+    """
+    rows = []
+    for trend in trends:
+        costs = trend.costs
+        rows.append(
+            (
+                '-' if trend.rank is None else f'{trend.rank}',
+                trend.series.name,
+                f'{len(trend.series.used)} of {len(trend.series.points)}',
+                percent(trend.now),
+                '-' if trend.power_kw is None else _plus_minus(trend.power_kw, 1.0),
+                '-' if costs is None else f'{costs.fuel_t_per_day:.2f}',
+                percent(trend.growth_per_year),
+                _cleaning(trend),
+            )
+        )
+    head = (
+        'rank',
+        'ship',
+        'runs used',
+        'added now [%]',
+        'effective power [kW]',
+        'fuel [t/day]',
+        'growth [% a year]',
+        'cleaning pays from',
+    )
+    return Table(head, tuple(rows))
+
+
+def lines(trend: ShipTrend) -> list[str]:
+    """
+    Return what is known of one ship, a sentence each.
+    """
+    series = trend.series
+    found = []
+    if trend.now is not None:
+        knots = series.reference_speed_m_s / M_S_PER_KNOT
+        found.append(
+            f'Added resistance {percent(trend.now)} % over {_CLEAN[series.clean]}, at '
+            f'{knots:.1f} kn ({series.reference_speed_m_s:.2f} m/s); growth between cleanings '
+            f'{percent(trend.growth_per_year)} % a year.'
+        )
+    if trend.scatter is not None:
+        found.append(f'Runs scatter by {trend.scatter:.1%} beyond their own error.')
+    if trend.costs is not None:
+        found.append(
+            f'It costs {trend.costs.usd_per_year:,.0f} USD a year as it is now; since the first '
+            f'run {trend.costs.usd_so_far:,.0f} USD.'
+        )
+    if trend.cleaning is not None and trend.cleaning_from_ns is not None:
+        base = trend.cleaning_from_ns - round(trend.cleaning.years * YEAR_NS)
+        early, late = (
+            day(base + round(years * YEAR_NS))
+            for years in (trend.cleaning.earliest, trend.cleaning.latest)
+        )
+        found.append(
+            f'Cleaning pays from {day(trend.cleaning_from_ns)} (80 %: {early} to {late}).'
+        )
+    left = [point for point in trend.points if not point.used]
+    if left:
+        found.append(f'{len(left)} run(s) are not used or given little weight:')
+        found += [f'  {day(point.time_ns)} {point.bag}: {point.reason}' for point in left]
+    return found + [f'{note[0].upper()}{note[1:]}.' for note in trend.notes]
+
+
+def speed_loss(trend: ShipTrend) -> str:
+    """
+    Return the speed loss at equal effective power, as a clause; '' where not known.
+
+    Power goes about as the cube of the speed; it is not the measure of ISO 19030, which needs
+    shaft power.
+    """
+    if trend.now is None or trend.now.value <= -0.9:
+        return ''
+    loss = 1.0 - (1.0 + trend.now.value) ** (-1.0 / 3.0)
+    return f', about {loss:.1%} of speed lost at equal effective power'
+
+
+def event_table(trend: ShipTrend) -> Table:
+    """
+    Return the steps of one ship, in the order of time.
+    """
+    return Table(
+        ('date', 'event', 'probability', 'change [%]'),
+        tuple(
+            (
+                day(event.time_ns),
+                event.kind if event.known else 'step that no log book tells',
+                '-' if event.known else f'{event.probability:.0%}',
+                percent(event.change),
+            )
+            for event in trend.events
+        ),
+    )
+
+
+def percent(found: Parameter | None) -> str:
+    """
+    Return a share and its standard deviation in percent; '-' where not known.
+    """
+    return '-' if found is None else _plus_minus(found, 100.0)
+
+
+def _plus_minus(found: Parameter, unit: float) -> str:
+    return f'{found.value * unit:.1f} ± {found.sd * unit:.1f}'
+
+
+def _cleaning(trend: ShipTrend) -> str:
+    if trend.cleaning_from_ns is None:
+        return 'cannot be said'
+    if trend.cleaning is not None and trend.cleaning.years == 0.0:
+        return 'now'
+    return day(trend.cleaning_from_ns)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Workers that die, a store that does not notice, and the verb over all of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import cloudpickle
+import pytest
+
+from shipdrag_ros.cli import main
+from shipdrag_ros.errors import FleetError
+from shipdrag_ros.fleet.engine import Engine, Lost
+from shipdrag_ros.fleet.find import find
+from shipdrag_ros.fleet.store import (
+    BAGS,
+    COASTDOWNS,
+    Store,
+    read_bags,
+    read_coastdowns,
+    ship_texts,
+)
+from shipdrag_ros.fleet.update import update
+
+cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import tests
+
+
+@pytest.fixture(scope='module')
+def engine() -> Iterator[Engine]:
+    with Engine(workers=2) as running:
+        yield running
+
+
+def deadly(item: str) -> str:
+    """Kill the worker for some items."""
+    if item == 'deadly':
+        os.kill(os.getpid(), signal.SIGKILL)
+    return item.upper()
+
+
+def contents(store: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(store)): path.read_bytes()
+        for path in store.rglob('*')
+        if path.is_file()
+    }
+
+
+def silent(text: str, done: int, total: int) -> None:
+    """Take progress and say nothing."""
+
+
+def test_the_verb_from_bags_to_rows_and_again(
+    fleet_folder: Path, tmp_path: Path, engine: Engine, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store, result = tmp_path / 'store', tmp_path / 'result.json'
+    line = ['fleet', str(fleet_folder), '-o', str(store)]
+    assert main([*line, '--workers', '1', '--json', str(result)]) == 1  # some bags were skipped
+    said, progress = capsys.readouterr()
+    assert '6 bag(s) found; 1 other file(s) left alone' in progress
+    assert "'bering/2026/the same.mcap' has the content of 'bering/2026/run 1.mcap'" in said
+    assert '5 skipped' in said
+    for name in ('empty.mcap', 'fore\\nign.mcap', 'pipe.mcap', 'endless.mcap', 'gone.mcap'):
+        assert f"  'other/{name}': " in said
+    found = json.loads(result.read_text())
+    assert found['ships'] == [{'name': 'Vitus Bering', 'bags': 3, 'coastdowns': 3}]
+    assert (found['new'], len(found['skipped']), found['notes']) == (5, 5, [])
+    rows = read_coastdowns(store).to_pylist()
+    assert [row['bag'] for row in rows] == [f'bering/2026/run {n}.mcap' for n in (1, 2, 3)]
+    assert [row['error'] for row in rows] == [None] * 3
+    assert ship_texts(store)['Vitus Bering']['events.csv'].splitlines()[1:] == [
+        '2026-02-10T00:00:00Z,cleaning,Lisbon'
+    ]
+
+    # what is done is not done again, and a cluster that exists is used
+    before = {path: path.stat().st_mtime_ns for path in (store / COASTDOWNS).rglob('*.parquet')}
+    bytes_before = contents(store)
+    assert main([*line, '--scheduler', engine.address, '--json', str(result)]) == 1
+    assert json.loads(result.read_text())['new'] == 0
+    assert '0 bag(s) replayed now, 5 done before' in capsys.readouterr().out
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert contents(store) == bytes_before
+
+    # workers that are killed amid the work change no byte
+    killed: list[int] = []
+
+    def kill(text: str, done: int, total: int) -> None:
+        if text.startswith('replaying') and done < total and len(killed) < 2:
+            killed.extend(list(engine.on_each(os.getpid).values())[:1])
+            os.kill(killed[-1], signal.SIGKILL)
+
+    again = Store(tmp_path / 'again')
+    update(find([str(fleet_folder)]), again, engine, kill)
+    assert killed
+    assert contents(again.path) == bytes_before
+
+
+def test_only_what_kills_its_worker_by_itself_is_given_up(engine: Engine) -> None:
+    items = {name: name for name in ('a', 'b', 'deadly', 'c', 'd')}
+    found = dict(engine.map(deadly, items))
+    lost = found.pop('deadly')
+    assert isinstance(lost, Lost)
+    assert 'its worker died' in lost.reason
+    assert found == {'a': 'A', 'b': 'B', 'c': 'C', 'd': 'D'}
+
+
+def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(
+    bags: list[Path], tmp_path: Path, engine: Engine
+) -> None:
+    folder, store = tmp_path / 'fleet', Store(tmp_path / 'store')
+    folder.mkdir()
+    for number in (1, 2):
+        (folder / f'{number}.mcap').write_bytes(bags[number].read_bytes())
+    assert update(find([str(folder)]), store, engine, silent).new == 2
+    first = read_coastdowns(store.path)['time_ns'].to_pylist()
+    (folder / '1.mcap').write_bytes(bags[3].read_bytes())
+    report = update(find([str(folder)]), store, engine, silent)
+    assert (report.new, report.removed, report.skipped) == (1, 1, ())
+    second = read_coastdowns(store.path)['time_ns'].to_pylist()
+    assert len(set(first) & set(second)) == 1
+    assert len(list((store.path / BAGS).iterdir())) == 2
+    # what is no longer there stays, and that is said
+    (folder / '1.mcap').unlink()
+    report = update(find([str(folder)]), store, engine, silent)
+    assert len(read_bags(store.path)) == 2
+    assert report.notes == (
+        '1 bag(s) of the store are not below these folders; their rows stay in it',
+    )
+
+
+def test_a_scheduler_that_cannot_be_reached_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('shipdrag_ros.fleet.engine._CONNECT_S', 0.5)
+    with (
+        pytest.raises(FleetError, match='cannot be reached'),
+        Engine(scheduler='tcp://127.0.0.1:9'),
+    ):
+        pass
+
+
+def test_a_folder_without_a_bag_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / 'empty').mkdir()
+    assert main(['fleet', str(tmp_path / 'empty'), '-o', str(tmp_path / 'store')]) == 1
+    assert 'no bag lies below' in capsys.readouterr().err

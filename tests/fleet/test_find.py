@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which bags lie below a folder, and what lies beside them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.errors import FleetError
+from shipdrag_ros.fleet.find import LIMIT_BYTES, find
+
+
+def names(folder: Path, without: Path | None = None) -> list[str]:
+    return [source.bag for source in find([str(folder)], without=without).sources]
+
+
+def touch(*paths: Path) -> None:
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+def test_every_bag_once_whatever_links_lead_to_it(fleet_folder: Path) -> None:
+    found = find([str(fleet_folder)])
+    assert [source.bag for source in found.sources] == [
+        'bering/2026/run 1.mcap',
+        'bering/2026/run 2.mcap',
+        'bering/2026/run 3.mcap',
+        'bering/2026/the same.mcap',
+        'other/empty.mcap',
+        'other/fore\nign.mcap',
+    ]
+    assert {source.root for source in found.sources} == {'fleet'}
+    assert {(each.bag, each.reason.split(';')[0]) for each in found.skipped} == {
+        ('other/endless.mcap', 'is a device and no file'),
+        ('other/gone.mcap', 'cannot be read: No such file or directory'),
+        ('other/pipe.mcap', 'is a pipe and no file'),
+    }
+    assert found.left_alone == 1
+
+
+def test_a_bag_alone_may_be_given(fleet_folder: Path) -> None:
+    (source,) = find([str(fleet_folder / 'bering' / '2026' / 'run 2.mcap')]).sources
+    assert (source.root, source.bag) == ('2026', 'run 2.mcap')
+    assert 'Vitus Bering' in source.beside.ship
+
+
+def test_what_does_not_exist_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FleetError, match='does not exist; give a folder of bags'):
+        find([str(tmp_path / 'nothing')])
+
+
+def test_the_nearest_ship_file_upwards_counts(tmp_path: Path) -> None:
+    for place, name in (('', 'fleet'), ('a', 'a'), ('a/b/c', 'c')):
+        touch(tmp_path / place / 'ship.yaml', tmp_path / place / 'events.csv')
+        (tmp_path / place / 'ship.yaml').write_text(f'name: {name}')
+        (tmp_path / place / 'events.csv').write_text(f'events of {name}')
+    touch(*(tmp_path / place / 'x.mcap' for place in ('', 'a', 'a/b', 'a/b/c', 'd')))
+    found = {each.bag: each.beside for each in find([str(tmp_path)]).sources}
+    assert {bag: beside.ship[6:] for bag, beside in found.items()} == {
+        'x.mcap': 'fleet',
+        'a/x.mcap': 'a',
+        'a/b/x.mcap': 'a',
+        'a/b/c/x.mcap': 'c',
+        'd/x.mcap': 'fleet',
+    }
+    assert all(each.events == f'events of {each.ship[6:]}' for each in found.values())
+    # above the folder that is given, too
+    (below,) = find([str(tmp_path / 'a' / 'b' / 'x.mcap')]).sources
+    assert below.beside.ship == 'name: a'
+
+
+def test_a_directory_of_rosbag2_is_one_bag(tmp_path: Path) -> None:
+    bag = tmp_path / 'day' / 'bag'
+    touch(bag / 'metadata.yaml', bag / 'bag_0.mcap', bag / 'bag_1.mcap', bag / 'notes.csv')
+    touch(tmp_path / 'day' / 'old' / 'old_0.db3')
+    found = find([str(tmp_path)])
+    assert [(each.bag, len(each.files), each.folder) for each in found.sources] == [
+        ('day/bag', 3, True),
+        ('day/old', 1, True),
+    ]
+
+
+def test_the_run_file_of_each_bag(tmp_path: Path) -> None:
+    touch(tmp_path / 'many' / 'a.mcap', tmp_path / 'many' / 'b.mcap', tmp_path / 'one' / 'c.mcap')
+    (tmp_path / 'many' / 'a.mcap.run.yaml').write_text('of a')
+    (tmp_path / 'many' / 'run.yaml').write_text('of nobody')
+    (tmp_path / 'one' / 'run.yaml').write_text('of c')
+    touch(tmp_path / 'two' / 'd_000.mcap', tmp_path / 'two' / 'd_001.mcap')
+    (tmp_path / 'two' / 'run.yaml').write_text('of d')
+    found = find([str(tmp_path)])
+    assert {each.bag: each.run for each in found.sources} == {
+        'many/a.mcap': 'of a',
+        'many/b.mcap': '',
+        'one/c.mcap': 'of c',
+        'two/d_000.mcap': 'of d',
+        'two/d_001.mcap': 'of d',
+    }
+    (note,) = found.notes
+    assert note.startswith("'many/run.yaml' lies beside 2 bags and is used for none of them")
+    assert [each.may_be_part for each in found.sources] == [False, False, False, True, True]
+
+
+def test_the_store_is_not_searched(tmp_path: Path) -> None:
+    touch(
+        tmp_path / 'a.mcap', tmp_path / 'store' / 'deep' / 'b.mcap', tmp_path / 'store2' / 'c.mcap'
+    )
+    assert names(tmp_path, tmp_path / 'store') == ['a.mcap', 'store2/c.mcap']
+
+
+def test_a_name_that_is_no_text_is_escaped(tmp_path: Path) -> None:
+    path = os.fsdecode(os.fsencode(tmp_path) + b'/\xff.mcap')
+    Path(path).touch()
+    (source,) = find([str(tmp_path)]).sources
+    assert source.bag == '\\xff.mcap'
+    assert Path(source.files[0]).exists()
+
+
+def test_a_file_beyond_all_measure_is_skipped(tmp_path: Path) -> None:
+    with (tmp_path / 'huge.mcap').open('wb') as file:
+        file.truncate(LIMIT_BYTES + 1)  # sparse: it takes no room
+    (skipped,) = find([str(tmp_path)]).skipped
+    assert 'cut it into parts' in skipped.reason
+
+
+def test_a_ship_file_that_is_no_text_is_told_for_each_bag(tmp_path: Path) -> None:
+    touch(tmp_path / 'a.mcap')
+    (tmp_path / 'ship.yaml').write_bytes(b'\xff\xfe')
+    (skipped,) = find([str(tmp_path)]).skipped
+    assert skipped.bag == 'a.mcap'
+    assert 'ship.yaml' in skipped.reason
+    assert 'is not UTF-8' in skipped.reason

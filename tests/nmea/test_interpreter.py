@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Lines heard live to messages: values, choice of the source, counts."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pynmeagps.nmeahelpers import calc_checksum
+
+from shipdrag_ros.messages import Source, decode
+from shipdrag_ros.nmea.interpreter import SETTLE_NS, SILENT_NS, Interpreter, raw_message
+from shipdrag_ros.samples import Channel
+
+START_NS = 1_700_000_000 * 10**9
+LINE = 'udp://127.0.0.1:10110'
+KNOT_M_S = 1852.0 / 3600.0
+
+
+def sentence(content: str) -> str:
+    return f'${content}*{calc_checksum(content)}'
+
+
+def settled(*contents: str) -> tuple[Interpreter, dict[Channel, tuple[float, float]]]:
+    """Hear sentences until their sources are chosen, and once more; return what that gives."""
+    interpreter = Interpreter()
+    found = {}
+    for stamp_ns in (START_NS, START_NS + SETTLE_NS):
+        for content in contents:
+            for message in interpreter.messages(sentence(content), LINE, stamp_ns):
+                source = Source(message.topic.lstrip('/'), message.type)
+                block = decode(source, [message.payload], [stamp_ns]).block
+                for channel, stamp, value in zip(block.channel, block.stamp_ns, block.value):
+                    assert stamp == stamp_ns
+                    found[Channel(channel)] = (float(value[0]), float(value[1]))
+    return interpreter, found
+
+
+@pytest.mark.parametrize(
+    ('content', 'channel', 'value'),
+    [
+        ('IIVHW,,T,,M,10.0,N,18.5,K', Channel.SPEED_THROUGH_WATER, (10 * KNOT_M_S, 0)),
+        ('VWVBW,5.0,0.0,A,3.0,4.0,A', Channel.SPEED_OVER_GROUND, (5 * KNOT_M_S, 0)),
+        ('GPVTG,90.0,T,,M,6.0,N,11.1,K,A', Channel.SPEED_OVER_GROUND, (6 * KNOT_M_S, 0)),
+        (
+            'GPRMC,120000,A,5430.000,N,01030.000,E,7.0,90.0,010123,,,A',
+            Channel.POSITION_GEODETIC,
+            (54.5, 10.5),
+        ),
+        (
+            'GPGGA,120000,5430.000,S,01030.000,W,1,8,1.0,0,M,0,M,,',
+            Channel.POSITION_GEODETIC,
+            (-54.5, -10.5),
+        ),
+        ('HEHDT,90.0,T', Channel.HEADING, (0, 0)),
+        ('HETHS,0.0,A', Channel.HEADING, (math.pi / 2, 0)),
+        ('IIRPM,S,2,60.0,,A', Channel.SHAFT_2, (2 * math.pi, 0)),
+        ('WIMWV,0.0,R,10.0,M,A', Channel.WIND_APPARENT, (-10, 0)),
+        ('SDDPT,20.0,5.0', Channel.DEPTH, (25, 0)),
+        ('IIRSA,10.0,A,,V', Channel.RUDDER, (math.radians(10), 0)),
+    ],
+)
+def test_each_sentence(content: str, channel: Channel, value: tuple[float, float]) -> None:
+    _, found = settled(content)
+    np.testing.assert_allclose(found[channel], value, atol=1e-9)
+
+
+def test_a_heading_that_is_not_measured_is_not_used() -> None:
+    interpreter, found = settled('HETHS,0.0,M')
+    assert found == {}
+    assert interpreter.no_value == {'heading THS: mode M: manual': 2}
+
+
+def test_two_instruments_are_never_mixed() -> None:
+    """The better sentence is chosen after the first seconds, and kept until it is silent."""
+    interpreter = Interpreter()
+    dual, single = sentence('VWVBW,5.0,0.0,A,,,V'), sentence('IIVHW,,T,,M,9.0,N,,K')
+    for step in range(3):
+        assert interpreter.messages(single, LINE, START_NS + step) == []
+        assert interpreter.messages(dual, LINE, START_NS + step) == []
+    now_ns = START_NS + SETTLE_NS
+    assert interpreter.messages(single, LINE, now_ns) == []
+    assert len(interpreter.messages(dual, LINE, now_ns)) == 1
+    assert interpreter.feeding() == {'speed_through_water': 'VWVBW'}
+    assert interpreter.not_taken['speed_through_water'] == 7
+
+    later_ns = now_ns + SILENT_NS + 1
+    assert interpreter.messages(single, LINE, later_ns) == []
+    assert len(interpreter.messages(single, LINE, later_ns + SETTLE_NS)) == 1
+    assert interpreter.feeding() == {'speed_through_water': 'IIVHW'}
+
+
+def test_the_same_sentence_on_two_lines_is_two_sources() -> None:
+    interpreter = Interpreter()
+    text = sentence('HEHDT,90.0,T')
+    for stamp_ns in (START_NS, START_NS + SETTLE_NS):
+        first = interpreter.messages(text, 'tcp://a:1', stamp_ns)
+        second = interpreter.messages(text, 'tcp://b:1', stamp_ns)
+    assert (len(first), len(second)) == (1, 0)
+
+
+def test_a_clock_set_back_makes_no_source_wait() -> None:
+    interpreter = Interpreter()
+    text = sentence('HEHDT,90.0,T')
+    interpreter.messages(text, LINE, START_NS)
+    earlier_ns = START_NS - 3600 * 10**9
+    interpreter.messages(text, LINE, earlier_ns)
+    assert len(interpreter.messages(text, LINE, earlier_ns + SETTLE_NS)) == 1
+
+
+def test_what_gives_nothing_is_counted() -> None:
+    interpreter = Interpreter()
+    good = sentence('HEHDT,90.0,T')
+    for text in (
+        good[:-2] + '00',
+        good[:-3],
+        'hello',
+        sentence('GPXYZ,1'),
+        sentence('PRDID,1'),
+        sentence('HEHDT,,T'),
+        sentence('HEHDT,nan,T'),
+        good + good,
+    ):
+        assert interpreter.messages(text, LINE, START_NS) == []
+    assert interpreter.rejected == {'wrong checksum': 1, 'without checksum': 1, 'no sentence': 1}
+    assert interpreter.unknown == {'GPXYZ': 1, 'PRDID': 1}
+    assert interpreter.no_value == {
+        'heading HDT: empty': 1,
+        'heading HDT: not a number': 1,
+    }
+    assert interpreter.sentences == 6
+
+
+def test_invented_addresses_take_no_memory() -> None:
+    interpreter = Interpreter()
+    for number in range(2000):
+        interpreter.messages(sentence(f'GP{number:03X},1'), LINE, START_NS)
+    assert len(interpreter.unknown) <= 51
+    assert interpreter.unknown['others'] + 50 == interpreter.unknown.total()
+
+
+@given(st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=120))
+def test_no_text_is_an_error(content: str) -> None:
+    interpreter = Interpreter()
+    for text in (content, f'${content}', sentence(content)):
+        interpreter.messages(text, LINE, START_NS)
+    assert raw_message(content, receive_ns=START_NS).payload

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Real sockets on loopback, and a pseudo-terminal as a serial line."""
+
+from __future__ import annotations
+
+import os
+import pty
+import socket
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.nmea import listener, live
+from shipdrag_ros.nmea.address import parse_addresses
+from shipdrag_ros.nmea.listener import SourceCounts
+from shipdrag_ros.nmea.live import LiveNmea
+
+WITHIN_S = 30.0
+TEXT = '$HEHDT,90.0,T*18'
+
+
+def until(condition: Callable[[], object]) -> None:
+    end = time.monotonic() + WITHIN_S
+    while not condition():
+        assert time.monotonic() < end, 'not within the time'
+        time.sleep(0.01)
+
+
+@contextmanager
+def hearing(*sources: str) -> Iterator[LiveNmea]:
+    heard = LiveNmea(parse_addresses(' '.join(sources)), clock_ns=time.time_ns, wake=lambda: None)
+    heard.start()
+    try:
+        yield heard
+    finally:
+        heard.close()
+
+
+def counts(heard: LiveNmea) -> SourceCounts:
+    (found,) = heard.counts().values()
+    return found
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(('127.0.0.1', 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def to_udp(heard: LiveNmea, port: int) -> Iterator[Callable[[bytes], object]]:
+    until(lambda: not counts(heard).problem)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(('127.0.0.1', port))
+        yield sender.send
+
+
+def test_udp_lines_in_their_order() -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    with hearing(f'udp://127.0.0.1:{port}') as heard, to_udp(heard, port) as send:
+        for number in range(50):
+            send(f'$A,{number}\r\n$B,{number}'.encode())  # the last end may be left out
+        send(b'')
+        until(lambda: heard.waiting == 100)
+        taken = heard.take(60) + heard.take(60)
+    assert [line.text for line in taken] == [f'${k},{n}' for n in range(50) for k in 'AB']
+    assert all(a.read_ns <= b.read_ns for a, b in pairwise(taken))
+    assert 0 <= time.time_ns() - taken[-1].read_ns < WITHIN_S * 1e9
+
+
+def test_hostile_datagrams_are_counted_and_end_nothing() -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    with hearing(f'udp://127.0.0.1:{port}') as heard, to_udp(heard, port) as send:
+        send(b'x' * 60000)
+        send(bytes(range(256)))
+        send(TEXT.encode())
+        until(lambda: heard.waiting)
+        assert [line.text for line in heard.take(10)] == [TEXT]
+        assert counts(heard).too_long == 1
+        assert counts(heard).binary >= 1
+
+
+def test_a_flood_is_slowed_and_what_finds_no_room_is_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(live, 'WAITING_LINES', 40)
+    monkeypatch.setattr(listener, 'BURST_LINES', 50.0)
+    port = free_port(socket.SOCK_DGRAM)
+    with hearing(f'udp://127.0.0.1:{port}') as heard, to_udp(heard, port) as send:
+        sent = 0
+        end = time.monotonic() + WITHIN_S
+        while not (counts(heard).flooded and heard.lost and counts(heard).dropped):
+            assert time.monotonic() < end, counts(heard)
+            send(TEXT.encode())
+            sent += 1
+        assert heard.waiting == 40
+        # each that arrived waits, found no room, or was dropped by the system
+        assert 40 < counts(heard).lines + counts(heard).dropped <= sent
+
+
+def test_tcp_is_opened_again_when_it_drops(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listener, '_RETRY_S', (0.05,))
+    port = free_port(socket.SOCK_STREAM)
+    with hearing(f'tcp://127.0.0.1:{port}') as heard:
+        until(lambda: 'refused' in counts(heard).problem)
+        with socket.create_server(('127.0.0.1', port)) as server:
+            for times in (1, 2):
+                line, _ = server.accept()
+                with line:
+                    line.sendall(TEXT.encode()[:5])
+                    until(lambda times=times: counts(heard).opened == times)
+                    assert counts(heard).problem == ''
+                    line.sendall(TEXT.encode()[5:] + b'\n$HALF')
+                    until(lambda: heard.waiting)
+                    assert [it.text for it in heard.take(10)] == [TEXT]
+                until(lambda: counts(heard).problem)
+                assert 'closed the connection' in counts(heard).problem
+
+
+def test_a_tcp_peer_that_vanished_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listener, 'SILENT_S', 0.3)
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        port = server.getsockname()[1]
+        with hearing(f'tcp://127.0.0.1:{port}') as heard:
+            until(lambda: counts(heard).opened >= 2)
+
+
+def test_serial_line_and_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listener, '_RETRY_S', (0.05,))
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    device = os.ttyname(theirs)
+    with hearing(f'serial:{device}:4800') as heard:
+        until(lambda: not counts(heard).problem)
+        os.write(ours, TEXT.encode() + b'\r\n\xff\xfe\r\n')
+        until(lambda: heard.waiting and counts(heard).binary)
+        assert [it.text for it in heard.take(10)] == [TEXT]
+        os.close(theirs)
+        os.close(ours)
+        until(lambda: counts(heard).problem)
+
+
+def test_what_is_no_serial_device_is_said(tmp_path: Path) -> None:
+    path = tmp_path / 'fifo'
+    os.mkfifo(path)
+    with hearing(f'serial:{path}:4800') as heard:
+        until(lambda: 'no serial device' in counts(heard).problem)

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""NMEA 0183 heard by the node: fed, recorded raw, reported, replayed to the bit."""
+
+from __future__ import annotations
+
+import math
+import socket
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from pynmeagps.nmeahelpers import calc_checksum
+
+pytest.importorskip('rclpy')
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.messages import types
+from shipdrag_ros.replay import replay
+
+SPEED_TYPE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+
+
+def sentence(content: str) -> str:
+    return f'${content}*{calc_checksum(content)}'
+
+
+class Instruments:
+    """A multiplexer that speaks over UDP."""
+
+    def __init__(self) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.bind(('127.0.0.1', 0))
+            self.port = probe.getsockname()[1]
+        self.source = f'udp://127.0.0.1:{self.port}'
+        self.sent: list[str] = []
+        self._line = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def say(self, *lines: str) -> None:
+        for line in lines:
+            self._line.sendto(line.encode() + b'\r\n', ('127.0.0.1', self.port))
+            self.sent.append(line)
+
+    def until(self, condition: Any, peer: Any, *contents: str) -> None:
+        """Repeat sentences, their number at the end of a field of no meaning, until it is so."""
+        end = time.monotonic() + 60.0
+        while not condition():
+            assert time.monotonic() < end
+            self.say(*(sentence(content) for content in contents))
+            peer.spin_for(0.1)
+
+    def close(self) -> None:
+        self._line.close()
+
+
+@pytest.fixture
+def instruments() -> Any:
+    it = Instruments()
+    yield it
+    it.close()
+
+
+def messages(bag: Path) -> dict[str, list[bytes]]:
+    found: dict[str, list[bytes]] = {}
+    with bag.open('rb') as stream:
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            found.setdefault(channel.topic, []).append(message.data)
+    return found
+
+
+def values(status: Any) -> dict[str, str]:
+    return {item.key: item.value for item in status.values}
+
+
+def test_what_is_heard_is_used_recorded_and_replayed(
+    start_node: Any, peer: Any, diagnostics: Any, instruments: Instruments, tmp_path: Path
+) -> None:
+    node = start_node(nmea=instruments.source)
+    part = f'nmea {instruments.source}'
+    diagnostics.wait_for(part, 'nothing heard yet')
+    used = lambda: (  # noqa: E731
+        diagnostics.of('input speed_through_water') is not None
+        and int(values(diagnostics.of('input speed_through_water')).get('used', '0')) >= 5
+    )
+    instruments.until(used, peer, 'IIVHW,,T,,M,10.0,N,,K', 'HEHDT,90.0,T', 'IIRPM,S,1,60.0,,A')
+    instruments.say(sentence('HEHDT,90.0,T')[:-2] + '00', sentence('GPXYZ,1'))
+    status = diagnostics.wait_for(part, '1', value='rejected wrong checksum')
+    found = values(status)
+    assert found['unknown sentence GPXYZ'] == '1'
+    assert found['feeds speed_through_water'] == 'IIVHW'
+    assert found['feeds shaft'] == 'IIRPM shaft 1'
+    status = diagnostics.of('input speed_through_water')
+    assert status.level == b'\x00'
+    assert status.message == f'receiving, from NMEA {instruments.source}'
+    assert node.stop() == 0
+
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    recorded = messages(bag)
+    lines = [types.deserialize(types.STRING, data).data for data in recorded['/nmea']]
+    assert lines == instruments.sent
+    twist = types.deserialize(SPEED_TYPE, recorded['/speed_through_water'][0]).twist.twist
+    assert math.isclose(twist.linear.x, 10.0 * 1852.0 / 3600.0)
+    (run,) = open_runs([bag])
+    result = replay(run)
+    assert result.inputs['speed_through_water'].messages == len(recorded['/speed_through_water'])
+    assert result.recorded.first_difference is None
+
+
+def test_a_topic_that_is_there_feeds_and_nmea_is_counted(
+    start_node: Any, peer: Any, diagnostics: Any, instruments: Instruments
+) -> None:
+    start_node(nmea=instruments.source)
+    publisher = peer.advertise('/speed_through_water', SPEED_TYPE)
+    peer.wait_for_listener(publisher)
+    publisher.publish(b'\x00\x01\x00\x00 whatever it is')
+    diagnostics.wait_for('input speed_through_water', '1', value='messages')
+    part = f'nmea {instruments.source}'
+    key = 'not used, a topic feeds speed_through_water'
+    refused = lambda: key in values(diagnostics.wait_for(part, ''))  # noqa: E731
+    instruments.until(refused, peer, 'IIVHW,,T,,M,10.0,N,,K', 'HEHDT,90.0,T')
+    assert values(diagnostics.of('input speed_through_water'))['messages'] == '1'
+
+    late = peer.advertise('/heading', 'geometry_msgs/msg/QuaternionStamped')
+    peer.wait_for_listener(late)
+    late.publish(b'\x00\x01\x00\x00 not used')
+    status = diagnostics.wait_for(part, 'heading: also published as a topic, which is not used')
+    assert status.level == b'\x01'

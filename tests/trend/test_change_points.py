@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Steps that no log book tells."""
+
+import numpy as np
+
+from shipdrag_ros.trend.change_points import search
+from shipdrag_ros.trend.hull_state import Growth, Runs, Steps
+
+MONTH = 31.0 / 365.25
+
+
+def ship(rng, cleaned=None, change=0.06):
+    """Two years of weekly runs, fouling that slows, errors with long tails."""
+    years = np.sort(rng.uniform(0.0, 2.0, 104))
+    level = 0.3 * (1.0 - np.exp(-years / 2.0))
+    if cleaned is not None:
+        level = level - change * (years >= cleaned)
+    error = rng.standard_t(5, 104) * np.sqrt(3.0 / 5.0) * 0.017 + rng.normal(0.0, 0.01, 104)
+    seen = Runs(years - years[0], level + error, np.full(104, 0.01), np.zeros((104, 0)))
+    return seen, years[0]
+
+
+def test_a_cleaning_of_six_percent_is_found_and_dated():
+    """N = 8, seed 11, scatter 2 %: at least 6 within a month."""
+    rng = np.random.default_rng(11)
+    found = 0
+    for _ in range(8):
+        when = rng.uniform(0.5, 1.5)
+        seen, first = ship(rng, when)
+        _, steps = search(seen, Steps(), Growth())
+        found += any(abs(step.year + first - when) < MONTH for step in steps)
+    assert found >= 6
+
+
+def test_few_steps_are_found_where_there_is_none():
+    """N = 8 ships of two years, seed 12: at most 2 in 16 ship-years."""
+    rng = np.random.default_rng(12)
+    assert sum(len(search(ship(rng)[0], Steps(), Growth())[1]) for _ in range(8)) <= 2
+
+
+def test_a_known_step_is_not_found_again():
+    seen, first = ship(np.random.default_rng(13), 1.0, 0.15)
+    state, steps = search(seen, Steps(np.array([1.0 - first])), Growth())
+    assert steps == []
+    assert len(state.steps) == 1
+
+
+def test_too_few_runs_have_no_unknown_step():
+    seen = Runs(
+        np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.3, 0.3]), np.full(3, 0.01), np.zeros((3, 0))
+    )
+    assert search(seen, Steps(), Growth())[1] == []

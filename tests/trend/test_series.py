@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rows of the store at one speed."""
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.trend.series import series_of
+
+START_NS = 1_700_000_000_000_000_000
+DAY_NS = 86_400_000_000_000
+SPEED = np.linspace(1.0, 10.0, 46)
+
+
+def row(days=0.0, added=0.1, **changes):
+    clean = 1e-3 * SPEED**2
+    valid = (SPEED >= 2.0) & (SPEED <= 8.0)
+    return {
+        'ship': 'Test',
+        'bag': f'{days}.mcap',
+        'time_ns': START_NS + round(days * DAY_NS),
+        'speed_at_stop_m_s': 8.0,
+        'speed_m_s': SPEED.tolist(),
+        'clean_m_s2': clean.tolist(),
+        'resistance_m_s2': np.where(valid, (1.0 + added) * clean, np.nan).tolist(),
+        'sigma_m_s2': (0.03 * clean).tolist(),
+        'sigma_repeatable_m_s2': (0.01 * clean).tolist(),
+        'displaced_volume_m3': 1000.0,
+        'water_density_kg_m3': 1025.0,
+        'water_temperature_c': None,
+        'length_m': 80.0,
+        'error': None,
+        **changes,
+    }
+
+
+def test_value_over_the_clean_hull_at_three_quarters_of_the_stop():
+    series = series_of('Test', [row(0.0, 0.1), row(30.0, 0.2)])
+    assert series.reference_speed_m_s == pytest.approx(6.0)
+    assert [point.value for point in series.points] == pytest.approx([0.1, 0.2], abs=1e-3)
+    assert series.points[0].sd == pytest.approx(0.03, rel=0.01)
+    assert series.points[0].sd_repeatable == pytest.approx(0.01, rel=0.01)
+    assert series.clean_force_n == pytest.approx(1e-3 * 36.0 * 1.025e6, rel=1e-3)
+
+
+def test_service_speed_is_taken_and_one_out_of_range_is_told():
+    assert series_of('Test', [row()], service_speed_m_s=5.0).reference_speed_m_s == 5.0
+    series = series_of('Test', [row()], service_speed_m_s=9.5)
+    assert series.reference_speed_m_s == pytest.approx(6.0)
+    assert 'service speed of 9.50 m/s lies outside' in series.notes[0]
+
+
+@pytest.mark.parametrize(
+    ('changes', 'reason'),
+    [
+        ({'error': 'withdrawn: brake'}, 'withdrawn: brake'),
+        ({'time_ns': 12_000_000_000}, 'its clock was not set: the date is before 1990'),
+        ({'resistance_m_s2': [None] * 46}, 'no estimate of r(v)'),
+        ({'clean_m_s2': None}, 'its ship file has no baseline at the reference speed'),
+    ],
+)
+def test_what_is_not_used_says_why(changes, reason):
+    series = series_of('Test', [row(0.0), row(1.0), row(2.0, **changes)])
+    [left] = [point for point in series.points if not point.used]
+    assert left.reason == reason
+
+
+def test_a_run_years_from_all_others_has_a_wrong_clock():
+    rows = [row(15.0 * number) for number in range(6)]
+    assert all(point.used for point in series_of('Test', rows).points)
+    first, *others = series_of('Test', [row(-4000.0), *rows]).points
+    assert 'years from every other run: a wrong clock' in first.reason
+    assert all(point.used for point in others)
+    # a second season is no wrong clock
+    later = [row(900.0 + 15.0 * number) for number in range(3)]
+    assert all(point.used for point in series_of('Test', rows + later).points)
+
+
+def test_without_a_baseline_the_first_months_are_the_clean_hull():
+    rows = [row(day, added, clean_m_s2=None) for day, added in ((0, 0.1), (10, 0.1), (300, 0.32))]
+    series = series_of('Test', rows)
+    assert series.clean == 'first months'
+    assert series.points[-1].value == pytest.approx(1.32 / 1.1 - 1.0, abs=1e-3)
+    assert 'mean of the first 2 run(s)' in series.notes[0]
+
+
+def test_displacement_and_temperature_count_against_their_mean():
+    rows = [
+        row(0, displaced_volume_m3=900.0, water_temperature_c=5.0),
+        row(1, displaced_volume_m3=1100.0, water_temperature_c=25.0),
+    ]
+    first, second = series_of('Test', rows).points
+    assert first.covariates[0] == pytest.approx(-second.covariates[0])
+    assert second.covariates[0] == pytest.approx(0.5 * np.log(1100.0 / 900.0))
+    assert second.covariates[1] == pytest.approx(0.02)
+
+
+def test_no_rows_at_all():
+    series = series_of('Test', [row(error='no estimate was possible', resistance_m_s2=None)])
+    assert np.isnan(series.reference_speed_m_s)
+    assert series.used == ()

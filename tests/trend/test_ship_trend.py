@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Trends of a fleet: events, sisters, prices, ranks."""
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.fleet.events import HullEvent
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.trend import fleet_trends
+
+START_NS = 1_700_000_000_000_000_000
+DAY_NS = 86_400_000_000_000
+SPEED = np.linspace(1.0, 10.0, 46)
+EVERY_TWO_WEEKS = np.arange(0.0, 720.0, 15.0)
+CLEAN = 1e-3 * SPEED**2
+PRICES = """
+length_m: 80.0
+displaced_volume_m3: 1000.0
+added_mass: {model: constant, value: 0.07, sd: 0.03}
+economics:
+  fuel_usd_per_t: 600.0
+  sfoc_g_per_kwh: 180.0
+  propulsive_efficiency: 0.6
+  days_at_sea_per_year: 240.0
+  cleaning_usd: 5000.0
+  service_speed_m_s: 6.0
+"""
+
+
+def rows(ship, growth, *, days=EVERY_TWO_WEEKS, seed=1, cleaned=None, length=80.0):
+    rng = np.random.default_rng(seed)
+    found = []
+    for day in days:
+        added = growth * day / 365.25 - 0.1 * (cleaned is not None and day >= cleaned)
+        r = (1.0 + added + rng.normal(0.0, 0.015)) * CLEAN
+        found.append(
+            {
+                'ship': ship,
+                'bag': f'{ship}/{day:.0f}.mcap',
+                'time_ns': START_NS + round(day * DAY_NS),
+                'speed_at_stop_m_s': 8.0,
+                'speed_m_s': SPEED.tolist(),
+                'clean_m_s2': CLEAN.tolist(),
+                'resistance_m_s2': r.tolist(),
+                'sigma_m_s2': (0.03 * CLEAN).tolist(),
+                'sigma_repeatable_m_s2': (0.01 * CLEAN).tolist(),
+                'displaced_volume_m3': 1000.0,
+                'water_density_kg_m3': 1025.0,
+                'water_temperature_c': None,
+                'length_m': length,
+                'error': None,
+            }
+        )
+    return found
+
+
+@pytest.fixture(scope='module')
+def priced():
+    return Ship.from_yaml(PRICES, subject='prices')
+
+
+def test_the_hull_that_costs_most_comes_first(priced):
+    ships = {'Slow': priced, 'Fast': priced}
+    trends = fleet_trends(rows('Slow', 0.05) + rows('Fast', 0.15), ships, {})
+    assert [trend.series.name for trend in trends] == ['Fast', 'Slow']
+    assert [trend.rank for trend in trends] == [1, 2]
+    first = trends[0]
+    assert first.now.value == pytest.approx(0.15 * 705 / 365.25, abs=3.0 * first.now.sd)
+    assert first.growth_per_year.value == pytest.approx(0.15, abs=3.0 * first.growth_per_year.sd)
+    force_n = 1e-3 * 36.0 * 1.025e6 * first.now.value
+    assert first.power_kw.value == pytest.approx(force_n * 6.0 / 1000.0, rel=0.01)
+    assert first.costs.usd_per_year > trends[1].costs.usd_per_year > 0.0
+    assert first.cleaning_from_ns is not None
+    assert first.now.sd > 0.02  # the error of the added mass is shared by all runs
+
+
+def test_known_and_unknown_steps(priced):
+    cleaning = HullEvent(START_NS + 400 * DAY_NS, 'cleaning', 'divers')
+    seen = rows('Known', 0.15, cleaned=400.0) + rows('Unknown', 0.15, cleaned=400.0, seed=2)
+    trends = {trend.series.name: trend for trend in fleet_trends(seen, {}, {'Known': [cleaning]})}
+    [known], [found] = trends['Known'].events, trends['Unknown'].events
+    assert (known.kind, known.known, known.probability) == ('cleaning', True, 1.0)
+    assert known.time_ns == cleaning.time_ns
+    assert (found.kind, found.known) == ('unknown', False)
+    assert found.probability > 0.5
+    for event in (known, found):
+        assert event.change.value == pytest.approx(-0.1, abs=3.0 * event.change.sd)
+        assert abs(event.time_ns - cleaning.time_ns) < 31 * DAY_NS
+    assert any('no `economics`' in note for note in trends['Known'].notes)
+
+
+def test_a_sister_lends_her_growth():
+    few = rows('Young', 0.15, days=np.array([0.0, 20.0, 40.0]), seed=3)
+    many = rows('Old', 0.15)
+    alone = fleet_trends(few, {}, {})[0]
+    with_sister = next(
+        trend for trend in fleet_trends(few + many, {}, {}) if trend.series.name == 'Young'
+    )
+    foreign = rows('Old', 0.15, length=120.0)
+    with_foreign = next(
+        trend for trend in fleet_trends(few + foreign, {}, {}) if trend.series.name == 'Young'
+    )
+    assert with_sister.growth_per_year.sd < 0.9 * alone.growth_per_year.sd
+    assert with_foreign.growth_per_year == alone.growth_per_year
+
+
+def test_two_runs_are_no_trend_and_the_ship_comes_last():
+    trends = fleet_trends(rows('Two', 0.1, days=np.array([0.0, 30.0])) + rows('Many', 0.1), {}, {})
+    assert [trend.series.name for trend in trends] == ['Many', 'Two']
+    assert (trends[1].now, trends[1].rank) == (None, None)
+    assert '2 run(s) can be used, a trend needs 3' in trends[1].notes[-1]
+
+
+def test_an_outlier_is_told_and_stays():
+    seen = rows('Test', 0.1)
+    seen[10]['resistance_m_s2'] = (1.8 * CLEAN).tolist()
+    [trend] = fleet_trends(seen, {}, {})
+    [left] = [point for point in trend.points if not point.used]
+    assert left.bag == seen[10]['bag']
+    assert 'outlier' in left.reason
+
+
+def test_an_event_outside_the_runs_is_told():
+    early = HullEvent(START_NS - 400 * DAY_NS, 'docking')
+    [trend] = fleet_trends(rows('Test', 0.1), {}, {'Test': [early]})
+    assert trend.events == ()
+    assert any('outside the time of the runs' in note for note in trend.notes)
