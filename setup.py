@@ -46,6 +46,7 @@ setup(
         PACKAGE: ['py.typed', 'data/*'],
         f'{PACKAGE}.diagnosis': ['*.json'],
         f'{PACKAGE}.report': ['*.html'],
+        f'{PACKAGE}.live': ['page/*', 'page/vendor/*'],
     },
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),

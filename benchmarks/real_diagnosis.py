@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What `shipdrag diagnose` says of two measured records, as a user would run it.
+What `shipdrag diagnose` says of measured records, as a user would run it.
 
-A yacht's log with no coastdown in it, and the coast of a model ship without a
-stated baseline. Reads the folder that SHIPDRAG_DATA names and draws nothing at
+Logs of two yachts with no coastdown in them, and the coast of a model ship without
+a stated baseline. Reads the folder that SHIPDRAG_DATA names and draws nothing at
 random. `--write` puts it into docs/real_records.md.
 """
 
@@ -24,8 +24,19 @@ DIAGNOSE_LOG = 'shipdrag diagnose yacht.mcap'
 DIAGNOSE_MODEL = 'shipdrag diagnose {}.mcap --window {:g} {:g}'.format(
     MODEL_SHIP.name, *MODEL_SHIP.window_s
 )
+
+
+def _irene(year: str, file: str) -> tuple[str, str]:
+    """Return how a record of the yacht Irene is imported and diagnosed."""
+    bag = f'irene_{year}.mcap'
+    return f'shipdrag import ${DATA}/{file}.nmea.gz -o {bag}', f'shipdrag diagnose {bag}'
+
+
 RECORDS = {
     'yacht, 3.5 h of sailing': (IMPORT_LOG, DIAGNOSE_LOG),
+    'Irene, 2007': _irene('2007', 'irene_2007_regate_1_dec_07'),
+    'Irene, 2013': _irene('2013', 'irene_2013_Flensburg2013_regate_3.8'),
+    'Irene, 2014': _irene('2014', 'irene_2014_20140611'),
     'model ship, 26 s of coasting': (MODEL_SHIP.import_command(), DIAGNOSE_MODEL),
 }
 
@@ -37,7 +48,8 @@ def diagnosed(name: str, *, data: Path, out: Path) -> dict[str, Any]:
     importing, diagnosing = RECORDS[name]
     run_command(importing, data=data, out=out)
     run_command(f'{diagnosing} --json diagnosis.json', data=data, out=out)
-    found: dict[str, Any] = json.loads((out / 'diagnosis.json').read_text())
+    text = (out / 'diagnosis.json').read_text().replace(f'{out}/', '')
+    found: dict[str, Any] = json.loads(text)
     return found
 
 
@@ -57,20 +69,22 @@ def block(found: dict[str, Any]) -> str:
         f'{" + ".join(each["names"])} {each["probability"]:.3f}' for each in found['candidates']
     )
     lines.append(f'- candidates: {candidates}')
-    gaps = [
-        f'{when} {1000.0 * gap["rms_speed_m_s"]:.1f} mm/s rms, chi2 {gap["chi2_per_sample"]:.2f}'
-        for when in ('before', 'after')
-        if (gap := found['gap'][when])
-    ]
+    gaps = [_gap(when, gap) for when in ('before', 'after') if (gap := found['gap'][when])]
     lines.append(f'- gap: {"; ".join(gaps)}')
     decides = (f'would decide: {each}' for each in found['would_decide'])
     lines += [f'- {line}' for line in (*found['notes'], *decides)]
     return '\n'.join(lines)
 
 
+def _gap(when: str, gap: dict[str, Any]) -> str:
+    chi2 = gap['chi2_per_sample']
+    told = f'{when} {1000.0 * gap["rms_speed_m_s"]:.1f} mm/s rms'
+    return told if chi2 is None else f'{told}, chi2 {chi2:.2f}'
+
+
 def main() -> None:
     """
-    Run both.
+    Run all.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--write', action='store_true', help=f'into {PAGE.name} as well')

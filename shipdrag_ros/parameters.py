@@ -157,6 +157,13 @@ class Parameters:
         low=0.1,
         high=3600.0,
     )
+    first_relative_sigma: float = _parameter(
+        0.25,
+        'standard deviation of the resistance, as a fraction of it, below which the first '
+        'estimate of a coastdown is given; those after it are all given',
+        low=0.01,
+        high=10.0,
+    )
     heading_convention: str = _parameter(
         'rep103',
         'rep103: yaw from east, anticlockwise; compass: from north, clockwise',

@@ -43,7 +43,19 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags.salvage': ESTIMATING | {'studies'},
     **{
         name: {'studies'}
-        for name in ('messages', 'nmea', 'replay', 'importing', 'node', 'fleet', 'trend', 'report')
+        for name in (
+            *(
+                'messages',
+                'nmea',
+                'replay',
+                'importing',
+                'node',
+                'fleet',
+                'trend',
+                'report',
+                'live',
+            ),
+        )
     },
 }
 GROUND = {'errors', 'compiled', 'strict_yaml', 'plain_file'}  # known by the modules that need them

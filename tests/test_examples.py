@@ -27,7 +27,11 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md')))
 PROGRAMS = ('shipdrag', 'coastdown_node', 'ros2')
 # needs ROS from apt, and keys
-NOT_HERE = ('ros2 launch', 'ros2 run shipdrag_ros coastdown_node --ros-args --enclave')
+NOT_HERE = (
+    'ros2 launch',
+    'ros2 security',
+    'ros2 run shipdrag_ros coastdown_node --ros-args --enclave',
+)
 DATA = 'SHIPDRAG_DATA'
 LIMIT_S = 120.0
 
@@ -110,6 +114,28 @@ def folder(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return here
 
 
+def run_watch(words: list[str]) -> None:
+    """Start the page, on a port that is free, until it says where it is."""
+    if not any(word.endswith('.mcap') for word in words):
+        pytest.importorskip('rclpy')
+    line = [sys.executable, '-m', 'shipdrag_ros.cli', *words[1:], '--port', '0']
+    environment = os.environ | {'PYTHONUNBUFFERED': '1'}
+    log = Path('watch.log')
+    with log.open('w') as file:
+        page = subprocess.Popen(line, stdout=file, stderr=file, env=environment)
+    try:
+        end_s = time.monotonic() + LIMIT_S
+        while 'the page: http' not in log.read_text():
+            assert page.poll() is None, log.read_text()
+            assert time.monotonic() < end_s
+            time.sleep(0.1)
+        page.terminate()
+        assert page.wait(timeout=LIMIT_S) == 0, log.read_text()
+    finally:
+        page.kill()
+        page.wait()
+
+
 def make_room(name: str) -> None:
     """Take away the file that an example makes; a store is brought up to date, as it is."""
     if not Path(name).is_dir():
@@ -124,6 +150,9 @@ def run(command: str) -> None:
         words = words[3:]
     if words[:2] == ['shipdrag', 'demo']:
         return  # tests/cli/test_demo.py runs it
+    if words[:2] == ['shipdrag', 'watch']:
+        run_watch(words)
+        return
     if words[0] == 'shipdrag' and words[1] != 'node':
         assert main(words[1:]) == 0, command
         return

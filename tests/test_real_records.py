@@ -193,6 +193,39 @@ def test_the_log_of_the_yacht_has_a_scale_error(diagnoses: dict[str, Any]) -> No
 
 
 @needs_data
+def test_a_wheel_that_stands_still_is_a_dead_band(diagnoses: dict[str, Any]) -> None:
+    found = diagnoses['Irene, 2007']
+    assert found['verdict'] == 'named'
+    (effect,) = found['effects']
+    assert effect['name'] == 'log_dead_band'
+    # 99 % of the readings are 0 from 0.3 to 1.2 kn, 22 % from 1.2 to 1.5 kn
+    assert 0.9 * 0.617 < effect['parameters']['speed_m_s']['value'] < 1.1 * 0.772
+    assert found['examined'] == ['log_track']
+    assert 'the log reads exactly 0 in' in found['notes'][0]
+
+
+@needs_data
+def test_a_steady_current_is_no_noise(diagnoses: dict[str, Any]) -> None:
+    found = diagnoses['Irene, 2013']
+    assert found['verdict'] == 'named'
+    assert [effect['name'] for effect in found['effects']] == ['current']
+    (told,) = (note for note in found['notes'] if note.startswith('the water moves by'))
+    east, north = map(float, re.findall(r'[+-]\d\.\d+', told))
+    # found by other means, +- 0.03 (two standard deviations)
+    np.testing.assert_allclose([east, north], [0.106, -0.041], rtol=0.0, atol=0.03)
+
+
+@needs_data
+def test_a_wheel_may_read_a_sixth_too_little(diagnoses: dict[str, Any]) -> None:
+    found = diagnoses['Irene, 2014']
+    assert found['verdict'] == 'named'
+    (effect,) = found['effects']
+    assert effect['name'] == 'log_scale'
+    size = effect['parameters']['factor']
+    np.testing.assert_allclose(size['value'], -0.173, rtol=0.0, atol=0.008 + size['sd'])
+
+
+@needs_data
 def test_the_coast_of_the_model_ship_is_answered_with_a_set(diagnoses: dict[str, Any]) -> None:
     found = diagnoses['model ship, 26 s of coasting']
     assert found['verdict'] == 'one_of'

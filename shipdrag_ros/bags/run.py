@@ -50,6 +50,18 @@ class ResetMark:
 
 
 @dataclass(frozen=True)
+class SilenceMark:
+    """All sources of the motion had fallen silent by the clock, at arrival time `receive_ns`."""
+
+    receive_ns: int
+    reason: str
+
+
+Mark = ResetMark | SilenceMark
+"""What the node was told but by samples, and what a replay obeys at its place."""
+
+
+@dataclass(frozen=True)
 class TopicInfo:
     """
     A topic of a run.
@@ -234,8 +246,8 @@ class Inputs:
         self._run = run
         self._span = (start_ns, end_ns)
 
-    def __iter__(self) -> Iterator[Block | ResetMark]:
-        """Yield the samples of at most `BATCH` messages, and resets at their place."""
+    def __iter__(self) -> Iterator[Block | Mark]:
+        """Yield the samples of at most `BATCH` messages, and marks at their place."""
         heard = self._run._matched.heard
         keys = list(heard)
         if self._run.node is not None:
@@ -246,14 +258,12 @@ class Inputs:
             for first in range(0, len(messages), BATCH):
                 yield from self._items(messages[first : first + BATCH], sources)
 
-    def _items(
-        self, messages: Messages, sources: tuple[Source, ...]
-    ) -> Iterator[Block | ResetMark]:
-        """Cut at the resets."""
+    def _items(self, messages: Messages, sources: tuple[Source, ...]) -> Iterator[Block | Mark]:
+        """Cut at the marks."""
         block, places = self._decode(messages, sources)
         done = 0
         for number in np.flatnonzero(messages.channel == len(sources)).tolist():
-            mark = _reset_mark(messages.payload(number))
+            mark = _mark(messages.payload(number))
             if mark is not None:
                 before = int(np.searchsorted(places, number))
                 if before > done:
@@ -302,14 +312,16 @@ def _topic_info(key: tuple[str, str], messages: int, matched: MatchedTopics) -> 
     )
 
 
-def _reset_mark(payload: bytes) -> ResetMark | None:
+def _mark(payload: bytes) -> Mark | None:
     try:
         note = read_event(payload)
     except MalformedMessage:
         return None
-    if note.kind is not EventKind.RESET_REQUEST:
-        return None
-    return ResetMark(note.stamp_ns, note.text)
+    if note.kind is EventKind.RESET_REQUEST:
+        return ResetMark(note.stamp_ns, note.text)
+    if note.kind is EventKind.SILENCE:
+        return SilenceMark(note.stamp_ns, note.text)
+    return None
 
 
 def _unpacked(messages: Messages) -> Messages:

@@ -37,6 +37,7 @@ VERBS = (
         'simulated ship -> ROS topics -> node -> bag -> replay -> report',
     ),
     Verb('node', '.node', 'the onboard node: estimates live and records'),
+    Verb('watch', '.watch', 'the page of the bridge: over the running node, or over bags'),
     Verb('replay', '.replay', 'the same estimator over bags, without ROS'),
     Verb('simulate', '.simulate', 'simulated coastdown with sensors, as a bag'),
     Verb('simulate-fleet', '.simulate_fleet', 'months of a few ships, as a folder of bags'),

@@ -34,6 +34,7 @@ from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.result import ToldFact
 from shipdrag_ros.diagnosis.score import Score
+from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.result import Estimate
@@ -162,10 +163,20 @@ def _diagnosed(
         return _unused(_sailing(runs, why), (*seen.ship.facts, *facts)), seen.ship
     if seen.ship.baseline is None:
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
+        found = _with_log_track(found, runs)
     else:
         found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
+
+
+def _with_log_track(found: Diagnosis, runs: Sequence[WindowedRun]) -> Diagnosis:
+    """Hold the logs against the ways over ground besides; a note says why not."""
+    try:
+        return with_log_track(found, _sailing(runs, ''))
+    except DiagnosisError as error:
+        why = f'the log was not held against the way over ground: {str(error).strip()}'
+        return replace(found, notes=(*found.notes, why))
 
 
 def _unused(found: Diagnosis, facts: Sequence[Fact]) -> Diagnosis:
@@ -175,12 +186,13 @@ def _unused(found: Diagnosis, facts: Sequence[Fact]) -> Diagnosis:
 
 def _sailing(runs: Sequence[WindowedRun], no_coastdown: str) -> Diagnosis:
     """Hold the logs against the ways over ground."""
-    read = [(run.name, *accepted_samples(run)) for run, _ in runs]
+    read = [(run.name, *accepted_samples(run, zeros=True)) for run, _ in runs]
     records = [SailingRecord(name, block) for name, block, _ in read]
     try:
         return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
     except DiagnosisError as error:
-        raise DiagnosisError(f'{no_coastdown} Log and track: {error}') from error
+        said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)
+        raise DiagnosisError(said) from error
 
 
 def coasts_of(
@@ -282,6 +294,8 @@ def _show(output: Output, found: Diagnosis, ship: Ship | None) -> None:
     if found.no_coastdown:
         output.say(found.no_coastdown)
     output.say(diagnosis_words.sentence(found))
+    if found.runs_differ:
+        output.say(diagnosis_words.differing(found))
     if ship is not None:
         for line in estimate_words.in_service(found.estimates, ship):
             output.say(line)

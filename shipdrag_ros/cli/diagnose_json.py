@@ -45,6 +45,16 @@ def document(found: Diagnosis) -> dict[str, Any]:
         'examined': list(found.examined),
         'no_coastdown': found.no_coastdown or None,
         'notes': list(found.notes),
+        'runs_differ': [
+            {
+                'bag': each.run,
+                'effect': each.effect,
+                'parameter': each.parameter,
+                'value': each.size.value,
+                'sd': each.size.sd,
+            }
+            for each in found.runs_differ
+        ],
         'facts': [
             {
                 **asdict(each.fact),

@@ -12,6 +12,10 @@ EXAMPLES = {
         'shipdrag node --ship ship.yaml --out records --ros-args -p window_s:=1800.0 '
         '-r position:=/gps --params-file parameters.yaml',
     ),
+    'watch': (
+        'shipdrag watch --port 8090 --earlier records',
+        'shipdrag watch run.mcap --speed 20',
+    ),
     'replay': (
         'shipdrag replay run.mcap --report report.html',
         'shipdrag replay run.mcap --ship ship.yaml --window 600 1800 --json result.json',

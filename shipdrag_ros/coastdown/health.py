@@ -41,6 +41,37 @@ class InputHealth:
     clock_offset_s: float | None
 
 
+@dataclass(frozen=True)
+class Progress:
+    """
+    How far the monitor is.
+
+    Attributes
+    ----------
+    steady_s
+        Since when the ship is steady; 0 where she is not.
+    used_s
+        The longest steady record that is of use.
+    coastdown_since_ns
+        Stamp of the stop; None where no coastdown runs.
+    """
+
+    steady_s: float
+    used_s: float
+    coastdown_since_ns: int | None
+
+    @property
+    def values(self) -> dict[str, str]:
+        """The same as texts by key, the unit in the key."""
+        told = {
+            'steady lead [s]': f'{self.steady_s:.0f}',
+            'steady lead used at most [s]': f'{self.used_s:.0f}',
+        }
+        if self.coastdown_since_ns is not None:
+            told['coastdown since [ns]'] = str(self.coastdown_since_ns)
+        return told
+
+
 def input_health(tally: Tally) -> dict[str, InputHealth]:
     """
     Tell the health of every input, by its name.

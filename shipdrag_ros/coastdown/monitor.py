@@ -31,7 +31,7 @@ from shipdrag_ros.coastdown.events import (
     Update,
 )
 from shipdrag_ros.coastdown.examination import estimate_examined
-from shipdrag_ros.coastdown.health import InputHealth, input_health
+from shipdrag_ros.coastdown.health import InputHealth, Progress, input_health
 from shipdrag_ros.coastdown.kernel import Stop, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
 from shipdrag_ros.coastdown.onset import Candidate, Doubt, Verdict, judge, propose
@@ -51,6 +51,7 @@ Estimator = Callable[[Window, Ship, Parameters], Estimate]
 
 _CUT_SHORT = {
     EndedBy.DATA_STOP: 'the speed fell silent',
+    EndedBy.SILENCE: 'all sources of speed fell silent',
     EndedBy.RESET: 'the memory was reset',
     EndedBy.RECORD_END: 'the record ended',
 }
@@ -127,6 +128,7 @@ class Monitor:
         self._candidate: Candidate | None = None
         self._onset: Onset | None = None
         self._heading_rad: float | None = None
+        self._estimated = False
         self._dismissals = Dismissals(self._steady_ns)
 
     @property
@@ -139,6 +141,18 @@ class Monitor:
         lead = int(self._memory.watch.lead[1])
         # the first slope is that of what came before, two thirds of a window at least
         return float(lead + 2 * self._tuning.slopes.width // 3) if lead else 0.0
+
+    @property
+    def progress(self) -> Progress:
+        """How long the ship has been steady by now, and since when she coasts."""
+        watch = self._memory.watch
+        used_s = self._parameters.steady_s
+        steady_s = 0.0
+        if int(watch.lead[0]) != NEVER and self._onset is None:
+            seconds = int(watch.seen[0]) - int(watch.lead[0]) + 2 * self._tuning.slopes.width // 3
+            steady_s = min(float(seconds), used_s)
+        since_ns = None if self._onset is None else self._onset.start_ns
+        return Progress(steady_s, used_s, since_ns)
 
     @property
     def state(self) -> State:
@@ -231,6 +245,14 @@ class Monitor:
         events += self._dismissals.flush()
         self._memory = self._fresh(self._memory.tally)
         return [*events, Reset(receive_ns, reason)]
+
+    def fall_silent(self) -> list[Event]:
+        """
+        End a coastdown, or a candidate, at the last sample of its speed source.
+
+        For whoever has a clock and knows that all sources are silent; the memory stays.
+        """
+        return self._stop_at_last_sample(EndedBy.SILENCE)
 
     def finish(self) -> list[Event]:
         """
@@ -337,6 +359,7 @@ class Monitor:
 
     def _begin(self, candidate: Candidate, number: int) -> Onset:
         onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)
+        self._estimated = False
         self._onset = onset
         self._memory.watch.update_ns[0] = self._grid_ns(onset.detected_ns)
         heading = mean_heading(self._memory.bins, candidate.start - 1, HEADING_BEFORE_S)
@@ -357,9 +380,15 @@ class Monitor:
         watch.update_ns[0] = self._grid_ns(next_stamp_ns)
         try:
             window = self._window(stamp_ns, before_ns=self._steady_ns)
-            return Update(stamp_ns, self._estimator(window, self._ship, self._parameters))
+            found = self._estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             return NoEstimate(stamp_ns, str(error))
+        # an estimator that is given may return what it likes
+        if not self._estimated and isinstance(found, Estimate):
+            self._estimated = not (why := _too_vague(found, self._parameters))
+            if why:
+                return NoEstimate(stamp_ns, why)
+        return Update(stamp_ns, found)
 
     def _window(self, end_ns: int, *, before_ns: int) -> Window:
         """Cut the coastdown so far, with the record before it where all of it is there."""
@@ -467,3 +496,16 @@ class Monitor:
             return f'{Channel(channel).input}: the stamp went back by {back * 1e-9:.3f} s'
         back = int(guard.arrival_ns[0]) - receive_ns
         return f'the time of arrival went back by {back * 1e-9:.3f} s'
+
+
+def _too_vague(found: Estimate, parameters: Parameters) -> str:
+    """Say why the first estimate of a coastdown is not given yet; '' if it is."""
+    sigma, resistance = found.last_sigma_m_s2, found.last_resistance_m_s2
+    share = parameters.first_relative_sigma
+    if sigma < share * resistance:
+        return ''
+    known = f'{sigma / resistance:.0%} of it' if resistance > 0.0 else 'more than all of it'
+    return (
+        f'the resistance at {found.last_speed_m_s:.2f} m/s is uncertain by {known} so far; '
+        f'the first figure waits until that is below {share:.0%}'
+    )

@@ -137,7 +137,7 @@ def _by_cost(ranked: Mapping[Advice, float]) -> tuple[Advice, ...]:
 
 def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
     """
-    Return what the effects say tells them apart, what serves most pairs first.
+    Return what the effects say tells them apart; first what costs least for what it serves.
 
     Parameters
     ----------
@@ -154,8 +154,9 @@ def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
         for measure in _discriminating(one, other):
             weight = one.probability * other.probability
             votes[measure] = votes.get(measure, 0.0) + weight
-    ranked = sorted(votes, key=lambda measure: -votes[measure])
-    return tuple(Advice(measure.value, None, COSTS[measure]) for measure in ranked)
+    return _by_cost(
+        {Advice(measure.value, None, COSTS[measure]): vote for measure, vote in votes.items()}
+    )
 
 
 def _discriminating(one: Candidate, other: Candidate) -> list[Measure]:
@@ -208,6 +209,8 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
     match measure:
         case Measure.RECIPROCAL_RUN:
             return any(math.cos(run.heading_rad - first.heading_rad) < -0.5 for run in seen)
+        case Measure.ANOTHER_COURSE:
+            return any(math.cos(run.heading_rad - first.heading_rad) < 0.9 for run in seen)
         case Measure.OTHER_SPEED:
             return any(abs(run.speed_m_s / first.speed_m_s - 1.0) > 0.2 for run in seen)
         case Measure.ANOTHER_RUN:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from shipdrag_ros.diagnosis.advice import advice
 from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
 from shipdrag_ros.diagnosis.facts import Facts, told_of
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
@@ -22,6 +23,7 @@ from shipdrag_ros.diagnosis.result import (
 )
 from shipdrag_ros.diagnosis.search import Found, search, with_pairs
 from shipdrag_ros.diagnosis.speeds import CoastRun
+from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.rows import LOG
@@ -109,7 +111,7 @@ def diagnose(
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
             break
         moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
-    found = with_pairs(found)
+    found = with_pairs(with_differing(found, model))
     best = found.best
     predicted = held_out(model, best) if found.alarm else None
     # an instrument that errs before the stop has taught the noise what it should have shown
@@ -122,9 +124,12 @@ def diagnose(
     explained = best if judged.missing else found.nothing
     if judged.verdict is Verdict.UNKNOWN:
         explained = max(found.smooth, key=lambda one: one.log_likelihood)
+    differ = runs_differ(found) if judged.missing else ()
     place: Where | None = None
     if judged.verdict is not Verdict.NONE:
         place = _before_the_stop(seen) if distrusted else where(model, as_stated, found.smooth)
+    if place is not None and differ:  # a smooth error alike in all runs would pass for the log's
+        place = replace(place, channel=FORCE)
     return judged.diagnosis(
         would_decide=would_decide,
         where=place,
@@ -138,6 +143,7 @@ def diagnose(
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
         facts=told.weighed(judged.posterior, [run.name for run in seen]),
+        runs_differ=differ,
     )
 
 
@@ -183,7 +189,8 @@ def _observed(
     if not seen:
         name, reason = next(iter(refused.items()))
         raise type(reason)(f'{name}: {reason}')
-    notes = [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes = [f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))]
+    notes += [f'left out: {name}: {why}' for name, why in refused.items()]
     notes += [
         f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
         'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '

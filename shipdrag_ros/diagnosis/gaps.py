@@ -127,9 +127,9 @@ def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
 
 
 def _has_its_own(hypothesis: Hypothesis, run: int) -> bool:
-    """Tell whether an effect of a single run acts in a run."""
+    """Tell whether an effect acts in a run that says nothing of the others."""
     return any(
-        term.of_single_run and term.acts_in(run)
+        (term.of_single_run or term.sizes > 1) and term.acts_in(run)
         for term in hypothesis.terms
         if isinstance(term, EffectTerm)
     )

@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
+from shipdrag_ros.diagnosis.timed import Timed
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.robust import MAD_TO_SD
-from shipdrag_ros.inference.rows import bin_means
+from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, Int64
 
@@ -33,9 +33,9 @@ _SHARE = 0.5  # of the samples that a leg should hold, below which it has a drop
 _YAW_SD_RAD = 0.1  # of the heading within a leg: at 0.1 the way made good is 0.5 % short
 _STRAIGHT = 0.99  # way made good over that of half legs, where there is no heading
 _NEAR_S = 10.0  # of a time are the positions that tell where the vessel was
+_ZEROS = 0.05  # of the readings of a leg, from where its mean is no speed
 _STOPPED = 0.25  # of the usual speed
 _UNSTEADY = 0.15  # of the speed, between the halves of a leg
-_OUTLIER = 5.0  # robust standard deviations
 
 
 class Left(StrEnum):
@@ -45,6 +45,7 @@ class Left(StrEnum):
     TURN = 'turn'
     STOP = 'stop'
     UNSTEADY = 'unsteady'
+    ZERO = 'log at 0'
 
 
 class Direction(StrEnum):
@@ -213,6 +214,54 @@ def told(left_out: Mapping[Left, int]) -> str:
 
 
 @dataclass(frozen=True)
+class Stretches:
+    """
+    Stretches of records in which the log may read exactly 0.
+
+    Attributes
+    ----------
+    way_m_s : (n,)
+        Velocity over ground, east + 1j north; without positions the speed alone.
+    zero : (n,)
+        Whether most readings are exactly 0.
+    by_place
+        Whether the direction of the way is known.
+    length_s
+        Of the longest record.
+    """
+
+    way_m_s: NDArray[np.complex128]
+    zero: NDArray[np.bool_]
+    by_place: bool
+    length_s: float
+
+    @classmethod
+    def of(cls, records: Sequence[SailingRecord], parameters: Parameters) -> Stretches:
+        """
+        Cut records into stretches, whatever was done in them.
+
+        Parameters
+        ----------
+        records, parameters
+            As of `Legs.of`.
+
+        Raises
+        ------
+        DiagnosisError
+            If they have no log, or nothing over ground.
+        """
+        cut = [_Cut(record, parameters) for record in records]
+        every = [one.stretch(float(at_s)) for one in cut for at_s in one.edges]
+        found = [each for each in every if each is not None]
+        return cls(
+            np.array([way for way, _ in found], np.complex128),
+            np.array([zero for _, zero in found], np.bool_),
+            all(one.by_place for one in cut),
+            max(float(one.edges[-1]) + one.length_s for one in cut),
+        )
+
+
+@dataclass(frozen=True)
 class _Leg:
     time_s: float
     log_m_s: float
@@ -248,9 +297,9 @@ class _Cut:
         degrees = np.count_nonzero(sent == Channel.POSITION_GEODETIC)
         self.geodetic = by_place and degrees > np.count_nonzero(sent == Channel.POSITION)
         self.by_place = by_place
-        self.log = _Timed.of(window.speed_through_water, start_ns)
-        self.ground = _Timed.of(ground, start_ns)
-        self.heading = _Timed.of(window.heading, start_ns)
+        self.log = Timed.of(window.speed_through_water, start_ns)
+        self.ground = Timed.of(ground, start_ns)
+        self.heading = Timed.of(window.heading, start_ns)
         self.compass = parameters.heading_convention == 'compass'
         span_s = (end_ns - start_ns) * 1e-9
         step_s = max(self.log.step_s, self.ground.step_s)
@@ -271,6 +320,9 @@ class _Cut:
         if abs(yaw) < math.exp(-0.5 * _YAW_SD_RAD**2):
             return Left.TURN
         middle = start_s + 0.5 * self.length_s
+        zeros = float(np.mean(np.asarray(log.value) == 0.0))
+        if zeros > _ZEROS:
+            return Left.ZERO
         through, first, second = log.means(middle)
         if through <= 0.0:
             return Left.STOP
@@ -294,55 +346,19 @@ class _Cut:
         over = abs(way) / self.length_s
         return _Leg(middle, through, over, cmath.phase(way), Direction.TRACK)
 
+    def stretch(self, start_s: float) -> tuple[complex, bool] | None:
+        """Return velocity over ground, and whether the log reads 0; None without readings."""
+        end_s = start_s + self.length_s
+        log, ground = self.log.part(start_s, end_s), self.ground.part(start_s, end_s)
+        if min(len(log), len(ground)) < 0.5 * _SAMPLES:
+            return None
+        if self.by_place:
+            way = (self._place(end_s) - self._place(start_s)) / self.length_s
+        else:
+            way = complex(float(np.mean(np.asarray(ground.value, np.float64))))
+        zero = float(np.mean(np.asarray(log.value) == 0.0)) > 0.5
+        return (way, zero) if cmath.isfinite(way) else None
+
     def _place(self, time_s: float) -> complex:
         """Return where the vessel was, by positions around that time."""
         return self.ground.part(time_s - self.near_s, time_s + self.near_s).at(time_s)
-
-
-@dataclass(frozen=True)
-class _Timed:
-    """Values at times from the start of the record [s]; places are complex."""
-
-    time_s: Float64
-    value: np.ndarray[tuple[int], np.dtype[np.float64 | np.complex128]]
-
-    @classmethod
-    def of(cls, series: Series, start_ns: int) -> _Timed:
-        value = series.value
-        flat = value if value.ndim == 1 else value[:, 0] + 1j * value[:, 1]
-        return cls(np.asarray((series.time_ns - start_ns) * 1e-9, np.float64), flat)
-
-    def __len__(self) -> int:
-        return len(self.time_s)
-
-    @property
-    def step_s(self) -> float:
-        """The usual time between samples."""
-        return max(float(np.median(np.diff(self.time_s))), 1e-3)
-
-    def part(self, start_s: float, end_s: float) -> _Timed:
-        """Return the samples between two times."""
-        first, last = np.searchsorted(self.time_s, (start_s, end_s))
-        return _Timed(self.time_s[first:last], self.value[first:last])
-
-    def means(self, middle_s: float) -> tuple[float, float, float]:
-        """Return the mean of all, and of each half, without outliers."""
-        value = np.asarray(self.value, np.float64)
-        away = np.abs(value - np.median(value))
-        keep = away <= _OUTLIER * MAD_TO_SD * np.median(away) + 0.05 * abs(np.median(value))
-        edges = np.array([-np.inf, middle_s, np.inf])
-        halves = bin_means(self.time_s[keep], value[keep], edges)[1]
-        return float(value[keep].mean()), float(halves[0]), float(halves[-1])
-
-    def at(self, time_s: float) -> complex:
-        """Return the value on a line through all, without outliers; NaN where they are few."""
-        after, value = self.time_s - time_s, np.asarray(self.value, np.complex128)
-        for _ in range(2):
-            if len(after) < 3 or after[0] > 0.0 or after[-1] < 0.0:
-                return complex(math.nan)
-            line = np.polynomial.polynomial.polyfit(after, np.array([value.real, value.imag]).T, 1)
-            place = complex(line[0, 0], line[0, 1])
-            away = np.abs(value - place - after * complex(line[1, 0], line[1, 1]))
-            keep = away <= _OUTLIER * np.median(away) + 1e-9
-            after, value = after[keep], value[keep]
-        return place

@@ -86,6 +86,27 @@ class Advice:
 
 
 @dataclass(frozen=True)
+class RunSize:
+    """
+    The size of an effect in one of some runs that differ.
+
+    Attributes
+    ----------
+    run
+        Its name.
+    effect, parameter
+        Names.
+    size
+        With its standard deviation.
+    """
+
+    run: str
+    effect: str
+    parameter: str
+    size: Parameter
+
+
+@dataclass(frozen=True)
 class ToldFact:
     """
     A fact of the log book, and what the data say of it.
@@ -247,6 +268,9 @@ class Diagnosis:
         r(v) of the coastdowns as measured, where they were estimated.
     facts
         All that were told, with what the data say of each.
+    runs_differ
+        Where one state of the hull does not fit all runs: the size in each. The
+        effects above have that of the last run.
     """
 
     verdict: Verdict
@@ -268,6 +292,7 @@ class Diagnosis:
     examined: tuple[str, ...] = ()
     no_coastdown: str = ''
     facts: tuple[ToldFact, ...] = ()
+    runs_differ: tuple[RunSize, ...] = ()
     estimates: tuple[Estimate, ...] = ()
 
     def summary(self) -> tuple[str, ...]:
@@ -282,7 +307,8 @@ class Diagnosis:
         from shipdrag_ros.diagnosis import words  # it tells what this module holds
 
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
-        told = (words.sentence(self), self.no_coastdown, words.examined(self), where)
+        first = (words.sentence(self), words.differing(self), self.no_coastdown)
+        told = (*first, words.examined(self), where)
         return (*filter(None, told), *words.facts(self), *self.notes)
 
     def table(self) -> Table:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -94,7 +95,7 @@ def gaps(found: Diagnosis) -> Table:
             name,
             _number(gap.rms_speed_m_s, '.3f'),
             _number(gap.rms_position_m, '.1f'),
-            f'{gap.chi2_per_sample:.2f}',
+            '-' if math.isnan(gap.chi2_per_sample) else f'{gap.chi2_per_sample:.2f}',
         )
         for name, gap in known.items()
         if gap is not None

@@ -7,6 +7,7 @@ An effect, and B-splines for what has no name, are parts of all models.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,12 +15,13 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BSpline
 
-from shipdrag_ros.parameter import Parameter, Shape, normal
+from shipdrag_ros.parameter import Parameter, Prior, Shape, half_normal, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action
 from shipdrag_ros.simulation.effect import Effect, Frame, Scope
 
+_OWN_START = 0.3  # z of a size that a run has of its own
 _TRIAL_Z = 0.5  # of a size that may have either sign, or be 0
 
 
@@ -62,6 +64,8 @@ class EffectTerm:
         Mean and sd of each parameter [SI], in place of the priors of the effect.
     stated
         Whether it is part of the model as its file states it, and no hypothesis.
+    sizes
+        Number of runs, of which each has a size of its own; 1: one for all.
     """
 
     effect: Effect
@@ -72,6 +76,7 @@ class EffectTerm:
     only_run: int | None = None
     gaussian: tuple[tuple[float, float], ...] = ()
     stated: bool = False
+    sizes: int = 1
 
     @cached_property
     def unknowns(self) -> tuple[Parameter, ...]:
@@ -85,10 +90,14 @@ class EffectTerm:
         free = [one for one in parameters if one.name not in dict(self.fixed)]
         starts = self.starts or (0.0,) * len(free)
         signs = dict(self.signs)
-        return tuple(
+        found = tuple(
             replace(one, prior=one.prior.of_sign(signs.get(one.name, 1.0)), start=start)
             for one, start in zip(free, starts, strict=True)
         )
+        if self.sizes == 1:
+            return found
+        size = replace(found[0], prior=_from_zero(found[0].prior), start=_OWN_START)
+        return (*(size for _ in range(self.sizes)), *found[1:])
 
     @property
     def of_single_run(self) -> bool:
@@ -100,7 +109,7 @@ class EffectTerm:
         """Places of components, which may have either sign: where one is small, so are all."""
         free = [q for q in self.effect.parameters if q.name not in dict(self.fixed)]
         found = [i for i, q in enumerate(free) if q.prior.shape is Shape.NORMAL]
-        return () if self.stated or len(found) < 2 else found
+        return () if self.stated or self.sizes > 1 or len(found) < 2 else found
 
     def acts_in(self, run: int) -> bool:
         """Tell whether it does anything in a run."""
@@ -108,6 +117,8 @@ class EffectTerm:
 
     def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
         """Return what the effect does in a run."""
+        if self.sizes > 1:
+            values = [values[run], *values[self.sizes :]]
         return self.effect.action(frame, *self.all_values(values))
 
     def all_values(self, values: Sequence[float]) -> list[float]:
@@ -116,6 +127,13 @@ class EffectTerm:
         """
         fixed, free = dict(self.fixed), iter(values)
         return [fixed[q.name] if q.name in fixed else next(free) for q in self.effect.parameters]
+
+
+def _from_zero(prior: Prior) -> Prior:
+    """Return the prior of a size that is not there in every run."""
+    if prior.shape is Shape.LOG_NORMAL:
+        return half_normal(prior.first * math.exp(prior.second))
+    return prior
 
 
 def scope_runs(effect: Effect, runs: int) -> tuple[int | None, ...]:

@@ -54,6 +54,12 @@ def sentence(found: Diagnosis) -> str:
                 'baseline that is further off than stated would explain these runs as well '
                 f'({probability(found.nothing)}).'
             )
+        case Verdict.NAMED if found.runs_differ:
+            names = names_text([effect.name for effect in found.effects])
+            return (
+                f'Missing in the model, and not alike in these runs: {names}; probability '
+                f'{probability(found.effects[0].probability)}.'
+            )
         case Verdict.NAMED:
             sizes = ' and '.join(_sized(effect) for effect in found.effects)
             return (
@@ -73,6 +79,24 @@ def sentence(found: Diagnosis) -> str:
             if first.names and found.unnamed < first.probability:
                 why = f' The likeliest of them, {names_text(first.names)}, leaves more than noise.'
             return f'Something is missing that is none of the known effects, {place(found)}.{why}'
+
+
+def differing(found: Diagnosis) -> str:
+    """
+    Say how the runs differ; '' where one state of the hull fits all.
+    """
+    if not found.runs_differ:
+        return ''
+    effects = names_text(list(dict.fromkeys(each.effect for each in found.runs_differ)))
+    sizes = '; '.join(
+        f'{each.run}: {plus_minus(each.size.value, 2.0 * each.size.sd)}'
+        for each in found.runs_differ
+    )
+    name = found.runs_differ[0].parameter.replace('_', ' ')
+    return (
+        f'These runs differ: no one state of the hull fits all. {effects}, {name}: {sizes} (two '
+        'standard deviations). Sizes elsewhere are those of the last run.'
+    )
 
 
 def examined(found: Diagnosis) -> str:
@@ -131,7 +155,7 @@ def place(found: Diagnosis) -> str:
         return 'nowhere'
     where = found.where
     (first, last), (slow, fast) = where.time_s, where.speed_m_s
-    since = 'of the record' if found.baseline == 'none' else 'after the stop'
+    since = 'of the record' if of_log_track(found) else 'after the stop'
     if last <= 0.0:
         first, last, since = -first, -last, 'before the stop'
     return (
@@ -146,12 +170,21 @@ def model(found: Diagnosis) -> str:
     Say what the runs were held against.
     """
     match found.baseline:
-        case 'none':
+        case _ if of_log_track(found):
             return 'log as it is'
         case 'fitted_here':
             return 'a form fitted to these runs'
         case _:
             return 'model as stated'
+
+
+def of_log_track(found: Diagnosis) -> bool:
+    """
+    Tell whether the answer rests on the log against the way over ground alone.
+    """
+    if found.baseline == 'fitted_here':
+        return found.where is not None and found.where.channel != FORCE
+    return found.baseline == 'none'
 
 
 def added(found: Diagnosis) -> str:

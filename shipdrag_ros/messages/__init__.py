@@ -11,6 +11,7 @@ from shipdrag_ros.messages.reporting import (
     outputs,
     read_event,
     reset_request,
+    silence_mark,
 )
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
@@ -45,4 +46,5 @@ __all__ = [
     'outputs',
     'read_event',
     'reset_request',
+    'silence_mark',
 ]

@@ -325,9 +325,15 @@ def _readings() -> Iterator[tuple[Source, _Reading]]:
     cells = [f'twist.covariance[{i}]' for i in (0, 7, 1)]
     yield _reading(speed, types.TWIST_WITH_COVARIANCE, linear, '', cells[0])
     yield _reading(speed, types.TWIST, x)
+    velocity = 'velocity.linear.x', 'velocity.linear.y'
+    yield _reading(speed, types.VELOCITY, velocity[0])
+    # the twist of an odometry has the place that it has in a TwistWithCovariance
+    yield _reading(speed, types.ODOMETRY, linear, '', cells[0])
     both = (linear, 'twist.twist.linear.y', *cells)
     yield _computed(ground, types.TWIST_WITH_COVARIANCE, _magnitude, *both)
+    yield _computed(ground, types.ODOMETRY, _magnitude, *both)
     yield _computed(ground, types.TWIST, _magnitude, x, y, '', '', '')
+    yield _computed(ground, types.VELOCITY, _magnitude, *velocity, '', '', '')
 
     position = Channel.POSITION
     pose = ['pose.pose.position.x', 'pose.pose.position.y']
@@ -343,6 +349,8 @@ def _readings() -> Iterator[tuple[Source, _Reading]]:
 
     quaternion = [f'quaternion.{axis}' for axis in 'xyzw']
     yield _computed(Channel.HEADING, types.QUATERNION, _yaw, *quaternion, '')
+    attitude = [f'pose.orientation.{axis}' for axis in 'xyzw']
+    yield _computed(Channel.HEADING, types.POSE, _yaw, *attitude, '')
     imu = [f'orientation.{axis}' for axis in 'xyzw']
     imu += [f'orientation_covariance[{i}]' for i in (8, 0)]
     yield _computed(Channel.HEADING, types.IMU, _imu, *imu)

@@ -59,6 +59,7 @@ class EventKind(Enum):
     DISMISSED = 'dismissed'  # nearly a coastdown, or a part of one that was cut
     RESET = 'reset'  # done, whatever the cause
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
+    SILENCE = 'silence'  # by the clock, which no sample tells: an input of replay
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
     FILES = 'files'  # recordings removed
@@ -73,6 +74,7 @@ class EventKind(Enum):
             EventKind.CLOCK_JUMP,
             EventKind.FILES,
             EventKind.MESSAGE_LOST,
+            EventKind.SILENCE,
         )
 
 
@@ -140,6 +142,15 @@ def reset_request(receive_ns: int, reason: str, *, node: str = DEFAULT_NODE) -> 
     that the monitor decides by itself need none: the samples bring them about.
     """
     return event_message(EventNote(EventKind.RESET_REQUEST, receive_ns, reason, {}), node=node)
+
+
+def silence_mark(receive_ns: int, reason: str, *, node: str = DEFAULT_NODE) -> OutputMessage:
+    """
+    Encode that all sources are silent, so that replay ends a coastdown there too.
+
+    To be recorded before the coastdown is ended, at log time `receive_ns`.
+    """
+    return event_message(EventNote(EventKind.SILENCE, receive_ns, reason, {}), node=node)
 
 
 def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage:

@@ -14,8 +14,18 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import types
 
 TOPICS: Mapping[str, tuple[str, ...]] = {
-    'speed_through_water': (types.TWIST_WITH_COVARIANCE, types.TWIST),
-    'speed_over_ground': (types.TWIST_WITH_COVARIANCE, types.TWIST),
+    'speed_through_water': (
+        types.TWIST_WITH_COVARIANCE,
+        types.TWIST,
+        types.VELOCITY,
+        types.ODOMETRY,
+    ),
+    'speed_over_ground': (
+        types.TWIST_WITH_COVARIANCE,
+        types.TWIST,
+        types.VELOCITY,
+        types.ODOMETRY,
+    ),
     'position': (
         types.POSE_WITH_COVARIANCE,
         types.POSE,
@@ -23,7 +33,7 @@ TOPICS: Mapping[str, tuple[str, ...]] = {
         types.ODOMETRY,
         types.NAV_SAT_FIX,
     ),
-    'heading': (types.QUATERNION, types.IMU),
+    'heading': (types.QUATERNION, types.IMU, types.POSE),
     'shaft': (types.JOINT_STATE,),
     'rudder': (types.JOINT_STATE,),
     'wind_apparent': (types.TWIST,),

@@ -34,6 +34,7 @@ RANGE = 'sensor_msgs/msg/Range'
 STRING = 'std_msgs/msg/String'
 TWIST = 'geometry_msgs/msg/TwistStamped'
 TWIST_WITH_COVARIANCE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+VELOCITY = 'geometry_msgs/msg/VelocityStamped'
 
 ENCAPSULATION_BYTES = 4
 _BIG_ENDIAN = b'\x00\x00'

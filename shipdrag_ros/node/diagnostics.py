@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from shipdrag_ros.coastdown.events import State
+from shipdrag_ros.coastdown.health import Progress
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
@@ -68,6 +69,8 @@ class Standing:
         Which topics may be meant, where nothing is heard; '' without any.
     steady_lead_s, steady_needed_s
         The longest that the ship was seen to be steady, and what an onset needs.
+    progress
+        How far the monitor is by now, None while not active.
     """
 
     lifecycle: str
@@ -77,6 +80,7 @@ class Standing:
     candidates: str = ''
     steady_lead_s: float = 0.0
     steady_needed_s: float = 0.0
+    progress: Progress | None = None
 
 
 def state_status(standing: Standing, inputs: Sequence[InputState]) -> DiagnosticStatus:
@@ -88,6 +92,7 @@ def state_status(standing: Standing, inputs: Sequence[InputState]) -> Diagnostic
         'lifecycle': standing.lifecycle,
         'monitor': 'none' if monitor is None else monitor.value,
         'clock': 'simulated' if standing.sim_time else 'system',
+        **({} if standing.progress is None else standing.progress.values),
     }
     if standing.sim_time and standing.clock_ns == 0:
         text = 'use_sim_time is true but no /clock: messages are not used'

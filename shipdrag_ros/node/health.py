@@ -75,7 +75,7 @@ class InputStates:
         topics: Sequence[InputTopic],
         health: Mapping[str, InputHealth],
         *,
-        direction: str,
+        doubts: Mapping[str, str],
         simulated: bool,
     ) -> tuple[InputState, ...]:
         """
@@ -85,8 +85,8 @@ class InputStates:
         ----------
         health
             By input, of the monitor; empty while there is none.
-        direction
-            What is wrong with the heading, '' if nothing is seen to be.
+        doubts
+            What is odd about an input besides, by its name.
         simulated
             Whether the clock is simulated; it then says nothing about that of a sensor.
         """
@@ -104,7 +104,7 @@ class InputStates:
                 now_s,
                 fresh,
                 behind.get(topic.name),
-                direction if topic.name == 'heading' else '',
+                doubts.get(topic.name, ''),
                 None if simulated else topic.clock_offset_s,
             )
             for topic in topics
@@ -118,7 +118,7 @@ class InputStates:
         now_s: float,
         fresh: Mapping[str, bool],
         behind: tuple[str, float] | None,
-        direction: str,
+        doubt: str,
         offset_s: float | None,
     ) -> InputState:
         recently = self._recently.setdefault(topic.name, Recently())
@@ -139,7 +139,7 @@ class InputStates:
             seconds=recently.seconds,
             offset_s=offset_s,
             behind=behind,
-            direction=direction,
+            doubt=doubt,
         )
         return InputState(
             topic, judge(facts), health, facts.recent, recently.rate_hz, fresh[topic.name]

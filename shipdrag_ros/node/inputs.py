@@ -107,6 +107,7 @@ class InputTopic:
         self._found: list[Any] = []
         self._sequences = Sequences(self._identities)
         self._offsets_s: deque[float] = deque(maxlen=_OFFSETS)
+        self._least_lag_s: float | None = None
         self.name = name
         self.topic = node.resolve_topic_name(name)
         self.accepted = accepted
@@ -171,6 +172,13 @@ class InputTopic:
         """Median of arrival minus stamp of the last readings, used or not [s]."""
         return median(self._offsets_s) if self._offsets_s else None
 
+    def least_lag_s(self) -> float | None:
+        """
+        Return the smallest arrival minus stamp since the last call [s]; None without a reading.
+        """
+        least, self._least_lag_s = self._least_lag_s, None
+        return least
+
     def take(self, most: int, *, ahead: bool = True) -> list[Heard]:
         """
         Return the messages that have arrived, at most so many.
@@ -190,9 +198,14 @@ class InputTopic:
         taken, self._taken = self._taken[:most], self._taken[most:]
         return taken
 
-    def count(self, decoded: Decoded) -> None:
+    def count(self, decoded: Decoded, received_ns: int = 0) -> None:
         """
         Take what became of one message.
+
+        Parameters
+        ----------
+        received_ns
+            When this computer got it [ns]; 0: when the node took it.
         """
         for reason, times in decoded.unreadable.items():
             self.unreadable[reason.value] += times
@@ -202,7 +215,10 @@ class InputTopic:
             if stamp_ns <= 0:
                 self.unstamped += 1
             else:
-                self._offsets_s.append((receive_ns - stamp_ns) * 1e-9)
+                lag_s = ((received_ns or receive_ns) - stamp_ns) * 1e-9
+                self._offsets_s.append(lag_s)
+                if self._least_lag_s is None or lag_s < self._least_lag_s:
+                    self._least_lag_s = lag_s
 
     def close(self) -> None:
         """

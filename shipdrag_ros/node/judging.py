@@ -148,8 +148,8 @@ class InputFacts:
     behind
         The input of the motion whose stamps are nearest to their arrival, and by how much this
         one is behind it [s]; None where it is that one, or nothing is known.
-    direction
-        What is wrong with a heading, '' if nothing is seen to be.
+    doubt
+        What else is odd about it, '' if nothing is.
     """
 
     name: str
@@ -166,7 +166,7 @@ class InputFacts:
     seconds: float = 0.0
     offset_s: float | None = None
     behind: tuple[str, float] | None = None
-    direction: str = ''
+    doubt: str = ''
 
 
 def judge(facts: InputFacts) -> Finding:
@@ -207,8 +207,8 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
         return
     yield from _of_readings(facts)
     yield from _of_time(facts)
-    if facts.direction:
-        yield Finding(Level.WARN, facts.direction)
+    if facts.doubt:
+        yield Finding(Level.WARN, facts.doubt)
 
 
 def _one_stream(senders: tuple[str, ...]) -> str:
@@ -271,8 +271,8 @@ _ADVICE = {
 
 def _of_time(facts: InputFacts) -> Iterator[Finding]:
     offset_s = facts.offset_s
-    if facts.recent.unstamped or not facts.stamped:
-        return
+    if facts.recent.unstamped or not facts.stamped or 'future' in facts.recent.rejected:
+        return  # said with the readings
     if offset_s is not None and (offset_s > BEHIND_S or offset_s < -AHEAD_S):
         text = f'its clock is {_offset(offset_s)}: set either'
         yield Finding(Level.WARN, text)

@@ -27,6 +27,7 @@ from rclpy.utilities import remove_ros_args
 
 from shipdrag_ros.compiled import compile_all
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.node.console import terminal_line
 from shipdrag_ros.node.node import CoastdownNode
 
 USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'
@@ -100,6 +101,7 @@ def _run(line: list[str]) -> int:
             node = CoastdownNode(context=context, arguments=line)
             try:
                 executor.add_node(node)
+                node.shown = terminal_line(sys.stderr)
                 node.start()
                 # while ROS finds the topics; a message that needs a function first waits for it
                 threading.Thread(target=compile_all, name='compiling', daemon=True).start()

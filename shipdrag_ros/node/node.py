@@ -19,6 +19,7 @@ from rclpy.context import Context
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from shipdrag_ros.bags.durable import PartLimits
@@ -38,6 +39,7 @@ from shipdrag_ros.node.recorder import Recorder, RecordingState
 from shipdrag_ros.node.service_guard import guard_services
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
+from shipdrag_ros.node.watching import Watching
 from shipdrag_ros.samples import MOTION_INPUTS
 from shipdrag_ros.ship import Ship
 
@@ -45,6 +47,9 @@ NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 INACTIVE = 'the node is not active'
+RELIABLE = ReliabilityPolicy.RELIABLE
+# who joins late still gets the last message
+LATCHED = QoSProfile(depth=1, reliability=RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class CoastdownNode(LifecycleNode):
@@ -55,6 +60,11 @@ class CoastdownNode(LifecycleNode):
     ----------
     arguments
         Command line, to check its parameter files.
+
+    Attributes
+    ----------
+    shown
+        Called with each message of /diagnostics, for a terminal; None: nobody looks.
 
     Raises
     ------
@@ -80,8 +90,9 @@ class CoastdownNode(LifecycleNode):
         self._nmea: NmeaFeed | None = None
         self._input_states = InputStates()
         self._mailbox = Mailbox((), ahead=False)
-        self._lost: dict[str, int] = {}
+        self._watching: Watching | None = None
         self._outputs: dict[str, Publisher] = {}
+        self.shown: Callable[[DiagnosticArray], None] | None = None
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
@@ -170,6 +181,8 @@ class CoastdownNode(LifecycleNode):
             topic.under(self.get_fully_qualified_name()): self._publisher(topic)
             for topic in OUTPUT_TOPICS
         }
+        self._outputs['ship'] = self.create_publisher(String, '~/ship', LATCHED)
+        self._outputs['ship'].publish(String(data=self._ship.to_yaml()))
         self._input_topics = [
             InputTopic(
                 self,
@@ -182,7 +195,6 @@ class CoastdownNode(LifecycleNode):
         ]
         self._input_states = InputStates()
         self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
-        self._lost = {}
         self._nmea = NmeaFeed(self, settings.nmea, session=lambda: self._session)
         self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
@@ -212,6 +224,9 @@ class CoastdownNode(LifecycleNode):
             node=self.get_fully_qualified_name(),
             ended=self._diagnosing.begin,
             told=self._announcer.event,
+        )
+        self._watching = Watching(
+            self._input_topics, self._settings.parameters, simulated=self._simulated
         )
         if self._settings.record:
             self._recorder.start()
@@ -253,14 +268,7 @@ class CoastdownNode(LifecycleNode):
     # traffic
 
     def _publisher(self, topic: OutputTopic) -> Publisher:
-        if topic.latched:  # who joins late still gets the last curve
-            qos = QoSProfile(
-                depth=1,
-                reliability=ReliabilityPolicy.RELIABLE,
-                durability=DurabilityPolicy.TRANSIENT_LOCAL,
-            )
-        else:
-            qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+        qos = LATCHED if topic.latched else QoSProfile(depth=10, reliability=RELIABLE)
         return self.create_publisher(message_class(topic.type), f'~/{topic.name}', qos)
 
     def _send(self, message: OutputMessage) -> None:
@@ -272,7 +280,7 @@ class CoastdownNode(LifecycleNode):
 
     def _hear(self) -> None:
         """Take what has come on all topics, in its order."""
-        for topic, data, _ in self._mailbox.take():
+        for topic, data, received_ns in self._mailbox.take():
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
                 topic.unused += 1
@@ -280,7 +288,10 @@ class CoastdownNode(LifecycleNode):
             if self._nmea is not None and not self._nmea.admits(topic):
                 continue
             assert topic.type is not None
-            topic.count(self._session.receive(Source(topic.name, topic.type), data, now_ns))
+            assert self._watching is not None
+            self._watching.watch_clock(self._session, now_ns)
+            decoded = self._session.receive(Source(topic.name, topic.type), data, now_ns)
+            topic.count(decoded, 0 if self._simulated else received_ns)
 
     def _look(self) -> None:
         for topic in self._input_topics:
@@ -292,13 +303,14 @@ class CoastdownNode(LifecycleNode):
     def _publish_diagnostics(self) -> None:
         now_ns = self._now_ns()
         session = self._session
-        if session is not None and now_ns:
-            session.watch_clock(now_ns)  # also while nothing arrives
+        health = {} if session is None else session.monitor.health()
+        if session is not None and self._watching is not None:
+            self._watching.tick(session, health, now_ns)
             session.note_removed(now_ns, self.get_logger().warning)
         states = self._input_states.tick(
             self._input_topics,
-            {} if session is None else session.monitor.health(),
-            direction='' if session is None else session.monitor.heading_doubt(),
+            health,
+            doubts=self._doubts(),
             simulated=self._simulated,
         )
         standing = self._standing(now_ns)
@@ -313,7 +325,6 @@ class CoastdownNode(LifecycleNode):
             statuses.append(diagnostics.estimate_status(session.latest, session.why_none))
             self._announcer.inputs(states)
             self._announcer.silence(states, standing.candidates)
-            self._note_lost(session, now_ns)
         if self._diagnosing is not None:
             found = self._diagnosing.status
             statuses.append(diagnostics.diagnosis_status(found))
@@ -328,6 +339,15 @@ class CoastdownNode(LifecycleNode):
             hardware_id='' if self._ship is None else self._ship.name,
         )
         self._diagnostics.publish(message)
+        if self.shown is not None:
+            self.shown(message)
+
+    def _doubts(self) -> dict[str, str]:
+        """Say what is odd about inputs besides what became of their readings."""
+        if self._session is None or self._watching is None:
+            return {}
+        heading = self._session.monitor.heading_doubt()
+        return {'heading': heading} | self._watching.doubts()
 
     def _standing(self, now_ns: int) -> diagnostics.Standing:
         session, states = self._session, self._input_states.seen
@@ -350,23 +370,12 @@ class CoastdownNode(LifecycleNode):
             now_ns,
             self._simulated,
             candidates=hint,
+            progress=None if session is None else session.monitor.progress,
             steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
             steady_needed_s=0.0
             if self._settings is None
             else self._settings.parameters.slope_window_s,
         )
-
-    def _note_lost(self, session: Session, now_ns: int) -> None:
-        """Keep in the recording how many messages were lost on their way."""
-        for topic in self._input_topics:
-            before = self._lost.get(topic.name, 0)
-            if topic.lost > before and now_ns:
-                self._lost[topic.name] = topic.lost
-                text = (
-                    f'{topic.name}: {topic.lost - before} messages were sent and not heard, '
-                    f'{topic.lost} so far'
-                )
-                session.note_lost(text, now_ns)
 
     # services
 

@@ -181,6 +181,21 @@ class Recorder:
         if self._recording is not None:
             self._recording.put(self._encoded(message))
 
+    def request(self, message: OutputMessage, receive_ns: int) -> None:
+        """
+        Take a message of the node that a replay obeys, as it does an input.
+        """
+        self._ring.add(
+            RawMessage(
+                message.topic.removeprefix(f'{self._namespace}/'),
+                message.type,
+                message.payload,
+                receive_ns,
+                message.stamp_ns,
+            )
+        )
+        self.output(message, receive_ns)
+
     def output(self, message: OutputMessage, receive_ns: int) -> None:
         """
         Take a message of the node, caused by what arrived at `receive_ns`.

@@ -10,7 +10,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event, NoEstimate, Update
+from shipdrag_ros.coastdown.events import (
+    Coastdown,
+    EndedBy,
+    Event,
+    NoEstimate,
+    State,
+    Update,
+)
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
@@ -23,6 +30,7 @@ from shipdrag_ros.messages import (
     event_message,
     outputs,
     reset_request,
+    silence_mark,
 )
 from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.ring import RawMessage
@@ -114,12 +122,39 @@ class Session:
         self._arrival_ns = max(self._arrival_ns, now_ns)
         return self._arrival_ns
 
+    def fall_silent(self, reason: str, now_ns: int) -> None:
+        """
+        End a coastdown that runs, as no source of the motion has been heard for too long.
+        """
+        arrival_ns = self.watch_clock(now_ns)
+        if self.monitor.state not in (State.CANDIDATE, State.COASTDOWN):
+            return
+        mark = silence_mark(arrival_ns, reason, node=self._node)
+        self._publish(mark)
+        if arrival_ns:
+            self.recorder.request(mark, arrival_ns)
+        self._report(self.monitor.fall_silent())
+
     def reset(self, reason: str, now_ns: int) -> None:
         """
         Drop all memory.
         """
         self.watch_clock(now_ns)
         self._reset(reason)
+
+    def clock_was_set(self, reason: str, now_ns: int, *, ends: bool = True) -> None:
+        """
+        Publish and record that a clock was set; end a coastdown that runs.
+
+        Parameters
+        ----------
+        ends
+            Whether readings that matter to a coastdown are told by that clock.
+        """
+        self.watch_clock(now_ns)
+        if ends and self.monitor.state in (State.CANDIDATE, State.COASTDOWN):
+            self._reset(reason)
+        self._note(EventKind.CLOCK_JUMP, reason)
 
     def note_lifecycle(self, text: str, now_ns: int) -> None:
         """

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.bags.run import ResetMark
 from shipdrag_ros.coastdown import Monitor, validate
 from shipdrag_ros.coastdown.driving import gone_s
 from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, Event
@@ -15,7 +14,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.playback import InputCounts, ReplayResult
+from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed
 from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Block, Reason, concatenate
 from shipdrag_ros.ship import Ship
 
@@ -85,10 +84,7 @@ def _look_anew(result: ReplayResult) -> tuple[Coastdown, ...]:
     monitor = Monitor(result.ship, parameters, estimate=_refuse, final=_refuse)
     events: list[Event] = []
     for item in result.run.inputs():
-        if isinstance(item, ResetMark):
-            events += monitor.reset(item.receive_ns, item.reason)
-        else:
-            events += monitor.update(_arrived_later(item))
+        events += feed(monitor, _arrived_later(item) if isinstance(item, Block) else item)
     events += monitor.finish()
     return tuple(event for event in events if isinstance(event, Coastdown) and not event.withdrawn)
 

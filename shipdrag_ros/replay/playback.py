@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.bags.run import Inputs, ResetMark, Run
+from shipdrag_ros.bags.run import Inputs, Mark, ResetMark, Run
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Coastdown, Dismissal, Event, NotCoastdown, Update
 from shipdrag_ros.errors import BagError
@@ -19,7 +19,7 @@ from shipdrag_ros.messages import DEFAULT_NODE, TOPICS, outputs
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
-from shipdrag_ros.samples import Channel, Reason
+from shipdrag_ros.samples import Block, Channel, Reason
 from shipdrag_ros.ship import Ship
 
 SHIP_FILE = 'ship.yaml'
@@ -137,12 +137,28 @@ def replay(
     ShipFileError, ParameterError
         If those attached to the bag cannot be used.
     """
-    if not any(topic.input for topic in run.topics):
-        raise BagError(_no_input(run))
-    used_ship, used_parameters = _ship(run, ship), _parameters(run, parameters)
+    used_ship, used_parameters = settings_of(run, ship, parameters)
     if window is not None:
         return _in_window(run, used_ship, used_parameters, window)
     return _as_on_board(run, used_ship, used_parameters, progress)
+
+
+def settings_of(
+    run: Run, ship: Ship | None = None, parameters: Parameters | None = None
+) -> tuple[Ship, Parameters]:
+    """
+    Return what a run is replayed with: what is given, else what is attached to it.
+
+    Raises
+    ------
+    BagError
+        If the run has no input, or no ship file where none is given.
+    ShipFileError, ParameterError
+        If those attached cannot be used.
+    """
+    if not any(topic.input for topic in run.topics):
+        raise BagError(_no_input(run))
+    return _ship(run, ship), _parameters(run, parameters)
 
 
 def _no_input(run: Run) -> str:
@@ -187,10 +203,7 @@ def _as_on_board(
     inputs = run.inputs()
     total = sum(topic.messages for topic in run.topics if topic.input)
     for item in inputs:
-        if isinstance(item, ResetMark):
-            take(monitor.reset(item.receive_ns, item.reason))
-        else:
-            take(monitor.update(item))
+        take(feed(monitor, item))
         if progress is not None:
             progress(inputs.messages.total(), total)
     take(monitor.finish())
@@ -206,6 +219,17 @@ def _as_on_board(
         comparison.finish(),
         monitor.steady_lead_s,
     )
+
+
+def feed(monitor: Monitor, item: Block | Mark) -> list[Event]:
+    """
+    Give a monitor what the node's had: samples, or what was told it by other means.
+    """
+    if isinstance(item, Block):
+        return monitor.update(item)
+    if isinstance(item, ResetMark):
+        return monitor.reset(item.receive_ns, item.reason)
+    return monitor.fall_silent()
 
 
 def _in_window(

@@ -9,10 +9,10 @@ from shipdrag_ros.bags.run import Run
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.playback import PARAMETERS_FILE
-from shipdrag_ros.samples import Block, Reason, concatenate
+from shipdrag_ros.samples import Block, Channel, Reason, concatenate
 
 
-def accepted_samples(run: Run) -> tuple[Block, Parameters]:
+def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameters]:
     """
     Read a run as it would be on board, without looking for a coastdown.
 
@@ -20,6 +20,9 @@ def accepted_samples(run: Run) -> tuple[Block, Parameters]:
     ----------
     run
         From `open_runs`.
+    zeros
+        A log that reads exactly 0 for long is no frozen one: below some speed a
+        wheel stands still.
 
     Returns
     -------
@@ -35,5 +38,9 @@ def accepted_samples(run: Run) -> tuple[Block, Parameters]:
     text = run.attachments.get(PARAMETERS_FILE, '')
     parameters = Parameters.from_yaml(text, subject=f'{run.name}: {PARAMETERS_FILE}')
     block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
-    accepted = validate(block, parameters) == Reason.ACCEPTED
+    reason = validate(block, parameters)
+    accepted = reason == Reason.ACCEPTED
+    if zeros:
+        of_log = block.channel == Channel.SPEED_THROUGH_WATER
+        accepted |= (reason == Reason.FROZEN) & of_log & (block.value[:, 0] == 0.0)
     return block[np.flatnonzero(accepted)], parameters

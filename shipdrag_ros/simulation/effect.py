@@ -38,19 +38,39 @@ class WithoutBaseline(StrEnum):
     LOG_TRACK
         The log held against the track over ground, on many courses and at many
         speeds. Such an effect acts alike on all ships.
+    ZEROS
+        Readings of exactly 0 while the ship moves, and right ones when she is faster.
     CONSTANT_FORCE
         A constant part of the deceleration beside a form of the resistance
         that is fitted to the coastdown itself.
     """
 
     LOG_TRACK = 'log_track'
+    ZEROS = 'zeros'
     CONSTANT_FORCE = 'constant_force'
 
 
-WEIGHTS = Scale('weight of the ship', lambda ship: ship.mass_kg * GRAVITY_M_S2)
-AREAS = Scale('V^(2/3)', lambda ship: ship.displaced_volume_m3 ** (2.0 / 3.0))
-SPEEDS = Scale('sqrt(g L)', lambda ship: float(ship.speed(1.0)))
-DRAUGHTS = Scale('draught', lambda ship: ship.draught_m or math.nan)
+def _weight(ship: Ship) -> float:
+    return ship.mass_kg * GRAVITY_M_S2
+
+
+def _area(ship: Ship) -> float:
+    return float(ship.displaced_volume_m3 ** (2.0 / 3.0))
+
+
+def _speed(ship: Ship) -> float:
+    return float(ship.speed(1.0))
+
+
+def _draught(ship: Ship) -> float:
+    return ship.draught_m or math.nan
+
+
+# no lambdas: sizes are part of a diagnosis, which is sent from process to process
+WEIGHTS = Scale('weight of the ship', _weight)
+AREAS = Scale('V^(2/3)', _area)
+SPEEDS = Scale('sqrt(g L)', _speed)
+DRAUGHTS = Scale('draught', _draught)
 
 
 @dataclass(frozen=True)

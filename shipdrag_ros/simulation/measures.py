@@ -11,6 +11,7 @@ class Measure(StrEnum):
     """What can be done to tell two effects apart, as it is advised."""
 
     RECIPROCAL_RUN = 'a run on the reciprocal heading'
+    ANOTHER_COURSE = 'a leg on another course'
     OTHER_SPEED = 'a run that begins or ends at another speed'
     ANOTHER_RUN = 'another run of the same ship'
     RADAR = 'radar or GNSS positions'
@@ -33,6 +34,7 @@ class Cost(StrEnum):
     """What a measure costs the crew."""
 
     LOOK = 'a look'
+    LEG = 'a few minutes on another course'
     RUN = 'another run'
     GEAR = 'gear to be rigged or hauled in'
     PASSAGE = 'a passage elsewhere'
@@ -44,9 +46,17 @@ class Cost(StrEnum):
         return _HOURS[self]
 
 
-_HOURS = {Cost.LOOK: 0.1, Cost.RUN: 1.0, Cost.GEAR: 2.0, Cost.PASSAGE: 6.0, Cost.DIVE: 48.0}
+_HOURS = {
+    Cost.LOOK: 0.1,
+    Cost.LEG: 0.3,
+    Cost.RUN: 1.0,
+    Cost.GEAR: 2.0,
+    Cost.PASSAGE: 6.0,
+    Cost.DIVE: 48.0,
+}
 COSTS: Mapping[Measure, Cost] = {
     Measure.RECIPROCAL_RUN: Cost.RUN,
+    Measure.ANOTHER_COURSE: Cost.LEG,
     Measure.OTHER_SPEED: Cost.RUN,
     Measure.ANOTHER_RUN: Cost.RUN,
     Measure.RADAR: Cost.GEAR,

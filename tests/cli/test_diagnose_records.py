@@ -140,3 +140,44 @@ def test_a_window_of_a_ship_without_baseline_is_fitted(tmp_path: Path) -> None:
     assert found['verdict'] == 'one_of'
     assert found['effects'] == []
     assert page.exists()
+
+
+def test_a_ship_file_of_two_values_does_not_hide_a_current(
+    tmp_path: Path, ship_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, document = tmp_path / 'run.mcap', tmp_path / 'found.json'
+    line = ['simulate', '--ship', str(ship_file), '-o', str(path), '--lead-in', '1800']
+    assert main([*line, '--effect', 'current=0.4', '--seed', '3']) == 0
+    two = tmp_path / 'two.yaml'
+    two.write_text('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
+    page = tmp_path / 'page.html'
+    line = ['diagnose', str(path), '--ship', str(two), '--report', str(page)]
+    assert main([*line, '--json', str(document)]) == 0
+    found = json.loads(document.read_text())
+    assert found['baseline'] == 'fitted_here'
+    assert found['coastdowns_used'] == 1
+    assert found['examined'] == ['force', 'log_track']
+    # on one course a current and an offset of the log are the same
+    assert found['verdict'] == 'one_of'
+    sizes = {each['names'][0]: each['effects'][0]['parameters'] for each in found['candidates']}
+    assert set(sizes) == {'current', 'log_offset'}
+    along = sizes['current']['along_track_m_s']
+    assert abs(along['value'] - 0.4) < 3.0 * along['sd']
+    assert along['sd'] < 0.1
+    assert found['would_decide'][0] == 'a leg on another course'
+    assert 'a leg on another course' in page.read_text(encoding='utf-8')
+
+
+def test_a_log_in_knots_is_asked_about_its_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(3600.0)
+    speed = np.where(time // 600.0 % 3 == 0, 3.0, 6.0)
+    east = np.where(time // 600.0 % 2 == 0, speed, -speed)
+    place = np.array([np.cumsum(east), np.zeros(len(time))]).T + rng.normal(0.0, 1.0, (3600, 2))
+    log = speed / 0.5144 + rng.normal(0.0, 0.05, len(time))
+    path = bag(tmp_path / 'knots.mcap', time, speed_through_water=log, position=place)
+    assert main(['diagnose', str(path)]) == 0
+    said = capsys.readouterr().out
+    assert 'the log reads 1.94 times the way over ground, which is knots over m/s' in said

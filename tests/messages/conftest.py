@@ -48,6 +48,11 @@ class Reference:
         bodies: dict[str, dict[str, Any]] = {
             'geometry_msgs/msg/TwistStamped': {'twist': twist},
             'geometry_msgs/msg/TwistWithCovarianceStamped': {'twist': twist_with_covariance},
+            'geometry_msgs/msg/VelocityStamped': {
+                'body_frame_id': frame_id[::-1],
+                'reference_frame_id': frame_id,
+                'velocity': twist,
+            },
             'geometry_msgs/msg/PoseStamped': {'pose': pose},
             'geometry_msgs/msg/PoseWithCovarianceStamped': {'pose': pose_with_covariance},
             'geometry_msgs/msg/PointStamped': {'point': point},

@@ -68,7 +68,7 @@ def test_what_is_well_is_receiving() -> None:
             'no publisher',
         ),
         ({'misfit': 'DURABILITY'}, Level.WARN, 'its DURABILITY QoS does not fit'),
-        ({'direction': 'it is off'}, Level.WARN, 'it is off'),
+        ({'doubt': 'it is off'}, Level.WARN, 'it is off'),
     ],
 )
 def test_what_is_wrong_is_said(changed: dict[str, Any], level: Level, said: str) -> None:

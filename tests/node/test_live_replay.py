@@ -18,7 +18,14 @@ from hypothesis import strategies as st
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedBy
-from shipdrag_ros.messages import EncodedMessage, OutputMessage, Source, encode
+from shipdrag_ros.messages import (
+    EncodedMessage,
+    EventKind,
+    OutputMessage,
+    Source,
+    encode,
+    read_event,
+)
 from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
@@ -81,6 +88,11 @@ class Desk:
         for message in messages()[first:last]:
             source = Source(message.topic.strip('/'), message.type)
             self.session.receive(source, message.payload, message.log_ns)
+
+    def kinds(self) -> list[EventKind]:
+        """What was said on `~/events`."""
+        events = [it for it in self.published if it.topic.endswith('/events')]
+        return [read_event(it.payload).kind for it in events]
 
     def replay(self) -> list[ReplayResult]:
         self.session.finish()
@@ -162,6 +174,43 @@ def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
     assert_identical(second, at_least=100)
 
 
+@pytest.mark.parametrize('recorded_from', ['the beginning', 'mid run', 'after the silence'])
+def test_a_coastdown_whose_sources_all_fall_silent(desk: Desk, recorded_from: str) -> None:
+    silent_s = LEAD_IN_S + 250.0
+    ended_ns = int(record().receive_ns[0]) + round((silent_s + 61.0) * SECOND_NS)
+    if recorded_from == 'the beginning':
+        desk.recorder.start()
+    desk.feed(0.0, LEAD_IN_S + 200.0)
+    if recorded_from == 'mid run':
+        desk.recorder.start()
+    desk.feed(LEAD_IN_S + 200.0, silent_s)
+    desk.session.fall_silent('nothing was heard', ended_ns)
+    # ended now, by the clock, and not when the sensors are back; and only once
+    assert desk.kinds()[-2:] == [EventKind.SILENCE, EventKind.COASTDOWN]
+    desk.session.fall_silent('nothing was heard', ended_ns + SECOND_NS)
+    assert desk.kinds()[-1] is EventKind.COASTDOWN
+    if recorded_from == 'after the silence':
+        desk.recorder.start()
+    desk.feed(3550.0, 1e9)
+    (result,) = desk.replay()
+    ended = [it.ended_by for it in result.coastdowns]
+    assert ended == [EndedBy.SILENCE, EndedBy.RECORD_END]
+    assert_identical(result, at_least=20)
+
+
+def test_a_clock_that_is_set_forward_ends_the_run(desk: Desk) -> None:
+    desk.recorder.start()
+    desk.feed(0, LEAD_IN_S + 250.0)
+    now_ns = int(record().receive_ns[0]) + round((LEAD_IN_S + 270.0) * SECOND_NS)
+    desk.session.clock_was_set('the clock of this computer went forward by 20.0 s', now_ns)
+    desk.feed(LEAD_IN_S + 271.0, 1e9)
+    (result,) = desk.replay()
+    assert result.coastdowns[0].ended_by is EndedBy.RESET
+    assert result.coastdowns[-1].ended_by is EndedBy.RECORD_END
+    assert EventKind.CLOCK_JUMP in desk.kinds()
+    assert_identical(result, at_least=50)
+
+
 @settings(
     max_examples=6,
     deadline=None,
@@ -170,18 +219,21 @@ def test_both_sides_of_a_clock_that_was_set_back(desk: Desk) -> None:
 @given(
     start_s=st.floats(0.0, 4400.0),
     reset_s=st.floats(0.0, 4400.0),
+    silence_s=st.floats(0.0, 4400.0),
 )
-def test_any_start_and_any_reset(
-    tmp_path_factory: pytest.TempPathFactory, start_s: float, reset_s: float
+def test_any_start_any_reset_and_any_silence(
+    tmp_path_factory: pytest.TempPathFactory, start_s: float, reset_s: float, silence_s: float
 ) -> None:
     desk = Desk(tmp_path_factory.mktemp('bags'))
     start_ns = int(record().receive_ns[0])
-    steps = sorted([(start_s, 'record'), (reset_s, 'reset')])
+    steps = sorted([(start_s, 'record'), (reset_s, 'reset'), (silence_s, 'silence')])
     done_s = 0.0
     for at_s, what in steps:
         desk.feed(done_s, at_s)
         if what == 'record':
             desk.recorder.start()
+        elif what == 'silence':
+            desk.session.fall_silent('by the clock', start_ns + round(at_s * SECOND_NS))
         else:
             desk.session.reset('asked for', start_ns + round(at_s * SECOND_NS))
         done_s = at_s

@@ -12,7 +12,15 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.bags import BagWriter, open_runs
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event, Onset, Reset, Update
+from shipdrag_ros.coastdown.events import (
+    Coastdown,
+    EndedBy,
+    Event,
+    NoEstimate,
+    Onset,
+    Reset,
+    Update,
+)
 from shipdrag_ros.errors import BagError, ParameterError, ShipFileError
 from shipdrag_ros.messages import encode, types
 from shipdrag_ros.parameters import Parameters
@@ -47,7 +55,8 @@ def test_replay_gives_the_live_figures_bit_for_bit(
     np.testing.assert_allclose(
         curve.resistance_m_s2[5:-5], curve.speed_m_s[5:-5] ** 2 / 3000.0, rtol=0.2
     )
-    assert [type(event) for event in result.events] == [Onset, Coastdown]
+    known = [event for event in result.events if not isinstance(event, NoEstimate)]
+    assert [type(event) for event in known] == [Onset, Coastdown]
     assert result.inputs['shaft'].messages == result.inputs['shaft'].used == 1100
     assert list(result.inputs) == ['speed_through_water', 'position', 'heading', 'shaft']
 

@@ -82,9 +82,9 @@ def test_confounders_are_inseparable_where_nothing_measured_tells_them_apart() -
     every = list(LIBRARY.values())
     assert inseparable(every) == (frozenset(('added_mass', 'displacement')),)
     scales = frozenset(('log_scale', 'radar_scale'))
-    courses = [Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED]
+    courses = [Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE, Measure.OTHER_SPEED]
     assert inseparable(OF_LOG_AND_TRACK, measured=courses) == (scales,)
-    assert set(inseparable(OF_LOG_AND_TRACK, measured=courses[1:])) == {
+    assert set(inseparable(OF_LOG_AND_TRACK, measured=courses[2:])) == {
         scales,
         frozenset(('current', 'log_offset')),
     }

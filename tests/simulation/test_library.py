@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -316,3 +317,10 @@ def test_all_impossible_effects_are_told_at_once():
         'log_lag is given 2 times',
     ):
         assert part in str(told.value)
+
+
+def test_every_parameter_goes_from_process_to_process() -> None:
+    """A diagnosis beside the node comes from a process of its own, sizes and all."""
+    for effect in LIBRARY.values():
+        for parameter in effect.parameters:
+            assert repr(pickle.loads(pickle.dumps(parameter))) == repr(parameter)

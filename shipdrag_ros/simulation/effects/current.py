@@ -38,9 +38,17 @@ EFFECT = Effect(
     source='kinematics',
     act=_act,
     confounders={
-        'log_offset': (Measure.RECIPROCAL_RUN,),
-        'radar_scale': (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED),
-        'log_scale': (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED),
+        'log_offset': (Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE),
+        'radar_scale': (
+            Measure.RECIPROCAL_RUN,
+            Measure.ANOTHER_COURSE,
+            Measure.OTHER_SPEED,
+        ),
+        'log_scale': (
+            Measure.RECIPROCAL_RUN,
+            Measure.ANOTHER_COURSE,
+            Measure.OTHER_SPEED,
+        ),
         'current_change': (Measure.ANOTHER_RUN,),
     },
     without_baseline={

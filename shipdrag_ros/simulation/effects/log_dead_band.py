@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
+from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, speed_m_s: float) -> Action:
@@ -34,4 +34,5 @@ EFFECT = Effect(
         'windmilling_propeller': (Measure.RADAR, Measure.SHAFT),
     },
     errs_in=('speed_through_water',),
+    without_baseline={WithoutBaseline.ZEROS: 'a wheel stands still below some speed'},
 )

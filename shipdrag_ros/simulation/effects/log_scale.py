@@ -20,7 +20,7 @@ EFFECT = Effect(
             name='factor',
             unit='',
             meaning='reading = (1 + factor) times the speed through water',
-            prior=normal(0.04),
+            prior=normal(0.08),
             low=-0.9,
             high=9.0,
         ),

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The page under load: CPU for many viewers, connections refused, slow readers survived.
+
+    python benchmarks/live_page.py [--viewers 50] [--connections 2000] [--slow 100] [--seconds 10]
+
+Readings come at 10 Hz and a frame is made for each. The server runs in this
+process, the viewers in another; CPU is that of the server alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import resource
+import socket
+import threading
+import time
+from contextlib import suppress
+
+import numpy as np
+
+from shipdrag_ros.live import guard
+from shipdrag_ros.live.app import PAGE, LivePage
+from shipdrag_ros.live.serve import listen, serve
+from shipdrag_ros.live.source import NodeSource
+from shipdrag_ros.messages.heard import Health, Samples, Status
+from shipdrag_ros.samples import Block, Channel
+
+ASK = b'GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n'
+HISTORY_S = 6 * 3600
+
+
+def feed(source: NodeSource, stop: threading.Event) -> None:
+    """Send six hours at once, then a reading and a status at 10 Hz."""
+    now_s = int(time.time())
+    stamps = np.arange(now_s - HISTORY_S, now_s) * 1_000_000_000
+    source.hear(Samples(Block.of(Channel.SPEED_THROUGH_WATER, stamps, np.full(len(stamps), 8.0))))
+    values = {'lifecycle': 'active', 'monitor': 'steady', 'steady lead used at most [s]': '1800'}
+    count = 0
+    while not stop.wait(0.1):
+        count += 1
+        block = Block.of(Channel.SPEED_THROUGH_WATER, [time.time_ns()], [8.0 + 0.001 * count])
+        source.hear(Samples(block))
+        state = Status('node', 'state', 0, 'steady', {**values, 'steady lead [s]': f'{count}'})
+        source.hear(Health((state,)))
+
+
+def read(address: tuple[str, int], viewers: int, seconds: float, result: object) -> None:
+    """Read streams in a process of its own, and count frames."""
+    streams = [socket.create_connection(address) for _ in range(viewers)]
+    for each in streams:
+        each.sendall(ASK)
+        each.setblocking(False)
+    frames, end_s = 0, time.monotonic() + seconds
+    while time.monotonic() < end_s:
+        for each in streams:
+            with suppress(BlockingIOError):
+                frames += each.recv(1 << 20).count(b'event: ')
+        time.sleep(0.02)
+    result.put(frames)  # type: ignore[attr-defined]
+
+
+def cpu_with(address: tuple[str, int], viewers: int, seconds: float) -> tuple[float, float]:
+    """Return the share of a core that the server takes, and frames a viewer and second."""
+    queue: multiprocessing.Queue[int] = multiprocessing.Queue()
+    reader = multiprocessing.Process(target=read, args=(address, viewers, seconds, queue))
+    reader.start()
+    time.sleep(1.0)  # the whole pictures are out
+    cpu_s, wall_s = time.process_time(), time.monotonic()
+    time.sleep(seconds - 2.0)
+    share = (time.process_time() - cpu_s) / (time.monotonic() - wall_s)
+    frames = queue.get()
+    reader.join()
+    return share, frames / viewers / seconds
+
+
+def connect(address: tuple[str, int], count: int) -> tuple[int, float]:
+    """Open connections that ask nothing; return how many were refused, and the slowest look."""
+    opened, refused, slowest = [], 0, 0.0
+    for number in range(count):
+        with suppress(OSError):
+            each = socket.create_connection(address, timeout=5.0)
+            each.setblocking(False)
+            opened.append(each)
+        if number % 500 == 499:
+            time.sleep(0.05)
+    time.sleep(0.5)
+    for each in opened:
+        with suppress(OSError):
+            refused += each.recv(64)[:12] == b'HTTP/1.1 503'
+    for each in opened:
+        each.close()
+    for _ in range(20):
+        begin_s = time.monotonic()
+        with socket.create_connection(address, timeout=5.0) as each:
+            each.sendall(b'GET / HTTP/1.1\r\nHost: localhost\r\n\r\n')
+            each.recv(1000)
+        slowest = max(slowest, time.monotonic() - begin_s)
+    return refused, slowest
+
+
+def main() -> None:
+    """Print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--viewers', type=int, default=50)
+    parser.add_argument('--connections', type=int, default=2000)
+    parser.add_argument('--slow', type=int, default=100)
+    parser.add_argument('--seconds', type=float, default=10.0)
+    options = parser.parse_args()
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(65536, hard), hard))
+    size = sum(path.stat().st_size for path in PAGE.rglob('*') if path.is_file())
+    print(f'page: {size / 1000:.0f} kB')
+    source, ended = NodeSource(), threading.Event()
+    page = LivePage(source)
+    with listen('127.0.0.1', 0) as found:
+        address = found.getsockname()
+        for target, arguments in ((serve, (page, [found])), (feed, (source, ended))):
+            more = {'until': ended} if target is serve else {}
+            arguments = arguments if more else (source, ended)
+            threading.Thread(target=target, args=arguments, kwargs=more, daemon=True).start()
+        time.sleep(2.0)
+        print(f'whole picture with six hours: {len(page.frames.whole()) / 1000:.0f} kB')
+        for viewers in (1, options.viewers):
+            share, rate = cpu_with(address, viewers, options.seconds)
+            print(f'{viewers} viewers: {100 * share:.1f} % of a core, {rate:.1f} frames/s each')
+        refused, slowest = connect(address, options.connections)
+        print(
+            f'{options.connections} connections at once: {refused} refused (limit '
+            f'{guard.CONNECTIONS}); then a page within {1000 * slowest:.0f} ms'
+        )
+        slow = [socket.create_connection(address) for _ in range(options.slow)]
+        for each in slow:
+            each.sendall(ASK)  # and reads nothing
+        share, rate = cpu_with(address, 1, options.seconds)
+        memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(
+            f'{options.slow} readers who read nothing: one who reads gets {rate:.1f} frames/s, '
+            f'{100 * share:.1f} % of a core, at most {memory_mb:.0f} MB'
+        )
+        ended.set()
+        time.sleep(0.5)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag watch`: the page of the bridge, over a running node or over bags."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import ipaddress
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.cli.arguments import add_remap, bag, number
+from shipdrag_ros.cli.node import no_ros
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.live.app import LivePage
+from shipdrag_ros.live.earlier import PastRun, recorded_runs
+from shipdrag_ros.live.serve import listen, serve
+from shipdrag_ros.live.source import FASTEST, BagSource, NodeSource, Source
+from shipdrag_ros.ship import Ship
+
+SHORTEST_TOKEN = 16
+LOOPBACK = '127.0.0.1'
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Serve one page for the bridge: the state and what to do now, speed, r(v) against the '
+        'clean hull, inputs, checklist and verdict. Without a bag it shows the node that runs on '
+        'this network, which may come and go; with bags it plays them. It only reads.'
+    )
+    parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='MCAP or rosbag2 to play')
+    parser.add_argument('--port', type=_port, default=8088, help='of the page, 0: any free one')
+    parser.add_argument(
+        '--listen',
+        default=LOOPBACK,
+        metavar='ADDRESS',
+        help='address to listen on; any but that of this machine alone needs --token-file',
+    )
+    parser.add_argument(
+        '--token-file',
+        type=Path,
+        metavar='FILE',
+        help=f'text of at least {SHORTEST_TOKEN} characters that a viewer must give',
+    )
+    parser.add_argument(
+        '--speed',
+        type=number(0.0, FASTEST, above=True),
+        default=10.0,
+        metavar='X',
+        help='seconds of a bag in a second [-]',
+    )
+    parser.add_argument(
+        '--ship',
+        type=Path,
+        metavar='FILE',
+        help='ship file, instead of that of the node or of the bag',
+    )
+    parser.add_argument(
+        '--earlier',
+        type=Path,
+        metavar='DIR',
+        help="folder of bags that this ship's nodes recorded: their coastdowns are listed",
+    )
+    parser.add_argument(
+        '--node', default='', metavar='NAME', help='full name of the node (default: the first)'
+    )
+    parser.add_argument(
+        '--signal-k',
+        type=_port,
+        metavar='PORT',
+        help='send Signal K deltas, a line each, to who connects to this TCP port of this machine',
+    )
+    parser.add_argument('--store', help=argparse.SUPPRESS)
+    add_remap(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Serve until SIGINT or SIGTERM.
+    """
+    if options.store is not None:
+        raise ShipdragError(
+            '--store: this page shows one ship, and reads no store; for the fleet run '
+            'shipdrag trend STORE --report FILE.html, for earlier runs give --earlier DIR'
+        )
+    output = Output()
+    token = _token(options.listen, options.token_file)
+    ship = None if options.ship is None else Ship.load(options.ship)
+    notes: list[str] = []
+    page_socket = listen(options.listen, options.port)
+    deltas = None if options.signal_k is None else listen(LOOPBACK, options.signal_k)
+    with page_socket, contextlib.ExitStack() as stack:
+        past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
+        source: Source = stack.enter_context(_source(options, ship, past))
+        page = LivePage(source, token=token, notes=tuple(notes))
+        for note in notes:
+            output.log(note)
+        name, port = page_socket.getsockname()[:2]
+        shown = f'[{name}]' if ':' in name else name
+        output.say(f'the page: http://{shown}:{port}/')
+        if deltas is not None:
+            output.say(f'Signal K deltas: tcp://{LOOPBACK}:{deltas.getsockname()[1]}')
+        if token is not None:
+            output.log('a viewer gives the token once; there is no encryption, see docs/bridge.md')
+        output.log('Ctrl-C ends it; the node is not touched')
+        serve(page, [page_socket], deltas=deltas)
+    return 0
+
+
+@contextlib.contextmanager
+def _source(
+    options: argparse.Namespace, ship: Ship | None, past: list[PastRun]
+) -> Iterator[Source]:
+    """Yield what feeds the page, and end it."""
+    if options.bags:
+        runs = open_runs(options.bags, remap=dict(options.remap))
+        bags = BagSource(runs, ship=ship, speed=options.speed, past=past)
+        try:
+            yield bags
+        finally:
+            bags.close()
+        return
+    try:
+        from shipdrag_ros.node.spectator import Spectator
+    except ModuleNotFoundError as error:
+        raise no_ros(error) from error
+    node = NodeSource(ship)
+    for each in past:
+        node.hear(each)
+    with Spectator(node.hear, node=options.node):
+        yield node
+
+
+def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:
+    """Yield the coastdowns of a folder; what gave none is told."""
+    for found in recorded_runs(folder):
+        if isinstance(found, str):
+            notes.append(found)
+        else:
+            yield found
+
+
+def _token(address: str, file: Path | None) -> str | None:
+    try:
+        alone = ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        raise ShipdragError(
+            f'--listen {address!r}: expected an address such as 192.168.1.5, or 0.0.0.0 for all'
+        ) from None
+    if file is None and not alone:
+        raise ShipdragError(
+            f'--listen {address} lets others in: give --token-file FILE with a text of at least '
+            f'{SHORTEST_TOKEN} characters that they must know'
+        )
+    if file is None:
+        return None
+    about = os.stat(file)
+    if not stat.S_ISREG(about.st_mode):
+        raise ShipdragError(f'--token-file {str(file)!r}: is no regular file')
+    if about.st_mode & stat.S_IRWXO:
+        raise ShipdragError(
+            f'--token-file {str(file)!r}: every user of this machine may read it; chmod 600 it'
+        )
+    with file.open('rb') as stream:
+        token = stream.read(1000).decode(errors='replace').strip()
+    if len(token) < SHORTEST_TOKEN or not token.isprintable():
+        raise ShipdragError(
+            f'--token-file {str(file)!r}: expected one line of at least {SHORTEST_TOKEN} '
+            'characters, for instance of `openssl rand -hex 16`'
+        )
+    return token
+
+
+def _port(text: str) -> int:
+    value = int(text) if text.isdecimal() else -1
+    if not 0 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f'{text!r}, expected a port, 0 to 65535')
+    return value

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A log that is off by the ratio of two units is asked about them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
+
+_RATIOS = {
+    3600.0 / 1852.0: 'knots over m/s',
+    1852.0 / 3600.0: 'm/s over knots',
+    3.6: 'km/h over m/s',
+    1.0 / 3.6: 'm/s over km/h',
+    1.852: 'km/h over knots',
+    1.0 / 1.852: 'knots over km/h',
+}
+_NEAR = 0.03  # relative
+
+
+def asked(ratio: float) -> str:
+    """
+    Ask about units where log over ground is a ratio of two; else return ''.
+
+    Parameters
+    ----------
+    ratio
+        Of the log over the speed over ground.
+
+    Returns
+    -------
+    str
+        For the reader.
+    """
+    if not ratio > 0.0:
+        return ''
+    near = min(_RATIOS, key=lambda each: abs(np.log(ratio / each)))
+    if abs(ratio / near - 1.0) > _NEAR:
+        return ''
+    return (
+        f'the log reads {ratio:.2f} times the way over ground, which is {_RATIOS[near]}: is the '
+        'unit of one of them wrong? Import it again with its unit, as in '
+        '--map speed_through_water=COLUMN:kn'
+    )
+
+
+def ratio_before_the_stop(seen: Observation) -> float:
+    """
+    Return log over ground in the steady record; NaN without both.
+
+    Parameters
+    ----------
+    seen
+        A run.
+    """
+    rows = seen.along.rows
+    steady = rows.time_s < seen.lead_in_s
+    of_log = rows.value[steady & (rows.kind == LOG)]
+    ground = rows.value[steady & (rows.kind == OVER_GROUND)]
+    if not len(ground):
+        placed = steady & (rows.kind == POSITION)
+        ground = np.diff(rows.value[placed]) / np.diff(rows.time_s[placed])
+    if not len(of_log) or not len(ground) or not np.median(ground) > 0.0:
+        return float('nan')
+    return float(np.median(of_log) / np.median(ground))

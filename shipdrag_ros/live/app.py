@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Routes of the page: itself, its stream, the player's buttons, Signal K."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import (
+    FileResponse,
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from shipdrag_ros import __version__
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.live import signal_k
+from shipdrag_ros.live.frames import Frames
+from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
+from shipdrag_ros.live.source import Source
+
+PAGE = Path(__file__).parent / 'page'
+TICK_S = 0.1
+LARGEST_BODY = 10_000
+_WRONG_TOKEN_S = 1.0  # an answer to a wrong token waits so long
+_KEEP_S = 30 * 86400
+
+
+class LivePage:
+    """
+    The page over a source.
+
+    Parameters
+    ----------
+    source
+        Looked at ten times a second.
+    token
+        What a viewer must know; None: nothing.
+    notes
+        Lines about how the page was started, shown below it.
+
+    Attributes
+    ----------
+    app
+        For an ASGI server.
+    frames
+    """
+
+    def __init__(
+        self, source: Source, *, token: str | None = None, notes: tuple[str, ...] = ()
+    ) -> None:
+        self.frames = Frames(lambda: source.bridge.trace.rows())
+        self._source = source
+        self._token = token
+        self._started = {'version': __version__, 'notes': list(notes)}
+        self.app: ASGIApp = Guard(self._routes(), token=token)
+
+    def _routes(self) -> Starlette:
+        return Starlette(
+            routes=[
+                Route('/', self._page),
+                Route('/login', self._login, methods=['GET', 'POST']),
+                Route('/stream', _Stream(self._stream)),
+                Route('/player', self._control, methods=['POST']),
+                Route('/signalk', self._signal_k),
+                Route('/signalk/v1/deltas', self._deltas),
+                Route('/state.json', self._state),
+                Mount('/', StaticFiles(directory=PAGE)),
+            ],
+            lifespan=self._lifespan,
+        )
+
+    def tick(self) -> None:
+        """
+        Look at the source and make a frame.
+        """
+        now_s = time.monotonic()
+        jumped = self._source.advance(now_s)
+        bridge = self._source.bridge
+        rows = bridge.trace.closed()
+        parts: dict[str, Any] = dict(bridge.parts(now_s))
+        parts['player'] = self._source.player()
+        parts['started'] = self._started
+        parts['clock'] = {'ship_s': bridge.now_ns // 10**9, 'machine_s': int(time.time())}
+        self.frames.add(parts, [list(row) for row in rows], anew=jumped)
+
+    @asynccontextmanager
+    async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        ticking = asyncio.create_task(self._tick_for_ever())
+        try:
+            yield
+        finally:
+            ticking.cancel()
+            with suppress(asyncio.CancelledError):
+                await ticking
+
+    async def _tick_for_ever(self) -> None:
+        due_s = time.monotonic()
+        while True:
+            self.tick()
+            due_s = max(due_s + TICK_S, time.monotonic())
+            await asyncio.sleep(due_s - time.monotonic())
+
+    # the page
+
+    async def _page(self, request: Request) -> Response:
+        return FileResponse(PAGE / 'index.html')
+
+    async def _login(self, request: Request) -> Response:
+        if self._token is None:
+            return RedirectResponse('/', 303)
+        if request.method == 'GET':
+            return FileResponse(PAGE / 'login.html')
+        form = parse_qs((await _body(request)).decode(errors='replace'))
+        if not same(form.get('token', [''])[0].strip(), self._token):
+            await asyncio.sleep(_WRONG_TOKEN_S)
+            return FileResponse(PAGE / 'login.html', status_code=403)
+        answer = RedirectResponse('/', 303)
+        answer.set_cookie(
+            COOKIE, pass_of(self._token), httponly=True, samesite='strict', max_age=_KEEP_S
+        )
+        return answer
+
+    async def _state(self, request: Request) -> Response:
+        """Everything at once, for a program."""
+        data = self.frames.whole().decode().partition('data: ')[2]
+        return Response(data.strip(), media_type='application/json')
+
+    async def _control(self, request: Request) -> Response:
+        try:
+            asked = json.loads(await _body(request))
+            self._source.control(str(asked['action']), float(asked.get('value', 0)))
+        except ShipdragError as error:
+            return PlainTextResponse(f'{error}\n', 400)
+        except (ValueError, KeyError, TypeError, AttributeError):
+            return PlainTextResponse('expected {"action": ..., "value": number}\n', 400)
+        return JSONResponse(self._source.player())
+
+    # streams
+
+    async def _stream(self, send: Callable[[bytes], Awaitable[None]]) -> None:
+        """Server-sent events, until the viewer goes."""
+        self.frames.viewers += 1
+        seen: int | None = None
+        try:
+            while True:
+                seen, data = self.frames.after(seen)
+                await send(data)
+                await self.frames.more(seen)
+        finally:
+            self.frames.viewers -= 1
+
+    async def _signal_k(self, request: Request) -> Response:
+        base = str(request.base_url).rstrip('/')
+        return JSONResponse(
+            {
+                'endpoints': {
+                    'v1': {'version': '1.7.0', 'shipdrag-deltas': f'{base}/signalk/v1/deltas'}
+                },
+                'server': {'id': 'shipdrag_ros', 'version': __version__},
+            }
+        )
+
+    async def _deltas(self, request: Request) -> Response:
+        found = signal_k.delta(self._source.bridge, time.monotonic())
+        return JSONResponse([signal_k.units(), *([] if found is None else [found])])
+
+    def delta(self) -> dict[str, Any] | None:
+        """
+        Return the latest figures as a Signal K delta.
+        """
+        return signal_k.delta(self._source.bridge, time.monotonic())
+
+
+class _Stream:
+    """
+    Server-sent events in plain ASGI: each frame goes out as it is, and a viewer who leaves or is
+    stuck ends here.
+    """
+
+    def __init__(
+        self, feed: Callable[[Callable[[bytes], Awaitable[None]]], Awaitable[None]]
+    ) -> None:
+        self._feed = feed
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        headers = [(b'content-type', b'text/event-stream'), (b'cache-control', b'no-store')]
+        await send({'type': 'http.response.start', 'status': 200, 'headers': headers})
+
+        async def body(data: bytes) -> None:
+            await send({'type': 'http.response.body', 'body': data, 'more_body': True})
+
+        async def feed() -> None:
+            await self._feed(body)
+
+        feeding = asyncio.create_task(feed())
+        leaving = asyncio.create_task(_left(receive))
+        try:
+            with suppress(asyncio.CancelledError):  # the process ends
+                await asyncio.wait({feeding, leaving}, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (feeding, leaving):
+                task.cancel()
+            await asyncio.gather(feeding, leaving, return_exceptions=True)
+
+
+async def _left(receive: Receive) -> None:
+    while (await receive())['type'] != 'http.disconnect':
+        pass
+
+
+async def _body(request: Request) -> bytes:
+    body = b''
+    async for piece in request.stream():
+        body += piece
+        if len(body) > LARGEST_BODY:
+            raise ValueError('too long')
+    return body

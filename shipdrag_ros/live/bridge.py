@@ -1,0 +1,396 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the bridge sees: all that was heard, as parts of a page.
+
+Plain figures in SI units; the page turns them into knots, kN and kW.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+import numpy as np
+
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.live import acceptance, verdicts
+from shipdrag_ros.live.earlier import PastRun
+from shipdrag_ros.live.headline import ENDED_S, GOAL, Ended, Situation, headline
+from shipdrag_ros.live.outlook import to_go_s
+from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
+from shipdrag_ros.live.trace import Trace
+from shipdrag_ros.live.verdicts import VerdictView
+from shipdrag_ros.messages import EventKind, MalformedMessage, read_event
+from shipdrag_ros.messages.heard import ERROR, Health, Heard, Output, Samples, ShipFile
+from shipdrag_ros.samples import Channel
+from shipdrag_ros.ship import Ship
+
+PAST_RUNS = 50  # that are listed
+_CLEAN_POINTS = 60
+_PAST_POINTS = 24
+_MESSAGES = 20
+_COURSE_S = 300
+
+Part = dict[str, Any] | list[Any] | None
+
+
+class Bridge:
+    """
+    All that was heard, by one thread.
+
+    Parameters
+    ----------
+    ship
+        Before the node names its own.
+    bag
+        Name of what is played; '' of a node that runs.
+    """
+
+    def __init__(self, ship: Ship | None = None, *, bag: str = '') -> None:
+        self._bag = bag
+        self.trace = Trace()
+        self.past: list[PastRun] = []
+        self._ship = ship
+        self._heard_s: float | None = None
+        self._health: Health | None = None
+        self._recent = acceptance.Recent()
+        self._courses: deque[tuple[int, float]] = deque()
+        self._course_at_stop: float | None = None
+        self._lead_at_stop: float | None = None
+        self._coast_ns: int | None = None
+        self._bands: list[tuple[float, float]] = []
+        self._speed: Figure | None = None
+        self._resistance: Figure | None = None
+        self._curve: Curve | None = None
+        self._verdict = VerdictView('', '')
+        self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
+        self._unread = 0
+
+    # heard
+
+    def hear(self, heard: Heard, now_s: float) -> None:
+        """
+        Take what was heard at a time [s, steady clock].
+        """
+        match heard:
+            case Samples(block):
+                self.trace.add(block)
+                self._recent.add(block)
+                self._note_course()
+            case Health():
+                self._heard_s = now_s
+                self._take_health(heard)
+            case Output(name, payload):
+                try:
+                    self._take_output(name, payload)
+                except (MalformedMessage, ValueError):
+                    self._unread += 1
+            case ShipFile(text):
+                try:
+                    self._ship = Ship.from_yaml(text, subject="the node's ship file")
+                except ShipdragError as error:
+                    self._notes.append((self._now_ns, str(error)))
+
+    def keep_alive(self, now_s: float) -> None:
+        """
+        Note that whoever tells is still there; a bag that is paused says nothing.
+        """
+        if self._heard_s is not None:
+            self._heard_s = now_s
+
+    def tell(self, view: VerdictView) -> None:
+        """
+        Take a verdict that no node told.
+        """
+        self._verdict = view
+
+    def add_past(self, run: PastRun) -> None:
+        """
+        Take a coastdown that has ended; one that is known already is not taken twice.
+        """
+        if all((run.start_ns, run.bag) != (known.start_ns, known.bag) for known in self.past):
+            self.past.append(run)
+            self.past.sort(key=lambda each: each.start_ns)
+
+    @property
+    def now_ns(self) -> int:
+        """The ship's time: the latest stamp, 0 before the first [ns]."""
+        return self._now_ns
+
+    @property
+    def speed_m_s(self) -> float | None:
+        """The ship's speed: estimated while she coasts, else as measured."""
+        row = self.trace.latest
+        if row is not None and (self._coast_ns is None or self._speed is None):
+            measured = [value for value in row[1:3] if value is not None]
+            if measured:
+                return measured[0]
+        return None if self._speed is None else self._speed.value
+
+    @property
+    def ship(self) -> Ship | None:
+        """The ship, if she is known."""
+        return self._ship
+
+    @property
+    def resistance(self) -> Figure | None:
+        """The latest r [m/s^2]."""
+        return self._resistance
+
+    def _note_course(self) -> None:
+        second, course = self._now_s, self._recent.direction(self._now_s)
+        if course is not None and (not self._courses or self._courses[-1][0] != second):
+            self._courses.append((second, course))
+            while self._courses[0][0] < second - _COURSE_S:
+                self._courses.popleft()
+
+    def _take_health(self, health: Health) -> None:
+        self._health = health
+        state = health.of('state')
+        since = None if state is None else state.number('coastdown since')
+        coasting = state is not None and state.values.get('monitor') == 'coastdown'
+        lead_s = None if state is None else state.number('steady lead')
+        if lead_s and not coasting:
+            self._lead_at_stop = lead_s
+        if coasting and self._coast_ns is None and since:
+            self._begin(int(since))  # heard from the middle on
+        elif not coasting:
+            self._coast_ns = None
+        found = health.of('diagnosis')
+        if found is not None:
+            self._verdict = verdicts.of_status(found)
+
+    def _take_output(self, name: str, payload: bytes) -> None:
+        if name == 'speed':
+            self._speed = read_speed(payload)
+            self.trace.add_estimate(self._speed.stamp_ns, self._speed.value)
+        elif name == 'resistance':
+            self._resistance = read_resistance(payload)
+        elif name == 'resistance_curve':
+            curve = read_curve(payload)
+            if curve is not None:
+                self._curve = curve
+                if self._coast_ns is not None and curve.stamp_ns > self._coast_ns:
+                    age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
+                    self._bands.append((age_s, curve.band))
+        elif name == 'events':
+            self._take_event(payload)
+
+    def _take_event(self, payload: bytes) -> None:
+        note = read_event(payload)
+        self._notes.append((note.stamp_ns, note.text))
+        if note.kind is EventKind.ONSET:
+            self._begin(int(note.values['start_ns']))
+        elif note.kind is EventKind.COASTDOWN:
+            self.add_past(PastRun.of(note, self._curve, bag=self._bag))
+            self._coast_ns = None
+        elif note.kind is EventKind.RESET:
+            self._coast_ns = None
+
+    def _begin(self, start_ns: int) -> None:
+        self._coast_ns, self._bands = start_ns, []
+        self._curve = self._resistance = self._speed = None
+        before = [course for second, course in self._courses if second * 10**9 <= start_ns]
+        self._course_at_stop = before[-1] if before else self._recent.direction(self._now_s)
+
+    # shown
+
+    @property
+    def _now_s(self) -> int:
+        return self.trace.newest_s
+
+    @property
+    def _now_ns(self) -> int:
+        return self.trace.newest_s * 1_000_000_000
+
+    def parts(self, now_s: float) -> dict[str, Part]:
+        """
+        Return every part of the page but the traces.
+
+        Parameters
+        ----------
+        now_s
+            On the clock of `hear`.
+        """
+        now = self._situation(now_s)
+        said = headline(now)
+        return {
+            'headline': {'tone': said.tone.value, 'text': said.text, 'action': said.action},
+            'ship': self._ship_part(),
+            'figures': self._figures(),
+            'curve': _curve_part(self._curve),
+            'inputs': self._inputs(),
+            'checks': self._checks(now),
+            'verdict': self._verdict_part(),
+            'past': [self._past_part(run) for run in self.past[-PAST_RUNS:]],
+            'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
+        }
+
+    def _situation(self, now_s: float) -> Situation:
+        state = None if self._health is None else self._health.of('state')
+        values = {} if state is None else state.values
+        coast_s = None
+        if self._coast_ns is not None and self._now_s:
+            coast_s = max(self._now_s - self._coast_ns * 1e-9, 0.0)
+        trouble = ''
+        if state is not None and state.level >= ERROR and values.get('monitor') != 'coastdown':
+            trouble = state.message
+        lead_s = None if state is None else state.number('steady lead')
+        return Situation(
+            silent_s=None if self._heard_s is None else now_s - self._heard_s,
+            lifecycle=values.get('lifecycle', ''),
+            monitor=values.get('monitor', ''),
+            trouble=trouble,
+            lead_s=lead_s,
+            lead_full_s=None if state is None else state.number('steady lead used at most'),
+            coast_s=coast_s,
+            band=self._bands[-1][1] if self._bands else None,
+            to_go_s=to_go_s(self._bands, GOAL),
+            ended=self._ended(),
+            steer_deg=self._steer_deg(),
+            paired=self._is_paired,
+        )
+
+    def _ended(self) -> Ended | None:
+        own = [run for run in self.past if run.bag == self._bag]
+        if not own or not self._now_s:
+            return None
+        last = own[-1]
+        return Ended(
+            by=last.ended_by,
+            ago_s=self._now_s - last.end_ns * 1e-9,
+            band=None if last.curve is None else last.curve.band,
+            why_not=last.why_not,
+        )
+
+    @property
+    def _is_paired(self) -> bool:
+        return bool(self.past) and any(self.past[-1].is_paired_with(run) for run in self.past)
+
+    def _steer_deg(self) -> float | None:
+        if not self.past or self._is_paired or self.past[-1].curve is None:
+            return None
+        if self._now_s - self.past[-1].end_ns * 1e-9 > 12 * 3600.0:
+            return None  # another day, another current
+        return self.past[-1].reciprocal_deg
+
+    def _ship_part(self) -> Part:
+        ship = self._ship
+        if ship is None:
+            return None
+        part: dict[str, Any] = {'name': ship.name, 'mass_kg': ship.mass_kg, 'clean': None}
+        if ship.baseline is not None:
+            low, high = ship.baseline_range_m_s
+            speed = np.linspace(max(low, 0.02 * high), high, _CLEAN_POINTS)
+            part['clean'] = {
+                'speed_m_s': _rounded(speed),
+                'resistance_n': _rounded(ship.resistance_n(speed)),
+            }
+        return part
+
+    def _figures(self) -> Part:
+        figures: dict[str, Any] = {'speed_m_s': self.speed_m_s}
+        if self._resistance is not None:
+            figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
+        if self._curve is not None:
+            at = self._curve.usual_m_s
+            r, sigma = self._curve.at(at)
+            figures['usual'] = {'speed_m_s': at, 'r': r, 'r_sigma': sigma, **self._over(at, r)}
+        return figures
+
+    def _over(self, speed_m_s: float, r: float) -> dict[str, float]:
+        """Return r over the clean hull at a speed, where that is known."""
+        ship = self._ship
+        if ship is None or ship.baseline is None:
+            return {}
+        low, high = ship.baseline_range_m_s
+        if not low < speed_m_s <= high:
+            return {}
+        return {'over_clean': r * ship.mass_kg / float(ship.resistance_n(speed_m_s)) - 1.0}
+
+    def _inputs(self) -> Part:
+        if self._health is None:
+            return []
+        told = [status for status in self._health.statuses if status.input]
+        told += [status for status in self._health.statuses if status.part == 'recording']
+        rows = []
+        for status in told:
+            rejected = {
+                key.removeprefix('rejected '): int(float(text))
+                for key, text in status.values.items()
+                if key.startswith('rejected ') and text.replace('.', '', 1).isdigit()
+            }
+            rows.append(
+                {
+                    'name': status.part.removeprefix('input ').replace('_', ' '),
+                    'level': status.level,
+                    'text': status.message,
+                    'rate_hz': status.number('rate'),
+                    'age_s': status.number('age'),
+                    'rejected': {name: count for name, count in rejected.items() if count},
+                }
+            )
+        return rows
+
+    def _checks(self, now: Situation) -> Part:
+        second, coasting = self._now_s, now.coast_s is not None
+        of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
+        course = self._recent.direction(second)
+        before = self._course_at_stop if coasting else None
+        if before is None and self._courses:
+            before = self._courses[0][1]
+        turned = None if course is None or before is None else course - before
+        depth = self._recent.mean(Channel.DEPTH, second)
+        rudder = self._recent.mean(Channel.RUDDER, second)
+        checks = [
+            acceptance.lead_check(self._lead_at_stop if of_run else now.lead_s, now.lead_full_s),
+            acceptance.wind_check(
+                self._recent.mean(Channel.WIND_APPARENT, second), self.speed_m_s
+            ),
+            acceptance.depth_check(depth and depth[0], self.speed_m_s, self._ship),
+            acceptance.rudder_check(rudder and rudder[0]),
+            acceptance.course_check(turned, coasting=coasting),
+            acceptance.reciprocal_check(now.steer_deg, paired=self._is_paired),
+        ]
+        return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]
+
+    def _verdict_part(self) -> Part:
+        view = self._verdict
+        return {
+            'state': view.state,
+            'sentence': view.sentence,
+            'sizes': [list(each) for each in view.sizes],
+            'probabilities': [list(each) for each in view.probabilities],
+            'decide': list(view.decide),
+        }
+
+    def _past_part(self, run: PastRun) -> Part:
+        part: dict[str, Any] = {
+            'start_s': run.start_ns // 1_000_000_000,
+            'length_s': (run.end_ns - run.start_ns) * 1e-9,
+            'heading_deg': run.compass_deg,
+            'ended_by': run.ended_by,
+            'why_not': run.why_not,
+            'bag': run.bag,
+        }
+        if run.curve is not None:
+            at = run.curve.usual_m_s
+            r, sigma = run.curve.at(at)
+            part |= {'speed_m_s': at, 'r': r, 'r_sigma': sigma, **self._over(at, r)}
+            part['curve'] = _curve_part(run.curve, points=_PAST_POINTS)
+        return part
+
+
+def _curve_part(curve: Curve | None, *, points: int = 60) -> Part:
+    if curve is None:
+        return None
+    speed = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], points)
+    return {
+        'speed_m_s': _rounded(speed),
+        'r': _rounded(np.interp(speed, curve.speed_m_s, curve.resistance_m_s2)),
+        'r_sigma': _rounded(np.interp(speed, curve.speed_m_s, curve.sigma_m_s2)),
+    }
+
+
+def _rounded(values: Any) -> list[float]:
+    return [float(f'{value:.5g}') for value in np.asarray(values).tolist()]

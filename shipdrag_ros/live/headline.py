@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What stands in large letters: the state, and what to do now."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from shipdrag_ros.coastdown.events import EndedBy
+
+READY_S = 600.0  # of steady sailing from which the noise is known well enough
+GOAL = 0.05  # two standard deviations over r that a run is worth
+ENDED_S = 600.0  # a run that has ended is the headline for so long
+SILENT_S = 5.0  # the node speaks every second
+
+_ENDED = {
+    EndedBy.SPEED: 'COASTDOWN COMPLETE',
+    EndedBy.TURN: 'TURNED: this run ends here',
+    EndedBy.ENGINE: 'ENGINE AHEAD: this run ends here',
+    EndedBy.BRAKE: 'BRAKED: this run ends here',
+    EndedBy.ASTERN: 'ASTERN: this run ends here',
+    EndedBy.DATA_STOP: 'SPEED LOST: this run ends here',
+    EndedBy.SILENCE: 'ALL INPUTS SILENT: this run ends here',
+    EndedBy.RESET: 'RESET: this run is lost',
+    EndedBy.RECORD_END: 'RECORD ENDS: this run ends here',
+}
+
+
+class Tone(StrEnum):
+    """How urgent; the page has a sign and a word for each, beside a colour."""
+
+    GOOD = 'good'
+    ACT = 'act'
+    WATCH = 'watch'
+    BAD = 'bad'
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The state in large letters, and the next action."""
+
+    tone: Tone
+    text: str
+    action: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ended:
+    """
+    A coastdown that has ended.
+
+    Attributes
+    ----------
+    by
+        As the event names it.
+    ago_s
+    band
+        Two standard deviations over r at the usual speed; None without an estimate.
+    why_not
+        Why there is no estimate.
+    """
+
+    by: str
+    ago_s: float
+    band: float | None
+    why_not: str = ''
+
+
+@dataclass(frozen=True, kw_only=True)
+class Situation:
+    """
+    Where the ship and the node stand.
+
+    Attributes
+    ----------
+    silent_s
+        Since the node was last heard; None: never.
+    lifecycle, monitor
+        States as the node names them.
+    trouble
+        What keeps the node from estimating; '' for nothing.
+    lead_s, lead_full_s
+        Steady sailing so far, and the longest that is used; None where it is not told.
+    coast_s
+        Since the stop; None without a coastdown.
+    band
+        Two standard deviations over r at the usual speed, so far.
+    to_go_s
+        Until `band` is `GOAL`; None where it cannot be foreseen.
+    ended
+        The last coastdown, None before the first.
+    steer_deg
+        Compass heading of the reciprocal run that is still to be made.
+    paired
+        Whether the last run has its reciprocal.
+    """
+
+    silent_s: float | None = None
+    lifecycle: str = ''
+    monitor: str = ''
+    trouble: str = ''
+    lead_s: float | None = None
+    lead_full_s: float | None = None
+    coast_s: float | None = None
+    band: float | None = None
+    to_go_s: float | None = None
+    ended: Ended | None = None
+    steer_deg: float | None = None
+    paired: bool = False
+
+
+def headline(now: Situation) -> Headline:
+    """
+    Say where things stand and what to do.
+    """
+    if now.silent_s is None:
+        return Headline(
+            Tone.BAD,
+            'NO NODE HEARD',
+            'Start it: shipdrag node --ship FILE --out DIR. If it runs: same machine, same '
+            'ROS_DOMAIN_ID?',
+        )
+    if now.silent_s > SILENT_S:
+        return Headline(
+            Tone.BAD,
+            f'NODE SILENT for {clock(now.silent_s)}',
+            'Figures below are old. Is the node still running? It is taken up again by itself.',
+        )
+    if now.lifecycle != 'active':
+        return Headline(
+            Tone.BAD, f'NODE {now.lifecycle.upper()}', 'It estimates nothing until it is active.'
+        )
+    if now.monitor == 'coastdown' and now.coast_s is not None:
+        return _coasting(now)
+    if now.trouble:
+        return Headline(Tone.BAD, 'NO SPEED HEARD', _sentence(now.trouble))
+    if now.monitor == 'candidate':
+        return Headline(
+            Tone.ACT,
+            'SLOWING: coastdown?',
+            'If the engine is stopped: leave it, rudder amidships. The answer takes two minutes.',
+        )
+    if now.ended is not None and now.ended.ago_s < ENDED_S:
+        return _ended(now, now.ended)
+    return _before(now)
+
+
+def clock(seconds: float) -> str:
+    """
+    Return a length of time as minutes and seconds.
+
+    Examples
+    --------
+    >>> clock(400.0)
+    '6:40'
+    """
+    whole = max(int(seconds), 0)
+    if whole >= 3600:
+        return f'{whole // 3600}:{whole // 60 % 60:02d}:{whole % 60:02d}'
+    return f'{whole // 60}:{whole % 60:02d}'
+
+
+def _coasting(now: Situation) -> Headline:
+    assert now.coast_s is not None
+    text = f'COASTDOWN {clock(now.coast_s)}'
+    hold = 'Hold the rudder'
+    if now.band is None or not math.isfinite(now.band):
+        return Headline(Tone.ACT, text, f'{hold}. The first figures come within minutes.')
+    text += f', ±{percent(now.band)}'
+    if now.band <= GOAL:
+        return Headline(
+            Tone.GOOD, text, f'Good enough (±{percent(GOAL)}). {hold}: longer is better.'
+        )
+    if now.to_go_s is None:
+        return Headline(Tone.ACT, text, f'{hold}. Longer is better.')
+    more = max(1, math.ceil(now.to_go_s / 60.0))
+    minutes = 'minute' if more == 1 else 'minutes'
+    return Headline(Tone.ACT, text, f'{hold}: {more} more {minutes} to ±{percent(GOAL)}.')
+
+
+def _ended(now: Situation, ended: Ended) -> Headline:
+    try:
+        text = _ENDED[EndedBy(ended.by)]
+    except (KeyError, ValueError):
+        text = f'RUN ENDED: {ended.by}'
+    if ended.band is None:
+        why = ended.why_not or 'no estimate was possible'
+        return Headline(Tone.BAD, 'RUN NOT USABLE', f'{_sentence(why)} {_then(now)}')
+    tone = Tone.GOOD if ended.band <= 2.0 * GOAL else Tone.WATCH
+    return Headline(tone, f'{text} (±{percent(ended.band)})', _then(now))
+
+
+def _then(now: Situation) -> str:
+    if now.paired:
+        return 'Both runs of the pair are made. The engine may be started.'
+    if now.steer_deg is None:
+        return 'Sail on steadily.'
+    full = 1800.0 if now.lead_full_s is None else now.lead_full_s
+    return (
+        f'Now the reciprocal: steer {heading(now.steer_deg)}, then {full / 60.0:.0f} min steady.'
+    )
+
+
+def _before(now: Situation) -> Headline:
+    hold = 'Hold course and revolutions.'
+    if now.steer_deg is not None:
+        hold = f'Hold {heading(now.steer_deg)} (reciprocal) and revolutions.'
+    if now.lead_s is None or now.lead_full_s is None:
+        return Headline(Tone.WATCH, 'STEADY' if now.monitor == 'steady' else 'WAITING', hold)
+    if now.monitor != 'steady' or now.lead_s <= 0.0:
+        return Headline(Tone.WATCH, 'NOT STEADY YET', hold)
+    ready_s = min(READY_S, now.lead_full_s)
+    text = f'STEADY {now.lead_s / 60.0:.0f} of {now.lead_full_s / 60.0:.0f} min'
+    if now.lead_s < ready_s:
+        more = math.ceil((ready_s - now.lead_s) / 60.0)
+        return Headline(Tone.WATCH, text, f'{hold} Ready in {more} min.')
+    action = 'The engine may be stopped, if the master decides so. Until then hold course.'
+    return Headline(Tone.GOOD, f'{text}: record ready', action)
+
+
+def percent(share: float) -> str:
+    """
+    Return a share in percent, one digit below 3 %.
+    """
+    value = 100.0 * share
+    return f'{value:.1f} %' if value < 2.95 else f'{value:.0f} %'
+
+
+def heading(degrees: float) -> str:
+    """
+    Return a compass heading in three digits.
+    """
+    return f'{round(degrees) % 360:03d}'
+
+
+def _sentence(text: str) -> str:
+    text = text.strip()
+    return f'{text[:1].upper()}{text[1:]}' + ('' if text.endswith('.') else '.')

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node's outputs, read back from their bytes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.messages import MalformedMessage, types
+from shipdrag_ros.messages.reporting import CURVE_FIELDS
+from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE, SPEED
+from shipdrag_ros.samples import Float64
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure with its standard deviation, at a stamp [ns]."""
+
+    stamp_ns: int
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Curve:
+    """
+    r(v) with its standard deviation, speeds ascending.
+
+    Attributes
+    ----------
+    stamp_ns
+    speed_m_s, resistance_m_s2, sigma_m_s2 : (n,)
+    """
+
+    stamp_ns: int
+    speed_m_s: Float64
+    resistance_m_s2: Float64
+    sigma_m_s2: Float64
+
+    def at(self, speed_m_s: float) -> tuple[float, float]:
+        """
+        Return r and its standard deviation [m/s^2] at a speed inside the curve.
+        """
+        r = np.interp(speed_m_s, self.speed_m_s, self.resistance_m_s2)
+        return float(r), float(np.interp(speed_m_s, self.speed_m_s, self.sigma_m_s2))
+
+    @property
+    def usual_m_s(self) -> float:
+        """Three quarters of the highest speed; where the curve ends above it, its lowest."""
+        return max(0.75 * float(self.speed_m_s[-1]), float(self.speed_m_s[0]))
+
+    @property
+    def band(self) -> float:
+        """Two standard deviations over r, at the usual speed."""
+        r, sigma = self.at(self.usual_m_s)
+        return 2.0 * sigma / r if r > 0.0 else math.inf
+
+
+def read_speed(payload: bytes) -> Figure:
+    """
+    Read `~/speed` [m/s].
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    message = types.deserialize(SPEED.type, payload)
+    variance = float(message.twist.covariance[0])
+    return _figure(message, float(message.twist.twist.linear.x), variance)
+
+
+def read_resistance(payload: bytes) -> Figure:
+    """
+    Read `~/resistance` [m/s^2].
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    message = types.deserialize(RESISTANCE.type, payload)
+    variance = float(message.accel.covariance[0])
+    return _figure(message, float(message.accel.accel.linear.x), variance)
+
+
+def read_curve(payload: bytes) -> Curve | None:
+    """
+    Read `~/resistance_curve`; None where it has too few points to be drawn.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    message = types.deserialize(RESISTANCE_CURVE.type, payload)
+    names = tuple(field.name for field in message.fields)
+    if names != CURVE_FIELDS or message.is_bigendian:
+        raise MalformedMessage(f'fields {", ".join(names)}, expected {", ".join(CURVE_FIELDS)}')
+    try:
+        points = np.frombuffer(message.data.tobytes(), '<f8').reshape(-1, len(CURVE_FIELDS))
+    except ValueError as error:
+        raise MalformedMessage(f'not whole points: {error}') from error
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) < 2:
+        return None
+    return Curve(types.stamp_ns(message), points[:, 0], points[:, 1], points[:, 2])
+
+
+def _figure(message: object, value: float, variance: float) -> Figure:
+    return Figure(types.stamp_ns(message), value, math.sqrt(max(variance, 0.0)))

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// The three charts. Lines differ by dash and width, not by colour alone.
+
+/* global uPlot */
+
+const POINTS = 120;
+
+const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+/** Values of a curve at the places x; null outside of it. */
+export function at(x, xs, ys) {
+  let i = 0;
+  return x.map(v => {
+    if (!xs.length || v < xs[0] || v > xs[xs.length - 1]) return null;
+    while (i < xs.length - 2 && xs[i + 1] < v) i += 1;
+    if (xs.length < 2) return ys[0];
+    return ys[i] + (ys[i + 1] - ys[i]) * (v - xs[i]) / (xs[i + 1] - xs[i]);
+  });
+}
+
+function axis(label, size) {
+  return { label, size, labelSize: 22, stroke: ink('--ink'), font: '13px sans-serif', labelFont: '13px sans-serif',
+    grid: { stroke: ink('--line'), width: 1 }, ticks: { stroke: ink('--line') } };
+}
+
+const SVG = 'http://www.w3.org/2000/svg';
+
+/** A piece of a line as it is drawn, for the legend. */
+function sample({ stroke, width, dash = [] }) {
+  const svg = document.createElementNS(SVG, 'svg');
+  const line = document.createElementNS(SVG, 'line');
+  const attributes = { x1: 0, x2: 36, y1: 6, y2: 6, stroke, 'stroke-width': width, 'stroke-dasharray': dash.join(' ') };
+  for (const [name, value] of Object.entries({ width: 36, height: 12, 'aria-hidden': 'true' })) svg.setAttribute(name, value);
+  for (const [name, value] of Object.entries(attributes)) line.setAttribute(name, value);
+  svg.append(line);
+  return svg;
+}
+
+/** A chart that fills its box, made anew where labels or colours change; the legend reads off the place pointed at. */
+export class Chart {
+  constructor(box) {
+    this.box = box;
+    this.legend = document.createElement('p');
+    this.legend.className = 'legend';
+    box.after(this.legend);
+    this.plot = null;
+    this.key = '';
+    new ResizeObserver(() => this.plot?.setSize(this.size())).observe(box);
+  }
+
+  size() {
+    return { width: Math.max(this.box.clientWidth, 100), height: Math.max(this.box.clientHeight, 80) };
+  }
+
+  draw(key, options, data) {
+    const whole = `${key} ${document.documentElement.dataset.mode}`;
+    if (this.plot && this.key === whole) { this.plot.setData(data); return; }
+    this.clear();
+    this.key = whole;
+    const made = options();
+    this.plot = new uPlot({ ...this.size(), legend: { show: false }, cursor: { drag: { x: false, y: false } }, hooks: { setCursor: [u => this.read(u)] }, ...made }, data, this.box);
+    this.values = made.series.map(({ label, legend = true, ...look }) => {
+      const value = document.createElement('b');
+      if (legend) {
+        const item = document.createElement('span');
+        item.append(...(look.stroke ? [sample(look)] : []), ` ${label} `, value);
+        item.hidden = !look.stroke;
+        this.legend.append(item);
+      }
+      return value;
+    });
+  }
+
+  read(u) {
+    this.values?.forEach((value, i) => {
+      const at = u.cursor.idx;
+      const shown = at == null || u.data[i][at] == null ? '' : u.series[i].value(u, u.data[i][at]);
+      value.textContent = shown;
+      if (i === 0 && value.parentElement) value.parentElement.hidden = shown === '';
+    });
+  }
+
+  clear() {
+    this.plot?.destroy();
+    this.plot = null;
+    this.values = null;
+    this.legend.replaceChildren();
+  }
+}
+
+/** r(v) with its band, over the clean hull and over what was found earlier. */
+export function drawCurve(chart, { curve, clean, past, units, mass }) {
+  const lines = [];
+  const force = r => units.toForce(r, mass);
+  if (clean) lines.push({ x: clean.speed_m_s, y: clean.resistance_n.map(n => force(n / mass)), name: 'clean hull' });
+  for (const run of past) lines.push({ x: run.curve.speed_m_s, y: run.curve.r.map(force), name: run.name });
+  if (!lines.length && !curve) { chart.clear(); return; }
+  const spans = [...past.map(run => run.curve), ...(curve ? [curve] : [])].map(c => c.speed_m_s);
+  const speeds = (spans.length ? spans : lines.map(line => line.x)).flat();
+  const high = Math.max(...speeds) * 1.05;
+  const low = Math.max(0, Math.min(...speeds) * 0.9);
+  const x = Array.from({ length: POINTS }, (_, i) => low + (high - low) * i / (POINTS - 1));
+  const data = [x.map(units.toSpeed)];
+  const band = s => (curve ? at(x, curve.speed_m_s, curve.r.map((r, i) => force(Math.max(r + s * curve.r_sigma[i], 0)))) : x.map(() => null));
+  data.push(band(2), band(-2), band(0));
+  for (const line of lines) data.push(at(x, line.x, line.y));
+  const key = `${units.name} ${lines.map(line => line.name).join()}`;
+  const shown = (_, v) => (v == null ? '–' : v.toFixed(units.force === 'kN' ? (v < 10 ? 2 : 0) : 5));
+  chart.draw(key, () => ({
+    scales: { x: { time: false }, y: { range: (_, min, max) => [0, (max || 1) * 1.05] } },
+    axes: [axis(`speed through water [${units.speed}]`, 34), axis(`resistance [${units.force}]`, 58)],
+    bands: [{ series: [1, 2], fill: ink('--band') }],
+    series: [
+      { label: units.speed === 'kn' ? 'at kn' : 'at m/s', value: (_, v) => (v == null ? '–' : v.toFixed(1)) },
+      { label: 'band', stroke: ink('--accent'), width: 0.5, value: shown, legend: false },
+      { label: 'low', stroke: ink('--accent'), width: 0.5, value: shown, legend: false },
+      { label: 'this run (shaded: band)', stroke: ink('--accent'), width: 3, value: shown },
+      ...lines.map(line => (line.name === 'clean hull'
+        ? { label: line.name, stroke: ink('--ink'), width: 2, dash: [10, 5], value: shown }
+        : { label: line.name, stroke: ink('--second'), width: 1.5, dash: [2, 4], value: shown })),
+    ],
+  }), data);
+}
+
+function timeAxis(offset) {
+  return { ...axis('', 32), labelSize: 0, values: (u, ticks) => ticks.map(t => new Date((t + offset * 3600) * 1000).toISOString().slice(11, 16)) };
+}
+
+/** Speeds over time; rows are [second, log, ground, estimate, shaft]. */
+export function drawSpeeds(chart, rows, span, units, offset) {
+  const cut = since(rows, span);
+  const speed = column => cut.map(row => (row[column] == null ? null : units.toSpeed(row[column])));
+  chart.draw(`${units.name} ${offset}`, () => ({
+    scales: { x: { time: true }, y: { range: (_, min, max) => (min == null ? [0, 1] : pad(min, max)) } },
+    axes: [timeAxis(offset), axis(`speed [${units.speed}]`, 58)],
+    series: [
+      { label: 'time', value: (_, v) => (v == null ? '–' : new Date((v + offset * 3600) * 1000).toISOString().slice(11, 19)) },
+      { label: 'log', stroke: ink('--accent'), width: 2, points: { show: false } },
+      { label: 'over ground', stroke: ink('--second'), width: 1.5, dash: [6, 4], points: { show: false } },
+      { label: 'estimate', stroke: ink('--third'), width: 3, dash: [2, 3], spanGaps: true, points: { show: false } },
+    ].map(each => (each.stroke ? { ...each, value: (_, v) => (v == null ? '–' : v.toFixed(2)) } : each)),
+  }), [cut.map(row => row[0]), speed(1), speed(2), speed(3)]);
+}
+
+export function drawShafts(chart, rows, span, offset) {
+  const cut = since(rows, span);
+  const rpm = cut.map(row => (row[4] == null ? null : row[4] * 60 / (2 * Math.PI)));
+  chart.draw(`${offset}`, () => ({
+    scales: { x: { time: true }, y: { range: (_, min, max) => (min == null ? [0, 1] : pad(Math.min(min, 0), max)) } },
+    axes: [timeAxis(offset), axis('shaft [rpm]', 58)],
+    series: [
+      { label: 'time', value: (_, v) => (v == null ? '–' : new Date((v + offset * 3600) * 1000).toISOString().slice(11, 19)) },
+      { label: 'rpm', stroke: ink('--accent'), width: 2, points: { show: false }, value: (_, v) => (v == null ? '–' : v.toFixed(0)) },
+    ],
+  }), [cut.map(row => row[0]), rpm]);
+}
+
+function pad(min, max) {
+  const more = Math.max((max - min) * 0.08, 0.2);
+  return [Math.max(min - more, Math.min(min, 0)), max + more];
+}
+
+function since(rows, span) {
+  if (!rows.length) return rows;
+  const first = rows[rows.length - 1][0] - span;
+  let i = rows.length;
+  while (i > 0 && rows[i - 1][0] >= first) i -= 1;
+  return i ? rows.slice(i) : rows;
+}

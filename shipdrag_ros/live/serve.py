@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The process of the page: a socket, a server, an orderly end."""
+
+from __future__ import annotations
+
+import asyncio
+import resource
+import signal
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import uvicorn
+
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.live.app import LivePage
+from shipdrag_ros.live.guard import Connection
+from shipdrag_ros.live.signal_k_stream import serve_deltas
+
+_FILES = 4096
+_BACKLOG = 4096
+_GOODBYE_S = 0  # a stream has no end to wait for
+_LOOK_S = 0.05
+
+
+def listen(address: str, port: int) -> socket.socket:
+    """
+    Return a socket that listens.
+
+    Raises
+    ------
+    ShipdragError
+        If the address or the port cannot be had.
+    """
+    family = socket.AF_INET6 if ':' in address else socket.AF_INET
+    found = socket.socket(family, socket.SOCK_STREAM)
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        found.bind((address, port))
+        found.listen(_BACKLOG)
+    except OSError as error:
+        found.close()
+        raise ShipdragError(
+            f'{address} port {port} cannot be listened on: {error.strerror}; choose another with '
+            '--port, or end what uses it'
+        ) from error
+    return found
+
+
+class _Server(uvicorn.Server):
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """End on SIGINT and SIGTERM, and return to whoever called."""
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+        kinds = (signal.SIGINT, signal.SIGTERM)
+        before = {kind: signal.signal(kind, self.handle_exit) for kind in kinds}
+        try:
+            yield
+        finally:
+            for kind, handler in before.items():
+                signal.signal(kind, handler)
+
+
+def serve(
+    page: LivePage,
+    sockets: list[socket.socket],
+    *,
+    deltas: socket.socket | None = None,
+    until: threading.Event | None = None,
+) -> None:
+    """
+    Serve until a signal.
+
+    Parameters
+    ----------
+    sockets
+        That listen, for the page.
+    deltas
+        The same for Signal K; None for none.
+    until
+        Ends it too, for a caller in another thread.
+    """
+    _allow_files()
+    config = uvicorn.Config(
+        page.app,
+        http=Connection,
+        ws='none',
+        log_level='critical',
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=_GOODBYE_S,
+        timeout_keep_alive=5,
+    )
+    server = _Server(config)
+
+    async def run() -> None:
+        sending = None
+        if deltas is not None:
+            sending = asyncio.create_task(serve_deltas(page.delta, deltas))
+        if until is not None:
+            asyncio.create_task(_end_when(until, server))  # noqa: RUF006
+        await server.serve(sockets=sockets)
+        if sending is not None:
+            sending.cancel()
+
+    asyncio.run(run())
+
+
+async def _end_when(event: threading.Event, server: uvicorn.Server) -> None:
+    while not event.is_set():
+        await asyncio.sleep(_LOOK_S)
+    server.should_exit = True
+
+
+def _allow_files() -> None:
+    """A limit of 1024 open files would be used up by connections that wait to be refused."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = _FILES if hard == resource.RLIM_INFINITY else min(_FILES, hard)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Traces of the last two days: means over 1 s of late, over 10 s before.
+
+Memory is bounded, whatever the rates of the sensors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shipdrag_ros.samples import Block, Channel
+
+FINE_S = 1800  # of 1 s each
+COARSE_S = 10
+LONGEST_S = 2 * 86400
+LATE_S, JUMP_S = 60, 3600  # a stamp further off than these is strange
+_STRANGE = 20  # readings in a row after which the time of all is another
+COLUMNS = ('log', 'ground', 'estimate', 'shaft')
+"""Speed through water, over ground, as estimated [m/s]; the fastest shaft [rad/s]."""
+_COLUMN_OF = {
+    Channel.SPEED_THROUGH_WATER: 0,
+    Channel.SPEED_OVER_GROUND: 1,
+    Channel.SHAFT: 3,
+    Channel.SHAFT_2: 3,
+    Channel.SHAFT_3: 3,
+    Channel.SHAFT_4: 3,
+}
+_ESTIMATE = 2
+
+Row = tuple[int, float | None, float | None, float | None, float | None]
+
+
+@dataclass
+class _Bin:
+    """Sums and counts over a second."""
+
+    sums: list[float] = field(default_factory=lambda: [0.0] * len(COLUMNS))
+    counts: list[int] = field(default_factory=lambda: [0] * len(COLUMNS))
+
+    def add(self, column: int, total: float, count: int) -> None:
+        self.sums[column] += total
+        self.counts[column] += count
+
+    def row(self, second: int) -> Row:
+        means = [
+            float(f'{total / count:.5g}') if count else None
+            for total, count in zip(self.sums, self.counts)
+        ]
+        return (second, *means)  # type: ignore[return-value]
+
+
+class Trace:
+    """
+    What speeds and shafts did, by second of stamp.
+
+    Attributes
+    ----------
+    newest_s
+        Last second with a reading, 0 before the first.
+    restarted
+        Whether all was dropped because time went back; for the reader to clear.
+    """
+
+    def __init__(self) -> None:
+        self.newest_s = 0
+        self.restarted = False
+        self._strange = 0
+        self._open: dict[int, _Bin] = {}
+        self._fine: deque[Row] = deque()
+        self._coarse: deque[Row] = deque()
+        self._thinning: list[Row] = []
+
+    def add(self, block: Block) -> None:
+        """
+        Take readings; what comes for a second that is closed already is left out.
+        """
+        sums: list[tuple[int, int, float, int]] = []
+        for code, column in _COLUMN_OF.items():
+            rows = np.flatnonzero(block.channel == code)
+            if not len(rows):
+                continue
+            value = block.value[rows, 0]
+            if code is Channel.SPEED_OVER_GROUND:
+                value = np.hypot(value, block.value[rows, 1])
+            known = np.isfinite(value) & (np.abs(value) < 1e4)
+            second = block.stamp_ns[rows[known]] // 1_000_000_000
+            seconds, place, counts = np.unique(second, return_inverse=True, return_counts=True)
+            totals = np.bincount(place, weights=value[known], minlength=len(seconds))
+            columns = [column] * len(seconds)
+            sums += zip(seconds.tolist(), columns, totals.tolist(), counts.tolist())
+        for each in sorted(sums):  # by time, all inputs abreast
+            self._bin(*each)
+
+    def add_estimate(self, stamp_ns: int, speed_m_s: float) -> None:
+        """
+        Take an estimated speed.
+        """
+        self._bin(stamp_ns // 1_000_000_000, _ESTIMATE, speed_m_s, 1)
+
+    def closed(self, *, all_of_it: bool = False) -> list[Row]:
+        """
+        Return the rows that no more reading is waited for, each once.
+
+        Parameters
+        ----------
+        all_of_it
+            Close the newest second too.
+        """
+        last = math.inf if all_of_it else self.newest_s
+        ready = sorted(second for second in self._open if second < last)
+        rows = [self._open.pop(second).row(second) for second in ready]
+        for row in rows:
+            self._keep(row)
+        return rows
+
+    @property
+    def latest(self) -> Row | None:
+        """The last row, None before the first."""
+        return self._fine[-1] if self._fine else None
+
+    def rows(self) -> list[Row]:
+        """
+        Return all that is kept, oldest first.
+        """
+        return [*self._coarse, *self._thinning, *self._fine]
+
+    def _bin(self, second: int, column: int, total: float, count: int) -> None:
+        off_s = second - self.newest_s
+        if self.newest_s and not -LATE_S < off_s < JUMP_S:
+            self._strange += 1
+            if self._strange < _STRANGE:
+                return  # one clock that is off is not drawn; the health of its input says so
+            if off_s < 0:
+                self._start_over()
+            self.newest_s = second
+        self._strange = 0
+        self.newest_s = max(self.newest_s, second)
+        if not self._fine or second > self._fine[-1][0]:
+            self._open.setdefault(second, _Bin()).add(column, total, count)
+
+    def _start_over(self) -> None:
+        """The time of all went back: a clock was set, or a record is played again."""
+        self._open.clear()
+        self._fine.clear()
+        self._coarse.clear()
+        self._thinning.clear()
+        self.restarted = True
+
+    def _keep(self, row: Row) -> None:
+        self._fine.append(row)
+        while self._fine and self._fine[0][0] < row[0] - FINE_S:
+            self._thin(self._fine.popleft())
+        while self._coarse and self._coarse[0][0] < row[0] - LONGEST_S:
+            self._coarse.popleft()
+
+    def _thin(self, row: Row) -> None:
+        if self._thinning and self._thinning[0][0] // COARSE_S != row[0] // COARSE_S:
+            merged = _Bin()
+            for each in self._thinning:
+                for column, value in enumerate(each[1:]):
+                    if value is not None:
+                        merged.add(column, value, 1)
+            self._coarse.append(merged.row(self._thinning[0][0]))
+            self._thinning = []
+        self._thinning.append(row)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the diagnosis says, for the page: from the node's health, or from a diagnosis itself."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from shipdrag_ros.messages.heard import Status
+
+if TYPE_CHECKING:  # slow to import, and needed only once there is one
+    from shipdrag_ros.diagnosis import Diagnosis
+
+_NO_SIZE = re.compile(r'probability|mean square|standard deviation|coastdown')
+
+
+@dataclass(frozen=True)
+class VerdictView:
+    """
+    A verdict, ready to be shown.
+
+    Attributes
+    ----------
+    state
+        As the node has it: `none yet`, `running`, `done`, ...
+    sentence
+    sizes
+        Name and text of each size.
+    probabilities
+        Name and share of each candidate.
+    decide
+        What would decide, a line each.
+    """
+
+    state: str
+    sentence: str
+    sizes: tuple[tuple[str, str], ...] = ()
+    probabilities: tuple[tuple[str, float], ...] = ()
+    decide: tuple[str, ...] = ()
+
+
+def of_status(status: Status) -> VerdictView:
+    """
+    Read the status `diagnosis` of a node.
+    """
+    values = status.values
+    sizes, probabilities, decide = [], [], []
+    for key, text in values.items():
+        name, _, unit = key.partition(' [')
+        unit = unit.rstrip(']').removesuffix('1')
+        if name.startswith('advice'):
+            decide.append(text)
+        elif name.startswith(('probability of ', 'probability that ')):
+            try:
+                share = float(text)
+            except ValueError:
+                continue
+            probabilities.append((re.sub('^probability (of|that) ', '', name), share))
+        elif ', ' in name and not _NO_SIZE.match(name):
+            sd = status.number(f'standard deviation of {name}')
+            spread = f' ± {2.0 * sd:.2g}' if sd else ''
+            sizes.append((name.replace('_', ' '), f'{text}{spread} {unit}'.strip()))
+    probabilities.sort(key=lambda each: -each[1])
+    return VerdictView(
+        values.get('state', ''),
+        status.message,
+        tuple(sizes),
+        tuple(probabilities),
+        tuple(decide),
+    )
+
+
+def of_diagnosis(found: Diagnosis) -> VerdictView:
+    """
+    Take a diagnosis.
+    """
+    from shipdrag_ros.diagnosis import words
+    from shipdrag_ros.simulation.effects import LIBRARY
+
+    sizes = [
+        (
+            f'{effect.name}, {words.quantity_text(quantity)}'.replace('_', ' '),
+            words.size(quantity, effect.parameters[quantity.name]),
+        )
+        for effect in found.effects
+        for quantity in LIBRARY[effect.name].parameters
+    ]
+    return VerdictView(
+        'done',
+        words.sentence(found),
+        tuple(sizes),
+        tuple((each.words, each.probability) for each in words.answers(found)),
+        tuple(words.advice(found)),
+    )

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a listener hears of a node: readings, outputs, health, the ship.
+
+The same whether it comes over topics or from a bag that is played.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from shipdrag_ros.messages import types
+from shipdrag_ros.samples import Block
+
+DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+OK, WARN, ERROR, STALE = range(4)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Readings of the inputs, in order of arrival."""
+
+    block: Block
+
+
+@dataclass(frozen=True)
+class Output:
+    """A message of the node, by the name of its topic below the node."""
+
+    name: str
+    payload: bytes
+
+
+@dataclass(frozen=True)
+class ShipFile:
+    """The ship file that the node uses."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Status:
+    """
+    One part of a node's health.
+
+    Attributes
+    ----------
+    node
+        As the status names it.
+    part
+        `state`, `input heading`, `recording`, ...
+    level
+        One of `OK`, `WARN`, `ERROR`, `STALE`.
+    message
+    values
+        Texts by key, the unit in the key.
+    """
+
+    node: str
+    part: str
+    level: int
+    message: str
+    values: Mapping[str, str]
+
+    @property
+    def input(self) -> str:
+        """Name of the input that it is of; '' of none."""
+        return self.part.removeprefix('input ') if self.part.startswith('input ') else ''
+
+    def number(self, key: str) -> float | None:
+        """
+        Return a figure, None where there is none; the unit need not be given.
+        """
+        for name, text in self.values.items():
+            if name == key or name.partition(' [')[0] == key:
+                try:
+                    return float(text)
+                except ValueError:
+                    return None
+        return None
+
+
+@dataclass(frozen=True)
+class Health:
+    """All that a node says of itself at one time."""
+
+    statuses: tuple[Status, ...]
+
+    def of(self, part: str) -> Status | None:
+        """
+        Return the status of a part.
+        """
+        return next((status for status in self.statuses if status.part == part), None)
+
+    @property
+    def inputs(self) -> tuple[Status, ...]:
+        """Those of the inputs."""
+        return tuple(status for status in self.statuses if status.input)
+
+
+Heard = Samples | Output | ShipFile | Health
+
+
+def read_health(payload: bytes) -> list[Health]:
+    """
+    Decode a message of /diagnostics: the health of each node of this package in it.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is no DiagnosticArray.
+    """
+    return health_of(types.deserialize(DIAGNOSTICS, payload).status)
+
+
+def health_of(statuses: Iterable[Any]) -> list[Health]:
+    """
+    Sort statuses by node; those of others, which have no life cycle and monitor, are left out.
+    """
+    sorted_by_node: dict[str, list[Status]] = {}
+    for status in statuses:
+        status = _read(status)
+        sorted_by_node.setdefault(status.node, []).append(status)
+    return [
+        Health(tuple(found))
+        for found in sorted_by_node.values()
+        if any({'lifecycle', 'monitor'} <= status.values.keys() for status in found)
+    ]
+
+
+def _read(status: Any) -> Status:
+    node, _, part = str(status.name).rpartition(': ')
+    level = status.level  # a byte of rclpy, a number elsewhere
+    return Status(
+        node=node,
+        part=part,
+        level=level[0] if isinstance(level, bytes) else int(level),
+        message=str(status.message),
+        values={str(item.key): str(item.value) for item in status.values},
+    )

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What no message tells: silence, clocks that are set, messages that were lost.
+
+Looked at every tick; what comes of it goes through the session, so that it is
+published, recorded, and obeyed by a replay.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+
+from shipdrag_ros.coastdown import InputHealth
+from shipdrag_ros.coastdown.events import State
+from shipdrag_ros.node.clocks import OwnClock, SensorClock, both_ns, set_by
+from shipdrag_ros.node.inputs import InputTopic
+from shipdrag_ros.node.session import Session
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import BACKWARD_JUMP_NS, MOTION_INPUTS
+
+AWAY_S = 5.0  # between two ticks: the node stood still, and what waits is not silence
+_SIDE = ('sooner', 'later')
+_SAID_S = 60.0  # a clock that was set is shown this long
+
+
+class Watching:
+    """
+    One activation's watch over its inputs.
+
+    Parameters
+    ----------
+    topics
+        All inputs.
+    parameters
+        `data_stop_s` and `frozen_s` are used.
+    simulated
+        Whether the clock is simulated, and may stand or run as it likes.
+    """
+
+    def __init__(
+        self, topics: Sequence[InputTopic], parameters: Parameters, *, simulated: bool
+    ) -> None:
+        self._topics = topics
+        self._parameters = parameters
+        self._simulated = simulated
+        self._own = OwnClock()
+        self._clocks = {topic.name: SensorClock() for topic in topics}
+        self._lost = {topic.name: topic.lost for topic in topics}
+        self._used = 0
+        self._heard = (0.0, 0)  # steady time [s] and time of the node [ns]
+        self._accepted = (0.0, 0)
+        self._tick_s: float | None = None
+        self._stepped: dict[str, tuple[float, str]] = {}
+
+    def tick(self, session: Session, health: Mapping[str, InputHealth], now_ns: int) -> None:
+        """
+        Look, and tell the session.
+
+        Parameters
+        ----------
+        now_ns
+            Clock of the node [ns], 0 while there is none.
+        """
+        if not now_ns:
+            return
+        self.watch_clock(session, now_ns)
+        session.watch_clock(now_ns)  # also while nothing arrives
+        self._watch_sensors(session, now_ns)
+        self._watch_silence(session, health, now_ns)
+        for topic in self._topics:
+            if topic.lost > self._lost[topic.name]:
+                more, self._lost[topic.name] = topic.lost - self._lost[topic.name], topic.lost
+                text = f'{more} messages were sent and not heard, {topic.lost} so far'
+                session.note_lost(f'{topic.name}: {text}', now_ns)
+
+    def watch_clock(self, session: Session, now_ns: int) -> None:
+        """
+        Look whether the clock of this computer was set; before a message is taken, too.
+        """
+        moment = None if self._simulated else both_ns()
+        step_s = 0.0 if moment is None else self._own.step_s(*moment)
+        if not step_s:
+            return
+        self._clocks = {topic.name: SensorClock() for topic in self._topics}
+        if step_s * 1e9 > -BACKWARD_JUMP_NS:  # further back, the arrivals tell
+            session.clock_was_set(f'the clock of this computer {set_by(step_s)}', now_ns)
+
+    def doubts(self) -> dict[str, str]:
+        """
+        Say of which inputs the clock was set lately.
+        """
+        now_s = time.monotonic()
+        return {
+            name: text for name, (at_s, text) in self._stepped.items() if now_s < at_s + _SAID_S
+        }
+
+    def _watch_sensors(self, session: Session, now_ns: int) -> None:
+        for topic in self._topics:
+            step_s = self._clocks[topic.name].step_s(topic.least_lag_s())
+            if not step_s or self._simulated:
+                continue
+            text = (
+                f'its clock {set_by(step_s)}, or its readings come as much {_SIDE[step_s < 0.0]}'
+            )
+            self._stepped[topic.name] = (time.monotonic(), text)
+            session.clock_was_set(
+                f'{topic.name}: {text}', now_ns, ends=topic.name in MOTION_INPUTS
+            )
+
+    def _watch_silence(
+        self, session: Session, health: Mapping[str, InputHealth], now_ns: int
+    ) -> None:
+        steady_s, now = time.monotonic(), (time.monotonic(), now_ns)
+        ages = [topic.age_s for topic in self._topics if topic.name in MOTION_INPUTS]
+        used = sum(health[name].used for name in MOTION_INPUTS if name in health)
+        away = self._tick_s is None or steady_s > self._tick_s + AWAY_S
+        last_s = 0.0 if self._tick_s is None else steady_s - self._tick_s
+        self._tick_s = steady_s
+        if away or any(age is not None and age <= last_s for age in ages):
+            self._heard = now
+        if away or used != self._used:
+            self._accepted, self._used = now, used
+        if session.monitor.state not in (State.CANDIDATE, State.COASTDOWN):
+            return
+        stop_s = self._parameters.data_stop_s
+        stuck_s = max(stop_s, self._parameters.frozen_s)
+        for since, limit_s, what in (
+            (self._heard, stop_s, 'nothing was heard'),
+            (self._accepted, stuck_s, 'no reading could be used'),
+        ):
+            # under simulated time both: one that stands still makes no silence
+            silent_s = steady_s - since[0]
+            if self._simulated:
+                silent_s = min(silent_s, (now_ns - since[1]) * 1e-9)
+            if silent_s > limit_s:
+                names = ', '.join(MOTION_INPUTS)
+                session.fall_silent(f'{what} of {names} for {silent_s:.0f} s', now_ns)
+                return

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A log that reads exactly 0 below some speed has a dead band; other zeros are none."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.diagnosis import SailingRecord, Verdict, diagnose_sailing
+from shipdrag_ros.diagnosis.zeros import stands_still
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
+
+BAND_M_S = 0.6
+
+
+def record(
+    *, band_m_s: float = 0.0, dropped: float = 0.0, drifting: bool = False, seed: int = 1
+) -> SailingRecord:
+    """Sail two hours at changing speeds and courses, slower than the band for a third of it."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 7200.0)
+    leg = (time // 600.0).astype(int)
+    speed = np.array([0.4, 1.5, 2.5])[leg % 3] + 0.05 * np.sin(time / 100.0)
+    course = np.radians(np.array([10.0, 130.0, 250.0, 310.0])[leg // 3])
+    log: Float64 = speed + rng.normal(0.0, 0.03, len(time))
+    velocity = np.array([speed * np.cos(course), speed * np.sin(course)]).T
+    if drifting:  # with the water, the log rightly at 0
+        velocity[speed < 1.0] = (0.3, 0.1)
+        log[speed < 1.0] = 0.0
+    log[speed < band_m_s] = 0.0
+    # some minutes in ten without a reading, at any speed
+    log[np.repeat(rng.random(120) < dropped, 60)] = 0.0
+    place = np.cumsum(velocity, axis=0) + rng.normal(0.0, 1.0, (len(time), 2))
+    stamps = np.round(time * 1e9).astype(np.int64) + 10**18
+    return SailingRecord(
+        'sailing',
+        in_arrival_order(
+            [
+                Block.of(Channel.SPEED_THROUGH_WATER, stamps, log),
+                Block.of(Channel.POSITION, stamps, place),
+            ]
+        ),
+    )
+
+
+def test_a_wheel_that_stands_still_has_a_dead_band() -> None:
+    # N = 5, seeds 0 .. 4: the speed lies between those that are and are not read
+    for seed in range(5):
+        found = stands_still([record(band_m_s=BAND_M_S, seed=seed)], Parameters())
+        assert found is not None
+        assert found.effect.probability > 0.99
+        (size,) = found.effect.parameters.values()
+        assert 0.4 < size.value < 1.5
+        assert found.share > 0.95
+        assert found.fastest_m_s < BAND_M_S
+
+
+@pytest.mark.parametrize('other', [{}, {'dropped': 0.3}, {'drifting': True}])
+def test_other_zeros_are_no_dead_band(other: dict[str, float]) -> None:
+    # N = 5, seeds 0 .. 4
+    for seed in range(5):
+        assert stands_still([record(**other, seed=seed)], Parameters()) is None
+
+
+def test_the_diagnosis_names_it_and_says_why() -> None:
+    found = diagnose_sailing([record(band_m_s=BAND_M_S)], Parameters())
+    assert found.verdict is Verdict.NAMED
+    (effect,) = found.effects
+    assert effect.name == 'log_dead_band'
+    assert found.candidates[0].names == ('log_dead_band',)
+    assert found.notes[0].startswith('the log reads exactly 0 in')
+    assert found.where is not None
+    assert found.where.channel == 'log'
+    assert math.isfinite(found.before.chi2_per_sample)

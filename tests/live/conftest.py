@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A browser driven by Playwright, and the processes that it looks at."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import gettempdir
+from typing import Any, TextIO
+
+import pytest
+
+from shipdrag_ros.live.app import LivePage
+from shipdrag_ros.live.serve import listen, serve
+
+REQUIRED = 'SHIPDRAG_BROWSER_REQUIRED'
+NAMES = ('chromium', 'chromium-browser', 'google-chrome')
+FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-dev-shm-usage']
+START_S = 240.0  # the first start of a machine compiles the kernels
+SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
+
+
+def _own_domain() -> tuple[int, TextIO]:
+    """Find a domain that no other test process of this machine is in, and lock it."""
+    for domain in range(10, 102):
+        path = Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock'
+        try:
+            lock = path.open('w')
+        except PermissionError:  # that of another user
+            continue
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+        else:
+            return domain, lock
+    raise RuntimeError('92 test processes run already')
+
+
+@pytest.fixture(scope='session')
+def browser() -> Iterator[Any]:
+    program = next(filter(None, map(shutil.which, NAMES)), None)
+    if program is None:
+        why = f'no browser: none of {", ".join(NAMES)} is installed'
+        if os.environ.get(REQUIRED):
+            pytest.fail(f'{why}, and {REQUIRED} is set')
+        pytest.skip(why)
+    playwright = pytest.importorskip('playwright.sync_api')
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=program, args=FLAGS)
+        yield found
+        found.close()
+
+
+class Viewer:
+    """
+    A page in the browser; what it complains about and asks for is noted.
+    """
+
+    def __init__(self, page: Any, url: str) -> None:
+        self.page = page
+        self.problems: list[str] = []
+        self._url = url
+        page.on('console', lambda message: self._note(message.text))
+        page.on('pageerror', lambda error: self.problems.append(str(error)))
+        page.on('request', self._on_request)
+        page.goto(url)
+
+    def _note(self, text: str) -> None:
+        # what a browser says when the server is gone is no fault of the page
+        if 'ERR_CONNECTION_REFUSED' not in text and 'ERR_INCOMPLETE_CHUNKED' not in text:
+            self.problems.append(text)
+
+    def _on_request(self, request: Any) -> None:
+        if not request.url.startswith((self._url, 'data:')):
+            self.problems.append(f'asks for {request.url}')
+
+    def text(self, selector: str) -> str:
+        return str(self.page.inner_text(selector))
+
+    def wait_for(self, selector: str, text: str, *, within_s: float = 120.0) -> str:
+        """Return what stands there once it has a text."""
+        end_s = time.monotonic() + within_s
+        while text not in (found := self.text(selector)):
+            assert time.monotonic() < end_s, f'no {text!r} in {found!r}'
+            self.page.wait_for_timeout(50)
+        return found
+
+
+@pytest.fixture
+def view(browser: Any) -> Iterator[Callable[..., Viewer]]:
+    """A function that opens a page; at the end none may have complained."""
+    opened: list[Viewer] = []
+
+    def start(url: str, *, width: int = 1280) -> Viewer:
+        context = browser.new_context(viewport={'width': width, 'height': 900})
+        opened.append(Viewer(context.new_page(), url))
+        return opened[-1]
+
+    yield start
+    for viewer in opened:
+        viewer.page.context.close()
+    for viewer in opened:
+        assert viewer.problems == []
+
+
+class Process:
+    """A program, its log, and its end."""
+
+    def __init__(self, log: Path, *line: str | Path, **environment: str) -> None:
+        self._log = log
+        with log.open('w') as file:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', *line],
+                stdin=subprocess.DEVNULL,
+                stdout=file,
+                stderr=subprocess.STDOUT,
+                env=os.environ | environment,
+            )
+
+    def wait_for(self, pattern: str) -> str:
+        """Return the first group of a pattern once it stands in the log."""
+        end_s = time.monotonic() + START_S
+        while (found := re.search(pattern, self._log.read_text())) is None:
+            assert self._process.poll() is None, self._log.read_text()
+            assert time.monotonic() < end_s, self._log.read_text()
+            time.sleep(0.05)
+        return found[1] if found.groups() else found[0]
+
+    def stop(self) -> int:
+        self._process.send_signal(signal.SIGTERM)
+        return self._process.wait(timeout=60.0)
+
+    def kill(self) -> None:
+        if self._process.poll() is None:
+            self._process.kill()
+            self._process.wait()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+    """A function that starts a module of the package on a domain of this test's own."""
+    domain, lock = _own_domain()
+    started: list[Process] = []
+
+    def run(*line: str | Path) -> Process:
+        process = Process(
+            tmp_path / f'log{len(started)}',
+            *line,
+            ROS_DOMAIN_ID=str(domain),
+            ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
+            PYTHONUNBUFFERED='1',
+        )
+        started.append(process)
+        return process
+
+    before = {name: os.environ.get(name) for name in ('ROS_DOMAIN_ID',)}
+    os.environ |= {'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    yield run
+    for process in started:
+        process.kill()
+    for name, value in before.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
+    lock.close()
+
+
+@contextmanager
+def _serving(page: LivePage) -> Iterator[str]:
+    """Serve a page from a thread of this process, at an address."""
+    with listen('127.0.0.1', 0) as found:
+        ended = threading.Event()
+        thread = threading.Thread(
+            target=serve, args=(page, [found]), kwargs={'deltas': None, 'until': ended}
+        )
+        thread.start()
+        try:
+            yield f'http://127.0.0.1:{found.getsockname()[1]}/'
+        finally:
+            ended.set()
+            thread.join()
+
+
+@pytest.fixture(scope='session')
+def serving() -> Callable[[LivePage], Any]:
+    """A context that serves a page, and gives its address."""
+    return _serving

@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is heard becomes parts of the page: from bags, from a node's own words, for Signal K."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.cli import main
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.live import acceptance, signal_k, verdicts
+from shipdrag_ros.live.acceptance import Held
+from shipdrag_ros.live.bridge import Bridge
+from shipdrag_ros.live.earlier import recorded_runs
+from shipdrag_ros.live.source import BagSource
+from shipdrag_ros.live.timeline import Timeline
+from shipdrag_ros.messages.heard import ERROR, Health, Output, Status, health_of
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import replay
+from shipdrag_ros.ship import Ship
+
+SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Two short runs on opposite headings."""
+    folder = tmp_path_factory.mktemp('bags')
+    found = []
+    for name, heading in (('out', '0'), ('back', '3.1416')):
+        found.append(folder / f'{name}.mcap')
+        line = ['simulate', '--ship', str(SHIP), '-o', str(found[-1]), '--speed', '8', '--seed']
+        line += [str(len(found)), '--heading', heading, '--first-heading', '0']
+        assert main([*line, '--lead-in', '400', '--duration', '400']) == 0
+    return found
+
+
+def play(timeline: Timeline, until_ns: int, bridge: Bridge) -> None:
+    for moment in timeline.between(0, until_ns):
+        for heard in moment.heard:
+            bridge.hear(heard, 0.0)
+
+
+def test_a_timeline_says_what_replay_says(bags: list[Path]) -> None:
+    (run,) = open_runs(bags[:1])
+    ship = Ship.load(SHIP)
+    ended: list[Any] = []
+    timeline = Timeline(run, ship, Parameters(), ended=lambda event, _: ended.append(event))
+    timeline.read()
+    (expected,) = replay(run, ship=ship).coastdowns
+    (found,) = ended
+    assert (found.start_ns, found.end_ns) == (expected.start_ns, expected.end_ns)
+    bridge = Bridge(ship)
+    play(timeline, timeline.end_ns, bridge)
+    (past,) = bridge.past
+    assert past.curve is not None
+    assert list(past.curve.resistance_m_s2) == list(expected.estimate.valid_curve.resistance_m_s2)
+    assert past.compass_deg == pytest.approx(90.0, abs=1.0)
+    figures = bridge.parts(0.0)['figures']
+    assert figures['usual']['r'] * ship.mass_kg == pytest.approx(
+        float(ship.resistance_n(figures['usual']['speed_m_s'])), rel=0.15
+    )
+    assert figures['usual']['over_clean'] == pytest.approx(0.0, abs=0.15)
+
+
+def settled(source: BagSource, now_s: float) -> float:
+    """Play a bag to its end, and say at what time of the caller that was."""
+    end_s = time.monotonic() + 120.0
+    while source.player()['playing']:
+        assert time.monotonic() < end_s
+        source.advance(now_s)
+        now_s += 1.0
+        time.sleep(0.005)
+    return now_s
+
+
+def test_two_bags_make_a_pair_and_seeking_back_shows_what_was(bags: list[Path]) -> None:
+    source = BagSource(open_runs(bags), ship=None, speed=100.0)
+    try:
+        now_s = settled(source, 0.0)
+        parts = source.bridge.parts(now_s)
+        assert [run['heading_deg'] > 180.0 for run in parts['past']] == [False, True]
+        assert parts['headline']['action'].startswith('Both runs of the pair are made')
+        start_s = source.player()['start_s']
+        source.control('seek', start_s + 300.0)
+        assert source.advance(now_s)  # the picture jumps
+        assert source.bridge.parts(now_s)['headline']['text'] == 'STEADY 5 of 30 min'
+        source.control('seek', start_s + 600.0)
+        source.advance(now_s)
+        there = source.bridge.parts(now_s)
+        assert there['headline']['text'].startswith('COASTDOWN 3:')
+        source.control('seek', start_s + 700.0)
+        source.control('seek', start_s + 600.0)
+        source.advance(now_s)
+        again = source.bridge.parts(now_s)
+        assert {name: part for name, part in again.items() if name != 'verdict'} == {
+            name: part for name, part in there.items() if name != 'verdict'
+        }
+        for action, value in (('speed', 0.0), ('speed', math.nan), ('bag', 2), ('dance', 1.0)):
+            with pytest.raises(ShipdragError, match='play, pause, speed'):
+                source.control(action, value)
+    finally:
+        source.close()
+
+
+def test_deltas_are_what_signal_k_asks_for(bags: list[Path]) -> None:
+    source = BagSource(open_runs(bags[:1]), ship=None, speed=100.0)
+    try:
+        assert signal_k.delta(Bridge(), 0.0) is None
+        found = signal_k.delta(source.bridge, settled(source, 0.0))
+    finally:
+        source.close()
+    assert found is not None
+    assert json.loads(json.dumps(found, allow_nan=False)) == found
+    assert found['context'] == 'vessels.self'
+    (update,) = found['updates']
+    assert update['timestamp'].endswith('Z')
+    values = {each['path']: each['value'] for each in update['values']}
+    told = {path for path in values if not path.startswith('notifications.')}
+    (meta,) = signal_k.units()['updates']
+    assert told == {each['path'] for each in meta['meta']}
+    assert values['performance.shipdrag.resistance'] > 1e5
+    note = values['notifications.performance.shipdrag']
+    assert note['state'] in ('nominal', 'normal', 'alert', 'warn', 'alarm', 'emergency')
+
+
+def status(part: str, level: int = 0, message: str = '', **values: str) -> Status:
+    return Status('a/coastdown_node', part, level, message, values)
+
+
+def test_a_node_is_told_from_other_statuses_by_what_it_says() -> None:
+    class Raw:
+        def __init__(self, name: str, *keys: str) -> None:
+            self.name, self.level, self.message = name, b'\x02', 'no'
+            self.values = [type('Pair', (), {'key': key, 'value': '1'}) for key in keys]
+
+    found = health_of(
+        [
+            Raw('driver: state', 'lifecycle'),
+            Raw('ns/any name: state', 'lifecycle', 'monitor'),
+            Raw('ns/any name: input depth', 'rate [Hz]'),
+        ]
+    )
+    (health,) = found
+    assert [each.part for each in health.statuses] == ['state', 'input depth']
+    assert health.inputs[0].input == 'depth'
+    assert health.inputs[0].number('rate') == 1.0
+    assert health.inputs[0].level == ERROR
+
+
+def test_trouble_of_the_node_is_the_headline_and_rejections_are_listed() -> None:
+    bridge = Bridge()
+    values = {'lifecycle': 'active', 'monitor': 'waiting'}
+    state = Status('n', 'state', ERROR, 'no data: nothing on any of a, b', values)
+    rejected = {'rejected nan': '3', 'rejected late': '0'}
+    heading = Status('n', 'input heading', 1, 'frozen', rejected)
+    bridge.hear(Health((state, heading)), 10.0)
+    parts = bridge.parts(11.0)
+    assert parts['headline']['text'] == 'NO SPEED HEARD'
+    assert parts['inputs'][0]['rejected'] == {'nan': 3}
+    assert bridge.parts(20.0)['headline']['text'].startswith('NODE SILENT')
+
+
+def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
+    bridge = Bridge(Ship.load(SHIP))
+    before = bridge.parts(0.0)
+    for name in ('speed', 'resistance', 'resistance_curve', 'events'):
+        bridge.hear(Output(name, b'\x00\x01'), 0.0)
+    assert bridge.parts(0.0) == before
+
+
+def test_a_verdict_is_read_from_the_status_of_the_node() -> None:
+    values = {
+        'state': 'done',
+        'probability that nothing is missing [1]': '0.01',
+        'probability of fouling [1]': '0.98',
+        'fouling, friction_factor [1]': '0.31',
+        'standard deviation of fouling, friction_factor [1]': '0.02',
+        'mean square of whitened residuals, before [1]': '9',
+        'advice 1': 'a run after the hull is cleaned',
+    }
+    view = verdicts.of_status(Status('n', 'diagnosis', 1, 'Missing: fouling.', values))
+    assert view.sizes == (('fouling, friction factor', '0.31 ± 0.04'),)
+    assert view.probabilities == (('fouling', 0.98), ('nothing is missing', 0.01))
+    assert view.decide == ('a run after the hull is cleaned',)
+
+
+@pytest.mark.parametrize(
+    ('check', 'held'),
+    [
+        (acceptance.lead_check(599.0, 1800.0), Held.WAIT),
+        (acceptance.lead_check(600.0, 1800.0), Held.YES),
+        (acceptance.lead_check(None, None), Held.UNKNOWN),
+        (acceptance.wind_check((-8.0, 0.0), 8.0), Held.YES),  # calm: own motion is all
+        (acceptance.wind_check((-8.0, 6.0), 8.0), Held.NO),
+        (acceptance.wind_check(None, 8.0), Held.UNKNOWN),
+        (acceptance.depth_check(42.0, 5.0, Ship.load(SHIP)), Held.YES),
+        (acceptance.depth_check(40.0, 5.0, Ship.load(SHIP)), Held.NO),  # 3 sqrt(B T) = 40.9 m
+        (acceptance.depth_check(20.0, 8.0, None), Held.YES),  # 2.75 v^2 / g = 17.9 m
+        (acceptance.depth_check(None, 8.0, None), Held.UNKNOWN),
+        (acceptance.rudder_check(math.radians(-4.0)), Held.YES),
+        (acceptance.rudder_check(math.radians(-6.0)), Held.NO),
+        (acceptance.course_check(math.radians(359.0), coasting=True), Held.YES),
+        (acceptance.course_check(math.radians(-30.0), coasting=True), Held.NO),
+        (acceptance.reciprocal_check(270.0, paired=False), Held.WAIT),
+        (acceptance.reciprocal_check(None, paired=True), Held.YES),
+    ],
+)
+def test_the_checklist_says_what_holds(check: acceptance.Check, held: Held) -> None:
+    assert check.held is held
+    assert check.text
+
+
+def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(
+    bags: list[Path], tmp_path: Path
+) -> None:
+    (tmp_path / 'broken.mcap').write_bytes(b'no bag')
+    (tmp_path / 'out.mcap').write_bytes(bags[0].read_bytes())
+    found = list(recorded_runs(tmp_path))
+    assert len(found) == 2
+    assert {str(each).partition(':')[0] for each in found} == {'broken.mcap', 'out.mcap'}
+    with pytest.raises(ShipdragError, match='is no folder'):
+        list(recorded_runs(tmp_path / 'none'))

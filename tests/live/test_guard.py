@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who gets in, and that nobody can make the page's process grow; over real sockets."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import httpx
+import pytest
+
+from shipdrag_ros.live import guard
+from shipdrag_ros.live.app import LivePage
+from shipdrag_ros.live.guard import COOKIE, pass_of
+from shipdrag_ros.live.source import NodeSource
+
+TOKEN = 'a token that nobody guesses'
+
+
+@pytest.fixture(scope='module')
+def open_page(serving: Any) -> Iterator[str]:
+    with serving(LivePage(NodeSource())) as url:
+        yield url
+
+
+@pytest.fixture(scope='module')
+def guarded(serving: Any) -> Iterator[str]:
+    with serving(LivePage(NodeSource(), token=TOKEN)) as url:
+        yield url
+
+
+def test_every_answer_forbids_what_is_from_elsewhere(open_page: str) -> None:
+    for path in ('', 'main.js', 'nothing', 'state.json'):
+        answer = httpx.get(open_page + path)
+        policy = answer.headers['content-security-policy']
+        assert policy.startswith("default-src 'none'")
+        assert 'unsafe' not in policy
+        assert answer.headers['x-content-type-options'] == 'nosniff'
+        assert 'server' not in answer.headers
+
+
+@pytest.mark.parametrize(
+    ('host', 'status'),
+    [
+        ('127.0.0.1:1', 200),
+        ('localhost', 200),
+        ('[::1]:80', 200),
+        ('192.168.1.5', 200),
+        (socket.gethostname(), 200),
+        ('evil.example', 421),  # a name that was made to lead here
+        ('localhost.evil.example', 421),
+        ('', 421),
+        ('[', 421),
+    ],
+)
+def test_it_answers_to_its_own_names_only(open_page: str, host: str, status: int) -> None:
+    assert httpx.get(open_page, headers={'Host': host}).status_code == status
+
+
+@pytest.mark.parametrize(
+    ('headers', 'status'),
+    [
+        ({'Origin': 'http://evil.example'}, 403),
+        ({'Sec-Fetch-Site': 'cross-site'}, 403),
+        ({}, 400),  # let in; and told that there is nothing to play
+    ],
+)
+def test_another_page_cannot_press_the_buttons(
+    open_page: str, headers: dict[str, str], status: int
+) -> None:
+    body = json.dumps({'action': 'play'})
+    assert httpx.post(f'{open_page}player', content=body, headers=headers).status_code == status
+
+
+@pytest.mark.parametrize(
+    'body', ['', '[]', '{"action": 1}', '{"action": "x", "value": []}', 'x' * 20_000]
+)
+def test_nonsense_is_answered(open_page: str, body: str) -> None:
+    assert httpx.post(f'{open_page}player', content=body).status_code == 400
+
+
+@pytest.mark.parametrize('path', ['../app.py', '%2e%2e/app.py', 'vendor/../../app.py'])
+def test_no_file_but_the_page_is_given(open_page: str, path: str) -> None:
+    assert httpx.get(open_page + path).status_code == 404
+
+
+def test_without_the_token_there_is_the_question_for_it_alone(guarded: str) -> None:
+    for path in ('stream', 'state.json', 'main.js', 'signalk/v1/deltas', 'player'):
+        assert httpx.get(guarded + path).status_code == 401
+    answer = httpx.get(guarded, follow_redirects=True)
+    assert 'Token' in answer.text
+    assert httpx.post(f'{guarded}login', content='token=wrong').status_code == 403
+    wrong = {'Authorization': 'Bearer wrong'}
+    assert httpx.get(f'{guarded}state.json', headers=wrong).status_code == 401
+
+
+def test_with_the_token_all_is_there_and_the_browser_keeps_something_else(guarded: str) -> None:
+    right = {'Authorization': f'Bearer {TOKEN}'}
+    assert httpx.get(f'{guarded}state.json', headers=right).status_code == 200
+    answer = httpx.post(f'{guarded}login', data={'token': TOKEN})
+    assert answer.status_code == 303
+    cookie = answer.headers['set-cookie']
+    assert pass_of(TOKEN) in cookie
+    assert TOKEN not in cookie
+    assert 'httponly' in cookie.lower()
+    assert 'samesite=strict' in cookie.lower()
+    kept = {'Cookie': f'{COOKIE}={pass_of(TOKEN)}'}
+    assert httpx.get(guarded, headers=kept).status_code == 200
+
+
+def test_too_many_connections_are_refused_and_silent_ones_closed(
+    serving: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guard, 'CONNECTIONS', 5)
+    monkeypatch.setattr(guard, 'ASK_S', 1.0)
+    with serving(LivePage(NodeSource())) as url:
+        address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
+        opened = [socket.create_connection(address) for _ in range(20)]
+        refused = 0
+        for each in opened:
+            each.settimeout(30.0)
+            refused += each.recv(100).startswith(b'HTTP/1.1 503')  # else closed: nothing asked
+            each.close()
+        assert refused == 15
+        assert httpx.get(url).status_code == 200
+
+
+def test_a_reader_who_reads_nothing_is_let_go(
+    serving: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guard, 'STUCK_S', 0.5)
+    source = NodeSource()
+    page = LivePage(source)
+    with serving(page) as url:
+        address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
+        stuck = socket.socket()
+        stuck.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        stuck.connect(address)
+        stuck.sendall(b'GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n')
+        end_s = time.monotonic() + 60.0
+        came = False
+        while not came or page.frames.viewers:
+            came = came or page.frames.viewers == 1
+            source.bridge._notes.append((0, 'x' * 100_000))  # frames that are large
+            assert time.monotonic() < end_s
+            time.sleep(0.05)
+        stuck.close()

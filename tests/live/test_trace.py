@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Traces are means by second, bounded, and one clock that is off does not spoil them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.live.trace import COARSE_S, FINE_S, LONGEST_S, Trace
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+
+START_S = 1_700_000_000
+
+
+def readings(channel: Channel, seconds: np.ndarray, value: float) -> Block:
+    return Block.of(channel, (seconds * 1e9).astype(np.int64), np.full(len(seconds), value))
+
+
+def test_a_row_is_the_mean_of_its_second_and_is_given_once() -> None:
+    trace = Trace()
+    times = START_S + np.array([0.1, 0.5, 0.9, 1.2, 2.0])
+    trace.add(Block.of(Channel.SPEED_THROUGH_WATER, (times * 1e9).astype(np.int64), range(5)))
+    ground = Block.of(Channel.SPEED_OVER_GROUND, [START_S * 10**9], [[3.0, 4.0]])
+    trace.add(ground)
+    trace.add_estimate(START_S * 10**9, 2.5)
+    assert trace.closed() == [(START_S, 1.0, 5.0, 2.5, None), (START_S + 1, 3.0, None, None, None)]
+    assert trace.closed() == []
+    assert trace.closed(all_of_it=True) == [(START_S + 2, 4.0, None, None, None)]
+
+
+def test_days_are_thinned_and_forgotten() -> None:
+    trace = Trace()
+    for day in range(3):
+        seconds = START_S + 86400 * day + np.arange(86400)
+        trace.add(readings(Channel.SPEED_THROUGH_WATER, seconds, float(day)))
+        trace.closed()
+    rows = trace.rows()
+    assert [row[0] for row in rows] == sorted(row[0] for row in rows)
+    assert rows[-1][0] - rows[0][0] <= LONGEST_S + COARSE_S
+    assert len(rows) <= LONGEST_S / COARSE_S + FINE_S + COARSE_S + 2
+    assert rows[0][1] == 1.0
+    assert rows[-1][1] == 2.0
+
+
+@pytest.mark.parametrize('off_s', [-7200, 7200, 10**8])
+def test_one_clock_that_is_off_is_left_out(off_s: int) -> None:
+    trace = Trace()
+    for second in range(START_S, START_S + 100):
+        good = readings(Channel.SPEED_THROUGH_WATER, np.array([second]), 8.0)
+        bad = readings(Channel.SHAFT, np.array([second + off_s]), 9.0)
+        trace.add(in_arrival_order([good]))
+        trace.add(bad)
+    rows = trace.closed(all_of_it=True)
+    assert len(rows) == 100
+    assert {row[1:] for row in rows} == {(8.0, None, None, None)}
+    assert not trace.restarted
+
+
+def test_where_all_clocks_go_back_it_starts_over() -> None:
+    trace = Trace()
+    trace.add(readings(Channel.SHAFT, START_S + np.arange(100), 9.0))
+    trace.closed()
+    trace.add(readings(Channel.SHAFT, START_S - 10_000 + np.arange(100), 8.0))
+    assert trace.restarted
+    trace.closed(all_of_it=True)
+    assert {row[4] for row in trace.rows()} == {8.0}
