@@ -49,18 +49,7 @@ def run(options: argparse.Namespace) -> int:
     if options.sql is not None:
         _answer(output, options.store, options.sql)
         return 0
-    # Parquet takes long to import
-    from shipdrag_ros.fleet.store import read_bags, read_coastdowns
-    from shipdrag_ros.trend import fleet_trends
-
-    ships, events = _ships(output, options.store)
-    rows = read_coastdowns(options.store).to_pylist()
-    skipped = [
-        (row['bag'], row['error'])
-        for row in read_bags(options.store).to_pylist()
-        if row['error'] is not None
-    ]
-    trends = fleet_trends(rows, ships, events)
+    trends, skipped = trends_of(output, options.store)
     _show(output, trends, skipped)
     if options.report is not None:
         from shipdrag_ros.trend.page import write_trends  # pictures take long to import
@@ -69,6 +58,33 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'report in {options.report}')
     output.json(trend_json.document(trends, skipped))
     return 0
+
+
+def trends_of(output: Output, store: Path) -> tuple[list[ShipTrend], list[tuple[str, str]]]:
+    """
+    Return the trend of every ship of a store, and what the fleet could not use.
+
+    Parameters
+    ----------
+    output
+        Told what of the ship files and of the events cannot be used.
+    store
+        Folder that `shipdrag fleet` has written.
+
+    Returns
+    -------
+    trends, skipped
+        In the order of their rank; bag and reason.
+    """
+    # Parquet takes long to import
+    from shipdrag_ros.fleet.store import read_bags, read_coastdowns
+    from shipdrag_ros.trend import fleet_trends
+
+    ships, events = _ships(output, store)
+    rows = read_coastdowns(store).to_pylist()
+    bags = read_bags(store).to_pylist()
+    skipped = [(row['bag'], row['error']) for row in bags if row['error'] is not None]
+    return fleet_trends(rows, ships, events), skipped
 
 
 def _ships(output: Output, store: Path) -> tuple[dict[str, Ship], dict[str, Sequence[HullEvent]]]:

@@ -8,6 +8,7 @@ import contextlib
 import ipaddress
 import os
 import stat
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import add_remap, bag, number
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.trend import trends_of
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
@@ -77,7 +79,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='PORT',
         help='send Signal K deltas, a line each, to who connects to this TCP port of this machine',
     )
-    parser.add_argument('--store', help=argparse.SUPPRESS)
+    parser.add_argument(
+        '--store',
+        type=Path,
+        metavar='STORE',
+        help='store of `shipdrag fleet`: the page of the fleet stands under /fleet',
+    )
     add_remap(parser)
 
 
@@ -85,11 +92,6 @@ def run(options: argparse.Namespace) -> int:
     """
     Serve until SIGINT or SIGTERM.
     """
-    if options.store is not None:
-        raise ShipdragError(
-            '--store: this page shows one ship, and reads no store; for the fleet run '
-            'shipdrag trend STORE --report FILE.html, for earlier runs give --earlier DIR'
-        )
     output = Output()
     token = _token(options.listen, options.token_file)
     ship = None if options.ship is None else Ship.load(options.ship)
@@ -99,7 +101,8 @@ def run(options: argparse.Namespace) -> int:
     with page_socket, contextlib.ExitStack() as stack:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
         source: Source = stack.enter_context(_source(options, ship, past))
-        page = LivePage(source, token=token, notes=tuple(notes))
+        fleet = None if options.store is None else fleet_page(output, options.store)
+        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet)
         for note in notes:
             output.log(note)
         name, port = page_socket.getsockname()[:2]
@@ -136,6 +139,18 @@ def _source(
         node.hear(each)
     with Spectator(node.hear, node=options.node):
         yield node
+
+
+def fleet_page(output: Output, store: Path) -> str:
+    """
+    Return the page of the fleet (HTML) by a store of `shipdrag fleet`.
+    """
+    from shipdrag_ros.trend.page import write_trends  # pictures take long to import
+
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / 'fleet.html'
+        write_trends(page, *trends_of(output, store))
+        return page.read_text(encoding='utf-8')
 
 
 def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:

@@ -297,17 +297,17 @@ class Diagnosis:
 
     def summary(self) -> tuple[str, ...]:
         """
-        Say what was found: the verdict, what was examined, where, and what the record shows.
+        Say what was found: that there is no coastdown, the verdict, what was examined, and where.
 
         Returns
         -------
         tuple of str
-            A paragraph each, the verdict first.
+            A paragraph each; the verdict first, where there is a coastdown.
         """
         from shipdrag_ros.diagnosis import words  # it tells what this module holds
 
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
-        first = (words.sentence(self), words.differing(self), self.no_coastdown)
+        first = (self.no_coastdown, words.sentence(self), words.differing(self))
         told = (*first, words.examined(self), where)
         return (*filter(None, told), *words.facts(self), *self.notes)
 

@@ -16,6 +16,7 @@ from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import (
     FileResponse,
+    HTMLResponse,
     JSONResponse,
     PlainTextResponse,
     RedirectResponse,
@@ -36,6 +37,10 @@ PAGE = Path(__file__).parent / 'page'
 TICK_S = 0.1
 LARGEST_BODY = 10_000
 _WRONG_TOKEN_S = 1.0  # an answer to a wrong token waits so long
+_ON_PAPER = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
+)
 _KEEP_S = 30 * 86400
 
 
@@ -51,6 +56,8 @@ class LivePage:
         What a viewer must know; None: nothing.
     notes
         Lines about how the page was started, shown below it.
+    fleet
+        The page of the fleet (HTML), shown under /fleet; None: none.
 
     Attributes
     ----------
@@ -60,18 +67,29 @@ class LivePage:
     """
 
     def __init__(
-        self, source: Source, *, token: str | None = None, notes: tuple[str, ...] = ()
+        self,
+        source: Source,
+        *,
+        token: str | None = None,
+        notes: tuple[str, ...] = (),
+        fleet: str | None = None,
     ) -> None:
         self.frames = Frames(lambda: source.bridge.trace.rows())
         self._source = source
         self._token = token
-        self._started = {'version': __version__, 'notes': list(notes)}
+        self._fleet = fleet
+        self._started = {
+            'version': __version__,
+            'notes': list(notes),
+            'fleet': fleet is not None,
+        }
         self.app: ASGIApp = Guard(self._routes(), token=token)
 
     def _routes(self) -> Starlette:
         return Starlette(
             routes=[
                 Route('/', self._page),
+                Route('/fleet', self._fleet_page),
                 Route('/login', self._login, methods=['GET', 'POST']),
                 Route('/stream', _Stream(self._stream)),
                 Route('/player', self._control, methods=['POST']),
@@ -118,6 +136,12 @@ class LivePage:
 
     async def _page(self, request: Request) -> Response:
         return FileResponse(PAGE / 'index.html')
+
+    async def _fleet_page(self, request: Request) -> Response:
+        if self._fleet is None:
+            return PlainTextResponse('No fleet: start the page with --store STORE.\n', 404)
+        # a page on paper: its style and its pictures are in it, and it runs nothing
+        return HTMLResponse(self._fleet, headers={'Content-Security-Policy': _ON_PAPER})
 
     async def _login(self, request: Request) -> Response:
         if self._token is None:

@@ -70,7 +70,7 @@ class Guard:
             if message['type'] == 'http.response.start':
                 headers = MutableHeaders(scope=message)
                 for name, value in _HEADERS.items():
-                    headers[name] = value
+                    headers.setdefault(name, value)
                 headers.setdefault('Cache-Control', 'no-store')
             await send(message)
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import sys
@@ -15,7 +14,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 from shipdrag_ros import __version__
-from shipdrag_ros.bags import BagWriter, Compression
+from shipdrag_ros.bags import BagWriter, Compression, writer
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, encode, types
 from shipdrag_ros.samples import Block, Channel
@@ -138,7 +137,7 @@ def test_a_type_that_nobody_knows_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path('/dev/full').exists(), reason='no /dev/full here')
 def test_a_full_disk_is_told(monkeypatch: pytest.MonkeyPatch, block: Block) -> None:
-    monkeypatch.setattr(Path, 'open', lambda *_: io.BufferedWriter(io.FileIO('/dev/full', 'w')))
+    monkeypatch.setattr(writer, 'private_opener', lambda *_: os.open('/dev/full', os.O_WRONLY))
     bag = BagWriter(Path('a.mcap'), chunk_bytes=1024)
     with pytest.raises(BagError, match=r'a\.mcap.* cannot be written: No space'):  # noqa: PT012
         for message in encode(block):

@@ -103,7 +103,10 @@ def view(browser: Any) -> Iterator[Callable[..., Viewer]]:
     opened: list[Viewer] = []
 
     def start(url: str, *, width: int = 1280) -> Viewer:
-        context = browser.new_context(viewport={'width': width, 'height': 900})
+        # colours amid a transition have no contrast to be judged by
+        context = browser.new_context(
+            viewport={'width': width, 'height': 900}, reduced_motion='reduce'
+        )
         opened.append(Viewer(context.new_page(), url))
         return opened[-1]
 

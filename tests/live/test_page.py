@@ -39,7 +39,10 @@ LARGEST_BYTES = 150_000
 def violations(page: Any) -> list[str]:
     """What axe finds wrong with a page."""
     axe = pytest.importorskip('axe_playwright_python.sync_playwright')
-    return [found['id'] for found in axe.Axe().run(page).response['violations']]
+    return [
+        f'{found["id"]}: {found["nodes"][0]["target"]}'
+        for found in axe.Axe().run(page).response['violations']
+    ]
 
 
 def test_a_coastdown_over_topics_from_steady_to_verdict(
@@ -83,7 +86,8 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
         viewer.wait_for('#headline', 'COASTDOWN COMPLETE')
         assert rehearsal.estimates > 10
     assert viewer.text('#ship') == 'Vitus Bering'
-    assert [text.split(' ')[0] for text in said][-2:] == ['STEADY', 'COASTDOWN'], said
+    states = [word for word in (text.split(' ')[0] for text in said) if word != 'SLOWING:']
+    assert states[-2:] == ['STEADY', 'COASTDOWN'], said
     assert 'Now the reciprocal: steer ' in viewer.text('#action')
     assert float(viewer.text('#figure-force').split()[0]) > 100.0
     assert abs(float(viewer.text('#figure-over').split()[0].strip('+'))) < 15.0  # she is clean

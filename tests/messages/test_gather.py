@@ -41,18 +41,24 @@ def fields(source: Source, message: Any) -> list[float] | None:
             taken = [linear.x, linear.y, covariance[0], covariance[7], covariance[1]]
         case 'TwistStamped':
             taken = [message.twist.linear.x, message.twist.linear.y, nan, nan, nan]
+        case 'VelocityStamped':
+            taken = [message.velocity.linear.x, message.velocity.linear.y, nan, nan, nan]
+        case 'Odometry' if source.input != 'position':
+            linear, covariance = message.twist.twist.linear, message.twist.covariance
+            taken = [linear.x, linear.y, covariance[0], covariance[7], covariance[1]]
         case 'PoseWithCovarianceStamped' | 'Odometry':
             at, covariance = message.pose.pose.position, message.pose.covariance
             taken = [at.x, at.y, covariance[0], covariance[7]]
-        case 'PoseStamped':
+        case 'PoseStamped' if source.input == 'position':
             taken = [message.pose.position.x, message.pose.position.y, nan, nan]
         case 'PointStamped':
             taken = [message.point.x, message.point.y, nan, nan]
         case 'NavSatFix':
             covariance = message.position_covariance
             taken = [message.latitude, message.longitude, covariance[4], covariance[0]]
-        case 'QuaternionStamped' | 'Imu' as name:
-            q = message.quaternion if name == 'QuaternionStamped' else message.orientation
+        case 'QuaternionStamped' | 'Imu' | 'PoseStamped' as name:
+            holder = message.pose if name == 'PoseStamped' else message
+            q = holder.quaternion if name == 'QuaternionStamped' else holder.orientation
             yaw = nan
             with np.errstate(all='ignore'):
                 x, y, z, w = (np.float64(c) for c in (q.x, q.y, q.z, q.w))

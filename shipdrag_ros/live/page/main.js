@@ -203,7 +203,8 @@ function showNotes(part) {
 
 function showStarted(part) {
   text('version', `shipdrag_ros ${part.version}.`);
-  el('started').replaceChildren(...part.notes.map(note => make('li', note)));
+  const fleet = part.fleet ? [make('li', make('a', 'The fleet: which hull first', { href: '/fleet' }))] : [];
+  el('started').replaceChildren(...fleet, ...part.notes.map(note => make('li', note)));
 }
 
 function showCurve() {

@@ -143,7 +143,7 @@ class SteeredShip:
 
 
 _FORCES = {'X': 'surge force', 'Y': 'sway force', 'N': 'yaw moment'}
-_MOTIONS = {'u': 'change of speed', 'v': 'sway', 'r': 'turning', 'd': 'rudder'}
+_MOTIONS = {'u': 'change of speed', 'v': 'sway', 'r': 'yaw', 'd': 'rudder'}
 
 
 def meaning(name: str) -> str:
@@ -159,7 +159,7 @@ def meaning(name: str) -> str:
     --------
     >>> from shipdrag_ros.studies.manoeuvring.ship import meaning
     >>> meaning('Yvvr')
-    'sway force by sway² x turning'
+    'sway force by sway² x yaw'
     """
     force, motions = _FORCES[name[0]], name[1:].removeprefix('0')
     powers = {letter: motions.count(letter) for letter in dict.fromkeys(motions)}
