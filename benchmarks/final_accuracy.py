@@ -29,6 +29,7 @@ from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.inference.noise import GaussMarkovNoise
+from shipdrag_ros.inference.settings import SENSORS_ALONE
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
@@ -176,7 +177,8 @@ def bound(case: Case, ship: Ship) -> tuple[float, float]:
     plain, _ = problem.fit_first(problem.start())
     assert plain is not None
     if case.log_m_s or case.gust_m_s:
-        problem = problem.disturbed(slow, plain)
+        known = SENSORS_ALONE._replace(slow=np.array([slow]))
+        problem = problem.damped(plain).disturbed(known)
     found, _ = problem.fit_first(plain.unknowns)
     assert found is not None
     low = max(float(record.coast.value[record.coast.kind == 0][-1]), float(ship.speed(0.05)))

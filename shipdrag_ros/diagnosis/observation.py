@@ -25,9 +25,10 @@ from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.learning import most_probable
-from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.learning import learn, of_steady
+from shipdrag_ros.inference.noise import WHITE, Noise, whiten
 from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, Rows, bin_means
+from shipdrag_ros.inference.settings import noise_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
@@ -237,23 +238,27 @@ class _Learner:
         rows = Rows(time, kind.astype(np.int64), value)
         steady = time < self.lead_in_s - self.margin_s
         damping, inertia = self._damping(np.array([self.speed_m_s]))
-        learnt = most_probable(
+        seen = of_steady(
             Rows(time[steady], rows.kind[steady], value[steady]),
             variance[steady],
-            damping_1_s=float(damping[0]),
-            inertia=float(inertia[0]),
+            float(damping[0]),
+            float(inertia[0]),
         )
+        # the engine damps the steady record; behind the stop the hull does
+        learnt = learn(seen, self.speed_m_s).typical
         # the ship slows down about as v0 / (1 + t / t0)
         after = np.maximum(time - self.lead_in_s, 0.0)
         speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
         whitener = np.eye(len(time))
-        whiten(rows, whitener, Noise(variance, learnt, *self._damping(speed)))
+        white = Noise(variance, WHITE, *self._damping(speed))
+        noise = noise_of(learnt, 0, rows, white, int(np.searchsorted(time, self.lead_in_s)))
+        whiten(rows, whitener, noise)
         return Measured(
             np.searchsorted(times, time),
             rows,
             np.ascontiguousarray(whitener.T),
             # without a log it is not told from a gust
-            learnt.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
+            noise.slow.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
         )
 
     def _damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:

@@ -38,7 +38,7 @@ class GaussMarkovNoise(NamedTuple):
     water_m_s, water_s
         Motion of the water along the track.
     log_m_s, log_s
-        Error of the log.
+        Error of the log; of the speed over ground where there is no log.
     place_m, place_s
         Error of the positions.
     """
@@ -238,7 +238,9 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
         return log_det
     moved = slow.gust_m_s2 > 0.0 or slow.water_m_s > 0.0
     place, active = _places(slow)
+    unlogged = not np.any(rows.kind == LOG)
     cov, mean = _stationary(noise, place, active), np.zeros((active + 1, columns))
+    innovation = np.empty(columns)
     gain, seen, step = np.zeros(active), np.zeros(active + 1), np.zeros(_STEP)
     last_dt, last_mid, last_inertia = -1.0, -1.0, -1.0
     for i in range(n):
@@ -253,23 +255,27 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
                 for _ in range(parts):
                     _predict(cov, mean, step, place, moved)
         # what is measured, and the error of its input
-        first, error = place[_X], place[_PLACE]
+        first, error, other = place[_X], place[_PLACE], active
         if rows.kind[i] == LOG:
             first, error = place[_U], place[_LOG]
         elif rows.kind[i] == OVER_GROUND:
             first, error = place[_U], place[_WATER]
+            other = place[_LOG] if unlogged else active
         for s in range(active):
-            seen[s] = cov[s, first] + cov[s, error]
-        total = seen[first] + seen[error] + variance[i]
+            seen[s] = cov[s, first] + cov[s, error] + cov[s, other]
+        total = seen[first] + seen[error] + seen[other] + variance[i]
         weight = 1.0 / np.sqrt(total)
         log_det += np.log(total)
         for s in range(active):
             gain[s] = seen[s] / total
+        # line after line, so that it is vectorised
         for c in range(columns):
-            innovation = table[c, i] - mean[first, c] - mean[error, c]
-            for s in range(active):
-                mean[s, c] += gain[s] * innovation
-            table[c, i] = innovation * weight
+            innovation[c] = table[c, i] - mean[first, c] - mean[error, c] - mean[other, c]
+            table[c, i] = innovation[c] * weight
+        for s in range(active):
+            of_state = gain[s]
+            for c in range(columns):
+                mean[s, c] += of_state * innovation[c]
         for a in range(active):
             for b in range(active):
                 cov[a, b] -= gain[a] * seen[b]

@@ -71,6 +71,6 @@ def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None
         curve = found.valid_curve
         away = curve.resistance_m_s2 - coast.resistance(curve.speed_m_s, ship)
         covered.append(np.mean(np.abs(away) <= 2.0 * curve.sigma_repeatable_m_s2))
-        said += any('not independent' in note for note in found.notes)
+        said += any('slow disturbances learnt' in note for note in found.notes)
     assert said >= 18
     assert np.mean(covered) > 0.7

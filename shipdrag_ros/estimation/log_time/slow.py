@@ -17,8 +17,8 @@ from shipdrag_ros.estimation.ode_fit.record import LEAST_STAMPS, Record
 from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S, condense, white_sd
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.learning import learn
-from shipdrag_ros.inference.noise import WHITE, GaussMarkovNoise, Noise, whiten
+from shipdrag_ros.inference.learning import learn, of_steady
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
 from shipdrag_ros.inference.rows import CODES, Input, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -78,19 +78,18 @@ class Slow:
         keep = record.steady.time_s < -ONSET_SD_S
         steady = record.steady
         rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
-        found, filtered = learn(
-            rows,
-            record.variance(rows, record.steady_weight[keep]),
-            damping_1_s=2.0 / coast_s,
-            inertia=1.0 + float(ship.n_r(speed_m_s)),
-            r_m_s2=(1.0 + float(ship.n_r(speed_m_s))) * speed_m_s / coast_s,
-        )
-        if found == WHITE:
+        inertia = 1.0 + float(ship.n_r(speed_m_s))
+        variance = record.steady_variance()[keep]
+        learnt = learn(of_steady(rows, variance, 2.0 / coast_s, inertia), speed_m_s)
+        if not learnt.learnt:
             return None
-        sizes = dict(record.white_sd)
-        if 'speed_through_water' in sizes:
-            sizes['speed_through_water'] *= math.sqrt(filtered)
-        return cls(found, sizes, coast_s, speed_m_s, record.steady_s)
+        # the nearest single setting: an average over all would cost each update ten times as much
+        found = learnt.typical
+        white = {input_.key: float(found.white[0, input_]) for input_ in Input}
+        sizes = {name: sd * white[name] for name, sd in record.white_sd.items()}
+        return cls(
+            GaussMarkovNoise(*found.slow[0].tolist()), sizes, coast_s, speed_m_s, record.steady_s
+        )
 
     @property
     def note(self) -> str:

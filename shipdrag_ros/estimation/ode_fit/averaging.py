@@ -9,15 +9,19 @@ average. The covariance is that of the mixture: what priors disagree about is in
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.estimation.ode_fit.coast import predict
 from shipdrag_ros.estimation.ode_fit.families import Priors
 from shipdrag_ros.estimation.ode_fit.law import Law
-from shipdrag_ros.estimation.ode_fit.solve import normal_equations
+from shipdrag_ros.estimation.ode_fit.solve import whitened_equations
 from shipdrag_ros.inference.gaussian import average as mix
 from shipdrag_ros.inference.noise import Noise
 from shipdrag_ros.inference.rows import Rows
+from shipdrag_ros.inference.settings import Settings, noise_of
 from shipdrag_ros.samples import Float64, Int64
 
 _ROUNDS, _WHOLE_ROUNDS = 16, 3  # the later ones go half the way: a late onset may oscillate
@@ -26,24 +30,46 @@ _VAGUE = 1e6
 _CLOSE, _NEAR = 0.03, 1.0  # of chi^2, between one average and the next; and at the end
 
 
+class Disturbed(NamedTuple):
+    """
+    Rows and what is known of their noise.
+
+    Attributes
+    ----------
+    rows
+    white
+        Noise of the sensors, and how the hull damps.
+    settings
+        Of the slow noise.
+    steady
+        How many of the rows are before the stop.
+    """
+
+    rows: Rows
+    white: Noise
+    settings: Settings
+    steady: int
+
+
 @compiled
 def average(
     law: Law,
     start: Float64,
     grid_s: Float64,
-    rows: Rows,
-    noise: Noise,
+    record: Disturbed,
     active: Int64,
     prior: Float64,
     priors: Priors,
 ) -> tuple[bool, Float64, Float64]:
     """
-    Fit the law under all priors and average.
+    Fit the law under all priors and settings of the noise, and average.
 
     Parameters
     ----------
     law
         Of k coefficients.
+    record
+        With the settings that are averaged over.
     active
         The k coefficients, then what else is fitted.
     prior
@@ -54,43 +80,57 @@ def average(
     Returns
     -------
     converged, unknowns, covariance
+        Within priors and settings and between them.
     """
     unknowns = start.copy()
     size, p = len(unknowns), len(active)
     count, k = priors.precision.shape
     covariance = np.zeros((size, size))
-    of_active = np.empty((p, p))
     whole, sure = np.ones((1, p), np.bool_), np.ones(1)
-    products = np.empty((p + 1, p))
+    products, of_active = np.empty((p + 1, p)), np.empty((p, p))
     means, roots = np.empty((count, p)), np.zeros((count, p, p))
+    weight = record.settings.weight
     away = np.inf
     for number in range(_ROUNDS):
-        _, matrix, gradient, _ = normal_equations(
-            law, unknowns, grid_s, rows, noise, active, prior
-        )
-        products[:p], products[p] = matrix, gradient
+        table, _ = predict(law, unknowns, grid_s, record.rows, active)
         now = unknowns[active]
-        for f in range(count):
+        step, second, information = np.zeros(p), np.zeros((p, p)), np.zeros((p, p))
+        total = 0.0
+        for which in range(len(weight)):
+            noise = noise_of(record.settings, which, record.rows, record.white, record.steady)
+            _, matrix, gradient = whitened_equations(
+                table.copy(), unknowns, record.rows, noise, active, prior
+            )
+            products[:p], products[p] = matrix, gradient
+            for f in range(count):
+                for a in range(p):
+                    held = priors.precision[f, a] if a < k else 0.0
+                    if held > 0.0:
+                        means[f, a], roots[f, a, a] = priors.mean[f, a], 1.0 / np.sqrt(held)
+                    else:
+                        means[f, a], roots[f, a, a] = now[a], _VAGUE / np.sqrt(matrix[a, a])
+            # written so that NaN fails: such a setting is left out
+            if not np.isfinite(roots).all() or not np.isfinite(products).all():
+                continue
+            found, of_active, _ = mix(products, now, whole, sure, means, roots)
+            total += weight[which]
             for a in range(p):
-                held = priors.precision[f, a] if a < k else 0.0
-                if held > 0.0:
-                    means[f, a], roots[f, a, a] = priors.mean[f, a], 1.0 / np.sqrt(held)
-                else:
-                    means[f, a], roots[f, a, a] = now[a], _VAGUE / np.sqrt(matrix[a, a])
-        # written so that NaN fails
-        if not np.isfinite(roots).all() or not np.isfinite(products).all():
+                step[a] += weight[which] * (found[a] - now[a])
+                for b in range(p):
+                    information[a, b] += weight[which] * matrix[a, b]
+                    second[a, b] += weight[which] * (
+                        of_active[a, b] + (found[a] - now[a]) * (found[b] - now[b])
+                    )
+        if not total > 0.0:
             return False, unknowns, covariance
-        found, of_active, _ = mix(products, now, whole, sure, means, roots)
-        step = found - now
+        step /= total
         away = 0.0
         part = 1.0 if number < _WHOLE_ROUNDS else 0.5
         for a in range(p):
             unknowns[active[a]] += part * step[a]
             for b in range(p):
-                away += step[a] * matrix[a, b] * step[b]
+                away += step[a] * information[a, b] / total * step[b]
+                covariance[active[a], active[b]] = second[a, b] / total - step[a] * step[b]
         if away < _CLOSE:
             break
-    for a in range(p):
-        for b in range(p):
-            covariance[active[a], active[b]] = of_active[a, b]
     return away < _NEAR, unknowns, covariance

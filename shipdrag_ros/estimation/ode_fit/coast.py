@@ -131,6 +131,21 @@ def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Fl
 
 
 @compiled
+def _behind(t: float, lag: float) -> tuple[float, float, float]:
+    """
+    Return the time whose speed a log tells, and how it follows the time and falls by the lag.
+
+    A filter of the time constant `lag`, at an even deceleration since 0; an earlier log is ahead.
+    """
+    if lag <= 0.0:
+        return t - lag, 1.0, 1.0
+    if t <= 0.0:
+        return t, 1.0, 0.0
+    left = np.exp(-t / lag)
+    return t - lag * (1.0 - left), 1.0 - left, 1.0 - left - t / lag * left
+
+
+@compiled
 def predict(
     law: Law, unknowns: Float64, grid_s: Float64, rows: Rows, active: Int64
 ) -> tuple[Float64, Float64]:
@@ -156,8 +171,10 @@ def predict(
     here = np.empty(2 * (q + 1))
     cell = 0
     for i in range(n):
-        # a log tells the speed of some seconds ago
-        t = rows.time_s[i] - onset - (lag if rows.kind[i] == LOG else 0.0)
+        t = rows.time_s[i] - onset
+        by_onset, by_lag = 1.0, 0.0
+        if rows.kind[i] == LOG:
+            t, by_onset, by_lag = _behind(t, lag)
         acceleration = 0.0
         if t < 0.0:
             here[:] = 0.0
@@ -213,7 +230,8 @@ def predict(
                 if kind == POSITION:
                     table[1 + p, i] = v0 - here[0]
                 else:
-                    table[1 + p, i] = -acceleration * (scale if kind == LOG else 1.0)
+                    by_time = by_onset * (scale if kind == LOG else 1.0)
+                    table[1 + p, i] = -acceleration * by_time
             elif u == k + X0:
                 table[1 + p, i] = 1.0 if kind == POSITION else 0.0
             elif u == k + CURRENT:
@@ -222,5 +240,6 @@ def predict(
                 elif kind == OVER_GROUND:
                     table[1 + p, i] = 1.0
             elif kind == LOG:
-                table[1 + p, i] = here[0] if u == k + LOG_SCALE else -scale * acceleration
+                by_lagging = -scale * acceleration * by_lag
+                table[1 + p, i] = here[0] if u == k + LOG_SCALE else by_lagging
     return table, speed

@@ -31,9 +31,10 @@ from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.learning import ENGINE_HOLD, learn
-from shipdrag_ros.inference.noise import GaussMarkovNoise
+from shipdrag_ros.inference.learning import LEAST_S as LEARN_S
+from shipdrag_ros.inference.learning import learn, of_steady, prior
 from shipdrag_ros.inference.rows import CODES, LOG, Rows
+from shipdrag_ros.inference.settings import NoisePosterior
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -68,20 +69,13 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     notes = [*window.notes, *ship.warnings, *run_down.notes]
     # first the coastdown alone, as if nothing but sensor noise disturbed
     alone = record.without_steady()
-    first, problem = fit_robustly(Problem.of(alone, run_down, ship, guess))
-    if record.steady_s >= LEAST_S:
-        plain = first.plainly(guess.lowest)
-        slow, filtered = _learn(record, plain, run_down)
-        problem = Problem.of(record, run_down, ship, guess).disturbed(slow, plain)
-        problem = weigh_disturbed(problem, first)
-        problem = problem.filtered(filtered * record.white_sd.get('speed_through_water', 0.0) ** 2)
-        notes.append(_noise_note(slow, record.steady_s))
-    else:
+    first, _ = fit_robustly(Problem.of(alone, run_down, ship, guess))
+    plain = first.plainly(guess.lowest)
+    if record.steady_s < LEAST_S:
         record = alone
-        notes.append(
-            'there is no steady record before the onset to learn slow disturbances from: the '
-            'band holds what scatters in the window alone'
-        )
+    problem = Problem.of(record, run_down, ship, guess).damped(plain)
+    problem = problem.disturbed(_at_first(record, problem, run_down, guess).typical)
+    problem = weigh_disturbed(problem, first)
     full = problem
     first, problem = with_log_scale(problem.condensed(first), first)
     if LOG_SCALE in problem.extras:
@@ -90,7 +84,14 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
             f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
             'deviations), taken out'
         )
-    found = problem.average(first)
+    whole = problem.whole(first)
+    near = problem.average(whole)
+    noise = learn(problem.seen(near or whole), guess.speed_m_s)
+    problem = problem.disturbed(noise.settings)
+    # where the whole law cannot be fitted, the first family stands alone
+    found = problem.average(near or whole) or near or first
+    full = full.disturbed(noise.typical)
+    notes += _noise_notes(noise, record)
     colours = full.colours(found)
     most = max(colour.inflation for colour in colours.values())
     if most > 1.0:
@@ -100,42 +101,61 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     return _result(found, full, record, window, ship, parameters, tuple(notes))
 
 
-def _learn(
-    record: Record, plain: FittedMotion, run_down: RunDown
-) -> tuple[GaussMarkovNoise, float]:
-    """Learn the disturbances of the steady record, damped as a plain fit has it."""
-    top = plain.unknowns[plain.law.size + V0 :][:1]
-    damping, inertia = plain.damping(top)
-    r, _ = plain.resistance(top)
-    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else -_QUIET_S
-    keep = record.steady.time_s < quiet
+def _at_first(record: Record, problem: Problem, run_down: RunDown, guess: Guess) -> NoisePosterior:
+    """Learn the noise of the steady record alone; that of the prior where there is none."""
     steady = record.steady
+    quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else -_QUIET_S
+    keep = steady.time_s < quiet
     rows = Rows(steady.time_s[keep], steady.kind[keep], steady.value[keep])
-    variance = record.variance(rows, record.steady_weight[keep])
+    if not len(rows.time_s):
+        rows = record.coast
+        variance, white = problem.white.variance, problem.white
+        return prior(
+            of_steady(rows, variance, float(white.damping_1_s[0]), float(white.inertia[0])),
+            guess.speed_m_s,
+        )
     return learn(
-        rows,
-        variance,
-        damping_1_s=float(damping[0]),
-        inertia=float(inertia[0]),
-        r_m_s2=float(r[0]),
+        of_steady(
+            rows,
+            record.steady_variance()[keep],
+            float(problem.white.damping_1_s[0]),
+            float(problem.white.inertia[0]),
+        ),
+        guess.speed_m_s,
     )
 
 
-def _noise_note(slow: GaussMarkovNoise, steady_s: float) -> str:
-    found = []
-    if slow.gust_m_s2:
-        found.append(
-            f'a force of {slow.gust_m_s2:.2g} m/s² over {slow.gust_s:.0f} s (the engine is '
-            f'taken to damp the speed {ENGINE_HOLD:g} times as the hull does; 1 to 2 is usual)'
+def _noise_notes(noise: NoisePosterior, record: Record) -> list[str]:
+    if not noise.learnt:
+        length_s = record.steady_s + float(np.ptp(record.coast.time_s))
+        why = (
+            f'{length_s:.0f} s of record are too short to learn slow disturbances from '
+            f'({LEARN_S:g} s are needed)'
         )
+        if length_s >= LEARN_S:
+            why = 'no size of slow disturbances explains the record'
+        return [f'{why}: the band holds what is usual at sea']
+    slow = noise.slow
+    found = [
+        f'a force of {slow.gust_m_s2:.2g} m/s² over {slow.gust_s:.0f} s (the engine is taken to '
+        f'damp the speed {noise.typical.hold[0]:.2g} times as the hull does; 1 to 2 is usual)'
+    ]
     if slow.log_m_s:
-        found.append(f'the log by {slow.log_m_s:.2g} m/s over {slow.log_s:.0f} s')
+        found.append(f'the speed readings by {slow.log_m_s:.2g} m/s over {slow.log_s:.0f} s')
     if slow.place_m:
         found.append(f'positions by {slow.place_m:.2g} m over {slow.place_s:.0f} s')
-    return (
-        f'disturbances learnt from {steady_s:.0f} s of steady record: '
-        f'{" and ".join(found) or "none but the noise of the sensors"}'
+    if slow.water_m_s:
+        found.append(f'the water by {slow.water_m_s:.2g} m/s over {slow.water_s:.0f} s')
+    where = f'{record.steady_s:.0f} s of steady record and ' if record.steady_s else ''
+    none = (
+        ''
+        if record.steady_s
+        else ('; without a steady record before the onset they are not well known')
     )
+    return [
+        f'slow disturbances learnt from {where}the coastdown, averaged over '
+        f'{len(noise.settings.weight)} settings: about {", ".join(found)}{none}'
+    ]
 
 
 def _colour_notes(colours: dict[int, Colour]) -> list[str]:

@@ -33,7 +33,7 @@ def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
     EstimationError
         If the fit does not converge.
     """
-    base = problem.noise.variance.copy()
+    base = problem.white.variance.copy()
     weight = np.ones(len(base))
     start = problem.start()
     unknown = problem.first.size + len(problem.extras)
@@ -59,7 +59,7 @@ def weigh_disturbed(problem: Problem, near: FittedMotion) -> Problem:
     """
     Weigh the rows by what a fit leaves that slow disturbances do not explain.
     """
-    base = problem.noise.variance.copy()
+    base = problem.white.variance.copy()
     weight = np.ones(len(base))
     residual = problem.residual(near)
     unknown = problem.first.size + len(problem.extras)

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.estimation.ode_fit.averaging import average
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.ode_fit.averaging import Disturbed, average
 from shipdrag_ros.estimation.ode_fit.coast import (
     CURRENT,
     EXTRAS,
@@ -30,14 +31,10 @@ from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.record import Record
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.solve import fit
-from shipdrag_ros.inference.learning import ENGINE_HOLD
-from shipdrag_ros.inference.noise import (
-    WHITE,
-    GaussMarkovNoise,
-    Noise,
-    whiten,
-)
+from shipdrag_ros.inference.noise import WHITE, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.inference.sampling import Seen
+from shipdrag_ros.inference.settings import SENSORS_ALONE, Settings, noise_of
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 
@@ -60,8 +57,10 @@ class Problem:
         How many of them are of the steady record.
     grid_s
         Times of the integration.
-    noise
-        White noise, larger for an outlier, and slow disturbances.
+    white
+        Noise of the sensors, larger for an outlier, and how the hull damps.
+    settings
+        Of the slow noise; the first is used where one is.
     run_down
         What is known of the stop.
     guess
@@ -77,7 +76,8 @@ class Problem:
     rows: Rows
     steady: int
     grid_s: Float64
-    noise: Noise
+    white: Noise
+    settings: Settings
     run_down: RunDown
     guess: Guess
     first: Law
@@ -93,7 +93,7 @@ class Problem:
         rows = Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast)))
         variance = np.concatenate(
             [
-                record.variance(steady, record.steady_weight),
+                record.steady_variance(),
                 record.variance(coast, record.coast_weight),
             ]
         )
@@ -120,6 +120,7 @@ class Problem:
             len(steady.time_s),
             grid,
             Noise(variance, WHITE, ones, ones),
+            SENSORS_ALONE,
             run_down,
             guess,
             Law(np.array(FIRST, np.int64), v_ref, run_down.shaft_s, ship.n_r_polynomial()),
@@ -127,34 +128,56 @@ class Problem:
             tuple(extras),
         )
 
-    def disturbed(self, slow: GaussMarkovNoise, plain: FittedMotion) -> Problem:
+    @property
+    def noise(self) -> Noise:
+        """That of the first setting."""
+        found: Noise = noise_of(self.settings, 0, self.rows, self.white, self.steady)
+        return found
+
+    def damped(self, plain: FittedMotion) -> Problem:
         """
-        Return the problem with slow noise, damped as a fit has it.
+        Return the problem in which a fit says how the hull damps.
+
+        Raises
+        ------
+        EstimationError
+            If the fit ran away.
         """
         _, speed = predict(
             plain.law, plain.unknowns, self.grid_s, self.rows, np.zeros(0, np.int64)
         )
+        if not np.all(np.isfinite(speed)):
+            raise EstimationError(
+                'the fitted speed is not finite: give one coastdown, with the engine stopped, '
+                'or set `estimator` to log_time'
+            )
         damping, inertia = plain.damping(speed)
-        damping[: self.steady] *= ENGINE_HOLD
-        return replace(self, noise=Noise(self.noise.variance, slow, damping, inertia))
+        return replace(self, white=Noise(self.white.variance, WHITE, damping, inertia))
+
+    def disturbed(self, settings: Settings) -> Problem:
+        """
+        Return the problem with settings of the slow noise.
+        """
+        return replace(self, settings=settings)
 
     def weighted(self, variance: Float64) -> Problem:
         """
         Return the problem with another variance of the white noise.
         """
-        return replace(self, noise=self.noise._replace(variance=variance))
+        return replace(self, white=self.white._replace(variance=variance))
 
-    def filtered(self, least: float) -> Problem:
+    def seen(self, near: FittedMotion) -> Seen:
         """
-        Return the problem with at least so large a variance of the log's noise.
+        Return what the noise is learnt from, linear about a fit of the whole law.
         """
-        variance = self.noise.variance.copy()
-        log = self.rows.kind == LOG
-        if not log[self.steady :].any():
-            return self
-        typical = float(np.median(variance[self.steady :][log[self.steady :]]))
-        variance[log] *= max(1.0, least / typical)
-        return self.weighted(variance)
+        active = self._active(near.law)
+        table, _ = predict(near.law, near.unknowns, self.grid_s, self.rows, active)
+        now, prior = near.unknowns[active], self._prior(near.law)[:, active]
+        priors = self.humps.priors(self._unit_m_s2)
+        count, k = priors.precision.shape
+        mean, precision = np.tile(prior[0] - now, (count, 1)), np.tile(prior[1], (count, 1))
+        mean[:, :k], precision[:, :k] = priors.mean - now[:k], priors.precision
+        return Seen(self.rows, table, mean, precision, self.white, self.steady)
 
     def residual(self, found: FittedMotion) -> Float64:
         """
@@ -183,8 +206,8 @@ class Problem:
         within a step either.
         """
         left = self.residual(near)
-        noise = self.noise
-        coast, variance = means(self.rows, self.steady, left, noise.variance, self.grid_s)
+        white = self.white
+        coast, variance = means(self.rows, self.steady, left, white.variance, self.grid_s)
         before = slice(self.steady)
         nothing = np.zeros(len(coast.time_s))
         rows = Rows(
@@ -197,13 +220,13 @@ class Problem:
         value -= replace(self, rows=rows).residual(near) - rows.value
         damping, inertia = (
             np.interp(rows.time_s, self.rows.time_s, of_row)
-            for of_row in (noise.damping_1_s, noise.inertia)
+            for of_row in (white.damping_1_s, white.inertia)
         )
-        variance = np.concatenate([noise.variance[before], variance])
+        variance = np.concatenate([white.variance[before], variance])
         return replace(
             self,
             rows=rows._replace(value=value),
-            noise=Noise(variance, noise.slow, damping, inertia),
+            white=Noise(variance, WHITE, damping, inertia),
         )
 
     def start(self) -> Float64:
@@ -238,9 +261,9 @@ class Problem:
         )
         return FittedMotion(self.first, unknowns, covariance) if converged else None, white
 
-    def average(self, first: FittedMotion) -> FittedMotion:
+    def whole(self, first: FittedMotion) -> FittedMotion:
         """
-        Fit the whole law from the first on; where it cannot be, the first stands alone.
+        Return the whole law as the first family has it.
         """
         law = self.first._replace(
             powers=np.array(POWERS, np.int64),
@@ -252,17 +275,23 @@ class Problem:
         start[law.size :] = first.unknowns[first.law.size :]
         for power, coefficient in zip(FIRST, first.unknowns):
             start[POWERS.index(power)] = coefficient
+        return FittedMotion(law, start, np.zeros((len(start), len(start))))
+
+    def average(self, near: FittedMotion) -> FittedMotion | None:
+        """
+        Average a fit of the whole law over priors and settings; None where it does not converge.
+        """
+        law = near.law
         converged, unknowns, covariance = average(
             law,
-            start,
+            near.unknowns,
             self.grid_s,
-            self.rows,
-            self.noise,
+            Disturbed(self.rows, self.white, self.settings, self.steady),
             self._active(law),
             self._prior(law),
             self.humps.priors(self._unit_m_s2),
         )
-        return FittedMotion(law, unknowns, covariance) if converged else first
+        return FittedMotion(law, unknowns, covariance) if converged else None
 
     @property
     def _unit_m_s2(self) -> float:

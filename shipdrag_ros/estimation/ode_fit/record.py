@@ -13,6 +13,7 @@ from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.stated import stated_weight
 from shipdrag_ros.estimation.ode_fit.steady import (
     condense,
+    display_sd,
     steady_since,
     weighted_white_sd,
 )
@@ -43,6 +44,8 @@ class Record:
         Standard deviation of the white noise of each input used, of such a sample.
     stamps
         Stamps of each input used, in the window.
+    display_sd
+        Of each input used: what the last digit hides from a mean of the steady record.
     """
 
     steady: Rows
@@ -51,6 +54,7 @@ class Record:
     coast_weight: Float64
     white_sd: dict[str, float]
     stamps: dict[str, Int64]
+    display_sd: dict[str, float]
 
     @classmethod
     def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> Record:
@@ -82,6 +86,7 @@ class Record:
         steady: list[tuple[Float64, int, Float64, Float64]] = []
         coast: list[tuple[Float64, int, Float64, Float64]] = []
         white: dict[str, float] = {}
+        display: dict[str, float] = {}
         for name, series in inputs.items():
             time_s = _seconds(series.time_ns, zero_ns)
             before_s: Float64 = np.empty(0)
@@ -108,6 +113,7 @@ class Record:
                 1e-6 * float(np.ptp(value)),
                 1e-9,
             )
+            display[name] = display_sd(series.value, white[name])
             coast.append((time_s, CODES[name], value, weight[len(before_s) :]))
             if len(before_s):
                 means = condense(before_s, before, weight[: len(before_s)], _FINE_S)
@@ -121,6 +127,7 @@ class Record:
             coast_weight,
             white,
             {name: series.time_ns for name, series in inputs.items()},
+            display,
         )
 
     @property
@@ -144,6 +151,16 @@ class Record:
             of_kind[CODES[name]] = sd**2
         result: Float64 = of_kind[rows.kind] / weight
         return result
+
+    def steady_variance(self) -> Float64:
+        """
+        Return that of the steady rows, with what the display hides from their means.
+        """
+        of_kind = np.zeros(len(CODES))
+        for name, sd in self.display_sd.items():
+            of_kind[CODES[name]] = sd**2
+        result: Float64 = self.variance(self.steady, self.steady_weight)
+        return result + of_kind[self.steady.kind]
 
 
 def _check_finite(inputs: dict[str, Series]) -> None:

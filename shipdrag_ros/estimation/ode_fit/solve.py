@@ -46,6 +46,27 @@ def normal_equations(
         Whitened residuals.
     """
     table, _ = predict(law, unknowns, grid_s, rows, active)
+    chi2, matrix, gradient = whitened_equations(table, unknowns, rows, noise, active, prior)
+    return chi2, matrix, gradient, table[0].copy()
+
+
+@compiled
+def whitened_equations(
+    table: Float64, unknowns: Float64, rows: Rows, noise: Noise, active: Int64, prior: Float64
+) -> tuple[float, Float64, Float64]:
+    """
+    Whiten residual and columns, in place, and return their normal equations.
+
+    Parameters
+    ----------
+    table : (1 + p, n)
+        From `predict`.
+
+    Returns
+    -------
+    chi2, matrix, gradient
+        As `normal_equations`.
+    """
     p = len(active)
     whiten(rows, table, noise)
     # of residual and columns
@@ -59,7 +80,7 @@ def normal_equations(
         chi2 += prior[1, u] * off * off
         matrix[a, a] += prior[1, u]
         gradient[a] += prior[1, u] * off
-    return chi2, matrix, gradient, table[0].copy()
+    return chi2, matrix, gradient
 
 
 @compiled

@@ -37,6 +37,30 @@ def white_sd(value: Float64) -> float:
     return float(weighted_white_sd(value, np.ones(len(value))))
 
 
+def display_sd(value: Float64, white_sd: float) -> float:
+    """
+    Return what the last digit of a display hides from a mean of a steady signal.
+
+    Parameters
+    ----------
+    value : (n,) or (n, 2)
+        Of a signal that moves.
+    white_sd
+        Of its noise, in which a coarse display is lost.
+
+    Notes
+    -----
+    Rounding to q errs by up to q / 2 and always alike while the signal stands; noise
+    averages that to a part exp(-2 pi^2 sd^2 / q^2) (Widrow's theorem, its first term).
+    """
+    levels = np.unique(value if value.ndim == 1 else value[:, 0])
+    if len(levels) < 2:
+        return 0.0
+    quantum = float(np.median(np.diff(levels)))
+    left = math.exp(-2.0 * (math.pi * white_sd / quantum) ** 2)
+    return quantum / math.sqrt(12.0) * left
+
+
 @compiled
 def weighted_white_sd(value: Float64, weight: Float64) -> float:
     """
@@ -147,7 +171,9 @@ def condense(
     edges = _parts(time_s, 2.0 * _BLOCK_S)
     near = np.interp(time_s, block_medians(time_s, edges), block_medians(value, edges))
     away = np.abs(value - near)
-    keep = away <= _OUTLIER * MAD_TO_SD * np.median(away)
+    # of a coarse display most readings are the median itself: that does not tell the scatter
+    scatter = max(MAD_TO_SD * np.median(away), weighted_white_sd(value, np.ones(len(value))))
+    keep = away <= _OUTLIER * scatter
     time_s, value, weight = time_s[keep], value[keep], weight[keep]
     split = len(time_s)
     if fine_s > 0.0:

@@ -6,13 +6,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.estimation.ode_fit.averaging import average
+from shipdrag_ros.estimation.ode_fit.averaging import Disturbed, average
 from shipdrag_ros.estimation.ode_fit.coast import EXTRAS, V0, predict
 from shipdrag_ros.estimation.ode_fit.families import Priors
 from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.solve import fit
-from shipdrag_ros.inference.noise import WHITE, Noise
+from shipdrag_ros.inference.noise import WHITE, GaussMarkovNoise, Noise
 from shipdrag_ros.inference.rows import LOG, Rows
+from shipdrag_ros.inference.settings import SENSORS_ALONE, Settings
 from shipdrag_ros.samples import Float64
 
 POWERS = np.array([1, 2, 3, 4])
@@ -33,7 +34,10 @@ def rows() -> Rows:
 
 
 def averaged(
-    rows: Rows, precision: list[list[float]], mean: list[list[float]] | None = None
+    rows: Rows,
+    precision: list[list[float]],
+    mean: list[list[float]] | None = None,
+    settings: Settings = SENSORS_ALONE,
 ) -> tuple[bool, Float64, Float64]:
     start = np.array([0.0, 0.04, 0.0, 0.0, 8.1, *np.zeros(EXTRAS - 1)])
     calm = Noise(np.full(N, 0.05**2), WHITE, np.ones(N), np.ones(N))
@@ -41,7 +45,8 @@ def averaged(
     priors = Priors(np.zeros_like(held) if mean is None else np.array(mean), held)
     active = np.array([0, 1, 2, 3, len(POWERS) + V0])
     prior = np.zeros((2, len(start)))
-    return average(LAW, start, GRID_S, rows, calm, active, prior, priors)
+    record = Disturbed(rows, calm, settings, 0)
+    return average(LAW, start, GRID_S, record, active, prior, priors)
 
 
 OUT = 1e14  # precision of what is known to be 0
@@ -70,6 +75,36 @@ def test_what_priors_disagree_about_is_in_the_covariance(rows: Rows) -> None:
     assert min(coefficient[0], coefficient[2]) < coefficient[1] < max(coefficient)
     between = (coefficient[0] - coefficient[2]) ** 2
     assert both[2][1, 1] > min(low[2][1, 1], high[2][1, 1]) + 1e-3 * between
+
+
+def test_settings_are_mixed_with_the_variance_between_them(rows: Rows) -> None:
+    log = GaussMarkovNoise(log_m_s=0.05, log_s=100.0)
+    sizes = np.array([WHITE, log])
+    ones = np.ones((2, 3)), np.ones(2)
+    alone = [
+        averaged(rows, [LOW], settings=Settings(sizes[i : i + 1], *(x[:1] for x in ones), one))
+        for i, one in ((0, np.ones(1)), (1, np.ones(1)))
+    ]
+    _, mean, covariance = averaged(
+        rows, [LOW], settings=Settings(sizes, *ones, np.array([0.25, 0.75]))
+    )
+    weight = 0.25, 0.75
+    expected = sum(w * one[1] for w, one in zip(weight, alone))
+    within = sum(w * np.diag(one[2]) for w, one in zip(weight, alone))
+    between = 0.25 * 0.75 * (alone[0][1] - alone[1][1]) ** 2
+    sd = np.sqrt(within[[1, 2, 4]])
+    np.testing.assert_allclose(mean[[1, 2, 4]], expected[[1, 2, 4]], rtol=0.0, atol=0.1 * sd.min())
+    np.testing.assert_allclose(np.diag(covariance), within + between, rtol=0.03, atol=1e-12)
+    assert np.all(np.diag(alone[1][2])[[1, 2, 4]] > 1.5 * np.diag(alone[0][2])[[1, 2, 4]])
+
+
+def test_a_setting_that_fails_is_left_out(rows: Rows) -> None:
+    sizes = np.array([WHITE, GaussMarkovNoise(log_m_s=np.inf, log_s=100.0)])
+    both = Settings(sizes, np.ones((2, 3)), np.ones(2), np.array([0.5, 0.5]))
+    one, two = averaged(rows, [LOW]), averaged(rows, [LOW], settings=both)
+    np.testing.assert_array_equal(two[1], one[1])
+    none = Settings(sizes[1:], np.ones((1, 3)), np.ones(1), np.ones(1))
+    assert not averaged(rows, [LOW], settings=none)[0]
 
 
 def test_twice_the_same_prior_is_one(rows: Rows) -> None:

@@ -15,8 +15,7 @@ from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.solve import cholesky_solve
 from shipdrag_ros.estimation.ode_fit.steady import white_sd
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.inference.learning import learn
-from shipdrag_ros.inference.noise import WHITE, GaussMarkovNoise, Noise, whiten
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
@@ -306,35 +305,6 @@ def test_log_and_positions_are_no_worse_than_either(coast, ship) -> None:
     print(np.array(rms))
     log, positions, both = np.sqrt(np.mean(np.square(rms), axis=0))
     assert both < 1.1 * min(log, positions)
-
-
-def test_a_wandering_log_is_learnt_and_a_quiet_one_left_alone() -> None:
-    # N = 20, seeds 0..19; medians within a factor of 2, not more than 4 false finds
-    time_s = np.arange(5.0, 1800.0, 10.0)
-    variance = np.full(len(time_s), 0.0005)
-    found, false = [], 0
-    for seed in range(20):
-        rng = np.random.default_rng(seed)
-        white = 8.0 + np.sqrt(variance) * rng.standard_normal(len(time_s))
-        wander = GaussMarkov(0.05, 200.0).sample(time_s, rng)
-        kind = np.full(len(time_s), LOG)
-        found.append(
-            learn(
-                Rows(time_s, kind, white + wander),
-                variance,
-                damping_1_s=0.007,
-                inertia=1.1,
-                r_m_s2=0.025,
-            )[0]
-        )
-        quiet, _ = learn(
-            Rows(time_s, kind, white), variance, damping_1_s=0.007, inertia=1.1, r_m_s2=0.025
-        )
-        false += quiet != WHITE
-    # log alone: the same wander may be told as a force
-    told = [item.log_m_s or item.gust_m_s2 / 1.1 / 0.0092 for item in found]
-    assert 0.025 < np.median(told) < 0.1
-    assert false <= 4
 
 
 def test_white_noise_is_told_from_a_smooth_signal() -> None:
