@@ -19,13 +19,13 @@ import numpy as np
 
 from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.inference.sampling import Prior, Seen, evidence, sample, spread_points, values
+from shipdrag_ros.inference.sampling import Prior, Seen, sample, spread_points, values
 from shipdrag_ros.inference.settings import HOLD, SIZE, WHITE_OF, NoisePosterior, Settings
 from shipdrag_ros.samples import Float64
 
 KEPT = 24  # settings
 _NEGLIGIBLE = 2e-3  # weight of a setting
-LEAST_S = 300.0  # of record from which noise can be learnt; from less the prior is taken
+LEAST_S = 300.0  # of record from which noise can be learnt; of less most is the prior's
 # At steady speed an engine that holds torque, power or revs gives more thrust to a ship that is
 # slowed: the speed is damped 1 to 2 times as much as the hull's resistance says.
 _TYPICAL_HOLD = 1.4
@@ -80,8 +80,8 @@ def learn(seen: Seen, speed_m_s: float) -> NoisePosterior:
     Returns
     -------
     NoisePosterior
-        Of a record shorter than `LEAST_S` the settings of the prior, weighed by how they explain
-        it; those of the prior as they are where no setting explains the record.
+        Of a record shorter than `LEAST_S` it is not called learnt: what it holds is mostly the
+        prior. Settings of the prior as they are, where no setting explains the record.
 
     Notes
     -----
@@ -89,16 +89,11 @@ def learn(seen: Seen, speed_m_s: float) -> NoisePosterior:
     root of their number times their mean (Ionides 2008).
     """
     prior = _prior(seen, speed_m_s)
+    z, log_weight = sample(seen, prior, spread_points(len(prior.which)))
+    if not np.isfinite(log_weight).any():
+        return _of_prior(prior)
     length_s = float(np.ptp(seen.rows.time_s)) if len(seen.rows.time_s) else 0.0
-    if length_s < LEAST_S:
-        # too short to search, but not to tell which settings are impossible
-        z = _points_of(prior)
-        log_weight = evidence(z, seen, prior)
-        if not np.isfinite(log_weight).any():
-            return _of_prior(prior)
-        return replace(_posterior(z, log_weight, prior), learnt=False)
-    found = sample(seen, prior, spread_points(len(prior.which)))
-    return _posterior(*found, prior) if np.isfinite(found[1]).any() else _of_prior(prior)
+    return replace(_posterior(z, log_weight, prior), learnt=length_s >= LEAST_S)
 
 
 def prior(seen: Seen, speed_m_s: float) -> NoisePosterior:

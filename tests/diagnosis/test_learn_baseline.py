@@ -142,8 +142,8 @@ def test_fouling_that_the_stated_baseline_hides_is_seen_against_the_learnt_one()
 
 def test_runs_that_scatter_raise_no_alarm_against_the_learnt_baseline() -> None:
     pair = [
-        coast(scaled(*(1.015 * TRUE)), seed=78),
-        coast(scaled(*(0.985 * TRUE)), seed=79, heading_rad=0.3 + math.pi),
+        coast(scaled(*(1.025 * TRUE)), seed=78),
+        coast(scaled(*(0.975 * TRUE)), seed=79, heading_rad=0.3 + math.pi),
     ]
     found = learnt(5).ship
     assert found.baseline is not None

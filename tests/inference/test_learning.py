@@ -68,15 +68,13 @@ def test_a_longer_record_leaves_less_doubt() -> None:
     assert long < 0.7 * short
 
 
-def test_a_short_record_chooses_among_settings_of_the_prior_and_says_so() -> None:
+def test_a_short_record_is_mostly_the_prior_and_says_so() -> None:
     time_s = np.arange(0.0, 280.0, 10.0)
     value = 8.0 + 0.02 * np.random.default_rng(0).standard_normal(len(time_s))
     seen = steady(value, time_s, 0.02)
     found, before = learn(seen, SPEED), prior(seen, SPEED)
     assert not found.learnt
     assert not before.learnt
-    known = {tuple(line) for line in before.settings.slow.tolist()}
-    assert all(tuple(line) in known for line in found.settings.slow.tolist())
     # sizes that a quiet record makes impossible weigh little
     assert found.slow.log_m_s < before.slow.log_m_s
 
