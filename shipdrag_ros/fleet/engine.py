@@ -30,6 +30,7 @@ DIED = 'its worker died'
 """What the reason begins with where nothing came back."""
 
 _CONNECT_S = 30.0
+_LOOK_S = 60.0  # between looks at whether a worker is left
 
 
 class Lost(NamedTuple):
@@ -132,24 +133,42 @@ class Engine:
         ------
         key, result
             `Lost` where workers died of it again and again.
+
+        Raises
+        ------
+        FleetError
+            If no worker is left.
         """
-        from distributed import as_completed
-
-        assert self._client is not None
-
-        futures = {self._submit(function, key, item): key for key, item in items.items()}
         put_off = []
-        completed = as_completed(list(futures), loop=self._client.loop)
-        for future in completed:
-            key = futures.pop(future)
-            result = _result(future)
-            future.release()
+        futures = {self._submit(function, key, item): key for key, item in items.items()}
+        for key, result in self._finished(futures):
             if isinstance(result, Lost):
                 put_off.append(key)
             else:
                 yield key, result
         for key in sorted(put_off):
-            yield key, _result(self._submit(function, key, items[key], again=True))
+            yield from self._finished({self._submit(function, key, items[key], again=True): key})
+
+    def _finished(self, futures: dict[Future[Result], str]) -> Iterator[tuple[str, Result | Lost]]:
+        """Yield results as they come; that no worker is left to give any is an error."""
+        from distributed import as_completed
+
+        assert self._client is not None
+        without = 0
+        while futures:
+            try:
+                for future in as_completed(list(futures), loop=self._client.loop, timeout=_LOOK_S):
+                    without = 0
+                    yield futures.pop(future), _result(future)
+                    future.release()
+            except TimeoutError:
+                # a worker that has died is soon there again; once more, and none comes
+                without = 0 if self._client.scheduler_info()['workers'] else without + 1
+                if without > 1:
+                    raise FleetError(
+                        f'no worker is left, and {len(futures)} bag(s) are not done; what is '
+                        'done is kept: run it again'
+                    ) from None
 
     def _submit(
         self, function: Callable[[Item], Result], key: str, item: Item, *, again: bool = False

@@ -7,6 +7,7 @@ import json
 import os
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -148,3 +149,18 @@ def test_a_folder_without_a_bag_is_told(
     (tmp_path / 'empty').mkdir()
     assert main(['fleet', str(tmp_path / 'empty'), '-o', str(tmp_path / 'store')]) == 1
     assert 'no bag lies below' in capsys.readouterr().err
+
+
+def test_that_no_worker_is_left_is_an_error_and_no_wait_for_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr('shipdrag_ros.fleet.engine._LOOK_S', 1.0)
+    with Engine(workers=1) as lonely:
+        assert lonely._client is not None
+        lonely._client.cluster.scale(0)
+        end_s = time.monotonic() + 60.0
+        while lonely._client.scheduler_info()['workers']:
+            assert time.monotonic() < end_s
+            time.sleep(0.1)
+        with pytest.raises(FleetError, match='no worker is left, and 1 bag'):
+            list(lonely.map(deadly, {'a': 'a'}))
