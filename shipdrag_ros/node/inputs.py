@@ -38,6 +38,7 @@ from shipdrag_ros.node.losses import Sequences
 # as long as many messages.
 DEPTH = 5000
 _OFFSETS = 32  # readings whose clock offset is kept
+_UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of rcl
 
 Arrived = Callable[[], None]
 
@@ -296,4 +297,6 @@ class InputTopic:
 
 
 def _sender(info: Any) -> str:
+    if info.node_name == _UNKNOWN:  # its name comes a little after its publishers
+        return 'a node without a name yet'
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
