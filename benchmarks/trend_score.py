@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.trend.change_points import search
-from shipdrag_ros.trend.hull_state import Growth, Runs, Steps
+from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps
 
 WEEK = 7.0 / 365.25
 MONTH = 31.0 / 365.25
@@ -121,7 +121,7 @@ def main() -> None:
         hit += bool(near)
         slope = state.growth_per_year()
         growth.append(abs(slope.value[0] - world.growth) < 1.96 * slope.sd[0])
-        known = search(world.runs, Steps(np.array([world.cleaned])), Growth())[0]
+        known = HullState(world.runs, Steps(np.array([world.cleaned])), Growth())
         size.append(float(known.changes().value[0]) + options.cleaning)
         half = np.abs(world.runs.years - world.cleaned) < 0.25
         after = world.runs.years >= world.cleaned
