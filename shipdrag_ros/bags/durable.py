@@ -19,7 +19,7 @@ from time import monotonic
 from uuid import uuid4
 
 from shipdrag_ros.bags.compaction import compact
-from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.live import LiveFile, NameTakenError
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 
@@ -303,18 +303,9 @@ class DurableRecording:
 
     def _open(self) -> LiveFile:
         self._make_directory()
-        try:
-            path = self._free_path()
-        except OSError as error:
-            raise BagError(f'{str(error.filename)!r}: {error.strerror}') from error
-        file = LiveFile(
-            path,
-            recording_id=self._recording_id,
-            part=self._part,
-            attachments=self._attachments,
-        )
+        file = next(filter(None, map(self._made, self._names())))
         with self._lock:
-            self._path, self._size_bytes = path, file.synced_bytes
+            self._path, self._size_bytes = file.path, file.synced_bytes
         self._file = file
         self._tried.set()
         return file
@@ -330,11 +321,21 @@ class DurableRecording:
         if not os.access(self._directory, os.W_OK | os.X_OK):
             raise BagError(f'{str(self._directory)!r}: Permission denied')
 
-    def _free_path(self) -> Path:
+    def _names(self) -> Iterator[str]:
         name = f'{self._stem}_{self._part:03d}'
-        names = chain([name], (f'{name}_{i}' for i in count(2)))
-        paths = (self._directory / f'{name}.mcap' for name in names)
-        return next(path for path in paths if not path.exists())
+        return chain([name], (f'{name}_{i}' for i in count(2)))
+
+    def _made(self, name: str) -> LiveFile | None:
+        """Return the file of this name, None where another recording has just taken it."""
+        try:
+            return LiveFile(
+                self._directory / f'{name}.mcap',
+                recording_id=self._recording_id,
+                part=self._part,
+                attachments=self._attachments,
+            )
+        except NameTakenError:
+            return None
 
     def _end_part(self, file: LiveFile) -> None:
         self._sync()

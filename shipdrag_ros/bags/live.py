@@ -37,6 +37,10 @@ from shipdrag_ros.messages import EncodedMessage
 DECLARE_BYTES = 1 << 20  # topics are declared anew behind so much
 
 
+class NameTakenError(BagError):
+    """A file of this name is there already."""
+
+
 class LiveFile:
     """
     An MCAP file that is safe up to its last `sync`.
@@ -59,8 +63,10 @@ class LiveFile:
 
     Raises
     ------
+    NameTakenError
+        If the file exists.
     BagError
-        If the file exists or cannot be made.
+        If it cannot be made.
     """
 
     def __init__(
@@ -77,7 +83,7 @@ class LiveFile:
             # unbuffered: what could not be written must not be tried again on closing
             self._file = open(path, 'xb', buffering=0, opener=private_opener)  # noqa: SIM115
         except FileExistsError:
-            raise BagError(f'{str(path)!r} exists') from None
+            raise NameTakenError(f'{str(path)!r} exists') from None
         except OSError as error:
             raise BagError(f'{str(path)!r} cannot be made: {error.strerror}') from error
         try:

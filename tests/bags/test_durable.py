@@ -256,3 +256,19 @@ def test_no_file_is_ever_overwritten(tmp_path: Path) -> None:
         end(recording(tmp_path, earlier=[message(1)]))
     names = [path.name for path in sorted(tmp_path.iterdir())]
     assert names == ['a_000.mcap', 'a_000_2.mcap', 'a_000_3.mcap']
+
+
+def test_recordings_that_begin_at_once_never_take_the_name_of_another(tmp_path: Path) -> None:
+    """Sixteen threads look for a free name in the same moment, in 10 rounds."""
+    for round_ in range(10):
+        folder = tmp_path / str(round_)
+        recordings = [
+            DurableRecording(folder, stem='a', attachments={}, limits=PartLimits(), at_once=False)
+            for _ in range(16)
+        ]
+        for number, it in enumerate(recordings):
+            it.put(message(number))
+            it.stop()
+        assert all(it.wait_ended(WITHIN_S) for it in recordings)
+        assert sum(it.progress().lost for it in recordings) == 0
+        assert sorted(all_numbers(folder)) == list(range(16))
