@@ -12,7 +12,18 @@ ROS = [  # the edge: a node on a machine without ROS from apt
     'ros-jazzy-rmw-fastrtps-cpp',  # rclpy alone brings no middleware
     'ros-jazzy-common-interfaces',
 ]
+FLIGHT = ['pymavlink', 'pyulog']  # logs of ArduPilot and PX4 vessels
+DOCS = [
+    'mkdocs-material',  # the site, searched without a network
+    'mkdocstrings[python]',  # its pages of the Python interface
+]
 DEVELOPMENT = [
+    'pandas',  # frames that a user may bring
+    'polars',
+    'nbclient',  # runs the notebooks
+    'nbformat',
+    'ipykernel',
+    'build',  # wheel and sdist, as they are released
     'pytest',
     'pytest-timeout',  # a hung node must not hang the suite
     'pytest-xdist',  # the suite in minutes on two cores
@@ -69,6 +80,8 @@ setup(
         'starlette',  # the page on the bridge: routes, server-sent events
         'uvicorn',  # its server
         'pyserial',  # NMEA 0183 from a serial line
+        'nmea2000',  # NMEA 2000: fast packets and fields
+        'shtab',  # completion for bash, zsh and others
         'dask',  # the fleet: a graph of bags
         'distributed',  # its workers, here or elsewhere
         'pyarrow',  # the fleet's store: Parquet
@@ -76,7 +89,7 @@ setup(
         'fsspec',  # folders and object stores alike
         's3fs',  # of those, S3
     ],
-    extras_require={'ros': ROS, 'dev': DEVELOPMENT},
+    extras_require={'ros': ROS, 'flight': FLIGHT, 'docs': DOCS, 'dev': DEVELOPMENT},
     entry_points={
         'console_scripts': [
             f'shipdrag = {PACKAGE}.cli:main',
