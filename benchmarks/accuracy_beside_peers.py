@@ -420,8 +420,8 @@ def preface(runs: int) -> list[str]:
         f'  the log, {COLOUR_S:.0f} s. Gusts: a force that moves the steady ship by 0.05 m/s, '
         f'{GUST_S:.0f} s. Run-down of the thrust: 8, 20, 3 s. In these three the '
         f'{STEADY_S / 60:.0f} min before',
-        '  the stop are given too, as a ship has them; the final fit learns from them. The noise '
-        'is told to nobody.',
+        '  the stop are given too, as a ship has them; the final fit learns from them. No '
+        'estimator is given the noise level.',
         '- Bound: Cramer-Rao, r = c₁v + .. + c₄v⁴ with the noise known, unknown current and state '
         'at the stop (`benchmarks/_bound.py`, apart from the',
         '  package). A smaller or a fitting family, or a biased estimator, may lie below it.',

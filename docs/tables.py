@@ -148,7 +148,7 @@ def effect_parameters() -> str:
     return _table(head, rows)
 
 
-def effect_look_alikes() -> str:
+def effect_confounders() -> str:
     """
     Return the table of effects that leave nearly the same trace.
     """
@@ -172,7 +172,7 @@ PAGES: Mapping[Path, Tables] = {
     EFFECTS: {
         'effects': effects,
         'effect parameters': effect_parameters,
-        'look-alikes': effect_look_alikes,
+        'confounders': effect_confounders,
     },
 }
 
