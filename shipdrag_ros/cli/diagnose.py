@@ -278,7 +278,7 @@ def _sheet(output: Output, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]
 
 
 def _tell_cuts(output: Output, result: ReplayResult, window: Span | None) -> None:
-    """Tell what of the coastdowns was cut; a window of which nothing is left is an error."""
+    """Say what of the coastdowns was cut; a window of which nothing is left is an error."""
     name = result.run.name
     for coastdown in result.coastdowns:
         if window is not None and coastdown.withdrawn:
