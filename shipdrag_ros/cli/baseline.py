@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
-from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, open_windowed, refuse_overlaps, windowed_bag
+from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, Learnt, learn_baseline
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.library.diagnosing import coasts_of
+from shipdrag_ros.library.windowed import refuse_overlaps
 from shipdrag_ros.ship import Ship
 
 
