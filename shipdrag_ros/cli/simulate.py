@@ -12,7 +12,13 @@ from shipdrag_ros.cli.arguments import add_json, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library import simulating
-from shipdrag_ros.library.simulating import SPEED_FRACTION, Settings, make, usual_speed, write_bag
+from shipdrag_ros.library.simulating import (
+    SPEED_FRACTION,
+    SimulationSettings,
+    make,
+    usual_speed,
+    write_bag,
+)
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import (
@@ -139,7 +145,7 @@ def run(options: argparse.Namespace) -> int:
     speed_m_s = options.speed
     if speed_m_s is None:
         speed_m_s = usual_speed(ship)
-    settings = Settings(
+    settings = SimulationSettings(
         speed_m_s=speed_m_s,
         duration_s=options.duration,
         lead_in_s=options.lead_in,

@@ -15,7 +15,7 @@ from shipdrag_ros.coastdown import events
 from shipdrag_ros.display import Table, utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
-from shipdrag_ros.estimation.force import Curve, Force
+from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.library.listener import Notes
@@ -207,7 +207,7 @@ class Resistance(Shown):
         return together(self.runs).combined
 
     @property
-    def curve(self) -> Curve:
+    def curve(self) -> ForceCurve:
         """The one r(v): of the only coastdown, or of all together."""
         usable = [each for each in self.coastdowns if each.estimate is not None]
         if len(usable) == 1:
@@ -302,7 +302,7 @@ class Resistance(Shown):
         return force_columns(self.curve, self.ship)
 
 
-def force_columns(curve: Curve, ship: Ship) -> dict[str, Any]:
+def force_columns(curve: ForceCurve, ship: Ship) -> dict[str, Any]:
     """
     Return a curve in SI units, with the force, the clean hull and the share over it.
     """

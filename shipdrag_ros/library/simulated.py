@@ -14,7 +14,13 @@ from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
-from shipdrag_ros.library.simulating import Settings, make, moment_ns, usual_speed, write_bag
+from shipdrag_ros.library.simulating import (
+    SimulationSettings,
+    make,
+    moment_ns,
+    usual_speed,
+    write_bag,
+)
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS
 from shipdrag_ros.simulation.effects import find, parse
@@ -121,7 +127,7 @@ def simulate(
             f'{", ".join(Sensing.__annotations__)}'
         )
     known = {'lead_in_s': 600.0, 'rate_hz': 1.0, 'noise': 1.0, **more}
-    settings = Settings(
+    settings = SimulationSettings(
         speed_m_s=usual_speed(ship) if speed_m_s is None else speed_m_s,
         duration_s=duration_s,
         heading_rad=heading_rad,

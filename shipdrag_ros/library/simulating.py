@@ -42,7 +42,7 @@ _RESISTANCE = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class SimulationSettings:
     """What a simulation was asked for, as `truth.yaml` states it."""
 
     speed_m_s: float
@@ -75,7 +75,7 @@ class Settings:
         return {**plain, 'resistance': _RESISTANCE}
 
 
-def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
+def make(ship: Ship, settings: SimulationSettings) -> tuple[Block, TrueCurve]:
     """
     Simulate a coastdown; return what the sensors read, and the truth.
 
