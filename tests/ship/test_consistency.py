@@ -32,7 +32,8 @@ def problems_of(**keys: object) -> tuple[str, ...]:
         ({'draught_m': 5.0}, 'block coefficient'),
         ({'breadth_m': 2.16}, 'breadth_m: 2.16'),
         ({'wetted_surface_m2': 48890.0}, 'wetted_surface_m2'),  # square feet
-        ({'wetted_surface_m2': 454.2}, 'wetted_surface_m2'),
+        # half and twice 2.6 sqrt(V L), or what is usual of such a hull
+        ({'wetted_surface_m2': 454.2}, 'RANGE'),
         ({'wetted_surface_m2': None}, 'wetted_surface_m2: missing'),
         ({'propeller': {'diameter_m': 12.0, 'state_in_baseline': 'free'}}, 'propeller.diameter_m'),
         (
