@@ -200,7 +200,7 @@ def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | N
 
 
 def _tell_cuts(listener: Listener, result: ReplayResult, window: Span | None) -> None:
-    """Tell what of the coastdowns was cut; a window of which nothing is left is an error."""
+    """Say what of the coastdowns was cut; a window of which nothing is left is an error."""
     name = result.run.name
     for coastdown in result.coastdowns:
         if window is not None and coastdown.withdrawn:
