@@ -77,7 +77,7 @@ def first_noticed(world: World) -> float | None:
                 for each in (years, world.runs.added, world.runs.sd, world.runs.covariates)
             )
         )
-        _, steps = search(part, Steps(), Growth())
+        steps = search(part, Steps(), Growth()).steps
         if any(abs(step.year - world.cleaned) < MONTH for step in steps):
             return float(years[last] - world.cleaned) * 365.25
     return None
@@ -97,7 +97,8 @@ def main() -> None:
     line = []
     for _ in range(options.ships):
         world = ship(rng, options.years, 0.0)
-        state, steps = search(world.runs, Steps(), Growth())
+        found_all = search(world.runs, Steps(), Growth())
+        state, steps = found_all.open, found_all.steps
         false += sum(not _is_jump(world, step.year) for step in steps)
         jumps += sum(_is_jump(world, step.year) for step in steps)
         found = state.growth_per_year()
@@ -116,7 +117,8 @@ def main() -> None:
     hit, size, means, noticed, growth = 0, [], [], [], []
     for number in range(options.ships):
         world = ship(rng, options.years, options.cleaning)
-        state, steps = search(world.runs, Steps(), Growth())
+        found_all = search(world.runs, Steps(), Growth())
+        state, steps = found_all.open, found_all.steps
         near = [step for step in steps if abs(step.year - world.cleaned) < MONTH]
         hit += bool(near)
         slope = state.growth_per_year()
