@@ -82,7 +82,7 @@ class Engine:
                 {
                     'distributed.scheduler.allowed-failures': DEATHS - 1,
                     'distributed.comm.timeouts.connect': f'{_CONNECT_S:g}s',
-                    # a worker that dies again while it starts is given up after this
+                    # so long after a death a worker that is not there just then is given up
                     'distributed.deploy.lost-worker-timeout': _GIVEN_UP,
                 }
             )
