@@ -70,6 +70,12 @@ class Parameters:
     ------
     ParameterError
         If a value is of the wrong type or out of its range.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> sd.Parameters(update_s=5.0).update_s
+    5.0
     """
 
     frozen_s: float = _parameter(
