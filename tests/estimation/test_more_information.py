@@ -28,7 +28,8 @@ def script() -> ModuleType:
 
 def test_no_input_and_no_second_run_makes_it_worse(script: ModuleType) -> None:
     # N = 4, seed 0; a step may lose by chance, by less than two standard errors; the benchmark
-    # has N = 30. The shaft's bound: its priors hold all laws of the thrust, which costs a little
+    # N = 4, seed 0; a step may lose by chance, by less than two standard errors; the benchmark
+    # has N = 30. 0.05: the shaft's priors hold all laws of the thrust, which costs a little
     found = np.array([script.scores(number, 0) for number in range(CASES)])
     assert np.isfinite(found).all()
     for gain, error in script.gains(found):
