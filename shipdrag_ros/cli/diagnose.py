@@ -6,12 +6,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.cli import diagnose_json
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.progress import stages
 from shipdrag_ros.cli.windowed import (
     HELP,
     Span,
@@ -39,6 +41,7 @@ from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.progress import Progress
 from shipdrag_ros.replay import (
     ReplayResult,
     accepted_samples,
@@ -114,7 +117,8 @@ def run(options: argparse.Namespace) -> int:
     runs = open_windowed(options.bags, remap=dict(options.remap), window=window)
     refuse_overlaps(runs)
     facts = _facts(options.fact)
-    found, ship = _diagnosed(output, runs, given, facts)
+    with stages(output) as progress:
+        found, ship = _diagnosed(output, runs, given, facts, progress)
     if ship is None and options.write is not None:
         raise DiagnosisError(
             f'no ship file is attached to {runs[0].run.name!r}, and --write needs one; give it '
@@ -151,29 +155,33 @@ def _diagnosed(
     runs: Sequence[WindowedRun],
     given: Ship | None,
     facts: Sequence[Fact],
+    progress: Progress,
 ) -> tuple[Diagnosis, Ship | None]:
     """Diagnose by what the records hold, and return the ship if one is known."""
     windowed = any(window is not None for _, window in runs)
     if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        return _unused(_sailing(runs, f'No coastdown was found: {why}.'), facts), None
-    seen = _found(output, runs, given)
+        return _unused(_sailing(runs, f'No coastdown was found: {why}.', progress), facts), None
+    seen = _found(output, runs, given, progress)
     if not seen.coasts:
         why = f'No coastdown was found {"; ".join(seen.without)}.'
-        return _unused(_sailing(runs, why), (*seen.ship.facts, *facts)), seen.ship
+        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts)), seen.ship
     if seen.ship.baseline is None:
+        progress('fitting a form of the resistance', 0, 0)
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
-        found = _with_log_track(found, runs)
+        found = _with_log_track(found, runs, progress)
     else:
-        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts)
+        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
 
 
-def _with_log_track(found: Diagnosis, runs: Sequence[WindowedRun]) -> Diagnosis:
+def _with_log_track(
+    found: Diagnosis, runs: Sequence[WindowedRun], progress: Progress
+) -> Diagnosis:
     """Hold the logs against the ways over ground besides; a note says why not."""
     try:
-        return with_log_track(found, _sailing(runs, ''))
+        return with_log_track(found, _sailing(runs, '', progress))
     except DiagnosisError as error:
         why = f'the log was not held against the way over ground: {str(error).strip()}'
         return replace(found, notes=(*found.notes, why))
@@ -184,9 +192,13 @@ def _unused(found: Diagnosis, facts: Sequence[Fact]) -> Diagnosis:
     return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
 
 
-def _sailing(runs: Sequence[WindowedRun], no_coastdown: str) -> Diagnosis:
+def _sailing(runs: Sequence[WindowedRun], no_coastdown: str, progress: Progress) -> Diagnosis:
     """Hold the logs against the ways over ground."""
-    read = [(run.name, *accepted_samples(run, zeros=True)) for run, _ in runs]
+    read = []
+    for done, (run, _) in enumerate(runs):
+        progress(f'reading {run.name}', done, len(runs))
+        read.append((run.name, *accepted_samples(run, zeros=True)))
+    progress('holding the log against the way over ground', 0, 0)
     records = [SailingRecord(name, block) for name, block, _ in read]
     try:
         return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
@@ -211,7 +223,8 @@ def coasts_of(
     DiagnosisError
         If there is none.
     """
-    seen = _found(output, runs, given)
+    with stages(output) as progress:
+        seen = _found(output, runs, given, progress)
     if not seen.coasts:
         raise DiagnosisError(
             f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
@@ -237,6 +250,7 @@ def _found(
     output: Output,
     runs: Sequence[WindowedRun],
     given: Ship | None,
+    progress: Progress,
 ) -> _Found:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
@@ -244,8 +258,9 @@ def _found(
     estimates: list[Estimate] = []
     ship, parameters = given, None
     for each, window in runs:
-        with output.progress(f'replaying {each.name}') as progress:
-            result = replay(each, ship=ship, window=window, progress=progress)
+        stage = partial(progress, f'replaying {each.name}')
+        stage(0, 0)
+        result = replay(each, ship=ship, window=window, progress=stage)
         ship, parameters = ship or result.ship, parameters or result.parameters
         sheet, of_run = _sheet(output, each, ship)
         for name in clocks_apart(result):

@@ -80,7 +80,13 @@ class Judgement:
         )
 
 
-def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False) -> Judgement:
+def judge(
+    found: Found,
+    *,
+    held_out: Gap | None = None,
+    distrusted: bool = False,
+    besides: Sequence[Fit] = (),
+) -> Judgement:
     """
     Return the verdict on what a search found.
 
@@ -93,6 +99,8 @@ def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False
         without.
     distrusted
         The measurements themselves are known to be wrong.
+    besides
+        Fits of the most probable hypothesis with something more that has no name.
 
     Returns
     -------
@@ -103,7 +111,7 @@ def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False
     doubted = distrusted or (
         found.alarm
         and (
-            has_residual_structure(best, found.with_discrepancy())
+            has_residual_structure(best, (*found.with_discrepancy(), *besides))
             or outside_prior(best)
             or (held_out is not None and exceeds_noise(held_out.chi2_per_sample, best.best.rows))
         )
