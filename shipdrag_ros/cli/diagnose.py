@@ -236,7 +236,7 @@ def coasts_of(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Coastdowns:
     """The coastdowns of all bags, their estimates, and of each bag without one why."""
 
     coasts: list[CoastRun]
@@ -251,7 +251,7 @@ def _found(
     runs: Sequence[WindowedRun],
     given: Ship | None,
     progress: Progress,
-) -> _Found:
+) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
     without: list[str] = []
@@ -278,7 +278,7 @@ def _found(
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
     assert ship is not None
     assert parameters is not None
-    return _Found(coasts, ship, parameters, tuple(without), tuple(estimates))
+    return _Coastdowns(coasts, ship, parameters, tuple(without), tuple(estimates))
 
 
 def _sheet(output: Output, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:

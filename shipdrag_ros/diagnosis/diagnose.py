@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.result import (
     Verdict,
     Where,
 )
-from shipdrag_ros.diagnosis.search import Found, search, with_pairs
+from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.swinging import swing_notes, swinging, with_swinging
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
@@ -154,7 +154,7 @@ def _searched(
     parameters: Parameters,
     facts: Sequence[Fact],
     progress: Progress,
-) -> tuple[CoastModel, Found, Facts, tuple[str, ...]]:
+) -> tuple[CoastModel, SearchResult, Facts, tuple[str, ...]]:
     """Search, and see the runs anew where that moves their stops; notes on them besides."""
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):
@@ -230,7 +230,7 @@ def _observed(
     return tuple(seen), tuple(notes)
 
 
-def _of_the_ship(found: Found) -> bool:
+def _of_the_ship(found: SearchResult) -> bool:
     """Tell whether what is missing acts on the ship, whatever water and instruments do."""
     names = found.best.hypothesis.names
     return bool(names) and {find(name).scope for name in names} <= {Scope.HULL, Scope.RUN}

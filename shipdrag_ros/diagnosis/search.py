@@ -32,7 +32,7 @@ _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """
     What a search found.
 
@@ -78,7 +78,7 @@ class Found:
         return tuple(fit(model, more, [start(model, one, best.best) for one in more]))
 
 
-def search(model: Model, *, progress: Progress = silent) -> Found:
+def search(model: Model, *, progress: Progress = silent) -> SearchResult:
     """
     Fit nothing, each effect, and something unnamed.
 
@@ -91,7 +91,7 @@ def search(model: Model, *, progress: Progress = silent) -> Found:
 
     Returns
     -------
-    Found
+    SearchResult
         Without pairs.
     """
     nothing = fit(model, [model.nothing], [start(model, model.nothing)])[0]
@@ -101,10 +101,10 @@ def search(model: Model, *, progress: Progress = silent) -> Found:
     both = [*likely, *unnamed]
     starts = [start(model, one, nothing.best) for one in both]
     fits = fit(model, both, starts, progress=progress)
-    return Found(model, nothing, (nothing, *fits))
+    return SearchResult(model, nothing, (nothing, *fits))
 
 
-def with_pairs(found: Found, *, progress: Progress = silent) -> Found:
+def with_pairs(found: SearchResult, *, progress: Progress = silent) -> SearchResult:
     """
     Fit pairs of effects besides, where something is missing.
 
@@ -120,7 +120,7 @@ def with_pairs(found: Found, *, progress: Progress = silent) -> Found:
 
     Returns
     -------
-    Found
+    SearchResult
         The same where nothing may be missing.
     """
     if found.posterior.nothing >= QUIET:

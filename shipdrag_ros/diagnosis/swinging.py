@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.coast_terms import Predicted
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, start
 from shipdrag_ros.diagnosis.observation import Observation, damping_of
-from shipdrag_ros.diagnosis.search import Found
+from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.inference.noise import apply
 from shipdrag_ros.inference.rows import POSITION
 from shipdrag_ros.parameter import Parameter, free, normal
@@ -111,7 +111,7 @@ def swinging(model: CoastModel, base: Fit) -> Fit | None:
     return replace(found, log_evidence=found.log_evidence + mean)
 
 
-def with_swinging(found: Found, model: CoastModel) -> Found:
+def with_swinging(found: SearchResult, model: CoastModel) -> SearchResult:
     """
     Fit a force that swings from the stop on, and nothing else that is missing.
 
@@ -124,7 +124,7 @@ def with_swinging(found: Found, model: CoastModel) -> Found:
 
     Returns
     -------
-    Found
+    SearchResult
         The same where such a force gains nothing.
     """
     swings = swinging(model, found.nothing)

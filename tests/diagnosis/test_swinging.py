@@ -13,7 +13,7 @@ from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.fitting import fit
 from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.search import Found
+from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.swinging import swing_notes, swinging, swung, with_swinging
 from shipdrag_ros.inference.rows import POSITION
 from shipdrag_ros.samples import Float64
@@ -56,10 +56,10 @@ def swung_model(model: CoastModel, share: float, period_s: float) -> CoastModel:
     return replace(model, seen=(replace(seen, along=along),))
 
 
-def found_in(model: CoastModel) -> Found:
+def found_in(model: CoastModel) -> SearchResult:
     """Return the fit of nothing alone, and what swings."""
     nothing = fit(model, [model.nothing], [start(model, model.nothing)])[0]
-    return with_swinging(Found(model, nothing, (nothing,)), model)
+    return with_swinging(SearchResult(model, nothing, (nothing,)), model)
 
 
 def test_the_response_is_that_of_the_equation_of_motion(
