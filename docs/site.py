@@ -39,12 +39,11 @@ def commands() -> str:
         '# Commands',
         'What `shipdrag VERB --help` prints. Exit status: 0 done, 1 user error, 2 usage.',
     ]
+    whole = parser(*(verb.name for verb in VERBS))
+    (below,) = (it.choices for it in whole._actions if it.dest == 'verb')
+    assert isinstance(below, dict)
     for verb in VERBS:
-        words = next(
-            action.choices for action in parser(verb.name)._actions if action.dest == 'verb'
-        )
-        assert isinstance(words, dict)
-        parts += [f'## {verb.name}', f'```text\n{words[verb.name].format_help().strip()}\n```']
+        parts += [f'## {verb.name}', f'```text\n{below[verb.name].format_help().strip()}\n```']
     return '\n\n'.join(parts)
 
 

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
-from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, open_windowed, refuse_overlaps, windowed_bag
+from shipdrag_ros.cli.progress import stages
+from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, LearntBaseline, learn_baseline
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.library.diagnosing import coasts_of
+from shipdrag_ros.library.windowed import refuse_overlaps
 from shipdrag_ros.ship import Ship
 
 
@@ -65,7 +67,8 @@ def run(options: argparse.Namespace) -> int:
         )
     runs = open_windowed(options.bags, remap=dict(options.remap))
     refuse_overlaps(runs)
-    coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship))
+    with stages(output) as progress:
+        coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship), progress)
     found = learn_baseline(coasts, ship, parameters)
     options.out.write_text(found.ship.to_yaml(), encoding='utf-8')
     _show(output, found)
@@ -118,7 +121,7 @@ def _show(output: Output, found: LearntBaseline) -> None:
         f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '
         f'{low:.2f} to {high:.2f} m/s.'
     )
-    output.heading('Learnt over stated')
+    output.heading('LearntBaseline over stated')
     stated = found.stated_sd
     rows = []
     for i, name in enumerate(found.names):
