@@ -33,6 +33,7 @@ from shipdrag_ros.ship import Ship
 _SD = 0.12  # of the force, sine and cosine each, of the resistance at the stop
 _SHORTEST_S, _LONGEST_S = 80.0, 800.0  # periods
 _APART = 0.5  # of one over the length of the run, between frequencies
+_WEATHER = 0.1  # how often weather swings at one period
 _STEPS = 600  # in which a force is followed, at least
 
 
@@ -91,9 +92,9 @@ def swinging(model: CoastModel, base: Fit) -> Fit | None:
     if not math.isfinite(base.log_evidence):
         return None
     longest_s = max(run.duration_s for run in model.seen)
-    periods_s = _periods_s(longest_s)
+    periods_s = _periods_s(longest_s, apart_s=longest_s)
     gain, runs = _gains(model, base, periods_s)
-    if not np.isfinite(gain).all() or logsumexp(gain) <= math.log(gain.size):
+    if not np.isfinite(gain).all() or _mean(gain) <= 0.0:
         return None
     chosen, at = np.unravel_index(int(gain.argmax()), gain.shape)
     terms = tuple(
@@ -107,8 +108,25 @@ def swinging(model: CoastModel, base: Fit) -> Fit | None:
         log_prior=base.hypothesis.log_prior + math.log(UNNAMED_ODDS),
     )
     found = fit(model, [hypothesis], [start(model, hypothesis, base.best)])[0]
-    mean = float(logsumexp(gain - gain.max())) - math.log(gain.size)
-    return replace(found, log_evidence=found.log_evidence + mean)
+    # of the best period to that of all, and over what weather that swings all the time explains
+    less = gain.max() - _mean(gain) + _weather(model, base, longest_s)
+    return replace(found, log_evidence=found.log_evidence - less)
+
+
+def _mean(gain: Float64) -> float:
+    """Return the logarithm of the mean of Bayes factors."""
+    return float(logsumexp(gain)) - math.log(gain.size)
+
+
+def _weather(model: CoastModel, base: Fit, longest_s: float) -> float:
+    """Return by how much weather that swings before and after the stop alike raises evidence."""
+    lead_in_s = max(run.lead_in_s for run in model.seen)
+    periods_s = _periods_s(longest_s, apart_s=longest_s + lead_in_s)
+    gain, _ = _gains(model, base, periods_s, before=True)
+    if not np.isfinite(gain).all():
+        return 0.0
+    swings = math.log(_WEATHER) + _mean(gain)
+    return float(np.logaddexp(math.log1p(-_WEATHER), swings))
 
 
 def with_swinging(found: SearchResult, model: CoastModel) -> SearchResult:
@@ -176,7 +194,9 @@ def size_m_s2(ship: Ship, speed_m_s: float) -> float:
     return _SD * float(ship.resistance_n(np.clip(speed_m_s, low, high))) / ship.mass_kg
 
 
-def swung(seen: Observation, speed_m_s: Float64, periods_s: Float64) -> Float64:
+def swung(
+    seen: Observation, speed_m_s: Float64, periods_s: Float64, *, before: bool = False
+) -> Float64:
     """
     Return what swinging forces do to the rows along the heading.
 
@@ -187,6 +207,8 @@ def swung(seen: Observation, speed_m_s: Float64, periods_s: Float64) -> Float64:
     speed_m_s : (m,)
         Through water without the force, at the times of the observation.
     periods_s : (p,)
+    before
+        Whether they swing in the steady record already.
 
     Returns
     -------
@@ -197,7 +219,9 @@ def swung(seen: Observation, speed_m_s: Float64, periods_s: Float64) -> Float64:
     -----
     du/dt = (f - (dr/dv) u) / (1 + n_r), about the motion without it.
     """
-    time = np.linspace(0.0, seen.duration_s, max(_STEPS, int(seen.duration_s / 2.0)))
+    first_s = -seen.lead_in_s if before else 0.0
+    steps = max(_STEPS, int((seen.duration_s - first_s) / 2.0))
+    time = np.linspace(first_s, seen.duration_s, steps)
     speed = np.interp(time, seen.time_s - seen.lead_in_s, speed_m_s)
     damping, inertia = damping_of(seen.ship, speed)
     damped = cumulative_trapezoid(damping, time, initial=0.0)
@@ -206,27 +230,28 @@ def swung(seen: Observation, speed_m_s: Float64, periods_s: Float64) -> Float64:
     grown = cumulative_trapezoid(force * np.exp(damped), time, axis=1, initial=0.0)
     change = np.exp(-damped) * grown
     way = cumulative_trapezoid(change, time, axis=1, initial=0.0)
-    since = np.clip(seen.along.rows.time_s - seen.lead_in_s, 0.0, time[-1])
-    at = np.minimum((since / time[1]).astype(np.int64), len(time) - 2)
-    part = since / time[1] - at
+    since = np.clip(seen.along.rows.time_s - seen.lead_in_s, first_s, time[-1])
+    place = (since - first_s) / (time[1] - time[0])
+    at = np.minimum(place.astype(np.int64), len(time) - 2)
+    part = place - at
     of_row = np.where(seen.along.rows.kind == POSITION, way[:, at], change[:, at])
     behind = np.where(seen.along.rows.kind == POSITION, way[:, at + 1], change[:, at + 1])
     result: Float64 = of_row + part * (behind - of_row)
     return result
 
 
-def _periods_s(longest_s: float) -> Float64:
-    """Return periods that a run can tell apart."""
+def _periods_s(longest_s: float, *, apart_s: float) -> Float64:
+    """Return periods up to the length of a run, that one of another length can tell apart."""
     slowest = 1.0 / min(_LONGEST_S, longest_s)
-    frequency = np.arange(slowest, 1.0 / _SHORTEST_S, _APART / longest_s)
+    frequency = np.arange(slowest, 1.0 / _SHORTEST_S, _APART / apart_s)
     return 1.0 / np.append(frequency, 1.0 / _SHORTEST_S)
 
 
 def _gains(
-    model: CoastModel, base: Fit, periods_s: Float64
+    model: CoastModel, base: Fit, periods_s: Float64, *, before: bool = False
 ) -> tuple[Float64, list[tuple[int, ...]]]:
     """Return the log Bayes factors, (ways, periods), and the runs of each way."""
-    columns = [_whitened(model, j, base, periods_s) for j in range(len(model.seen))]
+    columns = [_whitened(model, j, base, periods_s, before) for j in range(len(model.seen))]
     matrix, _ = base.best.normal_equations
     shared = np.concatenate(
         [
@@ -255,9 +280,9 @@ def _gains(
     return gain, runs
 
 
-def _whitened(model: CoastModel, run: int, base: Fit, periods_s: Float64) -> Float64:
+def _whitened(model: CoastModel, run: int, base: Fit, periods_s: Float64, before: bool) -> Float64:
     """Return what a force of the usual size does to the whitened rows, (2 p, n)."""
     seen = model.seen[run]
     speed = model.predict(run, base.best).speed
     size = size_m_s2(seen.ship, seen.speed_m_s)
-    return apply(seen.along.whitener, size * swung(seen, speed, periods_s))
+    return apply(seen.along.whitener, size * swung(seen, speed, periods_s, before=before))

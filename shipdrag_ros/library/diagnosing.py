@@ -84,9 +84,7 @@ def diagnose_runs(
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
         found = _with_log_track(found, runs, progress)
     else:
-        found = diagnose(
-            seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress
-        )
+        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
 
