@@ -87,11 +87,12 @@ def swinging(model: CoastModel, base: Fit) -> Fit | None:
     -------
     Fit or None
         At the most probable period; its evidence is the mean over all periods, and over whether
-        it is one run or all in which the force swings. None where it gains nothing.
+        it is one run or all in which the force swings. None where it gains nothing, and where
+        no run is longer than the shortest period.
     """
-    if not math.isfinite(base.log_evidence):
-        return None
     longest_s = max(run.duration_s for run in model.seen)
+    if not math.isfinite(base.log_evidence) or longest_s <= _SHORTEST_S:
+        return None
     periods_s = _periods_s(longest_s, apart_s=longest_s)
     gain, runs = _gains(model, base, periods_s)
     if not np.isfinite(gain).all() or _mean(gain) <= 0.0:

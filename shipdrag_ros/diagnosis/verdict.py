@@ -22,7 +22,7 @@ from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.parameter import Parameter
 
-_SET = 0.99  # of the candidates
+SET = 0.99  # of the candidates
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _SHAPE_SD = 2.5  # prior standard deviations of a shape parameter of an effect
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
@@ -270,6 +270,6 @@ def _smallest(posterior: Posterior) -> tuple[Candidate, ...]:
     for names in posterior.named():
         found.append(Candidate(names, posterior.probability[names]))
         held += posterior.probability[names]
-        if held >= _SET * total:
+        if held >= SET * total:
             break
     return tuple(found)
