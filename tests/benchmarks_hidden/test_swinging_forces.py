@@ -23,6 +23,7 @@ def test_the_force_swings_after_the_stop_or_always(kind: str, before: bool) -> N
     assert again.ship_file == cases.observe(4).ship_file
 
 
+@pytest.mark.timeout(1200)  # all of a diagnosis may have to be compiled first
 def test_a_force_that_begins_to_swing_is_unknown() -> None:
     import swinging_forces
 

@@ -72,9 +72,10 @@ def test_compiling_is_said_once_and_only_when_something_is_compiled() -> None:
     assert 'compiling, once' in said[0]
 
 
+@pytest.mark.timeout(1200)  # all of a diagnosis may have to be compiled first
 def test_a_pipe_is_told_in_plain_lines_on_stderr_alone(short_bag: Path) -> None:
     process = diagnosed(short_bag, stderr=subprocess.PIPE)
-    document, said = process.communicate(timeout=300)
+    document, said = process.communicate(timeout=900)
     assert process.returncode == 0
     assert json.loads(document)['verdict'] == 'none'
     first, *_ = said.decode().splitlines()
@@ -83,6 +84,7 @@ def test_a_pipe_is_told_in_plain_lines_on_stderr_alone(short_bag: Path) -> None:
     assert b'\r' not in said
 
 
+@pytest.mark.timeout(1200)
 def test_a_terminal_is_shown_a_bar_that_goes_away(short_bag: Path) -> None:
     controlling, terminal = pty.openpty()
     process = diagnosed(short_bag, stderr=terminal)
@@ -100,7 +102,7 @@ def test_a_terminal_is_shown_a_bar_that_goes_away(short_bag: Path) -> None:
     assert process.stdout is not None
     document = process.stdout.read()
     process.stdout.close()
-    assert process.wait(timeout=300) == 0
+    assert process.wait(timeout=900) == 0
     assert json.loads(document)['verdict'] == 'none'
     text = re.sub(r'\x1b\[[0-9;?]*[A-Za-z]', '', shown.decode())
     assert 'replaying' in text
