@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The page under load: CPU for many viewers, connections refused, slow readers survived.
+The page under load: how late a reading is, CPU for many viewers, connections refused, slow
+readers survived, eight hours of simulated time in memory.
 
-    python benchmarks/live_page.py [--viewers 50] [--connections 2000] [--slow 100] [--seconds 10]
+    python benchmarks/live_page.py [--viewers 50] [--connections 10000] [--slow 100] [--seconds 10]
 
 Readings come at 10 Hz and a frame is made for each. The server runs in this
 process, the viewers in another; CPU is that of the server alone.
@@ -12,11 +13,13 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
+import os
 import resource
 import socket
 import threading
 import time
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 
@@ -100,11 +103,57 @@ def connect(address: tuple[str, int], count: int) -> tuple[int, float]:
     return refused, slowest
 
 
+def memory_mb() -> float:
+    """Return what this process holds now."""
+    pages = int(Path('/proc/self/statm').read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+def soak(hours: int) -> list[float]:
+    """Return the memory after each hour of simulated time at 10 Hz, the history being full."""
+    source = NodeSource()
+    page = LivePage(source)
+    begin_s = 1_700_000_000
+    stamps = np.arange(begin_s - 2 * 86400, begin_s) * 1_000_000_000
+    for channel in (Channel.SPEED_THROUGH_WATER, Channel.SHAFT):
+        source.hear(Samples(Block.of(channel, stamps, np.full(len(stamps), 8.0))))
+    page.tick()
+    values = {'lifecycle': 'active', 'monitor': 'steady', 'steady lead used at most [s]': '1800'}
+    found = []
+    for second in range(hours * 3600):
+        stamps = (begin_s + second) * 1_000_000_000 + np.arange(10) * 100_000_000
+        source.hear(Samples(Block.of(Channel.SPEED_THROUGH_WATER, stamps, np.full(10, 8.0))))
+        state = Status('node', 'state', 0, 'steady', {**values, 'steady lead [s]': f'{second}'})
+        source.hear(Health((state,)))
+        if second % 5 == 4:
+            page.tick()
+        if second % 3600 == 3599:
+            found.append(memory_mb())
+    return found
+
+
+def in_the_browser() -> None:
+    """Print how late a reading is in the page, and how long a picture takes."""
+    from _live_browser import draw_ms, sample_to_pixel_ms
+
+    late = sample_to_pixel_ms(300)
+    half, most = np.nanpercentile(late, (50, 99))
+    print(
+        f'a reading heard to its figure in the page: median {half:.0f} ms, p99 {most:.0f} ms '
+        f'({np.isfinite(late).sum()} of {len(late)} readings at 10 Hz)'
+    )
+    drawn = draw_ms(20)
+    print(
+        f'six hours, curve, band and verdict drawn: least {drawn.min():.0f} ms, median '
+        f'{np.median(drawn):.0f} ms, at most {drawn.max():.0f} ms (20 times)'
+    )
+
+
 def main() -> None:
     """Print the figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--viewers', type=int, default=50)
-    parser.add_argument('--connections', type=int, default=2000)
+    parser.add_argument('--connections', type=int, default=10000)
     parser.add_argument('--slow', type=int, default=100)
     parser.add_argument('--seconds', type=float, default=10.0)
     options = parser.parse_args()
@@ -112,6 +161,10 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(65536, hard), hard))
     size = sum(path.stat().st_size for path in PAGE.rglob('*') if path.is_file())
     print(f'page: {size / 1000:.0f} kB')
+    print(f'load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores')
+    in_the_browser()
+    held = soak(8)
+    print(f'8 h at 10 Hz in simulated time: {held[0]:.1f} MB after 1 h, {held[-1]:.1f} MB after 8')
     source, ended = NodeSource(), threading.Event()
     page = LivePage(source)
     with listen('127.0.0.1', 0) as found:

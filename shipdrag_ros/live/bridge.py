@@ -117,11 +117,11 @@ class Bridge:
     @property
     def speed_m_s(self) -> float | None:
         """The ship's speed: estimated while she coasts, else as measured."""
-        row = self.trace.latest
-        if row is not None and (self._coast_ns is None or self._speed is None):
-            measured = [value for value in row[1:3] if value is not None]
-            if measured:
-                return measured[0]
+        if self._coast_ns is None or self._speed is None:
+            for row in (self.trace.current, self.trace.latest):
+                measured = [value for value in (row or ())[1:3] if value is not None]
+                if measured:
+                    return measured[0]
         return None if self._speed is None else self._speed.value
 
     @property

@@ -123,6 +123,12 @@ class Trace:
         """The last row, None before the first."""
         return self._fine[-1] if self._fine else None
 
+    @property
+    def current(self) -> Row | None:
+        """The newest second as far as it has been read, None before the first reading."""
+        found = self._open.get(self.newest_s)
+        return self.latest if found is None else found.row(self.newest_s)
+
     def rows(self) -> list[Row]:
         """
         Return all that is kept, oldest first.

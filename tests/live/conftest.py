@@ -50,7 +50,7 @@ class Viewer:
     def text(self, selector: str) -> str:
         return str(self.page.inner_text(selector))
 
-    def wait_for(self, selector: str, text: str, *, within_s: float = 120.0) -> str:
+    def wait_for(self, selector: str, text: str, *, within_s: float = START_S) -> str:
         """Return what stands there once it has a text."""
         end_s = time.monotonic() + within_s
         while text not in (found := self.text(selector)):

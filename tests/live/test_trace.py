@@ -64,3 +64,17 @@ def test_where_all_clocks_go_back_it_starts_over() -> None:
     assert trace.restarted
     trace.closed(all_of_it=True)
     assert {row[4] for row in trace.rows()} == {8.0}
+
+
+def test_the_newest_second_is_read_as_far_as_it_has_come() -> None:
+    trace = Trace()
+    assert trace.current is None
+    for tenth, speed in enumerate((8.0, 9.0, 10.0)):
+        stamp_ns = START_S * 10**9 + tenth * 10**8
+        trace.add(Block.of(Channel.SPEED_THROUGH_WATER, [stamp_ns], [speed]))
+        found = trace.current
+        assert found is not None
+        assert found[:2] == (START_S, 8.0 + 0.5 * tenth)
+    assert trace.latest is None
+    trace.closed(all_of_it=True)
+    assert trace.current == trace.latest == (START_S, 9.0, None, None, None)
