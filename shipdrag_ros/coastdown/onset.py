@@ -18,11 +18,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
-from itertools import pairwise
-
-import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, line, speeds
+from shipdrag_ros.coastdown.deceleration import begin_of_fall, fit_deceleration
 from shipdrag_ros.coastdown.events import Dismissal
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
@@ -30,16 +28,16 @@ from shipdrag_ros.coastdown.shafts import (
     SHAFT_S,
     UNTOLD,
     Drive,
-    Propulsion,
-    Seen,
+    ShaftEvidence,
+    SpeedEvidence,
     Thrust,
     propulsion,
     steady_drive,
 )
+from shipdrag_ros.coastdown.steadiness import Steadiness
 from shipdrag_ros.coastdown.tracking import turned_at
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed settles
@@ -47,14 +45,13 @@ EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed s
 _BRAKED = 1.5
 _BRAKE_EXPONENT = 1.0  # ... and by a force that falls less than in proportion to the speed
 _LAW_BINS_MIN = 6
-_BEND_BINS_MIN = 6
 _GUARD = 0.1  # of confirm_s: the thrust runs down first
 _TRIALS = 3  # after confirm_s, twice and three times as long
 _PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by then
 _APART = 3  # slope windows that the dates of shaft and speed may be apart
 
 
-class Verdict(Enum):
+class OnsetDecision(Enum):
     """What has become of a candidate."""
 
     PENDING = 'pending'
@@ -71,20 +68,20 @@ class Doubt:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class OnsetJudgement:
     """
     What has become of a candidate, with its start as it is known now.
 
     `doubt` is there where it was dismissed, unless it is not worth a word.
     """
 
-    verdict: Verdict
-    candidate: Candidate
+    decision: OnsetDecision
+    candidate: OnsetCandidate
     doubt: Doubt | None = None
 
 
 @dataclass(frozen=True)
-class Candidate:
+class OnsetCandidate:
     """
     Something that may be a coastdown.
 
@@ -101,7 +98,7 @@ class Candidate:
     limits
         Size of a slope that chance did not explain before it, over one, two and
         four times slope_window_s [m/s^2]; NaN while unknown.
-    spread
+    slope_sd
         Standard deviation of the first of these slopes before it [m/s^2].
     judged_from
         First bin in which it is judged.
@@ -116,10 +113,22 @@ class Candidate:
     drive: Drive
     noticed: bool
     limits: tuple[float, ...] = ()
-    spread: float = math.nan
+    slope_sd: float = math.nan
     judged_from: int = NEVER
     trials: int = 0
     doubt: Doubt | None = None
+
+    def knowing(self, steadiness: Steadiness) -> OnsetCandidate:
+        """
+        Return it with what chance could do before it, once that is known.
+        """
+        if not math.isnan(self.slope_sd):
+            return self
+        return replace(
+            self,
+            limits=tuple(float(limit) for limit in steadiness.limit[self.source]),
+            slope_sd=float(steadiness.slope_sd[self.source, 0]),
+        )
 
     def falls(self, bins: Bins, number: int, width: int) -> bool:
         """
@@ -142,7 +151,7 @@ class Candidate:
         return None
 
 
-def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candidate:
+def propose(bins: Bins, tuning: Tuning, seen: OnsetCandidate, number: int) -> OnsetCandidate:
     """
     Date back what the walk saw at bin `number`.
 
@@ -157,96 +166,98 @@ def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candida
         return replace(seen, drive=drive, judged_from=number + SHAFT_S - 1)
     # the window that shows the fall holds its start, and one as long before it the steady speed
     span = seen.falls_over(bins, number, width, 1.0) or width
-    start = change_point(bins, seen.source, number - 2 * span, number, tuning.speed_min)
+    start = begin_of_fall(bins, seen.source, number - 2 * span, number, tuning.speed_min)
     if not seen.drive.known:
         seen = replace(seen, drive=steady_drive(bins, start - (width + 1) // 2, width))
     return replace(seen, start=start)
 
 
 def judge(
-    candidate: Candidate,
+    candidate: OnsetCandidate,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
     parameters: Parameters,
     number: int,
-) -> Judgement:
+) -> OnsetJudgement:
     """
     Judge a candidate when bin `number` has closed.
     """
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
-    pending = Judgement(Verdict.PENDING, candidate)
+    pending = OnsetJudgement(OnsetDecision.PENDING, candidate)
     if number < candidate.judged_from:  # the clock of the speed may be slower than the shaft's
         return pending
     told = _propulsion(candidate, bins, tuning, parameters, number)
     doubt = _spoiled(candidate, told, bins, tuning, parameters, number)
     if doubt is not None:
-        return Judgement(Verdict.DISMISSED, candidate, doubt)
+        return OnsetJudgement(OnsetDecision.DISMISSED, candidate, doubt)
     if told.stop is not None:
         candidate = replace(candidate, start=told.stop)
     falls = candidate.falls(bins, number, width)
     age = number - candidate.start
     off = told.thrust in (Thrust.STANDS, Thrust.WINDMILLS)
     if off and falls:
-        return Judgement(Verdict.CONFIRMED, candidate)
+        return OnsetJudgement(OnsetDecision.CONFIRMED, candidate)
     if not candidate.noticed:
         if told is UNTOLD:  # it turns on as before
-            return Judgement(Verdict.DISMISSED, candidate)
+            return OnsetJudgement(OnsetDecision.DISMISSED, candidate)
         if age > _PATIENCE * confirm:
-            return Judgement(Verdict.DISMISSED, candidate, _no_fall(told, age))
+            return OnsetJudgement(OnsetDecision.DISMISSED, candidate, _no_fall(told, age))
     if not falls:
         if off or not candidate.noticed:
-            return Judgement(Verdict.PENDING, candidate)
-        return Judgement(Verdict.DISMISSED, candidate, _settled(candidate, bins, width, number))
+            return OnsetJudgement(OnsetDecision.PENDING, candidate)
+        return OnsetJudgement(
+            OnsetDecision.DISMISSED, candidate, _settled(candidate, bins, width, number)
+        )
     if age < confirm * (candidate.trials + 1):
-        return Judgement(Verdict.PENDING, candidate)
+        return OnsetJudgement(OnsetDecision.PENDING, candidate)
     return _tried(candidate, told, bins, ship, tuning, parameters, number)
 
 
 def _tried(
-    candidate: Candidate,
-    told: Propulsion,
+    candidate: OnsetCandidate,
+    told: ShaftEvidence,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
     parameters: Parameters,
     number: int,
-) -> Judgement:
+) -> OnsetJudgement:
     """Judge the deceleration once more."""
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
     if told.stop is None:
-        start = change_point(
+        start = begin_of_fall(
             bins, candidate.source, candidate.start - 2 * width, number, tuning.speed_min
         )
         candidate = replace(candidate, start=start)
     if 2 * (number - candidate.start) < confirm * (2 * candidate.trials + 1):
         # chance made it a candidate, then it began in earnest
-        return Judgement(Verdict.PENDING, candidate)
+        return OnsetJudgement(OnsetDecision.PENDING, candidate)
     candidate = replace(candidate, trials=candidate.trials + 1)
     # a governor, or a controllable propeller at zero pitch that holds its speed: ask for more
     strict = told.thrust is Thrust.REDUCED and candidate.trials < _TRIALS
-    doubt = _misses(candidate, bins, ship, tuning, parameters, number, strict=strict)
+    doubt = _unlike_a_coastdown(candidate, bins, ship, tuning, parameters, number, strict=strict)
     if told.thrust is Thrust.ON:
         doubt = Doubt(Dismissal.THRUST, f'a propeller drove on, {told.text}')
     elif told.thrust is Thrust.REDUCED and doubt is not None:
         doubt = Doubt(Dismissal.THRUST, f'{doubt.text}; the shaft held its speed, {told.text}')
     candidate = replace(candidate, doubt=doubt)
     if doubt is None:
-        return Judgement(Verdict.CONFIRMED, candidate)
+        return OnsetJudgement(OnsetDecision.CONFIRMED, candidate)
     if candidate.trials == _TRIALS:
-        return Judgement(Verdict.DISMISSED, candidate, doubt)
-    return Judgement(Verdict.PENDING, candidate)
+        return OnsetJudgement(OnsetDecision.DISMISSED, candidate, doubt)
+    return OnsetJudgement(OnsetDecision.PENDING, candidate)
 
 
 def _propulsion(
-    candidate: Candidate, bins: Bins, tuning: Tuning, parameters: Parameters, number: int
-) -> Propulsion:
+    candidate: OnsetCandidate, bins: Bins, tuning: Tuning, parameters: Parameters, number: int
+) -> ShaftEvidence:
     """Say what the propellers do, where that goes with what the speed does."""
     width = tuning.slopes.width
     told = propulsion(
         bins,
         candidate.drive,
-        Seen(candidate.source, candidate.start, candidate.spread),
+        SpeedEvidence(candidate.source, candidate.start, candidate.slope_sd),
         number,
         width=width,
         stands=0.5 * parameters.shaft_stopped_fraction,
@@ -262,8 +273,8 @@ def _propulsion(
 
 
 def _spoiled(
-    candidate: Candidate,
-    told: Propulsion,
+    candidate: OnsetCandidate,
+    told: ShaftEvidence,
     bins: Bins,
     tuning: Tuning,
     parameters: Parameters,
@@ -290,7 +301,7 @@ def _spoiled(
     return None
 
 
-def _no_fall(told: Propulsion, age: int) -> Doubt:
+def _no_fall(told: ShaftEvidence, age: int) -> Doubt:
     """Say that the propeller slowed down, the ship did not."""
     if told.thrust is Thrust.ON:
         return Doubt(Dismissal.THRUST, f'a propeller drove on for {age} s, {told.text}')
@@ -301,7 +312,7 @@ def _no_fall(told: Propulsion, age: int) -> Doubt:
     )
 
 
-def _settled(candidate: Candidate, bins: Bins, width: int, number: int) -> Doubt:
+def _settled(candidate: OnsetCandidate, bins: Bins, width: int, number: int) -> Doubt:
     """Say that the speed falls no longer, after how much of it was lost."""
     if candidate.doubt is not None:
         return candidate.doubt
@@ -315,8 +326,8 @@ def _settled(candidate: Candidate, bins: Bins, width: int, number: int) -> Doubt
     )
 
 
-def _misses(
-    candidate: Candidate,
+def _unlike_a_coastdown(
+    candidate: OnsetCandidate,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
@@ -339,7 +350,7 @@ def _misses(
         )
     guard = round(_GUARD * parameters.confirm_s)
     time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
-    found = law(time, speed) if len(time) >= _LAW_BINS_MIN else None
+    found = fit_deceleration(time, speed) if len(time) >= _LAW_BINS_MIN else None
     if found is None or not (before > level > 0.0 and slope < 0.0 and found.slope < 0.0):
         return Doubt(
             Dismissal.SETTLED,
@@ -352,7 +363,7 @@ def _misses(
     half = 0.5 * float(time[-1] - time[0])
     sd = (
         math.sqrt(2.0)
-        * candidate.spread
+        * candidate.slope_sd
         * (tuning.slopes.width / half**2)
         * (found.speed / found.slope**2)
     )
@@ -377,83 +388,3 @@ def _misses(
         f'{found.exponent:.1f} ± {sd:.1f} of the speed where the water has '
         f'{found.exponent - excess:.1f}: power was reduced, or the ship turned',
     )
-
-
-def change_point(bins: Bins, source: int, first: int, last: int, speed_min: float) -> int:
-    """
-    Return the bin at which a constant speed turns into a coastdown.
-
-    Parameters
-    ----------
-    first, last
-        Bins to look at; the second half of the coastdown is not needed.
-    speed_min
-        A speed below half of it is taken as half of it [m/s].
-
-    Notes
-    -----
-    Quadratic drag makes 1/v rise linearly.
-    """
-    return bend(bins, source, first, last, speed_min, degree=0, sign=1)
-
-
-def bend(
-    bins: Bins, source: int, first: int, last: int, speed_min: float, *, degree: int, sign: int
-) -> int:
-    """
-    Return the bin at which 1/v bends most.
-
-    Parameters
-    ----------
-    degree
-        Of the polynomial that 1/v follows before: 0 steady, 1 coasting.
-    sign
-        1: where it begins to rise faster, -1: slower.
-
-    Notes
-    -----
-    Least squares of 1/v = polynomial + c max(0, t - s), s searched over all bins, and over
-    each second of a gap between them.
-    """
-    time, speed = speeds(bins, source, first, last)
-    if len(time) < _BEND_BINS_MIN:  # too few to bend: what is there is all of it
-        return first
-    inverse = 1.0 / np.maximum(speed, 0.5 * speed_min)
-    hinges = np.concatenate([np.arange(one, other - 0.5) for one, other in pairwise(time[2:-1])])
-    ramp = np.maximum(0.0, time - hinges[:, np.newaxis])
-    # what the polynomial explains is taken out of both
-    basis, _ = np.linalg.qr(np.vander(time, degree + 1))
-    inverse = inverse - basis @ (basis.T @ inverse)
-    ramp -= (ramp @ basis) @ basis.T
-    gain = np.maximum(0.0, sign * (ramp @ inverse)) ** 2 / np.einsum('ij,ij->i', ramp, ramp)
-    return last + math.floor(float(hinges[np.argmax(gain)]))
-
-
-@dataclass(frozen=True)
-class Law:
-    """
-    Deceleration of a span of record, from a parabola through the speed.
-
-    Attributes
-    ----------
-    speed, slope, curvature
-        In the middle of the span [m/s, m/s^2, m/s^3].
-    """
-
-    speed: float
-    slope: float
-    curvature: float
-
-    @property
-    def exponent(self) -> float:
-        """The p of v' = -c v^p: p = v'' v / v'^2."""
-        return self.curvature * self.speed / self.slope**2
-
-
-def law(time: Float64, speed: Float64) -> Law:
-    """
-    Fit v = a + b t + c t^2 / 2 about the middle of the span.
-    """
-    middle = 0.5 * (time[0] + time[-1])
-    c, b, a = np.polyfit(time - middle, speed, 2)
-    return Law(float(a), float(b), 2.0 * float(c))

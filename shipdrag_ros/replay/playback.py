@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.bags.run import Inputs, Mark, ResetMark, Run
+from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Coastdown, Dismissal, Event, NotCoastdown, Update
 from shipdrag_ros.errors import BagError
@@ -38,7 +38,7 @@ class InputCounts:
     Attributes
     ----------
     messages
-        Messages that came.
+        Messages that came, in the window where one is given.
     used, rejected
         Readings that were used, and those that were not by reason. A message holds one
         reading, but of shafts and pitches one a joint; one that cannot be read counts
@@ -239,7 +239,8 @@ def _in_window(
     coastdown = estimate_window(samples, ship, parameters)
     used: Counter[str] = Counter()
     rejected: dict[str, Counter[str]] = {}
-    for channel, code in zip(samples.block.channel, samples.reasons, strict=True):
+    inside = samples.inside
+    for channel, code in zip(samples.block.channel[inside], samples.reasons[inside], strict=True):
         name, reason = Channel(channel).input, Reason(code)
         if reason is Reason.ACCEPTED:
             used[name] += 1
@@ -258,7 +259,7 @@ def _in_window(
 
 def _counts(
     run: Run,
-    inputs: Inputs,
+    inputs: RunSamples,
     used: Mapping[str, int],
     rejected: Mapping[str, Mapping[str, int]],
 ) -> dict[str, InputCounts]:

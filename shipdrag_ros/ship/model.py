@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import MISSING, dataclass
 from functools import cached_property
+from importlib import resources
 from os import PathLike
 
 import numpy as np
@@ -50,6 +51,13 @@ class Ship:
     `load` and `from_yaml` check every value; constructing one directly does
     not. Only the length and the volume are needed to estimate r(v); the
     baseline is needed to simulate.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> coaster = sd.Ship(name='Coaster', length_m=80.0, displaced_volume_m3=4000.0)
+    >>> coaster.summary()
+    'Coaster: length 80 m, displacement 4000 m³ (4,100 t)'
     """
 
     name: str = declare(text(), 'name of the ship', default='')
@@ -114,6 +122,18 @@ class Ship:
         """
         content = text_of(path, what='a ship file', error=ShipFileError)
         return cls.from_yaml(content, subject=str(path))
+
+    @classmethod
+    def example(cls) -> Ship:
+        """
+        Return the ship of the examples, a cargo ship of 150 m with a baseline.
+
+        Returns
+        -------
+        Ship
+            That of `config/vitus_bering.yaml`.
+        """
+        return cls.load(str(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml'))
 
     @classmethod
     def from_yaml(cls, content: str, *, subject: str) -> Ship:

@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -15,7 +13,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import gettempdir
 from typing import Any, TextIO
 
 import pytest
@@ -23,43 +20,8 @@ import pytest
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.serve import listen, serve
 
-REQUIRED = 'SHIPDRAG_BROWSER_REQUIRED'
-NAMES = ('chromium', 'chromium-browser', 'google-chrome')
-FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-dev-shm-usage']
 START_S = 240.0  # the first start of a machine compiles the kernels
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
-
-
-def _own_domain() -> tuple[int, TextIO]:
-    """Find a domain that no other test process of this machine is in, and lock it."""
-    for domain in range(10, 102):
-        path = Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock'
-        try:
-            lock = path.open('w')
-        except PermissionError:  # that of another user
-            continue
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
-        else:
-            return domain, lock
-    raise RuntimeError('92 test processes run already')
-
-
-@pytest.fixture(scope='session')
-def browser() -> Iterator[Any]:
-    program = next(filter(None, map(shutil.which, NAMES)), None)
-    if program is None:
-        why = f'no browser: none of {", ".join(NAMES)} is installed'
-        if os.environ.get(REQUIRED):
-            pytest.fail(f'{why}, and {REQUIRED} is set')
-        pytest.skip(why)
-    playwright = pytest.importorskip('playwright.sync_api')
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=program, args=FLAGS)
-        yield found
-        found.close()
 
 
 class Viewer:
@@ -151,9 +113,11 @@ class Process:
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+def start(
+    tmp_path: Path, own_domain: Callable[[], tuple[int, TextIO]]
+) -> Iterator[Callable[..., Process]]:
     """A function that starts a module of the package on a domain of this test's own."""
-    domain, lock = _own_domain()
+    domain, lock = own_domain()
     started: list[Process] = []
 
     def run(*line: str | Path) -> Process:

@@ -15,15 +15,15 @@ import numpy as np
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.assemble import AtEnd, assembled
 from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
+from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.s1.problems import (
-    Measured,
+    ScalarInput,
     Solution,
     solve_joint,
     solve_position,
     solve_speed,
 )
-from shipdrag_ros.estimation.s1.track import along_track
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
@@ -33,7 +33,7 @@ _GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is ev
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _Requirement:
     """What a problem needs."""
 
     speed: bool
@@ -44,23 +44,23 @@ class _Problem:
 
 # joint: fewer stamps of an input do not tell its noise, hence not its weight
 PROBLEMS = {
-    's1_speed': _Problem(speed=True, position=False, stamps=4, order=2),
-    's1_position': _Problem(speed=False, position=True, stamps=4, order=3),
-    's1_joint': _Problem(speed=True, position=True, stamps=12, order=3),
+    's1_speed': _Requirement(speed=True, position=False, stamps=4, order=2),
+    's1_position': _Requirement(speed=False, position=True, stamps=4, order=3),
+    's1_joint': _Requirement(speed=True, position=True, stamps=12, order=3),
 }
 
 
 @dataclass(frozen=True)
-class _Inputs:
+class _Offered:
     """What the window offers, and which problem it is for."""
 
     estimator: str
-    speed: Measured | None
-    position: Measured | None
+    speed: ScalarInput | None
+    position: ScalarInput | None
     notes: tuple[str, ...]
 
     @property
-    def used(self) -> tuple[Measured, ...]:
+    def used(self) -> tuple[ScalarInput, ...]:
         return tuple(data for data in (self.speed, self.position) if data is not None)
 
 
@@ -75,8 +75,8 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     ship
         For n_r and the Froude number.
     parameters
-        `estimator`, `order_max`, `froude_min` and the known standard
-        deviations are used.
+        `estimator`, one of `PROBLEMS`, `order_max`, `froude_min` and the known
+        standard deviations are used.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     )
 
 
-def _inputs(window: Window, parameters: Parameters) -> _Inputs:
+def _inputs(window: Window, parameters: Parameters) -> _Offered:
     """Decide which inputs are used, and for which problem."""
     name, speed = 'speed_through_water', window.speed_through_water
     notes: list[str] = []
@@ -120,39 +120,22 @@ def _inputs(window: Window, parameters: Parameters) -> _Inputs:
         name, speed = 'speed_over_ground', window.speed_over_ground
     position = window.position
     estimator = parameters.estimator
-    if estimator == 'auto':
-        estimator = _offered(len(speed), len(position))
     problem = PROBLEMS[estimator]
-    for series_name, series, used in (
-        (name, speed, problem.speed),
-        ('position', position, problem.position),
-    ):
-        if used:
-            _check(series_name, series, problem.stamps, estimator)
-        elif len(series) and parameters.estimator == 'auto':
-            notes.append(
-                f'{series_name}: {len(series)} sample(s) left out, a joint fit needs '
-                f'{PROBLEMS["s1_joint"].stamps} of each input'
-            )
+    if problem.speed:
+        _check(name, speed, problem.stamps, estimator)
+    if problem.position:
+        _check('position', position, problem.stamps, estimator)
     if problem.speed and name == 'speed_over_ground':
         notes.append(
             'speed over ground was used as the speed, there is none through water: '
             'a current is part of it'
         )
-    return _Inputs(
+    return _Offered(
         estimator,
         _speed(name, speed, parameters) if problem.speed else None,
         _distance(position, parameters) if problem.position else None,
         tuple(notes),
     )
-
-
-def _offered(speeds: int, positions: int) -> str:
-    """Name the problem that `auto` stands for."""
-    enough = PROBLEMS['s1_joint'].stamps
-    if min(speeds, positions) >= enough:
-        return 's1_joint'
-    return 's1_speed' if speeds >= min(positions, enough) else 's1_position'
 
 
 def _check(name: str, series: Series, enough: int, estimator: str) -> None:
@@ -167,17 +150,17 @@ def _check(name: str, series: Series, enough: int, estimator: str) -> None:
         raise EstimationError(f'{name}: {bad} value(s) are not finite: give accepted samples only')
 
 
-def _speed(name: str, series: Series, parameters: Parameters) -> Measured:
+def _speed(name: str, series: Series, parameters: Parameters) -> ScalarInput:
     scale, basis = _polynomials(series, parameters)
     sigma_m_s = parameters.speed_sigma_m_s
-    return Measured(name, series.time_ns, series.value, sigma_m_s, scale, basis)
+    return ScalarInput(name, series.time_ns, series.value, sigma_m_s, scale, basis)
 
 
-def _distance(series: Series, parameters: Parameters) -> Measured:
+def _distance(series: Series, parameters: Parameters) -> ScalarInput:
     scale, basis = _polynomials(series, parameters)
-    distance = along_track(scale.normalise(series.time_ns), series.value, basis)
+    distance = along_track(scale.normalise(series.time_ns), series.value)
     sigma_m = parameters.position_sigma_m
-    return Measured('position', series.time_ns, distance, sigma_m, scale, basis)
+    return ScalarInput('position', series.time_ns, distance, sigma_m, scale, basis)
 
 
 def _polynomials(series: Series, parameters: Parameters) -> tuple[TimeScale, OrthogonalBasis]:
@@ -185,7 +168,7 @@ def _polynomials(series: Series, parameters: Parameters) -> tuple[TimeScale, Ort
     return scale, OrthogonalBasis.on(scale.normalise(series.time_ns), parameters.order_max)
 
 
-def _solve(inputs: _Inputs) -> Solution:
+def _solve(inputs: _Offered) -> Solution:
     if inputs.speed is None:
         assert inputs.position is not None
         return solve_position(inputs.position)
@@ -194,7 +177,7 @@ def _solve(inputs: _Inputs) -> Solution:
     return solve_joint(inputs.speed, inputs.position)
 
 
-def _check_deceleration(inputs: _Inputs, solution: Solution) -> None:
+def _check_deceleration(inputs: _Offered, solution: Solution) -> None:
     needed = PROBLEMS[inputs.estimator].order
     if solution.order < needed:
         noise = ', '.join(f'{name} {value:.3g}' for name, value in solution.noise_sd.items())
@@ -206,7 +189,7 @@ def _check_deceleration(inputs: _Inputs, solution: Solution) -> None:
         )
 
 
-def _tracks(inputs: _Inputs, solution: Solution) -> dict[str, Track]:
+def _tracks(inputs: _Offered, solution: Solution) -> dict[str, Track]:
     fit = solution.fit
     result = {}
     if inputs.speed is not None:
