@@ -10,6 +10,8 @@ from datetime import UTC, datetime
 
 KINDS = ('cleaning', 'docking', 'propeller_polish', 'coating')
 HEADER = ('date', 'kind', 'note')
+_EARLIEST, _LATEST = 1900, 2200
+_LONGEST = 10_000  # characters of a line
 _AROUND = 60  # characters shown of what is wrong
 
 
@@ -49,7 +51,8 @@ def read_events(text: str) -> tuple[tuple[HullEvent, ...], tuple[str, ...]]:
     """
     events: set[HullEvent] = set()
     problems: list[str] = []
-    reader = csv.reader(text.splitlines())
+    # a line too long for the module csv is cut: no note needs as much
+    reader = csv.reader(line[:_LONGEST] for line in text.splitlines())
     for cells in reader:
         row = [cell.strip() for cell in cells]
         if not any(row) or row[0].startswith('#') or row[0].lower() == HEADER[0]:
@@ -69,6 +72,12 @@ def read_events(text: str) -> tuple[tuple[HullEvent, ...], tuple[str, ...]]:
             )
             continue
         utc = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+        if not _EARLIEST <= moment.year <= _LATEST:
+            problems.append(
+                f'{place} is left out: {date[:_AROUND]!r}, expected a year from {_EARLIEST} to '
+                f'{_LATEST}'
+            )
+            continue
         seconds = round(utc.timestamp())
         events.add(HullEvent(seconds * 1_000_000_000, kind, ','.join(row[2:])))
     return tuple(sorted(events)), tuple(problems)

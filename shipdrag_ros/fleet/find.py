@@ -241,13 +241,21 @@ class _Search:
             ship = self._tree.text(posixpath.join(path, SHIP_FILE))
             parent = posixpath.dirname(path)
             if ship is not None:
-                events = self._tree.text(posixpath.join(path, EVENTS_FILE)) or ''
+                events = self._events(posixpath.join(path, EVENTS_FILE))
                 self._ships[path] = Beside(ship, events, _text(posixpath.basename(path)))
             elif parent in ('', path):
                 self._ships[path] = Beside()
             else:
                 self._ships[path] = self._beside(parent)
         return self._ships[path]
+
+    def _events(self, path: str) -> str:
+        """Return the known events; bags can do without them, and that is said."""
+        try:
+            return self._tree.text(path) or ''
+        except FleetError as error:
+            self.notes.append(f'no event is known, since {_text(str(error))}')
+            return ''
 
     def _skip(self, bag: str, reason: str) -> None:
         self.skipped.append(Skipped(_text(self._tree.name), _text(bag), reason))

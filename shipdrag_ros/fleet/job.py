@@ -30,6 +30,7 @@ from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship
 
 UNNAMED = 'unnamed'
+_LONGEST_NAME = 80  # [bytes], and three times as long in the name of a folder
 
 
 class Job(NamedTuple):
@@ -187,7 +188,14 @@ def _hull(source: BagToRead, run: Run) -> _ShipInRun:
 
 
 def _name(ship: Ship, source: BagToRead) -> str:
-    return ship.name or source.beside.ship_name or UNNAMED
+    """Return the name under which the store keeps a ship: that of a folder, too."""
+    name = ship.name or source.beside.ship_name or UNNAMED
+    if not name.isprintable() or len(name.encode()) > _LONGEST_NAME:
+        raise BagError(
+            f'the name of the ship, {name[:40]!r}, has characters that cannot be printed or more '
+            f'than {_LONGEST_NAME} bytes; give a shorter one in {SHIP_FILE}'
+        )
+    return name
 
 
 def _bag_row(job: Job) -> Row:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # a verb that needs no folders does not import it
 LOCAL = 'file'
 TEXT_LIMIT_BYTES = 1 << 20
 _AT_MOST = 64  # folders inside each other
+_NO_FOLDERS = ('http://', 'https://')
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ class Tree:
     Raises
     ------
     FleetError
-        If there is nothing, or it cannot be reached.
+        If there is nothing, if it cannot be reached, or if it is a web server.
     """
 
     def __init__(self, place: str) -> None:
@@ -139,9 +140,13 @@ class Tree:
         """
         try:
             if not self._fs.isfile(path):
+                if self.protocol == LOCAL and os.path.lexists(path):
+                    raise FleetError(f'{path!r} is no regular file; put one there or remove it')
                 return None
             with self._fs.open(path, 'rb') as file:
                 content = file.read(TEXT_LIMIT_BYTES + 1)
+        except FleetError:
+            raise
         except Exception as error:  # each file system has errors of its own
             raise FleetError(f'{path!r} cannot be read: {error}') from error
         if len(content) > TEXT_LIMIT_BYTES:
@@ -205,6 +210,13 @@ class Tree:
 
 def _file_system(place: str) -> tuple[AbstractFileSystem, str]:
     """Return the file system of a place, and the place in it."""
+    if not place:
+        raise FleetError("a folder is '', perhaps of a variable that is not set; name one")
+    if place.lower().startswith(_NO_FOLDERS):
+        raise FleetError(
+            f'{place!r}: a web server has no folders to walk; download the bags and give their '
+            'folder, or give an object store as s3://bucket/folder'
+        )
     if '://' not in place:
         from fsspec.implementations.local import LocalFileSystem
 

@@ -16,6 +16,7 @@ SPEED_SHARE = 0.75  # of the speed at the stop: inside what nearly every run cov
 FIRST_MONTHS_NS = 90 * 86_400_000_000_000
 YEAR_NS = 365.25 * 86_400e9
 _ALONE_NS = YEAR_NS
+_LENGTH_TOLERANCE = 0.02  # between ship files of one ship
 _MANY_RUNS = 5  # of fewer each may stand alone
 _EARLIEST_NS = 631_152_000_000_000_000  # 1990: before it a clock was not set
 _MOST_SHARED = 0.5  # a reference speed must lie inside the range of at least this many runs
@@ -111,6 +112,7 @@ def series_of(
     with_baseline = [_at(row['clean_m_s2'], row, speed) for row in rows]
     baseline = any(np.isfinite(value) for value in with_baseline)
     points = [_point(row, speed, clean, baseline) for row, clean in zip(rows, with_baseline)]
+    points = _of_one_hull(points, [row['length_m'] for row in rows])
     points = _dated(points)
     masses = [row['displaced_volume_m3'] * row['water_density_kg_m3'] for row in rows]
     mass = float(np.median(masses)) if masses else np.nan
@@ -190,6 +192,24 @@ def _point(row: Row, speed: float, clean: float, baseline: bool) -> Point:
     return replace(
         plain, value=r / unit - (1.0 if baseline else 0.0), sd=sd, sd_repeatable=repeatable
     )
+
+
+def _of_one_hull(points: list[Point], lengths: Sequence[float]) -> list[Point]:
+    """Leave out runs of a ship of another length: two ships have one name."""
+    if not points:
+        return points
+    usual = float(np.median(lengths))
+    usual = min(lengths, key=lambda length: abs(length - usual))
+    return [
+        replace(
+            point,
+            reason=f'its ship file has a length of {length:g} m, most runs of this name have '
+            f'{usual:g} m: another ship; give each a name of her own',
+        )
+        if point.used and abs(length - usual) > _LENGTH_TOLERANCE * usual
+        else point
+        for point, length in zip(points, lengths)
+    ]
 
 
 def _dated(points: list[Point]) -> list[Point]:

@@ -34,6 +34,8 @@ def test_a_time_of_another_zone_is_utc() -> None:
         ('yesterday,cleaning', "'yesterday', expected a date as 2026-03-01"),
         ('2026-03-01,painted', "'painted', expected one of cleaning, docking"),
         ('2026-03-01', "'', expected one of cleaning"),
+        ('9999-12-31T23:59:59-23:00,cleaning', 'expected a year from 1900 to 2200'),
+        ('x' * 200_000, 'expected a date as 2026-03-01'),
     ],
 )
 def test_a_line_that_is_none_is_told(line: str, why: str) -> None:

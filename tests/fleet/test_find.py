@@ -52,6 +52,34 @@ def test_what_does_not_exist_is_an_error(tmp_path: Path) -> None:
         find([str(tmp_path / 'nothing')])
 
 
+@pytest.mark.parametrize(
+    ('place', 'why'),
+    [
+        ('', 'a variable that is not set'),
+        ('https://127.0.0.1/bags', 'a web server has no folders'),
+    ],
+)
+def test_what_has_no_folders_is_refused(place: str, why: str) -> None:
+    with pytest.raises(FleetError, match=why):
+        find([place])
+
+
+def test_a_ship_file_that_is_no_file_is_not_passed_over(tmp_path: Path) -> None:
+    """The ship file of the folder above would be that of another ship."""
+    touch(tmp_path / 'ship.yaml', tmp_path / 'a' / 'x.mcap', tmp_path / 'b' / 'y.mcap')
+    (tmp_path / 'a' / 'ship.yaml').symlink_to('gone.yaml')
+    os.mkfifo(tmp_path / 'events.csv')
+    found = find([str(tmp_path)])
+    assert [each.bag for each in found.sources] == ['b/y.mcap']
+    (skipped,) = found.skipped
+    assert skipped.bag == 'a/x.mcap'
+    assert 'ship.yaml' in skipped.reason
+    assert 'is no regular file' in skipped.reason
+    (note,) = found.notes
+    assert note.startswith('no event is known, since ')
+    assert 'events.csv' in note
+
+
 def test_the_nearest_ship_file_upwards_counts(tmp_path: Path) -> None:
     for place, name in (('', 'fleet'), ('a', 'a'), ('a/b/c', 'c')):
         touch(tmp_path / place / 'ship.yaml', tmp_path / place / 'events.csv')

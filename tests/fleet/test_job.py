@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from shipdrag_ros.fleet.job import work
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.fleet.find import BagToRead, Beside
+from shipdrag_ros.fleet.job import _name, work
 from shipdrag_ros.fleet.rows import FROUDE, BagResult
 from shipdrag_ros.ship import Ship
 
@@ -160,3 +163,9 @@ def test_a_bag_without_a_coastdown_is_no_error(tmp_path: Path) -> None:
     assert result.bag['error'] is None
     assert result.bag['coastdowns'] == 0
     assert any(each.startswith('no coastdown was found: ') for each in result.bag['warnings'])
+
+
+@pytest.mark.parametrize('name', ['x' * 300, 'ü' * 41, 'a\nb', '\ud800'])
+def test_a_name_that_no_folder_can_have_is_refused(name: str) -> None:
+    with pytest.raises(BagError, match='give a shorter one in ship'):
+        _name(replace(Ship.load(SHIP), name=name), BagToRead('', '', (), False, Beside()))

@@ -98,3 +98,10 @@ def test_no_rows_at_all():
     series = series_of('Test', [row(error='no estimate was possible', resistance_m_s2=None)])
     assert np.isnan(series.reference_speed_m_s)
     assert series.used == ()
+
+
+def test_runs_of_another_ship_of_the_same_name_are_not_used():
+    rows = [row(30.0 * number) for number in range(5)] + [row(200.0, length_m=120.0)]
+    series = series_of('Test', rows)
+    assert len(series.used) == 5
+    assert 'length of 120 m, most runs of this name have 80 m' in series.points[-1].reason
