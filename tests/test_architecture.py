@@ -34,7 +34,7 @@ PICTURE = (
     ('trend',),
     ('live',),
     ('cli',),
-    ('face',),  # of a study or of a format that is imported; found by cli, imported by none
+    ('face',),  # of a study; found by cli, imported by none
 )
 FLOORS = {room: number for number, floor in enumerate(PICTURE) for room in floor}
 ESTIMATING = {'coastdown', 'estimation', 'diagnosis', 'simulation'}

@@ -9,8 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags import Run
 from shipdrag_ros.cli.arguments import bag
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.sources import open_sources
 from shipdrag_ros.errors import BagError
 
 Span = tuple[float, float]
@@ -85,7 +87,11 @@ def _told(window: Span) -> str:
 
 
 def open_windowed(
-    bags: Sequence[WindowedBag], *, remap: Mapping[str, str], window: Span | None = None
+    bags: Sequence[WindowedBag],
+    *,
+    remap: Mapping[str, str],
+    window: Span | None = None,
+    output: Output | None = None,
 ) -> list[WindowedRun]:
     """
     Open bags in the order given.
@@ -99,18 +105,21 @@ def open_windowed(
         Recorded topic -> input.
     window
         Of the bags without a window of their own.
+    output
+        Told what was understood of a log that is no bag; stderr by default.
 
     Raises
     ------
     BagError
         If one cannot be read.
     """
+    output = output or Output()
     whole = [each.path for each in bags if each.window is None]
-    left = open_runs(whole, remap=remap) if whole else []
+    left = open_sources(whole, output, remap=remap) if whole else []
     found = []
     for each in bags:
         if each.window is not None:
-            runs = open_runs([each.path], remap=remap)
+            runs = open_sources([each.path], output, remap=remap)
             found += [WindowedRun(run, each.window) for run in runs]
             continue
         files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
