@@ -77,7 +77,7 @@ FILES = {'bags', 'bags.salvage'}
 FLEET = ('dask', 'distributed', 'pyarrow', 'fsspec', 's3fs')
 ONLY_IN = {
     'mcap': FILES,
-    'rosbags': {'messages', *FILES},
+    'rosbags': {'messages', 'importing', *FILES},  # a bag of ROS 1 is imported
     **{name: {'node'} for name in ROS},
     **{name: {'fleet', 'trend'} for name in FLEET},  # no other verb pays for them
 }

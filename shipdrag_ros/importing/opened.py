@@ -35,10 +35,17 @@ def beginning(path: Path) -> bytes:
     if not path.is_file():
         why = 'is no regular file' if path.exists() else 'does not exist'
         raise ImportDataError(f'{str(path)!r} {why}; give a log or a table of measurements')
+    raw = b''
     try:
-        with opened(path) as (_, file):
+        with opened(path) as (packed, file):
             raw = file.read(HEAD_BYTES)
+            size = len(raw)
+            while file is not packed and size <= _FREE_BYTES and (more := file.read(1 << 20)):
+                size += len(more)
+                check_unpacked(path, size, packed.tell())
     except _BROKEN as error:
+        if raw:
+            return raw  # whoever reads it says how far it goes
         why = getattr(error, 'strerror', None) or str(error)
         raise ImportDataError(
             f'{str(path)!r} cannot be read: {why}; give a log or a table of measurements'

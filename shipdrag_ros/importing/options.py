@@ -35,6 +35,16 @@ def positive(text: str) -> float:
     return value
 
 
+def _depth_m(text: str) -> float:
+    try:
+        depth_m = float(text)
+    except ValueError:
+        depth_m = -1.0
+    if not 0.0 <= depth_m < 100.0:
+        raise ImportDataError(f'{text!r}, expected a depth from 0 to 100 [m]')
+    return depth_m
+
+
 DATE = Option(
     '--date',
     'YYYY-MM-DD',
@@ -54,4 +64,10 @@ RATE = Option(
     'HZ',
     'without times: rows of a table, or frames of NMEA 2000, a second [Hz]; above 0 [Hz]',
     positive,
+)
+TRANSDUCER = Option(
+    '--transducer',
+    'M',
+    'depth of the echo sounder below the surface, where the log does not tell it [m]',
+    _depth_m,
 )

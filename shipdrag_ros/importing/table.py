@@ -8,6 +8,7 @@ import csv
 import gzip
 import re
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BufferedReader, TextIOWrapper
@@ -136,7 +137,9 @@ class Table:
             if start is None:
                 continue
             rest = rows[start:]
-            if sum(len(row) > 1 for row in rest) < 0.6 * len(rest):
+            usual = Counter(map(len, rest)).most_common(1)[0][0]
+            near = [len(row) > 1 and abs(len(row) - usual) <= 1 for row in rest]
+            if sum(near) < 0.6 * len(rest) or sum(near[:5]) < 0.7 * len(near[:5]):
                 continue  # as in a title with a comma
             score = (-start, len(rows[start]))
             if best is None or score > best[0]:

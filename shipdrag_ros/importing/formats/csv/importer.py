@@ -382,7 +382,7 @@ def _readers(
     """Return what reads the cells of each column, as they are written in the first rows."""
     cells = {place: [_cell(row, place) for row in sample] for each in places for place in each}
     plain = number
-    if has_decimal_commas(cell for column in cells.values() for cell in column):
+    if has_decimal_commas(cell for row in sample for cell in row.cells):
         plain = number_with_comma
     found: list[list[Reader]] = []
     for columns, here in zip(inputs, places, strict=True):

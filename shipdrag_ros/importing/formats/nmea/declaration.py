@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import re
 
-from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.format import CERTAIN, LIKELY, NO, Format, Head, Job, Option, head_of
 from shipdrag_ros.importing.formats.nmea.importer import NmeaResult, import_nmea
-from shipdrag_ros.importing.options import DATE
+from shipdrag_ros.importing.options import DATE, TRANSDUCER
 from shipdrag_ros.nmea.framing import Checksum
 
 _SENTENCE = re.compile(r'[$!](?:[A-Z][A-Z0-9]{4}|P[A-Z0-9]{2,}),[^*]*(\*[0-9A-Fa-f]{2})?')
@@ -43,16 +42,6 @@ def _write(job: Job) -> NmeaResult:
     )
 
 
-def _depth_m(text: str) -> float:
-    try:
-        depth_m = float(text)
-    except ValueError:
-        depth_m = -1.0
-    if not 0.0 <= depth_m < 100.0:
-        raise ImportDataError(f'{text!r}, expected a depth from 0 to 100 [m]')
-    return depth_m
-
-
 FORMAT = Format(
     name='nmea',
     kind='an NMEA 0183 log',
@@ -64,12 +53,7 @@ FORMAT = Format(
     write=_write,
     options=(
         DATE,
-        Option(
-            '--transducer',
-            'M',
-            'depth of the echo sounder below the surface, where the log does not tell it [m]',
-            _depth_m,
-        ),
+        TRANSDUCER,
         Option(
             '--no-checksum',
             '',
