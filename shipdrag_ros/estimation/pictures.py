@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shipdrag_ros.display import TRACK_LABELS, force_unit, power_unit, speed_unit
-from shipdrag_ros.estimation.force import Curve, Force, clean_hull
+from shipdrag_ros.estimation.force import Force, ForceCurve, clean_hull
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.words import speed_name
@@ -159,48 +159,60 @@ def resistance_picture(
     truth
         Speeds [m/s] and r [m/s²] of the simulation, where the record is simulated.
     """
-    scale = _Scale.of(ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
-        axis = figure.subplots()
-        valid, whole = estimate.valid_curve, estimate.curve
-        if len(valid):
-            axis.axvspan(
-                valid.speed_m_s[0] / scale.speed,
-                valid.speed_m_s[-1] / scale.speed,
-                color='#eef3f7',
-                zorder=0,
-                label='valid range, Fr {:.3f} to {:.3f}'.format(*estimate.froude_valid),
-            )
-        if len(valid) < len(whole):
-            axis.plot(
-                whole.speed_m_s / scale.speed,
-                ship.mass_kg * whole.resistance_m_s2 / scale.force,
-                color='#777777',
-                linestyle=':',
-                label='outside: not to be used',
-            )
-        _draw_clean(axis, ship, scale, whole.speed_m_s)
-        _draw_force(axis, Force.of(valid, ship), scale, label='today')
-        if truth is not None:
-            axis.plot(
-                truth[0] / scale.speed,
-                ship.mass_kg * truth[1] / scale.force,
-                color=GREEN,
-                linestyle=(0, (1, 1)),
-                label='truth of the simulation',
-            )
-        _frame(axis, whole, valid, ship, scale)
-        _label(axis, scale, ship, speed_name(estimate))
-        axis.legend(loc='upper left')
+        draw_resistance(figure.subplots(), estimate, ship, truth=truth)
     return figure
 
 
-def power_picture(curve: Curve, ship: Ship) -> Figure:
+def draw_resistance(
+    axis: Axes,
+    estimate: Estimate,
+    ship: Ship,
+    *,
+    truth: tuple[Float64, Float64] | None = None,
+) -> None:
+    """
+    Draw on axes what `resistance_picture` shows.
+    """
+    scale = _PictureUnits.of(ship)
+    valid, whole = estimate.valid_curve, estimate.curve
+    if len(valid):
+        axis.axvspan(
+            valid.speed_m_s[0] / scale.speed,
+            valid.speed_m_s[-1] / scale.speed,
+            color='#eef3f7',
+            zorder=0,
+            label='valid range, Fr {:.3f} to {:.3f}'.format(*estimate.froude_valid),
+        )
+    if len(valid) < len(whole):
+        axis.plot(
+            whole.speed_m_s / scale.speed,
+            ship.mass_kg * whole.resistance_m_s2 / scale.force,
+            color='#777777',
+            linestyle=':',
+            label='outside: not to be used',
+        )
+    _draw_clean(axis, ship, scale, whole.speed_m_s)
+    _draw_force(axis, Force.of(valid, ship), scale, label='today')
+    if truth is not None:
+        axis.plot(
+            truth[0] / scale.speed,
+            ship.mass_kg * truth[1] / scale.force,
+            color=GREEN,
+            linestyle=(0, (1, 1)),
+            label='truth of the simulation',
+        )
+    _frame(axis, whole, valid, ship, scale)
+    _label(axis, scale, ship, speed_name(estimate))
+    axis.legend(loc='upper left')
+
+
+def power_picture(curve: ForceCurve, ship: Ship) -> Figure:
     """
     Draw effective power against speed with its band, over that of the clean hull.
     """
-    scale = _Scale.of(ship)
+    scale = _PictureUnits.of(ship)
     force = Force.of(curve, ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
@@ -241,36 +253,48 @@ def curves_picture(
     combined
         The one curve of all; None where they are not combined.
     """
-    scale = _Scale.of(ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
-        axis = figure.subplots()
-        highest = max(float(curve.speed_m_s[-1]) for _, curve in dated)
-        _draw_clean(axis, ship, scale, np.linspace(0.02 * highest, highest, 101))
-        for number, (label, curve) in enumerate(dated):
-            color, style = _DATED[number % len(_DATED)]
-            force = Force.of(curve, ship)
-            if len(dated) == 1:
-                _draw_force(axis, force, scale, label=label)
-                continue
-            axis.plot(
-                force.speed_m_s / scale.speed,
-                force.newtons / scale.force,
-                color=color,
-                linestyle=style,
-                linewidth=0.9,
-                label=label if len(dated) <= _NAMED or number == 0 else '',
-            )
-        if combined is not None:
-            _draw_force(axis, Force.of(combined, ship), scale, label='all together')
-        _label(axis, scale, ship, 'speed through water')
-        axis.set_ylim(bottom=0.0)
-        axis.legend(loc='upper left', fontsize=7)
+        draw_curves(figure.subplots(), dated, ship, combined=combined)
     return figure
 
 
+def draw_curves(
+    axis: Axes,
+    dated: Sequence[tuple[str, ResistanceCurve]],
+    ship: Ship,
+    *,
+    combined: Combined | None = None,
+) -> None:
+    """
+    Draw on axes what `curves_picture` shows.
+    """
+    scale = _PictureUnits.of(ship)
+    highest = max(float(curve.speed_m_s[-1]) for _, curve in dated)
+    _draw_clean(axis, ship, scale, np.linspace(0.02 * highest, highest, 101))
+    for number, (label, curve) in enumerate(dated):
+        color, style = _DATED[number % len(_DATED)]
+        force = Force.of(curve, ship)
+        if len(dated) == 1:
+            _draw_force(axis, force, scale, label=label)
+            continue
+        axis.plot(
+            force.speed_m_s / scale.speed,
+            force.newtons / scale.force,
+            color=color,
+            linestyle=style,
+            linewidth=0.9,
+            label=label if len(dated) <= _NAMED or number == 0 else '',
+        )
+    if combined is not None:
+        _draw_force(axis, Force.of(combined, ship), scale, label='all together')
+    _label(axis, scale, ship, 'speed through water')
+    axis.set_ylim(bottom=0.0)
+    axis.legend(loc='upper left', fontsize=7)
+
+
 @dataclass(frozen=True)
-class _Scale:
+class _PictureUnits:
     """What a ship is drawn in: SI units in each, and its name."""
 
     speed: float
@@ -281,12 +305,12 @@ class _Scale:
     power_name: str
 
     @classmethod
-    def of(cls, ship: Ship) -> _Scale:
+    def of(cls, ship: Ship) -> _PictureUnits:
         mass = ship.mass_kg
         return cls(*speed_unit(mass), *force_unit(mass), *power_unit(mass))
 
 
-def _draw_clean(axis: Axes, ship: Ship, scale: _Scale, speed_m_s: Float64) -> None:
+def _draw_clean(axis: Axes, ship: Ship, scale: _PictureUnits, speed_m_s: Float64) -> None:
     clean, sd = clean_hull(ship, speed_m_s)
     if not np.isfinite(clean).any():
         return
@@ -296,7 +320,7 @@ def _draw_clean(axis: Axes, ship: Ship, scale: _Scale, speed_m_s: Float64) -> No
     axis.plot(speed, clean / scale.force, label='clean hull', **_CLEAN)
 
 
-def _draw_force(axis: Axes, force: Force, scale: _Scale, *, label: str) -> None:
+def _draw_force(axis: Axes, force: Force, scale: _PictureUnits, *, label: str) -> None:
     speed = force.speed_m_s / scale.speed
     low = (force.newtons - 2.0 * force.sigma_n) / scale.force
     high = (force.newtons + 2.0 * force.sigma_n) / scale.force
@@ -304,7 +328,7 @@ def _draw_force(axis: Axes, force: Force, scale: _Scale, *, label: str) -> None:
     axis.plot(speed, force.newtons / scale.force, color=BLUE, label=label)
 
 
-def _label(axis: Axes, scale: _Scale, ship: Ship, speed: str) -> None:
+def _label(axis: Axes, scale: _PictureUnits, ship: Ship, speed: str) -> None:
     """Name the axes, with m/s and m/s² on the other sides."""
     axis.set_xlabel(f'{speed} [{scale.speed_name}]')
     axis.set_ylabel(f'resistance [{scale.force_name}]')
@@ -319,7 +343,7 @@ def _scaled_by(factor: float) -> tuple[Callable[[Any], Any], Callable[[Any], Any
 
 
 def _frame(
-    axis: Axes, whole: ResistanceCurve, valid: ResistanceCurve, ship: Ship, scale: _Scale
+    axis: Axes, whole: ResistanceCurve, valid: ResistanceCurve, ship: Ship, scale: _PictureUnits
 ) -> None:
     """Scale by what may be used: the ends of a polynomial would flatten the rest."""
     if len(whole):

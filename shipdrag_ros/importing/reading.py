@@ -20,7 +20,7 @@ from shipdrag_ros.bags.locate import BagFiles, is_bag
 from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing import formats
-from shipdrag_ros.importing.format import Job, Result, best_of, head_of
+from shipdrag_ros.importing.format import Format, Job, Result, best_of, head_of
 from shipdrag_ros.importing.join import import_joined
 
 
@@ -135,16 +135,10 @@ def _imported(
     options: Mapping[str, Any],
     tell: Callable[[Understanding], None] | None,
 ) -> Run:
-    known = formats.found()
     folder = TemporaryDirectory(prefix='shipdrag-import-')
     bag = Path(folder.name) / 'imported.mcap'
-    parts = []
-    for source in sources:
-        asked = next((each for each in known if each.chosen_by in options), None)
-        declared = asked or best_of(known, head_of(source))
-        own = {option.key for option in declared.options}
-        values = {key: value for key, value in options.items() if key in own}
-        parts.append((declared, Job(source, bag, values)))
+    declared_parts = [(_declared(source, options), source) for source in sources]
+    parts = [(each, _job(each, source, bag, options)) for each, source in declared_parts]
     try:
         found = import_joined(parts, bag, {})
     except ImportDataError as error:
@@ -159,3 +153,54 @@ def _imported(
     run = ImportedRun(bag, sources, remap)
     weakref.finalize(run, folder.cleanup)
     return run
+
+
+def import_file(
+    source: Path,
+    bag: Path,
+    *,
+    options: Mapping[str, Any] | None = None,
+    attachments: Mapping[str, str] | None = None,
+) -> Understanding:
+    """
+    Make a bag of a log or a table.
+
+    Parameters
+    ----------
+    source
+        In any format that is known.
+    bag
+        MCAP file to make.
+    options
+        Values by `format.Option.key`; a format takes those that it knows.
+    attachments
+        Text by name, a ship file for instance.
+
+    Raises
+    ------
+    ImportDataError
+        If nothing in it can be used, saying what to type.
+    BagError
+        If the bag cannot be made.
+    """
+    declared = _declared(source, options or {})
+    job = _job(declared, source, bag, options or {}, attachments)
+    return Understanding(source, declared.kind, declared.write(job))
+
+
+def _declared(source: Path, options: Mapping[str, Any]) -> Format:
+    known = formats.found()
+    asked = next((each for each in known if each.chosen_by in options), None)
+    return asked or best_of(known, head_of(source))
+
+
+def _job(
+    declared: Format,
+    source: Path,
+    bag: Path,
+    options: Mapping[str, Any],
+    attachments: Mapping[str, str] | None = None,
+) -> Job:
+    own = {option.key for option in declared.options}
+    values = {key: value for key, value in options.items() if key in own}
+    return Job(source, bag, values, attachments or {})

@@ -31,7 +31,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
 from shipdrag_ros.live.frames import Frames
 from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
-from shipdrag_ros.live.source import Source
+from shipdrag_ros.live.source import PictureFeed
 
 PAGE = Path(__file__).parent / 'page'
 TICK_S = 0.1
@@ -68,7 +68,7 @@ class LivePage:
 
     def __init__(
         self,
-        source: Source,
+        source: PictureFeed,
         *,
         token: str | None = None,
         notes: tuple[str, ...] = (),
@@ -199,14 +199,13 @@ class LivePage:
         )
 
     async def _deltas(self, request: Request) -> Response:
-        found = signal_k.delta(self._source.bridge, time.monotonic())
-        return JSONResponse([signal_k.units(), *([] if found is None else [found])])
+        return JSONResponse([signal_k.units(), *self.deltas()])
 
-    def delta(self) -> dict[str, Any] | None:
+    def deltas(self) -> list[dict[str, Any]]:
         """
-        Return the latest figures as a Signal K delta.
+        Return the latest figures as Signal K deltas.
         """
-        return signal_k.delta(self._source.bridge, time.monotonic())
+        return signal_k.deltas(self._source.bridge, time.monotonic())
 
 
 class _Stream:

@@ -29,7 +29,7 @@ from shipdrag_ros.importing.bag import (
     new_bag,
 )
 from shipdrag_ros.importing.formats.nmea.log import NmeaLog
-from shipdrag_ros.importing.formats.nmea.record import Record
+from shipdrag_ros.importing.formats.nmea.record import SentenceConverter
 from shipdrag_ros.importing.formats.nmea.survey import Survey
 from shipdrag_ros.importing.words import (
     backward_and_repeated,
@@ -219,7 +219,7 @@ def import_nmea(
     for sentence in log.sentences(_part(progress, 0)):
         survey.take(sentence)
     clock = survey.clock(log, day)
-    record = Record(survey.chosen(), clock, mounting)
+    record = SentenceConverter(survey.chosen(), clock, mounting)
     with new_bag(out, attachments) as bag:
         text_of_log = log.text(LOG_LIMIT_BYTES)
         if text_of_log is not None:
@@ -251,7 +251,7 @@ def _part(
 def _result(
     log: NmeaLog,
     survey: Survey,
-    record: Record,
+    record: SentenceConverter,
     understood: tuple[Understood, ...],
     *,
     attached: bool,
@@ -303,14 +303,14 @@ def _result(
     )
 
 
-def _understood(bag: ImportBag, record: Record) -> tuple[Understood, ...]:
+def _understood(bag: ImportBag, record: SentenceConverter) -> tuple[Understood, ...]:
     return tuple(
         Understood(channel.input, str(record.chosen[channel]), '', first)
         for channel, first in sorted(bag.first.items())
     )
 
 
-def _sources(record: Record) -> dict[str, str]:
+def _sources(record: SentenceConverter) -> dict[str, str]:
     """Say what each input is taken from; of several shafts and pitches, each once."""
     told: dict[str, dict[str, None]] = {}
     for channel, source in sorted(record.chosen.items()):
@@ -318,7 +318,7 @@ def _sources(record: Record) -> dict[str, str]:
     return {name: ', '.join(sources) for name, sources in told.items()}
 
 
-def _not_taken(survey: Survey, record: Record) -> dict[str, dict[str, int]]:
+def _not_taken(survey: Survey, record: SentenceConverter) -> dict[str, dict[str, int]]:
     """Count by input the values of the sources that nothing is taken from."""
     counts: dict[str, dict[str, int]] = {}
     for channel, of_channel in sorted(survey.values.items()):
