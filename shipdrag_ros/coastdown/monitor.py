@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import SOURCES, warm
+from shipdrag_ros.coastdown.bins import SOURCES
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.ending import End, end_of, withdrawn
@@ -41,7 +41,7 @@ from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
+from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
@@ -118,9 +118,6 @@ class Monitor:
             round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
         )
         self._memory = self._fresh(Tally.fresh())
-        warm(self._memory.bins)
-        alive_ns(self._memory.guard, self._tuning.limits, 0)  # compiled now, too
-        ode_fit.warm()
         self._steady_ns = round(parameters.steady_s * SECOND_NS)
         self._window_ns = round(parameters.window_s * SECOND_NS)
         self._update_ns = round(parameters.update_s * SECOND_NS)

@@ -43,6 +43,8 @@ _LITTLE_ENDIAN = b'\x00\x01'
 # that up to 15 bytes follow a JointState; rosbags' own check would refuse what rclpy sends
 PADDING_BYTES = 15
 
+_TIME = struct.Struct('iI')  # builtin_interfaces/Time: the first that a header holds
+
 RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
 
 _store = get_typestore(Stores.ROS2_JAZZY)
@@ -178,6 +180,22 @@ def is_stamped(type_name: str) -> bool:
     Say whether a type begins with a header, which holds the time of measurement.
     """
     return any(name == 'header' for name, _ in _store.fielddefs[type_name][1][:1])
+
+
+def stated_stamp_ns(type_name: str, payload: bytes, arrival_ns: int) -> int:
+    """
+    Return the time that CDR bytes state, without looking at the rest of them.
+
+    Parameters
+    ----------
+    arrival_ns
+        For a type that holds no time, and for bytes that are too short [ns].
+    """
+    if not is_stamped(type_name) or len(payload) < ENCAPSULATION_BYTES + _TIME.size:
+        return arrival_ns
+    order = '<' if payload[:2] == _LITTLE_ENDIAN else '>'
+    seconds, nanoseconds = struct.unpack_from(order + _TIME.format, payload, ENCAPSULATION_BYTES)
+    return int(seconds * SECOND_NS + nanoseconds)
 
 
 def is_known(type_name: str) -> bool:

@@ -146,7 +146,7 @@ class NmeaFeed:
                     continue
                 self._fed_by_nmea.add(source.input)
                 topic.feed(f'NMEA {line.address}')
-                topic.count(session.receive(source, message.payload, now_ns))
+                session.receive(source, message.payload, now_ns, topic.count)
         if self._live.waiting:
             self._wake()
 
