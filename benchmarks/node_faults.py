@@ -95,7 +95,7 @@ class Bench:
         self.executor.add_node(self.node)
         self.latest: dict[str, Any] = {}
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._hear, 10)
-        self._spin(lambda: self._lifecycle() == 'active', START_S)
+        self._spin(self._is_ready, START_S)
 
     def of(self, fault: Fault) -> tuple[str, str]:
         """Publish a fault and return level and message."""
@@ -143,10 +143,10 @@ class Bench:
     def _hear(self, message: DiagnosticArray) -> None:
         self.latest |= {status.name: status for status in message.status}
 
-    def _lifecycle(self) -> str:
+    def _is_ready(self) -> bool:
         status = self.latest.get('coastdown_node: state')
         values = {} if status is None else {item.key: item.value for item in status.values}
-        return values.get('lifecycle', '')
+        return values.get('lifecycle') == 'active' and 'compiling [s]' not in values
 
     def _spin(self, done: Callable[[], bool], within_s: float) -> None:
         end = time.monotonic() + within_s

@@ -21,6 +21,7 @@ from shipdrag_ros.samples import SECOND_NS
 
 ACCEL_WITH_COVARIANCE = 'geometry_msgs/msg/AccelWithCovarianceStamped'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
+FLOAT64 = 'std_msgs/msg/Float64'
 IMU = 'sensor_msgs/msg/Imu'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 NAV_SAT_FIX = 'sensor_msgs/msg/NavSatFix'

@@ -60,11 +60,8 @@ class Announcer:
             self._compiled = work
             if work.failure:
                 self._logger.error(f'compiling failed:\n{work.failure}')
-            if self._compiling_said:
-                self._logger.info(
-                    f'compiled after {work.seconds:.0f} s; {waiting} messages waited'
-                )
-            self._compiling_said = False
+            after = f'ready to estimate, {work.seconds:.0f} s after the start'
+            self._logger.info(f'{after}; {waiting} messages waited')
         elif work.seconds > COMPILING_SAID_AFTER_S and not self._compiling_said:
             self._compiling_said = True
             self._logger.info(

@@ -100,13 +100,14 @@ def state_status(standing: Standing, inputs: Sequence[InputState]) -> Diagnostic
         'clock': 'simulated' if standing.sim_time else 'system',
         **({} if standing.progress is None else standing.progress.values),
     }
+    if standing.compiling_s is not None:
+        values |= {'compiling [s]': standing.compiling_s, 'messages that wait': standing.waiting}
     if standing.sim_time and standing.clock_ns == 0:
         text = 'use_sim_time is true but no /clock: messages are not used'
         return _status('state', ERROR, text, values)
     if monitor is None:
         return _status('state', WARN, f'{standing.lifecycle}: not estimating', values)
     if standing.compiling_s is not None:
-        values['messages that wait'] = standing.waiting
         text = (
             f'compiling, {standing.compiling_s:.0f} s: no estimates yet, one to three minutes on '
             f'a first start; {standing.waiting} messages are recorded and wait'

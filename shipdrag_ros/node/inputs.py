@@ -32,6 +32,7 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 
 from shipdrag_ros.messages import Decoded
+from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.losses import Sequences
 
 # As deep as Fast DDS goes unless told otherwise, some seconds of a flood: one estimate may take
@@ -210,6 +211,8 @@ class InputTopic:
         """
         for reason, times in decoded.unreadable.items():
             self.unreadable[reason.value] += times
+        if self.type is not None and not is_stamped(self.type):
+            return  # arrivals tell nothing of a clock
         for stamp_ns, receive_ns in zip(
             decoded.block.stamp_ns.tolist(), decoded.block.receive_ns.tolist(), strict=True
         ):

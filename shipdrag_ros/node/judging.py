@@ -175,7 +175,8 @@ def judge(facts: InputFacts) -> Finding:
     """
     found = sorted(_findings(facts), key=lambda finding: -finding.level)
     if not found:
-        return Finding(Level.OK, 'receiving')
+        stamped = '' if facts.stamped else '; its type holds no time: it counts from its arrival'
+        return Finding(Level.OK, f'receiving{stamped}')
     return Finding(found[0].level, '; '.join(finding.text for finding in found))
 
 

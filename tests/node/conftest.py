@@ -21,6 +21,7 @@ import yaml
 
 START_S = 240.0  # the first start of a machine compiles the kernels
 ANSWER_S = 60.0
+READY = 'ready to estimate'
 
 
 def _own_domain() -> tuple[int, TextIO]:
@@ -286,7 +287,10 @@ def start_node(tmp_path: Path, ship_file: Path) -> Iterator[StartNode]:
     started: list[NodeProcess] = []
 
     def start(
-        *arguments: str, up: str | None = 'active;', ship: bool = True, **parameters: object
+        *arguments: str,
+        up: str | None = 'ready to estimate',
+        ship: bool = True,
+        **parameters: object,
     ) -> NodeProcess:
         directory = tmp_path / f'node{len(started)}'
         directory.mkdir()
