@@ -94,6 +94,8 @@ class InputTopic:
         Messages that gave no sample, by reason, and joints that have no place.
     fed_by
         What feeds the input instead of its topic, '' if nothing does.
+    may_be_fed
+        Whether something else than the topic could feed it.
     unstamped
         Readings whose header holds no time.
     """
@@ -124,6 +126,7 @@ class InputTopic:
         self.unstamped = 0
         self.unreadable: Counter[str] = Counter()
         self.fed_by = ''
+        self.may_be_fed = False
         if fixed:
             self._subscribe(fixed, reliable=True)
 

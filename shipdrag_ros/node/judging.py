@@ -131,6 +131,8 @@ class InputFacts:
         Heard; None while there is none.
     stamped
         Whether that type carries a time.
+    fed, may_be_fed
+        Whether NMEA feeds it, or could.
     other_types, accepted
         Types published and not heard; types that could be.
     senders
@@ -156,6 +158,8 @@ class InputFacts:
     needed: bool
     type: str | None = None
     stamped: bool = True
+    fed: bool = False
+    may_be_fed: bool = False
     other_types: tuple[str, ...] = ()
     accepted: tuple[str, ...] = ()
     senders: tuple[str, ...] = ()
@@ -189,7 +193,8 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
         return
     if facts.type is None or (facts.age_s is None and not facts.senders and not others):
         level = Level.WARN if facts.needed else Level.OK
-        yield Finding(level, 'no publisher')
+        nor = ', and nothing by NMEA so far' if facts.may_be_fed else ''
+        yield Finding(level, f'no publisher{nor}')
         return
     if others:
         text = f'wrong type: also published as {others}, heard is only {facts.type}'
@@ -203,7 +208,7 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
         yield Finding(Level.WARN, 'no data')
         return
     if facts.age_s > SILENT_S:
-        gone = '' if facts.senders else ', no publisher any more'
+        gone = '' if facts.senders or facts.fed else ', no publisher any more'
         yield Finding(Level.STALE, f'no data for {facts.age_s:.0f} s{gone}')
         return
     yield from _of_readings(facts)

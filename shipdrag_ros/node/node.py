@@ -194,7 +194,7 @@ class CoastdownNode(LifecycleNode):
         ]
         self._input_states = InputStates()
         self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
-        self._nmea = NmeaFeed(self, settings.nmea, session=lambda: self._session)
+        self._nmea = NmeaFeed(self, settings, session=lambda: self._session)
         self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
         if self._compiling is None or self._compiling.estimator != settings.parameters.estimator:
@@ -374,16 +374,14 @@ class CoastdownNode(LifecycleNode):
         motion = [each for each in states if each.topic.name in MOTION_INPUTS]
         hint = ''
         if not any(each.fresh for each in motion):
-            hint = candidates_text(
-                candidates(
-                    self.get_topic_names_and_types(),
-                    MOTION_INPUTS,
-                    taken=[
-                        *(each.topic.topic for each in states),
-                        *(topic.under(self.get_fully_qualified_name()) for topic in OUTPUT_TOPICS),
-                    ],
-                )
-            )
+            name = self.get_fully_qualified_name()
+            taken = [
+                *(each.topic.topic for each in states),
+                *(it.under(name) for it in OUTPUT_TOPICS),
+            ]
+            found = candidates(self.get_topic_names_and_types(), MOTION_INPUTS, taken=taken)
+            by_nmea = '' if self._nmea is None else self._nmea.silence()
+            hint = '; '.join(filter(None, [by_nmea, candidates_text(found)]))
         return diagnostics.Standing(
             self._state_machine.current_state[1],
             None if session is None else session.monitor.state,
