@@ -9,11 +9,12 @@ STAMP := $(VENV)/installed
 # all traffic of demo and tests stays on this machine
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
-.PHONY: help env warm demo test lint types tests peers lock clean
+.PHONY: help env warm demo test lint types tests docs peers lock clean
 
 help:
 	@echo 'make demo   simulated ship -> ROS topics -> node -> bag -> replay -> report'
 	@echo 'make test   lint, types, tests'
+	@echo 'make docs   the pages of docs/ as a site, in site'
 	@echo 'make env    only the environment, in $(VENV)'
 	@echo 'make warm   compile now what a first start would compile (a minute)'
 	@echo 'make peers  what benchmarks compare with, into the same environment'
@@ -47,6 +48,10 @@ types: env
 tests: env
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2  # both cores are busy as it is
 
+docs: env
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir site
+	@echo 'open site/index.html'
+
 peers: env
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r benchmarks/peers.lock
 
@@ -57,4 +62,4 @@ lock:
 	    --constraints requirements.lock benchmarks/peers.in -o benchmarks/peers.lock
 
 clean:
-	rm -rf $(VENV) build install log demo *.egg-info
+	rm -rf $(VENV) build install log demo site *.egg-info

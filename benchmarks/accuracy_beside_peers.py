@@ -3,8 +3,8 @@
 Error and coverage of r(v) beside other ways to differentiate, on the same simulated records.
 
 Prints Markdown; `--write` puts it into docs/accuracy_beside_peers.md, and the short table into
-README.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps what is done, goes
-on from there, and with `--group` does a part only.
+docs/figures.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps what is done,
+goes on from there, and with `--group` does a part only.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ from shipdrag_ros.samples import Float64
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'docs' / 'accuracy_beside_peers.md'
-README = ROOT / 'README.md'
+FIGURES = ROOT / 'docs' / 'figures.md'
 BEGIN, END = '<!-- beside peers -->', '<!-- end beside peers -->'
 HULLS = (CARGO, TANKER, YACHT)
 COUNTS = (100, 500, 2000)
@@ -379,7 +379,7 @@ def table(counts: list[int], by_count: list[Figures]) -> list[str]:
 
 def short_table(results: dict[Case, Figures]) -> list[str]:
     """
-    Return the table of the README: the cargo ship, three cases, RMSE, top, cover.
+    Return the table of docs/figures.md: the cargo ship, three cases, RMSE, top, cover.
     """
     cases = (WHITE, CURRENT, GUSTS)
     lines = head(['RMSE / at the top / cover', *(case.name for case in cases)])
@@ -420,8 +420,8 @@ def preface(runs: int) -> list[str]:
         f'  the log, {COLOUR_S:.0f} s. Gusts: a force that moves the steady ship by 0.05 m/s, '
         f'{GUST_S:.0f} s. Run-down of the thrust: 8, 20, 3 s. In these three the '
         f'{STEADY_S / 60:.0f} min before',
-        '  the stop are given too, as a ship has them; the final fit learns from them. The noise '
-        'is told to nobody.',
+        '  the stop are given too, as a ship has them; the final fit learns from them. No '
+        'estimator is given the noise level.',
         '- Bound: Cramer-Rao, r = c₁v + .. + c₄v⁴ with the noise known, unknown current and state '
         'at the stop (`benchmarks/_bound.py`, apart from the',
         '  package). A smaller or a fitting family, or a biased estimator, may lie below it.',
@@ -460,7 +460,7 @@ def main() -> None:
     parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
     parser.add_argument('--n', type=int, choices=COUNTS, nargs='+', default=list(COUNTS))
     parser.add_argument('--hull', choices=[hull.name for hull in HULLS], help='this one alone')
-    parser.add_argument('--write', action='store_true', help='the page and README.md')
+    parser.add_argument('--write', action='store_true', help='the page and docs/figures.md')
     parser.add_argument('--jobs', type=int, default=1, help='processes')
     parser.add_argument('--parts', type=Path, metavar='FOLDER', help='keep and reuse what is done')
     parser.add_argument('--group', choices=list(GROUPS), help='fill the parts with this one alone')
@@ -529,7 +529,7 @@ def main() -> None:
     print('\n'.join(lines))
     if options.write:
         PAGE.write_text('\n'.join(lines) + '\n', encoding='utf-8')
-        between(README, short)
+        between(FIGURES, short)
 
 
 if __name__ == '__main__':

@@ -23,7 +23,7 @@ from shipdrag_ros.studies.cable.drag import (
     LONGEST,
     PUBLISHED_RANGE,
     SHORTEST,
-    Surface,
+    CableSurface,
     Tangent,
     base_coefficient,
     drag_coefficient,
@@ -35,8 +35,11 @@ from shipdrag_ros.studies.cable.drag import (
 from shipdrag_ros.studies.cable.face.pictures import LINES, RANGE_COLOR, SURFACES
 
 DOCS = Path(__file__).resolve().parents[1] / 'docs'
-ROUNDED = {Surface.SMOOTH: (0.777, 0.008), Surface.ROUGH: (0.769, 0.031)}  # the paper's (12)
-LIMITS = {Surface.SMOOTH: 0.01, Surface.ROUGH: 0.03}  # the paper's text
+ROUNDED = {
+    CableSurface.SMOOTH: (0.777, 0.008),
+    CableSurface.ROUGH: (0.769, 0.031),
+}  # the paper's (12)
+LIMITS = {CableSurface.SMOOTH: 0.01, CableSurface.ROUGH: 0.03}  # the paper's text
 UNIT = QuadraticDrag(0.02, 1.0)  # C0 = 0.02, as ropes have, on l d = 1 m^2, of unit density
 COLORS = (BLUE, VERMILION, GREEN)
 STYLES = ('-', '--', '-.')
@@ -58,7 +61,7 @@ def coefficients() -> Figure:
         axis.set_xlabel('length over diameter [-]')
         axis.set_ylim(0.0)
     for surface, (base, side) in ROUNDED.items():
-        label = 'rounded, (12)' if surface is Surface.SMOOTH else ''
+        label = 'rounded, (12)' if surface is CableSurface.SMOOTH else ''
         axes[0, 1].plot(
             slenderness, base / slenderness + side, color='#1a1a1a', linestyle=':', label=label
         )

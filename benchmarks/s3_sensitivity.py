@@ -455,7 +455,7 @@ def page(
         '',
         *lines_of(wrong),
         '',
-        'As the losses foretell, no other value reaches the verdict than '
+        'As the losses predict, no other value reaches the verdict than '
         + ', '.join(row[0] for row in wrong.rows if len(set(row[1:])) > 1)
         + '.',
     ]

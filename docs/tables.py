@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Write tables of README and docs from the code.
+Write tables of the docs from the code.
 
-`python docs/tables.py` rewrites what stands between the markers in README.md and
+`python docs/tables.py` rewrites what stands between the markers in docs/ros.md and
 docs/effects.md; a test fails while the two differ.
 """
 
@@ -19,7 +19,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.simulation.effects import LIBRARY, confounders, discriminating_measurements
 
 DOCS = Path(__file__).resolve().parent
-README = DOCS.parent / 'README.md'
+ROS = DOCS / 'ros.md'
 EFFECTS = DOCS / 'effects.md'
 _INPUT_MEANING = {
     'speed_through_water': 'speed log, `linear.x` forward [m/s]',
@@ -149,7 +149,7 @@ def effect_parameters() -> str:
     return _table(head, rows)
 
 
-def effect_look_alikes() -> str:
+def effect_confounders() -> str:
     """
     Return the table of effects that leave nearly the same trace.
     """
@@ -169,11 +169,11 @@ def effect_look_alikes() -> str:
 Tables = Mapping[str, Callable[[], str]]
 TABLES: Tables = {'inputs': inputs, 'outputs': outputs, 'parameters': parameters}
 PAGES: Mapping[Path, Tables] = {
-    README: TABLES,
+    ROS: TABLES,
     EFFECTS: {
         'effects': effects,
         'effect parameters': effect_parameters,
-        'look-alikes': effect_look_alikes,
+        'confounders': effect_confounders,
     },
 }
 

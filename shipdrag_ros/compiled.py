@@ -57,7 +57,7 @@ _CHECKED = 32  # bytes of the digest before what is kept
 _FORGOTTEN_S = 90 * 86400.0  # not used for so long: its module may be gone
 _log = logging.getLogger(__name__)
 _not_kept: list[str] = []
-_waiting: set[_Waiting] = set()
+_waiting: set[_LazyFunction] = set()
 
 
 @overload
@@ -122,7 +122,7 @@ def compiled(
             if folder is not None:
                 dispatcher._cache = _Cache(function, folder)
             if signature is not None:
-                _Waiting.take(dispatcher, signature)
+                _LazyFunction.take(dispatcher, signature)
         result: Callable[Arguments, Result] = dispatcher
         return result
 
@@ -137,7 +137,7 @@ def compile_all() -> None:
         next(iter(_waiting)).compile_now()
 
 
-class _Waiting(CPUDispatcher):  # type: ignore[misc]
+class _LazyFunction(CPUDispatcher):  # type: ignore[misc]
     """
     A function with a signature, before it is needed; then it is as numba makes it.
     """

@@ -2,7 +2,7 @@
 """
 Parameters of the monitor and of the estimator, the one list of them.
 
-The node's descriptors, `config/parameters.yaml`, the README's table and the
+The node's descriptors, `config/parameters.yaml`, the docs' table and the
 check of a bag's `parameters.yaml` are all made from `Parameters`.
 """
 

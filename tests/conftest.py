@@ -8,10 +8,14 @@ Property tests try the same examples each time, new ones with
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,6 +40,9 @@ settings.register_profile('repeatable', derandomize=True)
 settings.load_profile('repeatable')
 
 NO_BROWSER = 'no browser'
+_REQUIRED = 'SHIPDRAG_BROWSER_REQUIRED'
+_BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
+_FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-dev-shm-usage']
 _START_NS = 1_700_000_000_000_000_000
 _SECOND_NS = 1_000_000_000
 
@@ -52,6 +59,22 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             f'{len(skipped)} tests skipped: {NO_BROWSER}; with Chromium (apt-get install '
             'chromium) they open every kind of page'
         )
+
+
+@pytest.fixture(scope='session')
+def browser() -> Iterator[Any]:
+    """Chromium, driven by Playwright; one a process, which cannot drive two."""
+    program = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if program is None:
+        why = f'no browser: none of {", ".join(_BROWSERS)} is installed'
+        if os.environ.get(_REQUIRED):
+            pytest.fail(f'{why}, and {_REQUIRED} is set')
+        pytest.skip(why)
+    playwright = pytest.importorskip('playwright.sync_api')
+    with playwright.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=program, args=_FLAGS)
+        yield found
+        found.close()
 
 
 class Page(HTMLParser):

@@ -2,7 +2,7 @@
 """MCAP files in and out; nothing that estimates."""
 
 from shipdrag_ros.bags.reader import open_runs
-from shipdrag_ros.bags.run import Inputs, Mark, ResetMark, Run, SilenceMark, TopicInfo
+from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, SilenceMark, TopicInfo
 from shipdrag_ros.bags.summary import BagInfo, info
 from shipdrag_ros.bags.writer import BagWriter, Compression
 
@@ -10,10 +10,10 @@ __all__ = [
     'BagInfo',
     'BagWriter',
     'Compression',
-    'Inputs',
     'Mark',
     'ResetMark',
     'Run',
+    'RunSamples',
     'SilenceMark',
     'TopicInfo',
     'info',

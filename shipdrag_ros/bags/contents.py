@@ -46,7 +46,7 @@ class FileChannel(NamedTuple):
     encoding: str
 
 
-class Segment(NamedTuple):
+class FileSegment(NamedTuple):
     """
     A chunk, or consecutive messages outside chunks.
 
@@ -89,7 +89,7 @@ class Contents:
     attachments: dict[str, bytes] = field(default_factory=dict)
     metadata: dict[str, Mapping[str, str]] = field(default_factory=dict)
     compressions: set[str] = field(default_factory=set)
-    segments: list[Segment] = field(default_factory=list)
+    segments: list[FileSegment] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     _schemas: dict[int, str] = field(default_factory=dict)
 
@@ -162,7 +162,7 @@ def read_index(data: Buffer) -> Contents | None:
         end = place.end
         contents.compressions.add(chunk.compression)
         contents.segments.append(
-            Segment(
+            FileSegment(
                 chunk.message_start_time,
                 start,
                 end,
@@ -268,7 +268,7 @@ def _scan_chunk(data: Buffer, chunk: Place, contents: Contents) -> None:
     if len(messages):
         first, last = int(messages.log_ns.min()), int(messages.log_ns.max())
         contents.segments.append(
-            Segment(first, chunk.offset, chunk.end, last, frozenset(channels.tolist()))
+            FileSegment(first, chunk.offset, chunk.end, last, frozenset(channels.tolist()))
         )
     contents.warnings += damage
 
@@ -297,7 +297,7 @@ class _LooseMessages:
     def close(self) -> None:
         if self._times:
             self._contents.segments.append(
-                Segment(min(self._times), self._offset, self._end, max(self._times))
+                FileSegment(min(self._times), self._offset, self._end, max(self._times))
             )
             self._times = []
 

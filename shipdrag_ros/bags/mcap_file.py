@@ -21,7 +21,7 @@ import numpy as np
 import zstandard
 from mcap.opcode import Opcode
 
-from shipdrag_ros.bags.contents import Contents, Segment, read_index, scan
+from shipdrag_ros.bags.contents import Contents, FileSegment, read_index, scan
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
@@ -137,7 +137,7 @@ class McapFile:
             self._warn(f'{found} messages are there where the index tells of {expected}')
 
     def _load(
-        self, data: mmap, segments: deque[Segment], wanted: UInt8, least_bytes: int
+        self, data: mmap, segments: deque[FileSegment], wanted: UInt8, least_bytes: int
     ) -> Messages:
         """Take segments off the queue, one or as many small ones as are worth it."""
         least_bytes = max(least_bytes, _WORTHWHILE_BYTES)
@@ -198,7 +198,7 @@ class McapFile:
             yield data
 
 
-def _records(data: mmap, segment: Segment) -> bytes:
+def _records(data: mmap, segment: FileSegment) -> bytes:
     first = next(walk(data, segment.offset, segment.end))
     if first.opcode == Opcode.CHUNK:
         return unpack_chunk(data, first)[1]

@@ -62,7 +62,7 @@ class Removed:
 
 
 @dataclass(frozen=True)
-class _Part:
+class _BagPart:
     path: Path
     size_bytes: int
     changed_s: float
@@ -83,7 +83,7 @@ class Retention:
     def __init__(self, directory: Path, keep: Keep) -> None:
         self._directory = directory
         self._keep = keep
-        self._holds: dict[_Part, bool] = {}
+        self._holds: dict[_BagPart, bool] = {}
 
     def tidy(self, *, busy: Collection[Path], now_s: float) -> list[Removed]:
         """
@@ -119,7 +119,7 @@ class Retention:
                 total -= part.size_bytes
         return removed
 
-    def _parts(self) -> list[_Part]:
+    def _parts(self) -> list[_BagPart]:
         """Return the parts in the order of their recording."""
         parts = []
         with suppress(OSError):
@@ -128,13 +128,13 @@ class Retention:
                     about = path.lstat()
                     if stat.S_ISREG(about.st_mode):
                         size = max(about.st_size, _BLOCK_BYTES)
-                        parts.append(_Part(path, size, about.st_mtime))
+                        parts.append(_BagPart(path, size, about.st_mtime))
         return parts
 
-    def _worth_keeping(self, parts: list[_Part]) -> set[_Part]:
+    def _worth_keeping(self, parts: list[_BagPart]) -> set[_BagPart]:
         self._holds = {part: self._holds[part] for part in parts if part in self._holds}
         worth = set()
-        before: _Part | None = None
+        before: _BagPart | None = None
         for part in parts:
             if part not in self._holds:
                 self._holds[part] = _holds_coastdown(part.path)
@@ -145,7 +145,7 @@ class Retention:
             before = part
         return worth
 
-    def _remove(self, part: _Part, why: str, coastdown: bool) -> list[Removed]:
+    def _remove(self, part: _BagPart, why: str, coastdown: bool) -> list[Removed]:
         with suppress(OSError):  # tried again the next time
             part.path.unlink()
             return [Removed(part.path, coastdown, why)]

@@ -149,7 +149,7 @@ class Run:
             found += (f'{part.path.name}: {warning}' for warning in part.contents.warnings)
         return tuple(found)
 
-    def inputs(self, *, start_ns: int = 0, end_ns: int = sys.maxsize) -> Inputs:
+    def inputs(self, *, start_ns: int = 0, end_ns: int = sys.maxsize) -> RunSamples:
         """
         Return the samples in order of arrival.
 
@@ -158,7 +158,7 @@ class Run:
         start_ns, end_ns
             First and last time of arrival [ns].
         """
-        return Inputs(self, start_ns, end_ns)
+        return RunSamples(self, start_ns, end_ns)
 
     def outputs(self) -> Iterator[OutputMessage]:
         """
@@ -227,7 +227,7 @@ class Run:
         return joined
 
 
-class Inputs:
+class RunSamples:
     """
     The samples of a run, in order of arrival; to be read once.
 

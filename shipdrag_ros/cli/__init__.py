@@ -54,6 +54,7 @@ VERBS = (
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
     Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
     Verb('import', '.import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
+    Verb('completion', '.completion', 'completion of the command line in a shell'),
     Verb('doctor', '.doctor', 'what of the installation works, and what to do about the rest'),
     Verb('info', '.info', 'what is in a bag'),
     Verb('check', '.check', 'is a bag sound'),
@@ -107,6 +108,8 @@ def _run(line: list[str]) -> int:
         return INTERRUPTED
     except ShipdragError as error:
         print(f'ERROR: {error}', file=sys.stderr)
+    except BrokenPipeError:
+        raise
     except OSError as error:
         print(f'ERROR: {_told(error)}', file=sys.stderr)
     return USER_ERROR
@@ -123,9 +126,9 @@ def _told(error: OSError) -> str:
     )
 
 
-def parser(verb: str) -> argparse.ArgumentParser:
+def parser(*of: str) -> argparse.ArgumentParser:
     """
-    Return the parser of the command line, with the arguments of one verb.
+    Return the parser of the command line, with the arguments of the verbs `of`.
     """
     top = argparse.ArgumentParser(
         prog='shipdrag',
@@ -138,8 +141,8 @@ def parser(verb: str) -> argparse.ArgumentParser:
         added = verbs.add_parser(
             known.name, help=known.summary, description=known.summary, formatter_class=Help
         )
-        if known.name == verb:
-            added.epilog = epilog(verb)
+        if known.name in of:
+            added.epilog = epilog(known.name)
             module = import_module(known.module, __name__)
             module.add_arguments(added)
             added.set_defaults(run=module.run)

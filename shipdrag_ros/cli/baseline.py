@@ -13,7 +13,7 @@ from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
 from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, refuse_overlaps, windowed_bag
-from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, Learnt, learn_baseline
+from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, LearntBaseline, learn_baseline
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.ship import Ship
@@ -74,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def document(found: Learnt, out: Path) -> dict[str, Any]:
+def document(found: LearntBaseline, out: Path) -> dict[str, Any]:
     """
     Return the document of a learnt baseline.
     """
@@ -112,7 +112,7 @@ def document(found: Learnt, out: Path) -> dict[str, Any]:
     }
 
 
-def _show(output: Output, found: Learnt) -> None:
+def _show(output: Output, found: LearntBaseline) -> None:
     low, high = found.speed_m_s
     output.say(
         f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.description = (
-        'Tell whether bags are sound: checksums, lengths, references, index and statistics of '
+        'Say whether bags are sound: checksums, lengths, references, index and statistics of '
         'every file, each damage with its offset [bytes]. Exit status: 0 all sound, 1 not. '
         'What is whole in a damaged bag is saved by `shipdrag recover`.'
     )

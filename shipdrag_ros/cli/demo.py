@@ -41,7 +41,7 @@ if TYPE_CHECKING:  # help must not need ROS
     from shipdrag_ros.node.rehearsal import LiveEstimate, Rehearsal
 
 SHIP = 'vitus_bering.yaml'
-SETTINGS = simulate.Settings(
+SETTINGS = simulate.SimulationSettings(
     speed_m_s=8.2,
     duration_s=1500.0,
     lead_in_s=900.0,

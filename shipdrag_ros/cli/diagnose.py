@@ -223,7 +223,7 @@ def coasts_of(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Coastdowns:
     """The coastdowns of all bags, their estimates, and of each bag without one why."""
 
     coasts: list[CoastRun]
@@ -237,7 +237,7 @@ def _found(
     output: Output,
     runs: Sequence[WindowedRun],
     given: Ship | None,
-) -> _Found:
+) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
     without: list[str] = []
@@ -263,7 +263,7 @@ def _found(
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
     assert ship is not None
     assert parameters is not None
-    return _Found(coasts, ship, parameters, tuple(without), tuple(estimates))
+    return _Coastdowns(coasts, ship, parameters, tuple(without), tuple(estimates))
 
 
 def _sheet(output: Output, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:
@@ -278,7 +278,7 @@ def _sheet(output: Output, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]
 
 
 def _tell_cuts(output: Output, result: ReplayResult, window: Span | None) -> None:
-    """Tell what of the coastdowns was cut; a window of which nothing is left is an error."""
+    """Say what of the coastdowns was cut; a window of which nothing is left is an error."""
     name = result.run.name
     for coastdown in result.coastdowns:
         if window is not None and coastdown.withdrawn:

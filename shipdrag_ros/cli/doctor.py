@@ -37,7 +37,7 @@ _OPTIONAL = {  # module: what does not work without it
 }
 
 
-class State(Enum):
+class CheckState(Enum):
     """How a thing is."""
 
     FINE = 'fine'
@@ -45,11 +45,11 @@ class State(Enum):
     BROKEN = 'BROKEN'
 
 
-class Finding(NamedTuple):
+class CheckResult(NamedTuple):
     """What was looked at, how it is, and what to do; '' where nothing is to be done."""
 
     what: str
-    state: State
+    state: CheckState
     found: str
     do: str = ''
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
             tuple((each.what, each.state.value, each.found, each.do or '-') for each in found),
         )
     )
-    broken = any(each.state is State.BROKEN for each in found)
+    broken = any(each.state is CheckState.BROKEN for each in found)
     output.json(
         {
             'works': not broken,
@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
     return BROKEN if broken else 0
 
 
-def findings(out: Path) -> Iterator[Finding]:
+def findings(out: Path) -> Iterator[CheckResult]:
     """
     Look at everything.
 
@@ -116,8 +116,8 @@ def findings(out: Path) -> Iterator[Finding]:
     ------
     Finding
     """
-    yield Finding(
-        'shipdrag_ros', State.FINE, f'{__version__} on Python {platform.python_version()}'
+    yield CheckResult(
+        'shipdrag_ros', CheckState.FINE, f'{__version__} on Python {platform.python_version()}'
     )
     yield _machine()
     yield from _packages()
@@ -128,29 +128,33 @@ def findings(out: Path) -> Iterator[Finding]:
     yield _clock()
 
 
-def _machine() -> Finding:
+def _machine() -> CheckResult:
     if platform.machine() in ('x86_64', 'AMD64'):
-        return Finding('machine', State.FINE, f'{platform.machine()}, {os.cpu_count()} cores')
-    return Finding(
+        return CheckResult(
+            'machine', CheckState.FINE, f'{platform.machine()}, {os.cpu_count()} cores'
+        )
+    return CheckResult(
         'machine',
-        State.LOOK,
+        CheckState.LOOK,
         platform.machine(),
         'the lock file is tried on x86-64 alone; without ROS most of it works elsewhere',
     )
 
 
-def _packages() -> Iterator[Finding]:
+def _packages() -> Iterator[CheckResult]:
     missing = [name for name in _NEEDED if not _is_there(name)]
     if missing:
-        yield Finding('packages', State.BROKEN, f'missing: {", ".join(missing)}', 'make env')
+        yield CheckResult(
+            'packages', CheckState.BROKEN, f'missing: {", ".join(missing)}', 'make env'
+        )
     else:
-        yield Finding('packages', State.FINE, f'all {len(_NEEDED)} that every verb needs')
+        yield CheckResult('packages', CheckState.FINE, f'all {len(_NEEDED)} that every verb needs')
     for name, without in _OPTIONAL.items():
         if _is_there(name):
-            yield Finding(name, State.FINE, 'there')
+            yield CheckResult(name, CheckState.FINE, 'there')
         else:
             do = 'pip install .[ros], or source ROS 2 Jazzy' if name == 'rclpy' else 'make env'
-            yield Finding(name, State.LOOK, f'missing; does not work: {without}', do)
+            yield CheckResult(name, CheckState.LOOK, f'missing; does not work: {without}', do)
 
 
 def _is_there(name: str) -> bool:
@@ -160,57 +164,67 @@ def _is_there(name: str) -> bool:
         return False
 
 
-def _discovery() -> Finding:
+def _discovery() -> CheckResult:
     told = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
     domain = os.environ.get('ROS_DOMAIN_ID', '0')
     if told:
-        return Finding('ROS discovery', State.FINE, f'{told}, domain {domain}, by the environment')
-    return Finding(
+        return CheckResult(
+            'ROS discovery', CheckState.FINE, f'{told}, domain {domain}, by the environment'
+        )
+    return CheckResult(
         'ROS discovery',
-        State.FINE,
+        CheckState.FINE,
         f'not set, domain {domain}: shipdrag node hears this machine alone',
         'to hear the network: shipdrag node --network',
     )
 
 
-def _compiled() -> Finding:
+def _compiled() -> CheckResult:
     from shipdrag_ros.compiled import CACHE_DIR, cache_root  # numba takes long to import
 
     root = cache_root()
     if root is None:
         do = f'set {CACHE_DIR} to a folder that can be written'
-        return Finding('compiled code', State.LOOK, 'not kept: each start compiles anew', do)
+        return CheckResult(
+            'compiled code', CheckState.LOOK, 'not kept: each start compiles anew', do
+        )
     modules = sum(each.is_dir() for each in root.iterdir())
     if not modules:
-        return Finding('compiled code', State.LOOK, f'none yet in {root}', 'make warm, once')
-    return Finding('compiled code', State.FINE, f'of {modules} modules in {root}')
+        return CheckResult(
+            'compiled code', CheckState.LOOK, f'none yet in {root}', 'make warm, once'
+        )
+    return CheckResult('compiled code', CheckState.FINE, f'of {modules} modules in {root}')
 
 
-def _port(port: int) -> Finding:
+def _port(port: int) -> CheckResult:
     with socket.socket() as probe:
         try:
             probe.bind(('127.0.0.1', port))
         except OSError:
             do = 'a page may run there already; else shipdrag watch --port N'
-            return Finding(f'port {port}', State.LOOK, 'in use', do)
-    return Finding(f'port {port}', State.FINE, 'free for shipdrag watch')
+            return CheckResult(f'port {port}', CheckState.LOOK, 'in use', do)
+    return CheckResult(f'port {port}', CheckState.FINE, 'free for shipdrag watch')
 
 
-def _disk(out: Path) -> Finding:
+def _disk(out: Path) -> CheckResult:
     place = next(each for each in (out.absolute(), *out.absolute().parents) if each.exists())
     if not os.access(place, os.W_OK):
-        return Finding('disk', State.BROKEN, f'{place} cannot be written', 'give --out DIR')
+        return CheckResult(
+            'disk', CheckState.BROKEN, f'{place} cannot be written', 'give --out DIR'
+        )
     free = shutil.disk_usage(place).free
     if free < _LITTLE_BYTES:
         do = 'make room, or bound the recordings: shipdrag node --keep-bytes N'
-        return Finding('disk', State.LOOK, f'{free / 1e9:.1f} GB free in {place}', do)
-    return Finding('disk', State.FINE, f'{free / 1e9:.0f} GB free in {place}')
+        return CheckResult('disk', CheckState.LOOK, f'{free / 1e9:.1f} GB free in {place}', do)
+    return CheckResult('disk', CheckState.FINE, f'{free / 1e9:.0f} GB free in {place}')
 
 
-def _clock() -> Finding:
+def _clock() -> CheckResult:
     if sys.platform != 'linux' or not _SYNCHRONISED.parent.exists():
         do = 'see to it that one does (GNSS or NTP): runs are dated by this clock'
-        return Finding('clock', State.LOOK, 'not known whether anything sets it', do)
+        return CheckResult('clock', CheckState.LOOK, 'not known whether anything sets it', do)
     if not _SYNCHRONISED.exists():
-        return Finding('clock', State.LOOK, 'systemd has not set it yet', 'timedatectl status')
-    return Finding('clock', State.FINE, 'set by systemd-timesyncd')
+        return CheckResult(
+            'clock', CheckState.LOOK, 'systemd has not set it yet', 'timedatectl status'
+        )
+    return CheckResult('clock', CheckState.FINE, 'set by systemd-timesyncd')

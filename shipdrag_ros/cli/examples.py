@@ -6,7 +6,7 @@ from __future__ import annotations
 from shipdrag_ros.studies import found
 
 EXAMPLES = {
-    'demo': ('shipdrag demo --out demo',),
+    'demo': ('shipdrag demo', 'shipdrag demo --out demo --speed-up 20'),
     'node': (
         'shipdrag node --ship ship.yaml --out records',
         'shipdrag node --ship ship.yaml --out records --ros-args -p window_s:=1800.0 '
@@ -25,13 +25,22 @@ EXAMPLES = {
         'shipdrag simulate --ship ship.yaml -o fouled.mcap --effect fouling=0.3 '
         '--effect current=0.4,cross_track_m_s=0.1',
     ),
-    'simulate-fleet': ('shipdrag simulate-fleet -o fleet --ships 1 --months 1 --seed 4',),
-    'baseline': ('shipdrag baseline clean_1.mcap clean_2.mcap --ship ship.yaml -o learnt.yaml',),
+    'simulate-fleet': (
+        'shipdrag simulate-fleet -o fleet --ships 1 --months 1 --seed 4',
+        'shipdrag simulate-fleet -o weekly --ships 1 --months 0.5 --every 7 --sound',
+    ),
+    'baseline': (
+        'shipdrag baseline clean_1.mcap clean_2.mcap --ship ship.yaml -o learnt.yaml',
+        'shipdrag baseline clean_1.mcap --ship ship.yaml -o first.yaml --json baseline.json',
+    ),
     'diagnose': (
         'shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml',
         'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
     ),
-    'fleet': ('shipdrag fleet records -o store --workers 1',),
+    'fleet': (
+        'shipdrag fleet records -o store --workers 1',
+        'shipdrag fleet records -o store --json fleet.json',
+    ),
     'trend': (
         'shipdrag trend store --json trend.json',
         "shipdrag trend store --sql 'select ship, count(*) from coastdowns group by ship'",
@@ -42,10 +51,17 @@ EXAMPLES = {
         '--map position=x,y:km',
         'shipdrag import log.csv -o globe.mcap --rate 1 --map position=lat,lon:deg',
     ),
+    'completion': (
+        'shipdrag completion bash -o shipdrag.bash',
+        'shipdrag completion fish',
+    ),
     'doctor': ('shipdrag doctor', 'shipdrag doctor --out records --json'),
-    'info': ('shipdrag info run.mcap',),
-    'check': ('shipdrag check run.mcap --json check.json',),
-    'recover': ('shipdrag recover damaged.mcap -o saved.mcap',),
+    'info': ('shipdrag info run.mcap', 'shipdrag info out.mcap back.mcap --json info.json'),
+    'check': ('shipdrag check run.mcap', 'shipdrag check out.mcap back.mcap --json check.json'),
+    'recover': (
+        'shipdrag recover damaged.mcap -o saved.mcap',
+        'shipdrag recover damaged.mcap -o again.mcap --json recover.json',
+    ),
     **{study.verb: study.examples for _, study in found()},
 }
 

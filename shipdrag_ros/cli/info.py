@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.description = (
-        'Tell what is in bags: length, topics with their rates, which of them are inputs, what '
+        'Show what is in bags: length, topics with their rates, which of them are inputs, what '
         'is attached, and what is wrong. Estimates nothing.'
     )
     parser.add_argument(
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Tell what is in the bags.
+    Show what is in the bags.
     """
     output = Output(options.json)
     found = [info(each) for each in open_runs(options.bags, remap=dict(options.remap))]

@@ -45,7 +45,7 @@ _RESISTANCE = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class SimulationSettings:
     """What a simulation was asked for, as `truth.yaml` states it."""
 
     speed_m_s: float
@@ -194,7 +194,7 @@ def run(options: argparse.Namespace) -> int:
     speed_m_s = options.speed
     if speed_m_s is None:
         speed_m_s = round(_SPEED_FRACTION * _highest_speed(ship), 3)
-    settings = Settings(
+    settings = SimulationSettings(
         speed_m_s=speed_m_s,
         duration_s=options.duration,
         lead_in_s=options.lead_in,
@@ -232,7 +232,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def make(ship: Ship, settings: Settings) -> tuple[Block, TrueCurve]:
+def make(ship: Ship, settings: SimulationSettings) -> tuple[Block, TrueCurve]:
     """
     Simulate a coastdown; return what the sensors read, and the truth.
 

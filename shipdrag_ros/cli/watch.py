@@ -21,7 +21,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
 from shipdrag_ros.live.serve import listen, serve
-from shipdrag_ros.live.source import FASTEST, BagSource, NodeSource, Source
+from shipdrag_ros.live.source import FASTEST, BagSource, NodeSource, PictureFeed
 from shipdrag_ros.ship import Ship
 
 SHORTEST_TOKEN = 16
@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
     deltas = None if options.signal_k is None else listen(LOOPBACK, options.signal_k)
     with page_socket, contextlib.ExitStack() as stack:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
-        source: Source = stack.enter_context(_source(options, ship, past))
+        source: PictureFeed = stack.enter_context(_source(options, ship, past))
         fleet = None if options.store is None else fleet_page(output, options.store)
         page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet)
         for note in notes:
@@ -120,7 +120,7 @@ def run(options: argparse.Namespace) -> int:
 @contextlib.contextmanager
 def _source(
     options: argparse.Namespace, ship: Ship | None, past: list[PastRun]
-) -> Iterator[Source]:
+) -> Iterator[PictureFeed]:
     """Yield what feeds the page, and end it."""
     if options.bags:
         runs = open_runs(options.bags, remap=dict(options.remap))

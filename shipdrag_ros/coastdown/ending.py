@@ -17,9 +17,9 @@ from shipdrag_ros.coastdown.bins import Bins, line
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
-from shipdrag_ros.coastdown.onset import Candidate, Doubt, bend
-from shipdrag_ros.coastdown.settling import Force, constant_force
-from shipdrag_ros.coastdown.shafts import Seen, Thrust, all_stand, engaged_at, propulsion
+from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, bend
+from shipdrag_ros.coastdown.settling import ConstantForce, constant_force
+from shipdrag_ros.coastdown.shafts import SpeedEvidence, Thrust, all_stand, engaged_at, propulsion
 from shipdrag_ros.coastdown.tracking import heading_is_told, turned_at
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -52,7 +52,7 @@ class End:
 
 
 def end_of(
-    coasting: Candidate, bins: Bins, tuning: Tuning, parameters: Parameters, number: int
+    coasting: OnsetCandidate, bins: Bins, tuning: Tuning, parameters: Parameters, number: int
 ) -> End | None:
     """
     Say whether the coastdown is over now that bin `number` has closed.
@@ -83,7 +83,7 @@ def end_of(
 
 
 def _departed(
-    coasting: Candidate,
+    coasting: OnsetCandidate,
     bins: Bins,
     tuning: Tuning,
     parameters: Parameters,
@@ -123,7 +123,7 @@ def _departed(
 
 
 def _bend(
-    bins: Bins, coasting: Candidate, tuning: Tuning, first: int, number: int, *, sign: int
+    bins: Bins, coasting: OnsetCandidate, tuning: Tuning, first: int, number: int, *, sign: int
 ) -> int:
     """Return the last bin before the speed began to settle or rise (-1), or to fall faster (1)."""
     first = max(first, coasting.start)
@@ -156,7 +156,7 @@ _WITHDRAWN_FOR = {
 
 
 def withdrawn(
-    coasted: Candidate,
+    coasted: OnsetCandidate,
     end: End,
     bins: Bins,
     ship: Ship,
@@ -194,7 +194,7 @@ def withdrawn(
 
 
 def _forced(
-    coasted: Candidate,
+    coasted: OnsetCandidate,
     end: End,
     bins: Bins,
     ship: Ship,
@@ -210,14 +210,14 @@ def _forced(
         faster = tuning.speed_min
     exponent = expect(ship, 0.85 * faster).exponent
 
-    def force(last: int) -> Force | None:
+    def force(last: int) -> ConstantForce | None:
         return constant_force(
             bins,
             coasted.source,
             first,
             last,
             exponent=exponent,
-            spread=coasted.spread,
+            slope_sd=coasted.slope_sd,
             width=width,
         )
 
@@ -229,7 +229,7 @@ def _forced(
             'however slow she was: a brake, or a propeller astern',
         )
     # where the shafts are seen to do nothing, what drives her is the wind
-    seen = Seen(coasted.source, coasted.start, coasted.spread)
+    seen = SpeedEvidence(coasted.source, coasted.start, coasted.slope_sd)
     stands = 0.5 * parameters.shaft_stopped_fraction
     told = propulsion(bins, coasted.drive, seen, end.last, width=width, stands=stands).thrust
     if told in (Thrust.STANDS, Thrust.WINDMILLS):
@@ -246,7 +246,7 @@ def _forced(
     return None
 
 
-def _driven(force: Force) -> Doubt:
+def _driven(force: ConstantForce) -> Doubt:
     share = (
         'as if the resistance did not grow with the speed'
         if math.isinf(force.fraction)

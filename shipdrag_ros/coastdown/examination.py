@@ -210,7 +210,7 @@ def _slow_stop(window: Window, ship: Ship) -> list[NotCoastdown]:
     return [cut_of(window, 0.0, end.ended_s, Dismissal.THRUST, text)]
 
 
-class _Part(NamedTuple):
+class _KeptPart(NamedTuple):
     """
     A part that no instrument speaks against, and what of it is kept.
 
@@ -233,7 +233,7 @@ def _examine_part(
     top: float,
     *,
     steady: bool,
-) -> _Part:
+) -> _KeptPart:
     kept, cuts, notes = _steered(window.part(*span), ship, parameters)
     by_speed = _by_speed(window, kept, ship, parameters, steady=steady)
     kept = max(_left(kept, by_speed), key=_length, default=(kept[0], kept[0]))
@@ -252,7 +252,7 @@ def _examine_part(
         reason = Dismissal.OTHER
         length_s = _length(kept) * 1e-9
         text = f'she loses {fall:.0%} of her speed in {length_s:.3g} s; a better part is kept'
-    return _Part(kept, worth, [*cuts, *by_speed], notes, NotCoastdown(*span, reason, text))
+    return _KeptPart(kept, worth, [*cuts, *by_speed], notes, NotCoastdown(*span, reason, text))
 
 
 def _ends(window: Window) -> tuple[float, float, int]:

@@ -108,7 +108,7 @@ class Cut:
     quickened: float = 0.0
 
 
-class _Law:
+class _ForceLaw:
     """One law on a stretch of bins."""
 
     def __init__(self, time_s: Float64, speed: Float64, scale: float) -> None:
@@ -151,12 +151,15 @@ def change_point(time_s: Float64, speed: Float64) -> Change | None:
     scale = float(np.max(np.abs(speed), initial=0.0))
     if n < _LEAST or scale == 0.0:
         return None
-    whole = _Law(time_s, speed, scale)
+    whole = _ForceLaw(time_s, speed, scale)
     alone = float(whole.residual @ whole.residual)
     least, best, found = np.inf, np.inf, None
     left = whole.residual
     for at in range(_EDGE, n - _EDGE + 1):
-        first, second = _Law(time_s[:at], speed[:at], scale), _Law(time_s[at:], speed[at:], scale)
+        first, second = (
+            _ForceLaw(time_s[:at], speed[:at], scale),
+            _ForceLaw(time_s[at:], speed[at:], scale),
+        )
         both = np.concatenate([first.residual, second.residual])
         total = float(both @ both)
         if total < least:

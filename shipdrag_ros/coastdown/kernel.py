@@ -19,7 +19,7 @@ from shipdrag_ros.coastdown.bins import SOURCES, Bins, line, mean_turning, newes
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.memory import RECENT, Memory, Tally, Tuning, Watch
 from shipdrag_ros.coastdown.ring import append
-from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, learn
+from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
 from shipdrag_ros.coastdown.validate import (
     ARRIVAL_JUMPED_BACK,
     CHANNEL_CODES,
@@ -47,7 +47,7 @@ _SLOWED = 0.85  # of the steady shaft speed or pitch: worth a look at the speed
 _ACCEPTED = int(Reason.ACCEPTED)
 
 
-class Stop(IntEnum):
+class WalkEvent(IntEnum):
     """Why the walk stopped."""
 
     ARRIVAL_JUMPED_BACK = ARRIVAL_JUMPED_BACK
@@ -61,12 +61,12 @@ class Stop(IntEnum):
     SHAFT = 6  # a shaft has slowed down, or its pitch was taken back
 
 
-_FULL = int(Stop.FULL)
-_UPDATE = int(Stop.UPDATE)
-_SILENCE = int(Stop.SILENCE)
-_BIN = int(Stop.BIN)
-_SLOPE = int(Stop.SLOPE)
-_SHAFT_SLOWED = int(Stop.SHAFT)
+_FULL = int(WalkEvent.FULL)
+_UPDATE = int(WalkEvent.UPDATE)
+_SILENCE = int(WalkEvent.SILENCE)
+_BIN = int(WalkEvent.BIN)
+_SLOPE = int(WalkEvent.SLOPE)
+_SHAFT_SLOWED = int(WalkEvent.SHAFT)
 
 
 @compiled(inline=True, uncounted=True)
@@ -84,15 +84,17 @@ def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
 def _look_at_speed(
     bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
 ) -> int:
-    """Judge a closed bin of a speed source; return a `Stop` code, 0 to go on."""
+    """Judge a closed bin of a speed source; return a `WalkEvent` code, 0 to go on."""
     watched = watch.source[0]
     if watched == NEVER:
         if not _is_primary(bins, tuning, source, number):
             return 0
     elif watched != source:
-        learn(steadiness, tuning.slopes, bins, source, number)  # should the one watched fail
+        update_limits(
+            steadiness, tuning.slopes, bins, source, number
+        )  # should the one watched fail
         return 0
-    learn(steadiness, tuning.slopes, bins, source, number)
+    update_limits(steadiness, tuning.slopes, bins, source, number)
     before = watch.seen[0] if watch.seen_source[0] == source else NEVER
     watch.seen_source[0] = source
     watch.seen[0] = number
@@ -129,7 +131,7 @@ def _look_at_speed(
 
 @compiled(inline=True, uncounted=True)
 def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, number: int) -> int:
-    """Judge a closed bin of a shaft speed or a pitch; return a `Stop` code, 0 to go on."""
+    """Judge a closed bin of a shaft speed or a pitch; return a `WalkEvent` code, 0 to go on."""
     if (
         watch.source[0] != NEVER
         or watch.armed[1] == 0
@@ -177,7 +179,7 @@ def walk(
     Returns
     -------
     sample, stop
-        The first sample not taken, and the `Stop` code.
+        The first sample not taken, and the `WalkEvent` code.
     """
     guard, bins, steadiness, watch, tally, store = memory
     i, stop = start, 0

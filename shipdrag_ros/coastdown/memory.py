@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins
-from shipdrag_ros.coastdown.ring import Store, first_store
+from shipdrag_ros.coastdown.ring import RingBuffer, first_store
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness
-from shipdrag_ros.coastdown.validate import CHANNELS, NEVER, Guard, Limits
+from shipdrag_ros.coastdown.validate import CHANNELS, NEVER, CheckMemory, Limits
 from shipdrag_ros.samples import Float64, Int64, Reason
 
 ALWAYS = 2**62  # a stamp after all stamps
@@ -108,12 +108,12 @@ class Tally(NamedTuple):
 class Memory(NamedTuple):
     """All that a monitor remembers, besides a coastdown that runs."""
 
-    guard: Guard
+    guard: CheckMemory
     bins: Bins
     steadiness: Steadiness
     watch: Watch
     tally: Tally
-    store: Store
+    store: RingBuffer
 
     @classmethod
     def fresh(cls, slopes: Slopes, *, seconds: int, tally: Tally) -> Memory:
@@ -121,7 +121,7 @@ class Memory(NamedTuple):
         Return the memory before the first sample, with bins for the last `seconds`.
         """
         return cls(
-            Guard.fresh(),
+            CheckMemory.fresh(),
             Bins.fresh(seconds),
             Steadiness.fresh(slopes),
             Watch.fresh(),

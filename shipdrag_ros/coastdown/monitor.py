@@ -32,9 +32,9 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.coastdown.examination import estimate_examined
 from shipdrag_ros.coastdown.health import InputHealth, Progress, input_health
-from shipdrag_ros.coastdown.kernel import Stop, walk
+from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
-from shipdrag_ros.coastdown.onset import Candidate, Doubt, Verdict, judge, propose
+from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
@@ -122,7 +122,7 @@ class Monitor:
         self._window_ns = round(parameters.window_s * SECOND_NS)
         self._update_ns = round(parameters.update_s * SECOND_NS)
         self._history_ns = self._window_ns + self._seconds * SECOND_NS
-        self._candidate: Candidate | None = None
+        self._candidate: OnsetCandidate | None = None
         self._onset: Onset | None = None
         self._heading_rad: float | None = None
         self._estimated = False
@@ -201,25 +201,25 @@ class Monitor:
         value = np.ascontiguousarray(block.value)
         variance = np.ascontiguousarray(block.variance)
         events: list[Event] = []
-        at, stop = 0, int(Stop.FULL)
+        at, stop = 0, int(WalkEvent.FULL)
         while True:
             at, stop = walk(
                 self._memory, self._tuning, channel, stamp_ns, receive_ns, value, variance, at
             )
-            if stop == Stop.END:
+            if stop == WalkEvent.END:
                 return events
-            if stop == Stop.FULL:
+            if stop == WalkEvent.FULL:
                 self._make_room()
-            elif stop == Stop.UPDATE:
+            elif stop == WalkEvent.UPDATE:
                 events.append(self._update(int(stamp_ns[at])))
-            elif stop == Stop.BIN:
+            elif stop == WalkEvent.BIN:
                 events += self._judge()
-            elif stop == Stop.SILENCE:
+            elif stop == WalkEvent.SILENCE:
                 if not self._fall_back(int(stamp_ns[at])):
                     events += self._stop_at_last_sample(EndedBy.DATA_STOP)
-            elif stop == Stop.SLOPE:
+            elif stop == WalkEvent.SLOPE:
                 self._propose(int(self._memory.watch.seen[0]), noticed=True)
-            elif stop == Stop.SHAFT:
+            elif stop == WalkEvent.SHAFT:
                 self._propose(int(self._memory.bins.filling[channel[at]]), noticed=False)
             else:
                 arrival = int(receive_ns[at])
@@ -284,18 +284,18 @@ class Monitor:
         watch, bins = self._memory.watch, self._memory.bins
         source = int(watch.seen_source[0])
         watch.source[0] = source
-        seen = self._knowing_chance(Candidate(source, number, Drive(), noticed))
+        seen = self._knowing_chance(OnsetCandidate(source, number, Drive(), noticed))
         self._candidate = propose(bins, self._tuning, seen, number)
 
-    def _knowing_chance(self, candidate: Candidate) -> Candidate:
+    def _knowing_chance(self, candidate: OnsetCandidate) -> OnsetCandidate:
         """Fix what chance could do before the candidate, once it is known."""
-        if not np.isnan(candidate.spread):
+        if not np.isnan(candidate.slope_sd):
             return candidate
         steadiness, source = self._memory.steadiness, candidate.source
         return replace(
             candidate,
             limits=tuple(float(limit) for limit in steadiness.limit[source]),
-            spread=float(steadiness.spread[source, 0]),
+            slope_sd=float(steadiness.slope_sd[source, 0]),
         )
 
     def _judge(self) -> list[Event]:
@@ -309,16 +309,16 @@ class Monitor:
         if not candidate.noticed and self._memory.watch.falls[0]:
             # from here on as if the speed alone had made it one
             candidate = replace(
-                candidate, noticed=True, start=number, spread=np.nan, trials=0, doubt=None
+                candidate, noticed=True, start=number, slope_sd=np.nan, trials=0, doubt=None
             )
             candidate = propose(bins, tuning, self._knowing_chance(candidate), number)
         found = judge(
             self._knowing_chance(candidate), bins, self._ship, tuning, parameters, number
         )
         self._candidate = found.candidate
-        if found.verdict is Verdict.DISMISSED:
+        if found.decision is OnsetDecision.DISMISSED:
             return self._dismiss(found.doubt, (number + 1) * SECOND_NS)
-        if found.verdict is Verdict.CONFIRMED:
+        if found.decision is OnsetDecision.CONFIRMED:
             return [self._begin(self._candidate, number)]
         return []
 
@@ -349,12 +349,12 @@ class Monitor:
                 self._candidate,
                 source=source,
                 limits=tuple(float(limit) for limit in limits),
-                spread=float(steadiness.spread[source, 0]),
+                slope_sd=float(steadiness.slope_sd[source, 0]),
             )
             return True
         return False
 
-    def _begin(self, candidate: Candidate, number: int) -> Onset:
+    def _begin(self, candidate: OnsetCandidate, number: int) -> Onset:
         onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)
         self._estimated = False
         self._onset = onset
@@ -488,7 +488,7 @@ class Monitor:
 
     def _clock_set(self, stop: int, channel: int, stamp_ns: int, receive_ns: int) -> str:
         guard = self._memory.guard
-        if stop == Stop.STAMP_JUMPED_BACK:
+        if stop == WalkEvent.STAMP_JUMPED_BACK:
             back = int(guard.last_ns[channel]) - stamp_ns
             return f'{Channel(channel).input}: the stamp went back by {back * 1e-9:.3f} s'
         back = int(guard.arrival_ns[0]) - receive_ns

@@ -30,8 +30,8 @@ from shipdrag_ros.coastdown.shafts import (
     SHAFT_S,
     UNTOLD,
     Drive,
-    Propulsion,
-    Seen,
+    ShaftEvidence,
+    SpeedEvidence,
     Thrust,
     propulsion,
     steady_drive,
@@ -54,7 +54,7 @@ _PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by
 _APART = 3  # slope windows that the dates of shaft and speed may be apart
 
 
-class Verdict(Enum):
+class OnsetDecision(Enum):
     """What has become of a candidate."""
 
     PENDING = 'pending'
@@ -71,20 +71,20 @@ class Doubt:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class OnsetJudgement:
     """
     What has become of a candidate, with its start as it is known now.
 
     `doubt` is there where it was dismissed, unless it is not worth a word.
     """
 
-    verdict: Verdict
-    candidate: Candidate
+    decision: OnsetDecision
+    candidate: OnsetCandidate
     doubt: Doubt | None = None
 
 
 @dataclass(frozen=True)
-class Candidate:
+class OnsetCandidate:
     """
     Something that may be a coastdown.
 
@@ -101,7 +101,7 @@ class Candidate:
     limits
         Size of a slope that chance did not explain before it, over one, two and
         four times slope_window_s [m/s^2]; NaN while unknown.
-    spread
+    slope_sd
         Standard deviation of the first of these slopes before it [m/s^2].
     judged_from
         First bin in which it is judged.
@@ -116,7 +116,7 @@ class Candidate:
     drive: Drive
     noticed: bool
     limits: tuple[float, ...] = ()
-    spread: float = math.nan
+    slope_sd: float = math.nan
     judged_from: int = NEVER
     trials: int = 0
     doubt: Doubt | None = None
@@ -142,7 +142,7 @@ class Candidate:
         return None
 
 
-def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candidate:
+def propose(bins: Bins, tuning: Tuning, seen: OnsetCandidate, number: int) -> OnsetCandidate:
     """
     Date back what the walk saw at bin `number`.
 
@@ -164,54 +164,56 @@ def propose(bins: Bins, tuning: Tuning, seen: Candidate, number: int) -> Candida
 
 
 def judge(
-    candidate: Candidate,
+    candidate: OnsetCandidate,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
     parameters: Parameters,
     number: int,
-) -> Judgement:
+) -> OnsetJudgement:
     """
     Judge a candidate when bin `number` has closed.
     """
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
-    pending = Judgement(Verdict.PENDING, candidate)
+    pending = OnsetJudgement(OnsetDecision.PENDING, candidate)
     if number < candidate.judged_from:  # the clock of the speed may be slower than the shaft's
         return pending
     told = _propulsion(candidate, bins, tuning, parameters, number)
     doubt = _spoiled(candidate, told, bins, tuning, parameters, number)
     if doubt is not None:
-        return Judgement(Verdict.DISMISSED, candidate, doubt)
+        return OnsetJudgement(OnsetDecision.DISMISSED, candidate, doubt)
     if told.stop is not None:
         candidate = replace(candidate, start=told.stop)
     falls = candidate.falls(bins, number, width)
     age = number - candidate.start
     off = told.thrust in (Thrust.STANDS, Thrust.WINDMILLS)
     if off and falls:
-        return Judgement(Verdict.CONFIRMED, candidate)
+        return OnsetJudgement(OnsetDecision.CONFIRMED, candidate)
     if not candidate.noticed:
         if told is UNTOLD:  # it turns on as before
-            return Judgement(Verdict.DISMISSED, candidate)
+            return OnsetJudgement(OnsetDecision.DISMISSED, candidate)
         if age > _PATIENCE * confirm:
-            return Judgement(Verdict.DISMISSED, candidate, _no_fall(told, age))
+            return OnsetJudgement(OnsetDecision.DISMISSED, candidate, _no_fall(told, age))
     if not falls:
         if off or not candidate.noticed:
-            return Judgement(Verdict.PENDING, candidate)
-        return Judgement(Verdict.DISMISSED, candidate, _settled(candidate, bins, width, number))
+            return OnsetJudgement(OnsetDecision.PENDING, candidate)
+        return OnsetJudgement(
+            OnsetDecision.DISMISSED, candidate, _settled(candidate, bins, width, number)
+        )
     if age < confirm * (candidate.trials + 1):
-        return Judgement(Verdict.PENDING, candidate)
+        return OnsetJudgement(OnsetDecision.PENDING, candidate)
     return _tried(candidate, told, bins, ship, tuning, parameters, number)
 
 
 def _tried(
-    candidate: Candidate,
-    told: Propulsion,
+    candidate: OnsetCandidate,
+    told: ShaftEvidence,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
     parameters: Parameters,
     number: int,
-) -> Judgement:
+) -> OnsetJudgement:
     """Judge the deceleration once more."""
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
     if told.stop is None:
@@ -221,32 +223,32 @@ def _tried(
         candidate = replace(candidate, start=start)
     if 2 * (number - candidate.start) < confirm * (2 * candidate.trials + 1):
         # chance made it a candidate, then it began in earnest
-        return Judgement(Verdict.PENDING, candidate)
+        return OnsetJudgement(OnsetDecision.PENDING, candidate)
     candidate = replace(candidate, trials=candidate.trials + 1)
     # a governor, or a controllable propeller at zero pitch that holds its speed: ask for more
     strict = told.thrust is Thrust.REDUCED and candidate.trials < _TRIALS
-    doubt = _misses(candidate, bins, ship, tuning, parameters, number, strict=strict)
+    doubt = _unlike_a_coastdown(candidate, bins, ship, tuning, parameters, number, strict=strict)
     if told.thrust is Thrust.ON:
         doubt = Doubt(Dismissal.THRUST, f'a propeller drove on, {told.text}')
     elif told.thrust is Thrust.REDUCED and doubt is not None:
         doubt = Doubt(Dismissal.THRUST, f'{doubt.text}; the shaft held its speed, {told.text}')
     candidate = replace(candidate, doubt=doubt)
     if doubt is None:
-        return Judgement(Verdict.CONFIRMED, candidate)
+        return OnsetJudgement(OnsetDecision.CONFIRMED, candidate)
     if candidate.trials == _TRIALS:
-        return Judgement(Verdict.DISMISSED, candidate, doubt)
-    return Judgement(Verdict.PENDING, candidate)
+        return OnsetJudgement(OnsetDecision.DISMISSED, candidate, doubt)
+    return OnsetJudgement(OnsetDecision.PENDING, candidate)
 
 
 def _propulsion(
-    candidate: Candidate, bins: Bins, tuning: Tuning, parameters: Parameters, number: int
-) -> Propulsion:
+    candidate: OnsetCandidate, bins: Bins, tuning: Tuning, parameters: Parameters, number: int
+) -> ShaftEvidence:
     """Say what the propellers do, where that goes with what the speed does."""
     width = tuning.slopes.width
     told = propulsion(
         bins,
         candidate.drive,
-        Seen(candidate.source, candidate.start, candidate.spread),
+        SpeedEvidence(candidate.source, candidate.start, candidate.slope_sd),
         number,
         width=width,
         stands=0.5 * parameters.shaft_stopped_fraction,
@@ -262,8 +264,8 @@ def _propulsion(
 
 
 def _spoiled(
-    candidate: Candidate,
-    told: Propulsion,
+    candidate: OnsetCandidate,
+    told: ShaftEvidence,
     bins: Bins,
     tuning: Tuning,
     parameters: Parameters,
@@ -290,7 +292,7 @@ def _spoiled(
     return None
 
 
-def _no_fall(told: Propulsion, age: int) -> Doubt:
+def _no_fall(told: ShaftEvidence, age: int) -> Doubt:
     """Say that the propeller slowed down, the ship did not."""
     if told.thrust is Thrust.ON:
         return Doubt(Dismissal.THRUST, f'a propeller drove on for {age} s, {told.text}')
@@ -301,7 +303,7 @@ def _no_fall(told: Propulsion, age: int) -> Doubt:
     )
 
 
-def _settled(candidate: Candidate, bins: Bins, width: int, number: int) -> Doubt:
+def _settled(candidate: OnsetCandidate, bins: Bins, width: int, number: int) -> Doubt:
     """Say that the speed falls no longer, after how much of it was lost."""
     if candidate.doubt is not None:
         return candidate.doubt
@@ -315,8 +317,8 @@ def _settled(candidate: Candidate, bins: Bins, width: int, number: int) -> Doubt
     )
 
 
-def _misses(
-    candidate: Candidate,
+def _unlike_a_coastdown(
+    candidate: OnsetCandidate,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
@@ -339,7 +341,7 @@ def _misses(
         )
     guard = round(_GUARD * parameters.confirm_s)
     time, speed = speeds(bins, candidate.source, candidate.start + guard, number)
-    found = law(time, speed) if len(time) >= _LAW_BINS_MIN else None
+    found = fit_deceleration(time, speed) if len(time) >= _LAW_BINS_MIN else None
     if found is None or not (before > level > 0.0 and slope < 0.0 and found.slope < 0.0):
         return Doubt(
             Dismissal.SETTLED,
@@ -352,7 +354,7 @@ def _misses(
     half = 0.5 * float(time[-1] - time[0])
     sd = (
         math.sqrt(2.0)
-        * candidate.spread
+        * candidate.slope_sd
         * (tuning.slopes.width / half**2)
         * (found.speed / found.slope**2)
     )
@@ -430,7 +432,7 @@ def bend(
 
 
 @dataclass(frozen=True)
-class Law:
+class DecelerationFit:
     """
     Deceleration of a span of record, from a parabola through the speed.
 
@@ -450,10 +452,10 @@ class Law:
         return self.curvature * self.speed / self.slope**2
 
 
-def law(time: Float64, speed: Float64) -> Law:
+def fit_deceleration(time: Float64, speed: Float64) -> DecelerationFit:
     """
     Fit v = a + b t + c t^2 / 2 about the middle of the span.
     """
     middle = 0.5 * (time[0] + time[-1])
     c, b, a = np.polyfit(time - middle, speed, 2)
-    return Law(float(a), float(b), 2.0 * float(c))
+    return DecelerationFit(float(a), float(b), 2.0 * float(c))

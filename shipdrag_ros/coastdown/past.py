@@ -269,9 +269,9 @@ def _learn_speed(past: Past, channel: int, count: int, kept: int) -> None:
         _insert(scratch, i, abs(value[one, 0] - value[other, 0]))
     known = kept - 1
     # the quartile too: more than half of the readings of a coarse log repeat
-    spread = max(scratch[known // 2] * MAD_TO_SD, scratch[3 * known // 4] / _OF_QUARTILE)
+    sd = max(scratch[known // 2] * MAD_TO_SD, scratch[3 * known // 4] / _OF_QUARTILE)
     near = abs(median(past, channel, count, 0, 0.0))
-    past.gate[channel] = max(_FLOOR_M_S + _FLOOR_PART * near, SD * spread)
+    past.gate[channel] = max(_FLOOR_M_S + _FLOOR_PART * near, SD * sd)
 
 
 @compiled(uncounted=True)

@@ -20,7 +20,7 @@ CAPACITY = 1 << 21  # samples kept at most, 100 MB: 5400 s of 390 samples a seco
 _FIRST_CAPACITY = 1 << 12
 
 
-class Store(NamedTuple):
+class RingBuffer(NamedTuple):
     """
     The buffer; `end[0]` is where the next sample goes.
 
@@ -35,7 +35,7 @@ class Store(NamedTuple):
     end: Int64
 
     @classmethod
-    def fresh(cls, capacity: int) -> Store:
+    def fresh(cls, capacity: int) -> RingBuffer:
         """
         Return an empty buffer.
         """
@@ -51,7 +51,7 @@ class Store(NamedTuple):
 
 @compiled(uncounted=True)
 def append(
-    store: Store,
+    store: RingBuffer,
     channel: UInt8,
     stamp_ns: Int64,
     receive_ns: Int64,
@@ -80,7 +80,7 @@ def append(
     store.end[0] = end + count
 
 
-def make_room(store: Store, *, keep_ns: int, late_ns: int, capacity: int) -> Store:
+def make_room(store: RingBuffer, *, keep_ns: int, late_ns: int, capacity: int) -> RingBuffer:
     """
     Drop what is older than `keep_ns`, or grow; return the store to go on with.
 
@@ -98,7 +98,7 @@ def make_room(store: Store, *, keep_ns: int, late_ns: int, capacity: int) -> Sto
     begin = max(_before(store, newest - keep_ns, late_ns), end - capacity)
     room = len(store.stamp_ns)
     if 2 * (end - begin) > room:
-        grown = Store.fresh(min(2 * room, 2 * capacity))
+        grown = RingBuffer.fresh(min(2 * room, 2 * capacity))
     else:
         grown = store
     grown.channel[: end - begin] = store.channel[begin:end]
@@ -110,14 +110,14 @@ def make_room(store: Store, *, keep_ns: int, late_ns: int, capacity: int) -> Sto
     return grown
 
 
-def first_store() -> Store:
+def first_store() -> RingBuffer:
     """
     Return the small buffer a monitor starts with.
     """
-    return Store.fresh(_FIRST_CAPACITY)
+    return RingBuffer.fresh(_FIRST_CAPACITY)
 
 
-def since(store: Store, start_ns: int, *, late_ns: int, capacity: int) -> Block:
+def since(store: RingBuffer, start_ns: int, *, late_ns: int, capacity: int) -> Block:
     """
     Return the samples kept from `start_ns` on, without copying them.
 
@@ -134,7 +134,7 @@ def since(store: Store, start_ns: int, *, late_ns: int, capacity: int) -> Block:
     )
 
 
-def _before(store: Store, stamp_ns: int, late_ns: int) -> int:
+def _before(store: RingBuffer, stamp_ns: int, late_ns: int) -> int:
     """Return an index before which all stamps are older than `stamp_ns`."""
     # The stamps are sorted but for late_ns. A bisection for stamp_ns - late_ns drops what is
     # in front of a stamp older than that, and all in front of it is older than stamp_ns.

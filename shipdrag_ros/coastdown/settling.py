@@ -18,11 +18,11 @@ from shipdrag_ros.coastdown.bins import Bins, speeds
 _BINS_MIN = 30
 # noise of the sea has a longer memory than a slope window: the sd that this window shows,
 # continued as white noise, is too small by about so much
-_COLOUR = 1.5
+_CORRELATED = 1.5
 
 
 @dataclass(frozen=True)
-class Force:
+class ConstantForce:
     """
     The constant force beside that of the water.
 
@@ -50,8 +50,8 @@ class Force:
 
 
 def constant_force(
-    bins: Bins, source: int, first: int, last: int, *, exponent: float, spread: float, width: int
-) -> Force | None:
+    bins: Bins, source: int, first: int, last: int, *, exponent: float, slope_sd: float, width: int
+) -> ConstantForce | None:
     """
     Fit the speed of the bins first .. last.
 
@@ -59,7 +59,7 @@ def constant_force(
     ----------
     exponent
         The p that is expected of the water.
-    spread, width
+    slope_sd, width
         Standard deviation of a slope [m/s^2] over a slope window of this many bins.
 
     Returns
@@ -83,11 +83,11 @@ def constant_force(
     free = ramps - (ramps @ basis) @ basis.T
     size = np.einsum('ij,ij->i', free, free)
     along = free @ rest
-    noise = _COLOUR**2 * spread**2 * width**3 / 12.0 / np.mean(np.diff(time))
+    noise = _CORRELATED**2 * slope_sd**2 * width**3 / 12.0 / np.mean(np.diff(time))
     gain = np.maximum(along, 0.0) ** 2 / size / noise
     d = float(along[0] / size[0])
     c = float(np.linalg.solve(triangle, basis.T @ (speed - d * ramps[0]))[1])
     if not c > 0.0:
-        return Force(np.inf, np.inf, float(gain.max() - gain[0]))
+        return ConstantForce(np.inf, np.inf, float(gain.max() - gain[0]))
     sd = float(np.sqrt(noise / size[0])) / c
-    return Force(d / c, sd, float(gain.max() - gain[0]))
+    return ConstantForce(d / c, sd, float(gain.max() - gain[0]))

@@ -83,7 +83,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Seen:
+class SpeedEvidence:
     """
     What the speed shows.
 
@@ -93,17 +93,17 @@ class Seen:
         Of the speed.
     start
         First bin of what may be a coastdown, as far as is known.
-    spread
+    slope_sd
         Standard deviation of a slope over a slope window [m/s^2].
     """
 
     source: int
     start: int
-    spread: float
+    slope_sd: float
 
 
 @dataclass(frozen=True)
-class Propulsion:
+class ShaftEvidence:
     """
     What the propellers did about a candidate.
 
@@ -127,7 +127,7 @@ class Propulsion:
         return f'at {self.drive:.0%} of its steady drive'
 
 
-UNTOLD = Propulsion(Thrust.UNKNOWN)
+UNTOLD = ShaftEvidence(Thrust.UNKNOWN)
 
 
 def steady_drive(bins: Bins, last: int, width: int) -> Drive:
@@ -189,8 +189,8 @@ def _each(bins: Bins, channel: int, first: int, last: int) -> Float64:
 
 
 def propulsion(
-    bins: Bins, steady: Drive, seen: Seen, number: int, *, width: int, stands: float
-) -> Propulsion:
+    bins: Bins, steady: Drive, seen: SpeedEvidence, number: int, *, width: int, stands: float
+) -> ShaftEvidence:
     """
     Say what the propellers do at bin `number`, and when the last of them stopped.
 
@@ -214,7 +214,7 @@ def propulsion(
     moves = np.array([np.ptp(row[-width:]) > 0.0 for row in rows], bool)
     now = np.nanmean(rows[:, -SHAFT_S:], axis=1)  # the last one is known
     if np.any(now < _ASTERN):
-        return Propulsion(Thrust.ASTERN, None, float(now.min()))
+        return ShaftEvidence(Thrust.ASTERN, None, float(now.min()))
     fell = now < FELL
     if not fell.any():
         pitched = not any(
@@ -222,10 +222,10 @@ def propulsion(
             for turning, pitch in zip(steady.turning, steady.pitch, strict=True)
         )
         if pitched and moves.any():
-            return Propulsion(Thrust.ON, None, float(now.max()))
+            return ShaftEvidence(Thrust.ON, None, float(now.max()))
         return UNTOLD
     if np.any(~fell & moves):
-        return Propulsion(Thrust.ON, None, float(now.max()))
+        return ShaftEvidence(Thrust.ON, None, float(now.max()))
     stops = [first + _knee(row) for row in rows[fell]]
     found = [
         Thrust.STANDS
@@ -237,15 +237,17 @@ def propulsion(
     dated = [stop for stop, one in zip(stops, found, strict=True) if one is not Thrust.ON]
     for worst in (Thrust.REDUCED, Thrust.UNKNOWN, Thrust.WINDMILLS, Thrust.STANDS):
         if worst in found:
-            return Propulsion(worst, max(dated), float(now[fell].max()))
-    return Propulsion(Thrust.ON, None, float(now.max()))
+            return ShaftEvidence(worst, max(dated), float(now[fell].max()))
+    return ShaftEvidence(Thrust.ON, None, float(now.max()))
 
 
 def _heard(bins: Bins, number: int) -> bool:
     return any(newest_bin(bins, int(shaft)) >= number - _SILENT_S for shaft in SHAFTS)
 
 
-def _follows(bins: Bins, seen: Seen, row: Float64, stop: int, number: int, width: int) -> Thrust:
+def _follows(
+    bins: Bins, seen: SpeedEvidence, row: Float64, stop: int, number: int, width: int
+) -> Thrust:
     """Say whether a propeller that slowed down at `stop` follows the ship, or drives it."""
     # after the run-down: a third of the time since, but not less than two thirds of a window
     settled = max((number - stop) // 3, 2 * width // 3)
@@ -267,7 +269,7 @@ def _follows(bins: Bins, seen: Seen, row: Float64, stop: int, number: int, width
     first, last = (float(np.nanmean(part)) for part in (row[settled:][: third + 1], row[-third:]))
     if not min(before, early, late, first, last) > 0.0:
         return Thrust.UNKNOWN
-    sd = _FOLLOWS * 0.7 * seen.spread * width / late + _DRIVE_SD
+    sd = _FOLLOWS * 0.7 * seen.slope_sd * width / late + _DRIVE_SD
     excess = math.log(last / first) - _FOLLOWS * math.log(late / early)
     if excess > _SIGMAS * sd:
         return Thrust.REDUCED

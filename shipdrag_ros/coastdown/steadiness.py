@@ -2,10 +2,10 @@
 """
 How much the speed of a steady ship wanders, learnt from the record itself.
 
-At sea the noise of a slope is coloured, so its spread is measured, not derived
+At sea the noise of a slope is correlated, so its sd is measured, not derived
 from the noise of a reading: slopes are taken at points aligned to absolute
 time, and the size of the change from one slope to the neighbour that shares no
-sample with it gives a spread that neither a coastdown in the record nor a slow
+sample with it gives an sd that neither a coastdown in the record nor a slow
 trend spoils. A short window finds a fast fall soon; a window four times as long
 finds the slow one of a tanker, which the noise of the short one would hide.
 """
@@ -27,11 +27,11 @@ SCALES = 3  # windows of one, two and four times slope_window_s
 _STRIDES_PER_WINDOW = 4
 # independent slopes that a window's length holds, as far as chance excursions go
 _LOOKS_PER_WINDOW = 4.0
-_FREEDOM_PER_WINDOW = 1.2  # degrees of freedom of the spread, per window's length of record
-_WINDOWS_LEARNT = 6  # windows' lengths of record below which the spread is not trusted
-# until then: how much larger than white noise the spread may be
+_FREEDOM_PER_WINDOW = 1.2  # degrees of freedom of the sd, per window's length of record
+_WINDOWS_LEARNT = 6  # windows' lengths of record below which the sd is not trusted
+# until then: how much larger than white noise the sd may be
 _COLOUR = 3.0
-_FEW = 1.5  # and how much too small the spread of a few slopes
+_FEW = 1.5  # and how much too small the sd of a few slopes
 SLOPE_FLOOR_M_S2 = 1e-7  # a record without noise must not divide by it
 # The largest quarter may be the ends of coastdowns; of a normal distribution the rest has a
 # root mean square of 1 / 1.6475 standard deviations.
@@ -51,11 +51,11 @@ class Slopes(NamedTuple):
         Distance of the points where its slopes are kept; points from a slope to
         its neighbour. A window twice as long has a stride twice as long.
     points
-        Number of changes of slope that the spread is learnt from at most.
+        Number of changes of slope that the sd is learnt from at most.
     quantile : (SCALES, points + 1)
-        Threshold in spreads against the number of changes known; inf where too few.
+        Threshold in sd against the number of changes known; inf where too few.
     white
-        Threshold where the spread is guessed from white noise.
+        Threshold where the sd is guessed from white noise.
     """
 
     width: int
@@ -72,7 +72,7 @@ class Slopes(NamedTuple):
 
         Notes
         -----
-        The spread is itself an estimate, from few independent windows: the
+        The sd is itself an estimate, from few independent windows: the
         threshold is a quantile of Student's t, not of the normal distribution.
         """
         from scipy.special import ndtri, stdtrit  # slow to import
@@ -111,7 +111,7 @@ class Steadiness(NamedTuple):
         The bin that completes the next point.
     limit : (sources, SCALES)
         Size of a slope that chance does not explain [m/s^2]; NaN while unknown.
-    spread : (sources, SCALES)
+    slope_sd : (sources, SCALES)
         Standard deviation of a slope [m/s^2].
     scratch : (4 width,)
         Room to sort in: compiled code makes no arrays.
@@ -121,7 +121,7 @@ class Steadiness(NamedTuple):
     changes: Float64
     due: Int64
     limit: Float64
-    spread: Float64
+    slope_sd: Float64
     scratch: Float64
 
     @classmethod
@@ -140,19 +140,21 @@ class Steadiness(NamedTuple):
 
 
 @compiled(inline=True, uncounted=True)
-def learn(steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int) -> None:
+def update_limits(
+    steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int
+) -> None:
     """
-    Bring the spreads up to the last point at or before the closed bin `number`.
+    Bring the sd up to the last point at or before the closed bin `number`.
 
     The result depends on the bins of the last steady_s and two windows alone.
     """
     for scale in range(SCALES):
         if number >= steadiness.due[source, scale]:
-            _learn_scale(steadiness, slopes, bins, source, number, scale)
+            _update_scale(steadiness, slopes, bins, source, number, scale)
 
 
 @compiled(uncounted=True)
-def _learn_scale(
+def _update_scale(
     steadiness: Steadiness, slopes: Slopes, bins: Bins, source: int, number: int, scale: int
 ) -> None:
     width, stride, points = slopes.width << scale, slopes.stride << scale, slopes.points >> scale
@@ -172,17 +174,17 @@ def _learn_scale(
     steadiness.due[source, scale] = (newest + 1) * stride - 1
 
     count = int(np.searchsorted(changes, np.inf))
-    spread = _spread(changes, count)
+    sd = _sd_of_changes(changes, count)
     threshold = slopes.quantile[scale, count]
     if threshold == np.inf:
         # a longer window would need a longer guess
         guess = np.nan
         if scale == 0:
-            guess = _COLOUR * white_spread(bins, source, number, width, steadiness.scratch)
-        spread = guess if np.isnan(guess) else max(guess, _FEW * spread)
+            guess = _COLOUR * white_sd_of_slopes(bins, source, number, width, steadiness.scratch)
+        sd = guess if np.isnan(guess) else max(guess, _FEW * sd)
         threshold = slopes.white
-    steadiness.spread[source, scale] = spread + SLOPE_FLOOR_M_S2
-    steadiness.limit[source, scale] = threshold * spread + SLOPE_FLOOR_M_S2
+    steadiness.slope_sd[source, scale] = sd + SLOPE_FLOOR_M_S2
+    steadiness.limit[source, scale] = threshold * sd + SLOPE_FLOOR_M_S2
 
 
 @compiled(uncounted=True)
@@ -206,7 +208,7 @@ def _replace(ascending: Float64, gone: float, come: float) -> None:
 
 
 @compiled(uncounted=True)
-def _spread(changes: Float64, known: int) -> float:
+def _sd_of_changes(changes: Float64, known: int) -> float:
     """Return the sd of a slope from the first `known`, ascending sizes of changes of slope."""
     count = int(_KEPT * known)
     if count == 0:
@@ -218,7 +220,7 @@ def _spread(changes: Float64, known: int) -> float:
 
 
 @compiled(uncounted=True)
-def white_spread(bins: Bins, source: int, last: int, width: int, scratch: Float64) -> float:
+def white_sd_of_slopes(bins: Bins, source: int, last: int, width: int, scratch: Float64) -> float:
     """
     Return the sd of a slope over `width` bins if successive bins differ by white noise.
 
@@ -235,6 +237,6 @@ def white_spread(bins: Bins, source: int, last: int, width: int, scratch: Float6
             scratch[at] = scratch[at - 1]
             at -= 1
         scratch[at] = change
-    reading = _spread(scratch, count)
+    reading = _sd_of_changes(scratch, count)
     used = line(bins, source, last, width)[2] / apart
     return float(reading * math.sqrt(12.0 / max(used, 1.0)) / width)

@@ -94,7 +94,7 @@ CHANNEL_CODES = types.Array(types.uint8, 1, 'C', readonly=True)
 VALUES = types.Array(types.float64, 2, 'C', readonly=True)
 
 
-class Guard(NamedTuple):
+class CheckMemory(NamedTuple):
     """
     What the tests remember.
 
@@ -122,7 +122,7 @@ class Guard(NamedTuple):
     past: Past
 
     @classmethod
-    def fresh(cls) -> Guard:
+    def fresh(cls) -> CheckMemory:
         """
         Return the memory before the first sample.
         """
@@ -155,7 +155,7 @@ class Limits(NamedTuple):
 
 @compiled(inline=True, uncounted=True)
 def examine(
-    guard: Guard,
+    guard: CheckMemory,
     limits: Limits,
     channel: int,
     stamp: int,
@@ -213,7 +213,7 @@ def examine(
 
 @compiled(inline=True, uncounted=True)
 def remember(
-    guard: Guard,
+    guard: CheckMemory,
     channel: int,
     stamp: int,
     a: float,
@@ -239,7 +239,7 @@ def remember(
 
 @compiled(inline=True, uncounted=True)
 def reject(
-    guard: Guard,
+    guard: CheckMemory,
     code: int,
     channel: int,
     stamp: int,
@@ -256,7 +256,7 @@ def reject(
 
 
 @compiled(inline=True, uncounted=True)
-def alive_ns(guard: Guard, limits: Limits, channel: int) -> int:
+def alive_ns(guard: CheckMemory, limits: Limits, channel: int) -> int:
     """
     Return the stamp up to which a channel of the motion has been delivering [ns].
 
@@ -268,7 +268,7 @@ def alive_ns(guard: Guard, limits: Limits, channel: int) -> int:
 
 
 @compiled(uncounted=True)
-def forget(guard: Guard) -> None:
+def forget(guard: CheckMemory) -> None:
     """
     Return to the state before the first sample.
     """
@@ -302,7 +302,7 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
     """
     reasons = np.empty(len(block), np.uint8)
     _walk(
-        Guard.fresh(),
+        CheckMemory.fresh(),
         Limits.of(parameters),
         np.ascontiguousarray(block.channel),
         np.ascontiguousarray(block.stamp_ns),
@@ -315,7 +315,7 @@ def validate(block: Block, parameters: Parameters) -> UInt8:
 
 
 _SIGNATURE: Signature = types.void(
-    typeof(Guard.fresh()),
+    typeof(CheckMemory.fresh()),
     typeof(Limits(0, 0)),
     CHANNEL_CODES,
     STAMPS,
@@ -328,7 +328,7 @@ _SIGNATURE: Signature = types.void(
 
 @compiled(_SIGNATURE, uncounted=True)
 def _walk(
-    guard: Guard,
+    guard: CheckMemory,
     limits: Limits,
     channel: UInt8,
     stamp_ns: Int64,

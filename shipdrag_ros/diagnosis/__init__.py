@@ -13,7 +13,7 @@ from shipdrag_ros.diagnosis.result import (
     Diagnosis,
     EffectEstimate,
     Gap,
-    Trace,
+    RunTrace,
     Verdict,
     Where,
 )
@@ -30,8 +30,8 @@ __all__ = [
     'Diagnosis',
     'EffectEstimate',
     'Gap',
+    'RunTrace',
     'SailingRecord',
-    'Trace',
     'Verdict',
     'Where',
     'diagnose',

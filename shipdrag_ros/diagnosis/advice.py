@@ -82,7 +82,7 @@ def advice(
     -----
     The probability is that something is named after the measurement, averaged over
     what may be the truth; None where it is not simulated. Among the rivals are pairs
-    that the runs do not ask for, which a measurement may bring up.
+    whose Bayes factor is below 10 as yet, which a measurement may bring up.
     """
     fits = _rivals(posterior)
     rivals = [

@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.result import (
     Verdict,
     Where,
 )
-from shipdrag_ros.diagnosis.search import Found, search, with_pairs
+from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
 from shipdrag_ros.diagnosis.verdict import judge
@@ -201,7 +201,7 @@ def _observed(
     return tuple(seen), tuple(notes)
 
 
-def _of_the_ship(found: Found) -> bool:
+def _of_the_ship(found: SearchResult) -> bool:
     """Tell whether what is missing acts on the ship, whatever water and instruments do."""
     names = found.best.hypothesis.names
     return bool(names) and {find(name).scope for name in names} <= {Scope.HULL, Scope.RUN}

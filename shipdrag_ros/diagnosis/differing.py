@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.fitting import fit
 from shipdrag_ros.diagnosis.model import Hypothesis, start
 from shipdrag_ros.diagnosis.result import RunSize
-from shipdrag_ros.diagnosis.search import Found
+from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.simulation.effect import Scope
@@ -25,7 +25,7 @@ _DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
 _ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
 
-def with_differing(found: Found, model: CoastModel) -> Found:
+def with_differing(found: SearchResult, model: CoastModel) -> SearchResult:
     """
     Fit each effect of the hull with a size for each run besides.
 
@@ -60,7 +60,7 @@ def with_differing(found: Found, model: CoastModel) -> Found:
     return replace(found, fits=(*found.fits, *fit(model, tried, starts)))
 
 
-def runs_differ(found: Found) -> tuple[RunSize, ...]:
+def runs_differ(found: SearchResult) -> tuple[RunSize, ...]:
     """
     Return the size in each run, where the most probable hypothesis has one for each.
 

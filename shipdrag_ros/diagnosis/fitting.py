@@ -89,7 +89,7 @@ def fit(
     best and hardly comes nearer is left where it is.
     """
     states = [
-        _State(h, z.copy(), model.converged) for h, z in zip(hypotheses, starts, strict=True)
+        _FitState(h, z.copy(), model.converged) for h, z in zip(hypotheses, starts, strict=True)
     ]
     active = states
     for number in range(model.iterations):
@@ -106,7 +106,7 @@ def fit(
     return [state.result() for state in states]
 
 
-class _State:
+class _FitState:
     """A hypothesis on its way to the best fit."""
 
     def __init__(self, hypothesis: Hypothesis, z: Float64, converged: float) -> None:

@@ -63,7 +63,7 @@ class GaussianTerm:
     one_size: ClassVar[Sequence[int]] = ()
 
 
-class FormTerm(GaussianTerm):
+class ResistanceFormTerm(GaussianTerm):
     """ln a [1/s], ln b [1/m], the shape about that form, first speed of each run [m/s]."""
 
 
@@ -162,7 +162,7 @@ class FormModel(DirectModel):
             *(free(f'shape {k}', normal(_SHAPE_SD)) for k in range(_SHAPES)),
             *(free(f'first {j}', normal(_START_SD * v, mean=v)) for j, v in enumerate(first)),
         )
-        return Hypothesis((), (FormTerm(unknowns),), log_prior=math.log(_NOTHING))
+        return Hypothesis((), (ResistanceFormTerm(unknowns),), log_prior=math.log(_NOTHING))
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
         """
@@ -210,7 +210,7 @@ class FormModel(DirectModel):
             value = np.array(
                 [[u.prior.at(each) for each in z[place + i]] for i, u in enumerate(part.unknowns)]
             )
-            if isinstance(part, FormTerm):
+            if isinstance(part, ResistanceFormTerm):
                 (a, b), shape = np.exp(value[:2]), value[2 : 2 + _SHAPES]
                 first = value[2 + _SHAPES :]
             elif isinstance(part, ConstantForceTerm):

@@ -13,7 +13,7 @@ from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, start
 from shipdrag_ros.diagnosis.observation import Measured
-from shipdrag_ros.diagnosis.result import Compared, Gap, Trace, Where
+from shipdrag_ros.diagnosis.result import Compared, Gap, RunTrace, Where
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.samples import Float64
@@ -240,7 +240,7 @@ def where(model: CoastModel, as_stated: Fit, unnamed: Sequence[Fit]) -> Where:
     )
 
 
-def traces(model: CoastModel, before: Linear, after: Linear) -> tuple[Trace, ...]:
+def traces(model: CoastModel, before: Linear, after: Linear) -> tuple[RunTrace, ...]:
     """
     Return each run as it was measured and as two models have it.
 
@@ -259,7 +259,7 @@ def traces(model: CoastModel, before: Linear, after: Linear) -> tuple[Trace, ...
     return tuple(_trace(model, j, before, after) for j in range(len(model.seen)))
 
 
-def _trace(model: CoastModel, run: int, before: Linear, after: Linear) -> Trace:
+def _trace(model: CoastModel, run: int, before: Linear, after: Linear) -> RunTrace:
     seen = model.seen[run]
     speed = model.predict(run, after).speed
     n = len(seen.along)
@@ -288,4 +288,4 @@ def _trace(model: CoastModel, run: int, before: Linear, after: Linear) -> Trace:
                 after.tables[run][0, part][own],
             )
         )
-    return Trace(seen.name, seen.lead_in_s, tuple(found))
+    return RunTrace(seen.name, seen.lead_in_s, tuple(found))

@@ -53,7 +53,7 @@ class CleanRun:
 
 
 @dataclass(frozen=True)
-class Learnt:
+class LearntBaseline:
     """
     A learnt baseline.
 
@@ -102,7 +102,7 @@ class Learnt:
         return base.relative_sd.correlation if isinstance(base, CoefficientBaseline) else 0.0
 
 
-def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> Learnt:
+def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters) -> LearntBaseline:
     """
     Learn a ship's baseline from clean runs.
 
@@ -158,7 +158,7 @@ def learn_baseline(runs: Sequence[CoastRun], ship: Ship, parameters: Parameters)
         CleanRun(run.name, each, problem.chi2_per_row(j))
         for j, (run, each) in enumerate(zip(runs, factors, strict=True))
     )
-    return Learnt(
+    return LearntBaseline(
         ship=Ship.from_yaml(learnt.to_yaml(), subject='the learnt baseline'),
         names=problem.names,
         factors=1.0 + mean,

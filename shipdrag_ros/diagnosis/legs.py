@@ -133,7 +133,7 @@ class Legs:
         DiagnosisError
             If they have no log, nothing over ground, or too few even stretches.
         """
-        cut = [_Cut(record, parameters) for record in records]
+        cut = [_LegCutter(record, parameters) for record in records]
         stretches = [(j, one.leg(float(at_s))) for j, one in enumerate(cut) for at_s in one.edges]
         found = [(j, leg) for j, leg in stretches if isinstance(leg, _Leg)]
         left = Counter(dict.fromkeys(Left, 0))
@@ -250,7 +250,7 @@ class Stretches:
         DiagnosisError
             If they have no log, or nothing over ground.
         """
-        cut = [_Cut(record, parameters) for record in records]
+        cut = [_LegCutter(record, parameters) for record in records]
         every = [one.stretch(float(at_s)) for one in cut for at_s in one.edges]
         found = [each for each in every if each is not None]
         return cls(
@@ -270,7 +270,7 @@ class _Leg:
     direction: Direction
 
 
-class _Cut:
+class _LegCutter:
     """One record on its way to legs."""
 
     def __init__(self, record: SailingRecord, parameters: Parameters) -> None:

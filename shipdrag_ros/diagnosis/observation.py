@@ -209,7 +209,7 @@ class Observation:
 
 
 @dataclass(frozen=True)
-class _Part:
+class _CondensedRows:
     """Condensed rows of one kind."""
 
     time_s: Float64
@@ -227,7 +227,7 @@ class _Learner:
     lead_in_s: float
     margin_s: float
 
-    def measured(self, parts: list[_Part], times: Float64) -> Measured:
+    def measured(self, parts: list[_CondensedRows], times: Float64) -> Measured:
         """Put parts in the order of time, and learn their disturbances."""
         time = np.concatenate([part.time_s for part in parts])
         order = np.argsort(time, kind='stable')
@@ -317,9 +317,11 @@ def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
     return keep
 
 
-def _condensed(time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int) -> _Part:
+def _condensed(
+    time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int
+) -> _CondensedRows:
     when, mean, count = bin_means(time_s, value, edges)
-    return _Part(when, kind, mean, sd**2 / count)
+    return _CondensedRows(when, kind, mean, sd**2 / count)
 
 
 def _condensed_all(
@@ -328,11 +330,11 @@ def _condensed_all(
     edges: Float64,
     white_sd: Mapping[str, float],
     heading_rad: float,
-) -> tuple[list[_Part], list[_Part]]:
+) -> tuple[list[_CondensedRows], list[_CondensedRows]]:
     """Return the rows along the heading, and those to port of it."""
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    along: list[_Part] = []
-    across: list[_Part] = []
+    along: list[_CondensedRows] = []
+    across: list[_CondensedRows] = []
     for input_, found in series.items():
         sd, time = white_sd[input_], seconds[input_]
         if input_ != 'position':
@@ -371,7 +373,7 @@ def _heading(
     return math.atan2(slopes[1], slopes[0]), _COURSE_SD_RAD
 
 
-def _speed(parts: list[_Part], lead_in_s: float) -> float:
+def _speed(parts: list[_CondensedRows], lead_in_s: float) -> float:
     for part in sorted(parts, key=lambda part: part.kind):
         steady = part.time_s < lead_in_s
         if steady.sum() < _LEAST_ROWS:

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shipdrag_ros.diagnosis import Compared, Trace
+from shipdrag_ros.diagnosis import Compared, RunTrace
 from shipdrag_ros.diagnosis.words import Answer, probability
 from shipdrag_ros.display import TRACK_LABELS, speed_unit
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE, VERMILION
@@ -30,7 +30,7 @@ _BAND_LABEL = '±2 sd of the noise'
 _STEADY_SHOWN_S = 300.0  # before the stop, where the ship only sails on
 
 
-def motion_pictures(trace: Trace, *, after: str, mass_kg: float) -> tuple[Figure, ...]:
+def motion_pictures(trace: RunTrace, *, after: str, mass_kg: float) -> tuple[Figure, ...]:
     """
     Draw a run as measured and as simulated, over the difference; a picture each quantity.
 
@@ -97,7 +97,7 @@ def _legend(figure: Figure, *axes: Axes) -> None:
 
 
 def residual_pictures(
-    traces: Sequence[Trace], *, after: str, mass_kg: float
+    traces: Sequence[RunTrace], *, after: str, mass_kg: float
 ) -> tuple[Figure, ...]:
     """
     Draw what each model leaves, in units of the noise, by time and by speed.

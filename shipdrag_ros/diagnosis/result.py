@@ -208,7 +208,7 @@ class Compared:
 
 
 @dataclass(frozen=True)
-class Trace:
+class RunTrace:
     """
     A run.
 
@@ -287,7 +287,7 @@ class Diagnosis:
     baseline: str
     best: tuple[EffectEstimate, ...] = ()
     notes: tuple[str, ...] = ()
-    traces: tuple[Trace, ...] = ()
+    traces: tuple[RunTrace, ...] = ()
     coastdowns_used: int = 0
     examined: tuple[str, ...] = ()
     no_coastdown: str = ''

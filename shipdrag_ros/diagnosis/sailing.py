@@ -19,7 +19,7 @@ from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
 from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Where
 from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
-from shipdrag_ros.diagnosis.search import Found, search, with_pairs
+from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
 from shipdrag_ros.diagnosis.units import asked
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
@@ -130,7 +130,7 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
     return found
 
 
-def _why(model: SailingModel, found: Found) -> list[str]:
+def _why(model: SailingModel, found: SearchResult) -> list[str]:
     """Tell why it is this and none of the others."""
     legs, best, names = model.legs, found.best, found.best.hypothesis.names
     told = [f'log over ground: {_by_speed(legs)}']

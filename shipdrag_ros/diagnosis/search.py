@@ -31,7 +31,7 @@ _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """
     What a search found.
 
@@ -77,7 +77,7 @@ class Found:
         return tuple(fit(model, more, [start(model, one, best.best) for one in more]))
 
 
-def search(model: Model) -> Found:
+def search(model: Model) -> SearchResult:
     """
     Fit nothing, each effect, and something unnamed.
 
@@ -97,10 +97,10 @@ def search(model: Model) -> Found:
     unnamed = [model.with_discrepancy(model.nothing, channel) for channel in model.channels]
     both = [*likely, *unnamed]
     fits = fit(model, both, [start(model, one, nothing.best) for one in both])
-    return Found(model, nothing, (nothing, *fits))
+    return SearchResult(model, nothing, (nothing, *fits))
 
 
-def with_pairs(found: Found) -> Found:
+def with_pairs(found: SearchResult) -> SearchResult:
     """
     Fit pairs of effects besides, where something is missing.
 

@@ -17,8 +17,8 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Fact, Ship
 
 _BINS, _LEAST_ROWS = 150, 20
-_KINK_BEFORE_S, _KINK_AFTER_S = 240.0, 240.0  # of the onset that was found
-_KINK_LEAST = 20  # samples on either side
+_STOP_BEFORE_S, _STOP_AFTER_S = 240.0, 240.0  # of the onset that was found
+_STOP_LEAST = 20  # samples on either side
 _FARTHEST_S = 90.0
 
 
@@ -152,12 +152,12 @@ def stop_time_s(time_s: Float64, speed_m_s: Float64, *, sd_m_s: float, run_down_
     resistance as the square of her speed, with s the time less what the thrust
     gives back of it. So simple a form is off by some 2 s.
     """
-    near = (time_s > -_KINK_BEFORE_S) & (time_s < _KINK_AFTER_S)
+    near = (time_s > -_STOP_BEFORE_S) & (time_s < _STOP_AFTER_S)
     time, speed = time_s[near], speed_m_s[near]
-    if min((time < 0.0).sum(), (time >= 0.0).sum()) < _KINK_LEAST:
+    if min((time < 0.0).sum(), (time >= 0.0).sum()) < _STOP_LEAST:
         return 0.0
     top = float(np.median(speed[time <= 0.5 * time[0]]))
-    last = float(np.median(speed[-_KINK_LEAST:]))
+    last = float(np.median(speed[-_STOP_LEAST:]))
     if not 0.0 < last < top:
         return 0.0
 

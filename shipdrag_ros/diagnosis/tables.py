@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipdrag_ros.diagnosis import Compared, Diagnosis, EffectEstimate, Trace
+from shipdrag_ros.diagnosis import Compared, Diagnosis, EffectEstimate, RunTrace
 from shipdrag_ros.diagnosis import words as words
 from shipdrag_ros.display import TRACK_LABELS, Table, plus_minus
 from shipdrag_ros.parameter import Parameter
@@ -105,7 +105,7 @@ def gaps(found: Diagnosis) -> Table:
     )
 
 
-def noise(traces: Sequence[Trace]) -> Table:
+def noise(traces: Sequence[RunTrace]) -> Table:
     """
     Show what the noise of each measurement is, and what is left of it.
     """

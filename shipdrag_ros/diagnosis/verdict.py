@@ -18,7 +18,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
 from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, EffectEstimate, Gap, Verdict
-from shipdrag_ros.diagnosis.search import Found
+from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.parameter import Parameter
 
@@ -43,7 +43,7 @@ class Judgement:
     candidates
     """
 
-    found: Found
+    found: SearchResult
     posterior: Posterior
     verdict: Verdict
     candidates: tuple[Candidate, ...]
@@ -80,7 +80,9 @@ class Judgement:
         )
 
 
-def judge(found: Found, *, held_out: Gap | None = None, distrusted: bool = False) -> Judgement:
+def judge(
+    found: SearchResult, *, held_out: Gap | None = None, distrusted: bool = False
+) -> Judgement:
     """
     Return the verdict on what a search found.
 

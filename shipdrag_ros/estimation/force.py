@@ -22,7 +22,7 @@ from shipdrag_ros.ship import CoefficientBaseline, Ship
 _USUAL = 0.75  # of the speed at the stop
 
 
-class Curve(Protocol):
+class ForceCurve(Protocol):
     """Specific resistance against speed: of one coastdown, or of several together."""
 
     @property
@@ -66,7 +66,7 @@ class Force:
     over_sd: Float64
 
     @classmethod
-    def of(cls, curve: Curve, ship: Ship) -> Force:
+    def of(cls, curve: ForceCurve, ship: Ship) -> Force:
         """
         Take a curve in N/kg.
 

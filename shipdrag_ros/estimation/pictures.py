@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shipdrag_ros.display import TRACK_LABELS, force_unit, power_unit, speed_unit
-from shipdrag_ros.estimation.force import Curve, Force, clean_hull
+from shipdrag_ros.estimation.force import Force, ForceCurve, clean_hull
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
 from shipdrag_ros.estimation.words import speed_name
@@ -159,7 +159,7 @@ def resistance_picture(
     truth
         Speeds [m/s] and r [m/s²] of the simulation, where the record is simulated.
     """
-    scale = _Scale.of(ship)
+    scale = _PictureUnits.of(ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
         axis = figure.subplots()
@@ -196,11 +196,11 @@ def resistance_picture(
     return figure
 
 
-def power_picture(curve: Curve, ship: Ship) -> Figure:
+def power_picture(curve: ForceCurve, ship: Ship) -> Figure:
     """
     Draw effective power against speed with its band, over that of the clean hull.
     """
-    scale = _Scale.of(ship)
+    scale = _PictureUnits.of(ship)
     force = Force.of(curve, ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
@@ -241,7 +241,7 @@ def curves_picture(
     combined
         The one curve of all; None where they are not combined.
     """
-    scale = _Scale.of(ship)
+    scale = _PictureUnits.of(ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
         axis = figure.subplots()
@@ -270,7 +270,7 @@ def curves_picture(
 
 
 @dataclass(frozen=True)
-class _Scale:
+class _PictureUnits:
     """What a ship is drawn in: SI units in each, and its name."""
 
     speed: float
@@ -281,12 +281,12 @@ class _Scale:
     power_name: str
 
     @classmethod
-    def of(cls, ship: Ship) -> _Scale:
+    def of(cls, ship: Ship) -> _PictureUnits:
         mass = ship.mass_kg
         return cls(*speed_unit(mass), *force_unit(mass), *power_unit(mass))
 
 
-def _draw_clean(axis: Axes, ship: Ship, scale: _Scale, speed_m_s: Float64) -> None:
+def _draw_clean(axis: Axes, ship: Ship, scale: _PictureUnits, speed_m_s: Float64) -> None:
     clean, sd = clean_hull(ship, speed_m_s)
     if not np.isfinite(clean).any():
         return
@@ -296,7 +296,7 @@ def _draw_clean(axis: Axes, ship: Ship, scale: _Scale, speed_m_s: Float64) -> No
     axis.plot(speed, clean / scale.force, label='clean hull', **_CLEAN)
 
 
-def _draw_force(axis: Axes, force: Force, scale: _Scale, *, label: str) -> None:
+def _draw_force(axis: Axes, force: Force, scale: _PictureUnits, *, label: str) -> None:
     speed = force.speed_m_s / scale.speed
     low = (force.newtons - 2.0 * force.sigma_n) / scale.force
     high = (force.newtons + 2.0 * force.sigma_n) / scale.force
@@ -304,7 +304,7 @@ def _draw_force(axis: Axes, force: Force, scale: _Scale, *, label: str) -> None:
     axis.plot(speed, force.newtons / scale.force, color=BLUE, label=label)
 
 
-def _label(axis: Axes, scale: _Scale, ship: Ship, speed: str) -> None:
+def _label(axis: Axes, scale: _PictureUnits, ship: Ship, speed: str) -> None:
     """Name the axes, with m/s and m/s² on the other sides."""
     axis.set_xlabel(f'{speed} [{scale.speed_name}]')
     axis.set_ylabel(f'resistance [{scale.force_name}]')
@@ -319,7 +319,7 @@ def _scaled_by(factor: float) -> tuple[Callable[[Any], Any], Callable[[Any], Any
 
 
 def _frame(
-    axis: Axes, whole: ResistanceCurve, valid: ResistanceCurve, ship: Ship, scale: _Scale
+    axis: Axes, whole: ResistanceCurve, valid: ResistanceCurve, ship: Ship, scale: _PictureUnits
 ) -> None:
     """Scale by what may be used: the ends of a polynomial would flatten the rest."""
     if len(whole):

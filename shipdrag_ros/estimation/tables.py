@@ -10,7 +10,7 @@ import numpy as np
 from shipdrag_ros import display
 from shipdrag_ros.display import Table, force_unit, power_unit, speed_unit
 from shipdrag_ros.estimation import words
-from shipdrag_ros.estimation.force import Curve, Force
+from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.samples import Float64, Int64
@@ -22,7 +22,7 @@ FORCE = 'Resistance and effective power; ± is two standard deviations'
 SPECIFIC = 'Specific resistance r in SI; sigma is one standard deviation'
 
 
-def force_table(curve: Curve, ship: Ship, *, count: int = _COUNT) -> Table:
+def force_table(curve: ForceCurve, ship: Ship, *, count: int = _COUNT) -> Table:
     """
     Show about `count` points of a curve in knots, kN and kW (m/s, N and W of a model).
 

@@ -51,7 +51,7 @@ class Beside:
 
 
 @dataclass(frozen=True)
-class Source:
+class BagToRead:
     """
     A bag to be read.
 
@@ -93,7 +93,7 @@ class Skipped:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundBags:
     """
     What was found.
 
@@ -109,13 +109,13 @@ class Found:
         What lies beside bags and is not used, a sentence each.
     """
 
-    sources: tuple[Source, ...]
+    sources: tuple[BagToRead, ...]
     skipped: tuple[Skipped, ...]
     left_alone: int
     notes: tuple[str, ...] = ()
 
 
-def find(places: Sequence[str], *, without: Path | None = None) -> Found:
+def find(places: Sequence[str], *, without: Path | None = None) -> FoundBags:
     """
     Find the bags below folders.
 
@@ -131,7 +131,7 @@ def find(places: Sequence[str], *, without: Path | None = None) -> Found:
     FleetError
         If one of the places does not exist or cannot be reached.
     """
-    sources: list[Source] = []
+    sources: list[BagToRead] = []
     skipped: list[Skipped] = []
     notes: list[str] = []
     left_alone = 0
@@ -141,7 +141,7 @@ def find(places: Sequence[str], *, without: Path | None = None) -> Found:
         skipped += search.skipped
         left_alone += search.left_alone
         notes += search.notes
-    return Found(tuple(sources), tuple(skipped), left_alone, tuple(notes))
+    return FoundBags(tuple(sources), tuple(skipped), left_alone, tuple(notes))
 
 
 class _Search:
@@ -155,7 +155,7 @@ class _Search:
         self.left_alone = 0
         self.notes: list[str] = []
 
-    def sources(self) -> Iterator[Source]:
+    def sources(self) -> Iterator[BagToRead]:
         for folder in self._tree.folders():
             if self._without is not None and self._is_store(folder):
                 continue
@@ -170,7 +170,7 @@ class _Search:
         here = str(Path(folder.path).resolve())
         return here == self._without or here.startswith(f'{self._without}/')
 
-    def _in_folder(self, folder: Folder) -> Iterator[Source]:
+    def _in_folder(self, folder: Folder) -> Iterator[BagToRead]:
         if any(entry.name == _METADATA or entry.name.endswith('.db3') for entry in folder.files):
             yield from self._bag_folder(folder)
             return
@@ -191,13 +191,13 @@ class _Search:
         for entry in bags:
             yield from self._one(folder, entry, alone=alone)
 
-    def _one(self, folder: Folder, entry: Entry, *, alone: bool) -> Iterator[Source]:
+    def _one(self, folder: Folder, entry: Entry, *, alone: bool) -> Iterator[BagToRead]:
         bag = _text('/'.join((*folder.parts, entry.name)))
         stem = entry.name.partition('.')[0]
         names = [f'{entry.name}.{RUN_FILE}', f'{stem}.{RUN_FILE}', *([RUN_FILE] if alone else [])]
         yield from self._source(folder, bag, (entry,), names, folder_bag=False)
 
-    def _bag_folder(self, folder: Folder) -> Iterator[Source]:
+    def _bag_folder(self, folder: Folder) -> Iterator[BagToRead]:
         """Yield a directory of rosbag2 as one bag."""
         files = tuple(e for e in folder.files if e.name.endswith((_METADATA, *_BAGS, '.db3')))
         bag = _text('/'.join(folder.parts) or self._tree.name)
@@ -214,7 +214,7 @@ class _Search:
         run_names: Sequence[str],
         *,
         folder_bag: bool,
-    ) -> Iterator[Source]:
+    ) -> Iterator[BagToRead]:
         problem = next((_problem(entry) for entry in files if _problem(entry)), '')
         if problem:
             self._skip(bag, problem)
@@ -226,7 +226,7 @@ class _Search:
             self._skip(bag, str(error))
             return
         urls = tuple(self._tree.url(entry.path) for entry in files)
-        yield Source(_text(self._tree.name), bag, urls, folder_bag, beside, run)
+        yield BagToRead(_text(self._tree.name), bag, urls, folder_bag, beside, run)
 
     def _run(self, folder: Folder, names: Sequence[str]) -> str:
         for name in names:

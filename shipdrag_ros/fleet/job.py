@@ -21,7 +21,7 @@ from shipdrag_ros.coastdown.events import Coastdown
 from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose, diagnose_fitted
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.fleet.find import LOGS, RUN_FILE, SHIP_FILE, TABLES, Source
+from shipdrag_ros.fleet.find import LOGS, RUN_FILE, SHIP_FILE, TABLES, BagToRead
 from shipdrag_ros.fleet.local import fetched
 from shipdrag_ros.fleet.rows import BagResult, Row, coastdown_row
 from shipdrag_ros.fleet.sources import import_log, import_table
@@ -44,11 +44,11 @@ class Job(NamedTuple):
         What the rows depend on, see `local.content_hash`.
     """
 
-    sources: tuple[Source, ...]
+    sources: tuple[BagToRead, ...]
     content_hash: str
 
 
-class _Hull(NamedTuple):
+class _ShipInRun(NamedTuple):
     """The ship as she was in a run, and what is known of it."""
 
     ship: Ship
@@ -91,7 +91,7 @@ def _result(job: Job, runs: Sequence[Run]) -> BagResult:
     rows: list[Row] = []
     warnings: list[str] = []
     messages = 0
-    hull: _Hull | None = None
+    hull: _ShipInRun | None = None
     for run in runs:
         hull = _hull(source, run)
         result = replay(run, ship=hull.ship)
@@ -114,7 +114,7 @@ def _result(job: Job, runs: Sequence[Run]) -> BagResult:
     )
 
 
-def _coastdowns(job: Job, hull: _Hull, result: ReplayResult) -> tuple[list[Row], list[str]]:
+def _coastdowns(job: Job, hull: _ShipInRun, result: ReplayResult) -> tuple[list[Row], list[str]]:
     """Return a row for each coastdown, those withdrawn too, and what is to be said."""
     context = {
         'bag': job.sources[0].bag,
@@ -145,7 +145,9 @@ def _coastdowns(job: Job, hull: _Hull, result: ReplayResult) -> tuple[list[Row],
     return sorted(rows, key=lambda row: int(row['time_ns'])), told
 
 
-def _diagnosis(result: ReplayResult, hull: _Hull, window: Window) -> tuple[Diagnosis | None, str]:
+def _diagnosis(
+    result: ReplayResult, hull: _ShipInRun, window: Window
+) -> tuple[Diagnosis | None, str]:
     """Diagnose one coastdown, or say why that cannot be."""
     runs = [CoastRun(Path(result.run.name).name, window, hull.facts)]
     try:
@@ -156,7 +158,7 @@ def _diagnosis(result: ReplayResult, hull: _Hull, window: Window) -> tuple[Diagn
         return None, str(error)
 
 
-def _hull(source: Source, run: Run) -> _Hull:
+def _hull(source: BagToRead, run: Run) -> _ShipInRun:
     """Return the ship as she was in a run: the file beside it or attached, and `run.yaml`."""
     attached, beside = run.attachments.get(SHIP_FILE, ''), source.beside.ship
     if not (attached or beside):
@@ -178,13 +180,13 @@ def _hull(source: Source, run: Run) -> _Hull:
             )
     ship = Ship.from_yaml(text, subject=subject)
     if not source.run:
-        return _Hull(ship, (), None, text, warnings)
+        return _ShipInRun(ship, (), None, text, warnings)
     sheet = RunSheet.from_yaml(source.run, subject=RUN_FILE)
     temperature_c = None if sheet.water is None else sheet.water.temperature_c
-    return _Hull(sheet.of(ship, subject=RUN_FILE), sheet.facts, temperature_c, text, warnings)
+    return _ShipInRun(sheet.of(ship, subject=RUN_FILE), sheet.facts, temperature_c, text, warnings)
 
 
-def _name(ship: Ship, source: Source) -> str:
+def _name(ship: Ship, source: BagToRead) -> str:
     return ship.name or source.beside.ship_name or UNNAMED
 
 
@@ -207,7 +209,7 @@ def _failed(job: Job, why: str) -> BagResult:
 
 
 @contextmanager
-def _runs(sources: Sequence[Source]) -> Iterator[list[Run]]:
+def _runs(sources: Sequence[BagToRead]) -> Iterator[list[Run]]:
     """Open the runs of a bag, whatever it is written in."""
     if len(sources) == 1 and sources[0].bag.endswith((*LOGS, *TABLES)):
         with fetched(sources[0]) as (path,), TemporaryDirectory(prefix='shipdrag-fleet-') as made:
@@ -221,7 +223,7 @@ def _runs(sources: Sequence[Source]) -> Iterator[list[Run]]:
 
 
 @contextmanager
-def _all_fetched(sources: Sequence[Source]) -> Iterator[list[Path]]:
+def _all_fetched(sources: Sequence[BagToRead]) -> Iterator[list[Path]]:
     if not sources:
         yield []
         return

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from shipdrag_ros.errors import BagError, ShipdragError
-from shipdrag_ros.fleet.find import Source
+from shipdrag_ros.fleet.find import BagToRead
 
 _AT_ONCE_BYTES = 1 << 20
 
@@ -35,7 +35,7 @@ class Identity:
 
 
 @contextmanager
-def fetched(source: Source) -> Iterator[tuple[Path, ...]]:
+def fetched(source: BagToRead) -> Iterator[tuple[Path, ...]]:
     """
     Bring the files of a bag to the disk, where they are not there already.
 
@@ -82,7 +82,7 @@ def _named_by_the_bag(folder: Path) -> Iterator[None]:
         raise BagError(str(error).replace(f'{folder}/', '')) from error
 
 
-def identify(source: Source) -> Identity | str:
+def identify(source: BagToRead) -> Identity | str:
     """
     Read a bag once, for its digest.
 
@@ -98,7 +98,7 @@ def identify(source: Source) -> Identity | str:
         return str(error)
 
 
-def content_hash(digests: Sequence[str], source: Source) -> str:
+def content_hash(digests: Sequence[str], source: BagToRead) -> str:
     """
     Return what the rows of a bag depend on, as one digest.
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 from shipdrag_ros import __version__
 from shipdrag_ros.fleet.engine import DIED, Engine, Lost
 from shipdrag_ros.fleet.events import read_events, write_events
-from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, Found, Skipped, Source
+from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
 from shipdrag_ros.fleet.job import Job, work
 from shipdrag_ros.fleet.local import Identity, content_hash, identify
 from shipdrag_ros.fleet.rows import BagResult
@@ -63,7 +63,7 @@ class Report:
     notes: tuple[str, ...]
 
 
-def update(found: Found, store: Store, engine: Engine, progress: Progress) -> Report:
+def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -> Report:
     """
     Replay and diagnose what the store does not have.
 
@@ -121,7 +121,7 @@ def update(found: Found, store: Store, engine: Engine, progress: Progress) -> Re
 
 
 def _jobs(
-    sources: Sequence[Source], engine: Engine, progress: Progress
+    sources: Sequence[BagToRead], engine: Engine, progress: Progress
 ) -> tuple[dict[str, Job], list[Twin], list[Skipped]]:
     """Return what is to be done by content hash, in the order of the search."""
     known: dict[int, Identity] = {}
@@ -146,7 +146,7 @@ def _jobs(
     return jobs, twins, unread
 
 
-def _recordings(sources: Sequence[Source], known: Mapping[int, Identity]) -> list[list[int]]:
+def _recordings(sources: Sequence[BagToRead], known: Mapping[int, Identity]) -> list[list[int]]:
     """Put the parts of one recording together; a part that is there twice counts once."""
     groups: dict[tuple[str, ...], list[int]] = {}
     for number in sorted(known):

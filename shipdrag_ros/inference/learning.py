@@ -19,7 +19,7 @@ import numpy as np
 
 from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise
 from shipdrag_ros.inference.rows import KIND_COUNT, LOG, OVER_GROUND, POSITION, Rows
-from shipdrag_ros.inference.sampling import Prior, Seen, sample, spread_points, values
+from shipdrag_ros.inference.sampling import Seen, SizePrior, sample, spread_points, values
 from shipdrag_ros.inference.settings import HOLD, SIZE, WHITE_OF, NoisePosterior, Settings
 from shipdrag_ros.samples import Float64
 
@@ -117,19 +117,19 @@ def settings_at(seen: Seen, speed_m_s: float, points: Float64) -> Settings:
     return _settings(points, np.full(len(points), 1.0 / len(points)), _prior(seen, speed_m_s))
 
 
-def _points_of(prior: Prior) -> Float64:
+def _points_of(prior: SizePrior) -> Float64:
     points = spread_points(len(prior.which))[: 1 + KEPT]
     z = np.zeros((len(points), SIZE))
     z[:, prior.which] = points
     return z
 
 
-def _of_prior(prior: Prior) -> NoisePosterior:
+def _of_prior(prior: SizePrior) -> NoisePosterior:
     z = _points_of(prior)
     return NoisePosterior(_settings(z, np.full(len(z), 1.0 / len(z)), prior), False)
 
 
-def _posterior(z: Float64, log_weight: Float64, prior: Prior) -> NoisePosterior:
+def _posterior(z: Float64, log_weight: Float64, prior: SizePrior) -> NoisePosterior:
     """Keep what counts, the most probable first."""
     usable = np.isfinite(log_weight)
     z, log_weight = z[usable], log_weight[usable]
@@ -141,7 +141,7 @@ def _posterior(z: Float64, log_weight: Float64, prior: Prior) -> NoisePosterior:
     return NoisePosterior(_settings(z[order], weight[order] / weight[order].sum(), prior), True)
 
 
-def _settings(z: Float64, weight: Float64, prior: Prior) -> Settings:
+def _settings(z: Float64, weight: Float64, prior: SizePrior) -> Settings:
     """Return the settings at points, in standard deviations of the prior."""
     value = np.array([values(each, prior) for each in z])
     return Settings(
@@ -149,7 +149,7 @@ def _settings(z: Float64, weight: Float64, prior: Prior) -> Settings:
     )
 
 
-def _prior(seen: Seen, speed_m_s: float) -> Prior:
+def _prior(seen: Seen, speed_m_s: float) -> SizePrior:
     """Return what instruments, engines, air and water usually do."""
     rows, noise = seen.rows, seen.noise
     has = np.array([np.any(rows.kind == kind) for kind in range(KIND_COUNT)])
@@ -182,4 +182,4 @@ def _prior(seen: Seen, speed_m_s: float) -> Prior:
     # water that moves is a matter of what is measured over ground
     active = np.array([True, bool(has[1:].any()), bool(has[:2].any()), bool(has[POSITION])])
     which = np.concatenate([np.repeat(active, 2), has, [seen.steady > 0]])
-    return Prior(np.log(medians), sd, np.flatnonzero(which))
+    return SizePrior(np.log(medians), sd, np.flatnonzero(which))

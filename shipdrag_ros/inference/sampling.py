@@ -59,7 +59,7 @@ class Seen(NamedTuple):
     steady: int
 
 
-class Prior(NamedTuple):
+class SizePrior(NamedTuple):
     """Medians and standard deviations of the logarithms, and which of them matter."""
 
     centre: Float64
@@ -85,7 +85,7 @@ def spread_points(dimensions: int) -> Float64:
 
 
 @compiled
-def values(z: Float64, prior: Prior) -> Float64:
+def values(z: Float64, prior: SizePrior) -> Float64:
     """Return sizes and times, white factors and hold; a source that does not matter is none."""
     value = np.exp(prior.centre + prior.sd * z)
     matters = np.zeros(SIZE)
@@ -99,7 +99,7 @@ def values(z: Float64, prior: Prior) -> Float64:
 
 
 @compiled
-def _log_posterior(z: Float64, seen: Seen, prior: Prior) -> float:
+def _log_posterior(z: Float64, seen: Seen, prior: SizePrior) -> float:
     """Return the logarithm of evidence times prior, less a constant; -inf where it fails."""
     value = values(z, prior).reshape(1, SIZE)
     setting = Settings(value[:, :WHITE_OF], value[:, WHITE_OF:HOLD], value[:, HOLD], np.ones(1))
@@ -148,7 +148,7 @@ def _of_model(products: Float64, mean: Float64, precision: Float64) -> float:
 
 
 @compiled
-def _slope(z: Float64, value: float, seen: Seen, prior: Prior) -> Float64:
+def _slope(z: Float64, value: float, seen: Seen, prior: SizePrior) -> Float64:
     """Return the slope of the logarithm in each direction that matters."""
     p = len(prior.which)
     slope = np.zeros(p)
@@ -160,7 +160,7 @@ def _slope(z: Float64, value: float, seen: Seen, prior: Prior) -> Float64:
 
 
 @compiled
-def _mode(start: Float64, seen: Seen, prior: Prior) -> tuple[Float64, float]:
+def _mode(start: Float64, seen: Seen, prior: SizePrior) -> tuple[Float64, float]:
     """Climb to the most probable setting by a quasi-Newton search (BFGS)."""
     p = len(prior.which)
     z, value = start.copy(), _log_posterior(start, seen, prior)
@@ -223,7 +223,7 @@ def _trade(a: int, b: int) -> bool:
 
 
 @compiled
-def _curvature(z: Float64, value: float, seen: Seen, prior: Prior) -> Float64:
+def _curvature(z: Float64, value: float, seen: Seen, prior: SizePrior) -> Float64:
     """Return minus the second derivatives of the logarithm, by differences."""
     p = len(prior.which)
     matrix, ahead = np.empty((p, p)), np.empty(p)
@@ -271,7 +271,7 @@ def _root(matrix: Float64) -> Float64:
 
 
 @compiled
-def sample(seen: Seen, prior: Prior, points: Float64) -> tuple[Float64, Float64]:
+def sample(seen: Seen, prior: SizePrior, points: Float64) -> tuple[Float64, Float64]:
     """Return settings about the most probable one, and the logarithms of their weights."""
     p = len(prior.which)
     start, least = np.zeros(SIZE), -np.inf
@@ -304,7 +304,7 @@ def sample(seen: Seen, prior: Prior, points: Float64) -> tuple[Float64, Float64]
 
 
 @compiled
-def evidence(z: Float64, seen: Seen, prior: Prior) -> Float64:
+def evidence(z: Float64, seen: Seen, prior: SizePrior) -> Float64:
     """
     Return the logarithm of the evidence of settings, less a constant.
 

@@ -31,7 +31,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
 from shipdrag_ros.live.frames import Frames
 from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
-from shipdrag_ros.live.source import Source
+from shipdrag_ros.live.source import PictureFeed
 
 PAGE = Path(__file__).parent / 'page'
 TICK_S = 0.1
@@ -68,7 +68,7 @@ class LivePage:
 
     def __init__(
         self,
-        source: Source,
+        source: PictureFeed,
         *,
         token: str | None = None,
         notes: tuple[str, ...] = (),

@@ -21,7 +21,7 @@ from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance
 from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.live.verdicts import VerdictView
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event
-from shipdrag_ros.messages.heard import ERROR, Health, Heard, Output, Samples, ShipFile
+from shipdrag_ros.messages.heard import ERROR, Health, Heard, NodeMessage, Samples, ShipFile
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
@@ -80,7 +80,7 @@ class Bridge:
             case Health():
                 self._heard_s = now_s
                 self._take_health(heard)
-            case Output(name, payload):
+            case NodeMessage(name, payload):
                 try:
                     self._take_output(name, payload)
                 except (MalformedMessage, ValueError):

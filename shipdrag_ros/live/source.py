@@ -26,7 +26,7 @@ WAITING = 20_000  # messages heard and not yet looked at; more are dropped and c
 FASTEST = 1000.0
 
 
-class Source(Protocol):
+class PictureFeed(Protocol):
     """What feeds the picture."""
 
     bridge: Bridge

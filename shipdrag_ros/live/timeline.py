@@ -21,7 +21,16 @@ from shipdrag_ros.coastdown import InputHealth, Monitor
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.messages import outputs
-from shipdrag_ros.messages.heard import OK, STALE, WARN, Health, Heard, Output, Samples, Status
+from shipdrag_ros.messages.heard import (
+    OK,
+    STALE,
+    WARN,
+    Health,
+    Heard,
+    NodeMessage,
+    Samples,
+    Status,
+)
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.playback import feed
 from shipdrag_ros.samples import Block
@@ -141,7 +150,7 @@ class Timeline:
         heard: list[Heard] = []
         for event in events:
             for message in outputs(event):
-                heard.append(Output(message.topic.rpartition('/')[2], message.payload))
+                heard.append(NodeMessage(message.topic.rpartition('/')[2], message.payload))
             if (
                 self._ended is not None
                 and isinstance(event, Coastdown)

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipdrag_ros.messages import types
-from shipdrag_ros.messages.gather import Found, gather
+from shipdrag_ros.messages.gather import GatherResult, gather
 from shipdrag_ros.messages.joints import Joints, read_joints
 from shipdrag_ros.messages.layout import steps
 from shipdrag_ros.messages.topics import Source
@@ -142,7 +142,7 @@ def decode_batch(
         Time of arrival of each [ns].
     """
     n = len(start)
-    code, found = np.empty(n, np.uint8), np.full(n, Found.NOTHING, np.uint8)
+    code, found = np.empty(n, np.uint8), np.full(n, GatherResult.NOTHING, np.uint8)
     readings = [_READINGS[source] for source in sources]
     width = max((reading.width for reading in readings), default=_COLUMNS)
     stamp_ns, rows = np.empty(n, np.int64), np.empty((n, width))
@@ -165,12 +165,12 @@ def decode_batch(
             if reading.columns is not None:
                 computed = reading.columns(rows[place, _COLUMNS : reading.width])
                 rows[place, :_COLUMNS] = computed
-            bad = found[place] != Found.READ
+            bad = found[place] != GatherResult.READ
             place = place[bad] if bad.any() else place[:0]
             if not len(place):
                 break
         unreadable.append(_count(found[place]))
-    kept = np.flatnonzero(found == Found.READ)
+    kept = np.flatnonzero(found == GatherResult.READ)
     if any(len(joints.message) for joints in more):
         kept, code, rows = _with_more(kept, code, rows, more)
         stamp_ns, receive_ns = stamp_ns[kept], receive_ns[kept]
@@ -197,15 +197,15 @@ def _with_more(
 
 def _count(found: UInt8, surplus: int = 0) -> Counter[Unreadable]:
     """Count what gave no sample."""
-    counts = Counter(_UNREADABLE[each] for each in found[found != Found.READ].tolist())
+    counts = Counter(_UNREADABLE[each] for each in found[found != GatherResult.READ].tolist())
     if surplus:
         counts[Unreadable.SURPLUS_JOINT] = surplus
     return counts
 
 
 _UNREADABLE = {
-    int(Found.MALFORMED): Unreadable.MALFORMED,
-    int(Found.NO_JOINT): Unreadable.NO_JOINT,
+    int(GatherResult.MALFORMED): Unreadable.MALFORMED,
+    int(GatherResult.NO_JOINT): Unreadable.NO_JOINT,
 }
 _COLUMNS = 4  # two values and two variances, which the extra fields follow
 Columns = Callable[[Float64], Float64]

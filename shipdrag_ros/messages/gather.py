@@ -21,7 +21,7 @@ from shipdrag_ros.messages.types import ENCAPSULATION_BYTES, PADDING_BYTES
 from shipdrag_ros.samples import SECOND_NS, Float64, Int64, UInt8
 
 
-class Found(IntEnum):
+class GatherResult(IntEnum):
     """What became of a message."""
 
     READ = 0
@@ -30,8 +30,8 @@ class Found(IntEnum):
     NOTHING = 3  # not read yet, or of no source
 
 
-_READ = int(Found.READ)
-_MALFORMED = int(Found.MALFORMED)
+_READ = int(GatherResult.READ)
+_MALFORMED = int(GatherResult.MALFORMED)
 _SECTION = int(Step.SECTION)
 _FLOAT64 = int(Step.FLOAT64)
 _FLOAT32 = int(Step.FLOAT32)
@@ -236,7 +236,7 @@ def gather(
         Filled with the fields. The first four are two values and two variances: a
         value that the type lacks is 0, a variance that says nothing NaN.
     found : (n,) uint8
-        Filled with a `Found` each.
+        Filled with a `GatherResult` each.
     """
     for k in range(len(place)):
         i = _U(place[k])

@@ -26,7 +26,7 @@ class Samples:
 
 
 @dataclass(frozen=True)
-class Output:
+class NodeMessage:
     """A message of the node, by the name of its topic below the node."""
 
     name: str
@@ -100,7 +100,7 @@ class Health:
         return tuple(status for status in self.statuses if status.input)
 
 
-Heard = Samples | Output | ShipFile | Health
+Heard = Samples | NodeMessage | ShipFile | Health
 
 
 def read_health(payload: bytes) -> list[Health]:

@@ -19,7 +19,7 @@ from shipdrag_ros.messages.gather import (
     BODY,
     COLUMNS,
     TIME_BYTES,
-    Found,
+    GatherResult,
     aligned,
     float64,
     read_stamp,
@@ -31,9 +31,9 @@ from shipdrag_ros.messages.types import PADDING_BYTES
 from shipdrag_ros.samples import PITCHES, SHAFTS, Channel, Float64, Int64, UInt8
 
 _CODES = np.array([*SHAFTS, *PITCHES, Channel.RUDDER], np.uint8)
-_READ = int(Found.READ)
-_MALFORMED = int(Found.MALFORMED)
-_NO_JOINT = int(Found.NO_JOINT)
+_READ = int(GatherResult.READ)
+_MALFORMED = int(GatherResult.MALFORMED)
+_NO_JOINT = int(GatherResult.NO_JOINT)
 _PADDING = PADDING_BYTES
 _ARRAYS = 3  # position, velocity, effort
 # what is found in one message: the joint of each slot; the shafts and the pitches that take a free
@@ -102,7 +102,7 @@ def read_joints(
         Filled with the value of the first joint of each, and what `gather` fills for
         a single value without a variance.
     found : (n,) uint8
-        Filled with a `Found` each.
+        Filled with a `GatherResult` each.
 
     Returns
     -------

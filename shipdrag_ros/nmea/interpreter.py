@@ -17,7 +17,7 @@ from pynmeagps.nmeatypes_core import NMEA_TALKERS
 from shipdrag_ros.messages import EncodedMessage, encode, types
 from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
 from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting, NoValue
-from shipdrag_ros.nmea.values import Source, best, read_values
+from shipdrag_ros.nmea.values import SentenceSource, best, read_values
 from shipdrag_ros.samples import Block, Channel
 
 TOPIC = 'nmea'
@@ -33,7 +33,7 @@ _KINDS = 50  # of unknown sentences are counted apart; a hostile talker may inve
 _OTHERS = 'others'
 
 # a source of an input, and the address it is heard on
-Heard = tuple[Source, str]
+Heard = tuple[SentenceSource, str]
 
 
 def raw_message(text: str, *, receive_ns: int) -> EncodedMessage:

@@ -42,7 +42,7 @@ class NoValue(Exception):
         self.text = text
 
 
-class Measured(NamedTuple):
+class MeasuredValue(NamedTuple):
     """
     A value of a sentence.
 
@@ -118,38 +118,38 @@ class Mounting:
 
 
 # None: the sentence need not hold it, and does not
-Reader = Callable[[Fields, Mounting], Measured | None]
+Reader = Callable[[Fields, Mounting], MeasuredValue | None]
 
 
-def _water_vhw(fields: Fields, mounting: Mounting) -> Measured:
-    return Measured(fields.first(('spdN', M_S_PER_KNOT), ('spdK', 1.0 / 3.6)))
+def _water_vhw(fields: Fields, mounting: Mounting) -> MeasuredValue:
+    return MeasuredValue(fields.first(('spdN', M_S_PER_KNOT), ('spdK', 1.0 / 3.6)))
 
 
-def _water_vbw(fields: Fields, mounting: Mounting) -> Measured:
+def _water_vbw(fields: Fields, mounting: Mounting) -> MeasuredValue:
     fields.check('waterspdstatus', allowed='A')
-    return Measured(fields.number('longwaterspd') * M_S_PER_KNOT)
+    return MeasuredValue(fields.number('longwaterspd') * M_S_PER_KNOT)
 
 
-def _ground_vbw(fields: Fields, mounting: Mounting) -> Measured:
+def _ground_vbw(fields: Fields, mounting: Mounting) -> MeasuredValue:
     fields.check('groundspdstatus', allowed='A')
-    return Measured(
+    return MeasuredValue(
         hypot(fields.number('longgroundspd'), fields.number('transgroundspd')) * M_S_PER_KNOT
     )
 
 
-def _ground_vtg(fields: Fields, mounting: Mounting) -> Measured:
+def _ground_vtg(fields: Fields, mounting: Mounting) -> MeasuredValue:
     _check_mode(fields)
-    return Measured(fields.first(('sogn', M_S_PER_KNOT), ('sogk', 1.0 / 3.6)))
+    return MeasuredValue(fields.first(('sogn', M_S_PER_KNOT), ('sogk', 1.0 / 3.6)))
 
 
-def _ground_rmc(fields: Fields, mounting: Mounting) -> Measured:
+def _ground_rmc(fields: Fields, mounting: Mounting) -> MeasuredValue:
     _check_fix(fields)
-    return Measured(fields.number('spd') * M_S_PER_KNOT)
+    return MeasuredValue(fields.number('spd') * M_S_PER_KNOT)
 
 
-def _position(fields: Fields, mounting: Mounting) -> Measured:
+def _position(fields: Fields, mounting: Mounting) -> MeasuredValue:
     _check_fix(fields)
-    return Measured(
+    return MeasuredValue(
         _angle(fields, 'lat', _LATITUDE, 'NS', ('N', 'S'), 90.0),
         _angle(fields, 'lon', _LONGITUDE, 'EW', ('E', 'W'), 180.0),
     )
@@ -177,25 +177,25 @@ def _angle(
     return angle_deg if fields[side] == sides[0] else -angle_deg
 
 
-def _yaw_hdt(fields: Fields, mounting: Mounting) -> Measured:
-    return Measured(_yaw(fields.number('headingT')))
+def _yaw_hdt(fields: Fields, mounting: Mounting) -> MeasuredValue:
+    return MeasuredValue(_yaw(fields.number('headingT')))
 
 
-def _yaw_ths(fields: Fields, mounting: Mounting) -> Measured:
+def _yaw_ths(fields: Fields, mounting: Mounting) -> MeasuredValue:
     mode = fields['mi']
     if mode in _NO_HEADING:
         raise NoValue(f'mode {mode}: {_NO_HEADING[mode]}', mode)
-    return Measured(_yaw(fields.number('headt')))
+    return MeasuredValue(_yaw(fields.number('headt')))
 
 
-def _yaw_hdg(fields: Fields, mounting: Mounting) -> Measured:
+def _yaw_hdg(fields: Fields, mounting: Mounting) -> MeasuredValue:
     """Apply what deviation and variation the sensor states; none is no zero variation."""
     heading_deg = fields.number('headingM')
     if fields['deviation']:
         heading_deg += _easterly(fields, 'deviation', 'deviationEW')
     if not fields['variation']:
-        return Measured(_yaw(heading_deg), detail=MAGNETIC)
-    return Measured(_yaw(heading_deg + _easterly(fields, 'variation', 'variationEW')))
+        return MeasuredValue(_yaw(heading_deg), detail=MAGNETIC)
+    return MeasuredValue(_yaw(heading_deg + _easterly(fields, 'variation', 'variationEW')))
 
 
 def _easterly(fields: Fields, name: str, side: str) -> float:
@@ -209,17 +209,17 @@ def _yaw(compass_deg: float) -> float:
     return remainder(radians(90.0 - compass_deg), 2.0 * pi)
 
 
-def _shaft(fields: Fields, mounting: Mounting) -> Measured:
+def _shaft(fields: Fields, mounting: Mounting) -> MeasuredValue:
     place, detail = _shaft_place(fields)
-    return Measured(fields.number('rpm') * pi / 30.0, detail=detail, channel=SHAFTS[place])
+    return MeasuredValue(fields.number('rpm') * pi / 30.0, detail=detail, channel=SHAFTS[place])
 
 
-def _pitch(fields: Fields, mounting: Mounting) -> Measured | None:
+def _pitch(fields: Fields, mounting: Mounting) -> MeasuredValue | None:
     """Return the ratio to the greatest pitch; a fixed propeller has none to tell."""
     if not fields['pitch'] or fields['source'] != 'S':
         return None
     place, detail = _shaft_place(fields)
-    return Measured(fields.number('pitch') * 0.01, detail=detail, channel=PITCHES[place])
+    return MeasuredValue(fields.number('pitch') * 0.01, detail=detail, channel=PITCHES[place])
 
 
 def _shaft_place(fields: Fields) -> tuple[int, str]:
@@ -239,7 +239,7 @@ def _shaft_place(fields: Fields) -> tuple[int, str]:
     return (int(number) - 1) % len(SHAFTS), f'shaft {number}'
 
 
-def _wind(fields: Fields, mounting: Mounting) -> Measured:
+def _wind(fields: Fields, mounting: Mounting) -> MeasuredValue:
     fields.check('status', allowed='A')
     if fields['reference'] == 'T':
         raise NoValue('true wind, computed and not measured', 'T')
@@ -250,20 +250,20 @@ def _wind(fields: Fields, mounting: Mounting) -> Measured:
         raise NoValue('no unit', fields['speedu'])
     # where it comes from, clockwise from ahead; its velocity points the other way
     angle, speed = radians(fields.number('angle')), fields.number('speed') * unit
-    return Measured(-speed * cos(angle), speed * sin(angle))
+    return MeasuredValue(-speed * cos(angle), speed * sin(angle))
 
 
-def _depth_dpt(fields: Fields, mounting: Mounting) -> Measured:
+def _depth_dpt(fields: Fields, mounting: Mounting) -> MeasuredValue:
     depth_m = fields.number('depth')
     # negative: to the keel, whose depth is not told
     if fields['offset'] and (offset_m := fields.number('offset')) >= 0.0:
-        return Measured(depth_m + offset_m, detail=OWN_OFFSET)
-    return Measured(depth_m + _transducer(mounting), detail=STATED_DEPTH)
+        return MeasuredValue(depth_m + offset_m, detail=OWN_OFFSET)
+    return MeasuredValue(depth_m + _transducer(mounting), detail=STATED_DEPTH)
 
 
-def _depth_dbt(fields: Fields, mounting: Mounting) -> Measured:
+def _depth_dbt(fields: Fields, mounting: Mounting) -> MeasuredValue:
     depth_m = fields.first(('depthm', 1.0), ('depthf', _FOOT_M), ('depthfath', _FATHOM_M))
-    return Measured(depth_m + _transducer(mounting), detail=STATED_DEPTH)
+    return MeasuredValue(depth_m + _transducer(mounting), detail=STATED_DEPTH)
 
 
 def _transducer(mounting: Mounting) -> float:
@@ -272,12 +272,12 @@ def _transducer(mounting: Mounting) -> float:
     return mounting.transducer_m
 
 
-def _rudder(fields: Fields, mounting: Mounting) -> Measured:
+def _rudder(fields: Fields, mounting: Mounting) -> MeasuredValue:
     """Return the starboard or single rudder, or the port one; as sent, + turns to starboard."""
     for side, detail in (('stbd', ''), ('port', 'port')):
         if fields[f'{side}angle']:
             fields.check(f'{side}status', allowed='A')
-            return Measured(radians(fields.number(f'{side}angle')), detail=detail)
+            return MeasuredValue(radians(fields.number(f'{side}angle')), detail=detail)
     raise NoValue('empty')
 
 

@@ -7,15 +7,15 @@ from collections import Counter
 from typing import NamedTuple, TypeVar
 
 from shipdrag_ros.nmea.framing import Sentence
-from shipdrag_ros.nmea.sentences import READERS, Fields, Measured, Mounting, NoValue
+from shipdrag_ros.nmea.sentences import READERS, Fields, MeasuredValue, Mounting, NoValue
 from shipdrag_ros.samples import Channel
 
-Told = TypeVar('Told', 'Source', 'tuple[Source, str]')
+Told = TypeVar('Told', 'SentenceSource', 'tuple[SentenceSource, str]')
 
 _RANK = {kind: place for place, kind in enumerate(READERS)}
 
 
-class Source(NamedTuple):
+class SentenceSource(NamedTuple):
     """Who tells an input; the better source is the smaller."""
 
     rank: int
@@ -29,11 +29,11 @@ class Source(NamedTuple):
 
 def read_values(
     sentence: Sentence, mounting: Mounting
-) -> list[tuple[Channel, Source | None, Measured | NoValue]]:
+) -> list[tuple[Channel, SentenceSource | None, MeasuredValue | NoValue]]:
     """
     Return what a sentence measures, or why it does not.
     """
-    found: list[tuple[Channel, Source | None, Measured | NoValue]] = []
+    found: list[tuple[Channel, SentenceSource | None, MeasuredValue | NoValue]] = []
     fields = Fields(sentence.kind, sentence.fields)
     for told, read in READERS.get(sentence.kind, ()):
         channel = told
@@ -47,7 +47,7 @@ def read_values(
             if value.channel is not None:
                 channel = value.channel
             rank = _RANK[sentence.kind]
-            source = Source(rank, value.detail, sentence.talker, sentence.kind)
+            source = SentenceSource(rank, value.detail, sentence.talker, sentence.kind)
             found.append((channel, source, value))
     return found
 
@@ -56,7 +56,7 @@ def best(counts: Counter[Told]) -> Told:
     """
     Return the one source of an input, by the number of values of each.
 
-    The first in the order of `Source` of those with at least half as many
+    The first in the order of `SentenceSource` of those with at least half as many
     values as the most frequent: two instruments of different place or
     scale are never mixed.
     """

@@ -32,43 +32,43 @@ _ENDED_BY = {
 }
 
 
-class Line(NamedTuple):
+class LogLine(NamedTuple):
     """A line of the log, and whether somebody should look at it."""
 
     text: str
     warning: bool = False
 
 
-def line_of(event: Event) -> Line | None:
+def line_of(event: Event) -> LogLine | None:
     """
     Return the line of an event; None where it is one of many.
     """
     match event:
         case Onset(start_ns, detected_ns):
             seen_s = (detected_ns - start_ns) * _NS
-            return Line(
+            return LogLine(
                 f'a coastdown began at {utc(start_ns)}, confirmed {seen_s:.0f} s later: '
                 'hold rudder and engine'
             )
         case Coastdown():
             return _ended(event)
         case NotCoastdown():
-            return Line(f'nearly a coastdown: {event.text}')
+            return LogLine(f'nearly a coastdown: {event.text}')
         case Reset(_, reason):
-            return Line(f'all memory is dropped: {reason}', warning=True)
+            return LogLine(f'all memory is dropped: {reason}', warning=True)
         case NoEstimate() | _:
             return None
 
 
-def _ended(event: Coastdown) -> Line:
+def _ended(event: Coastdown) -> LogLine:
     seconds = (event.end_ns - event.start_ns) * _NS
     why = f'{event.ended_by.value}: {_ENDED_BY[event.ended_by]}'
     if event.withdrawn:
-        return Line(f'a coastdown is refused after {duration(seconds)}: {event.failure}', True)
+        return LogLine(f'a coastdown is refused after {duration(seconds)}: {event.failure}', True)
     text = f'a coastdown has ended after {duration(seconds)} ({why})'
     if event.estimate is None:
-        return Line(f'{text}; no estimate: {event.failure}', True)
-    return Line(f'{text}: {figure(event.estimate)}')
+        return LogLine(f'{text}; no estimate: {event.failure}', True)
+    return LogLine(f'{text}: {figure(event.estimate)}')
 
 
 def figure(estimate: Estimate) -> str:

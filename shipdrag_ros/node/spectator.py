@@ -20,7 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, MalformedMessage, Source, decode
-from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, Heard, Output, Samples, ShipFile
+from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, Heard, NodeMessage, Samples, ShipFile
 from shipdrag_ros.messages.heard import read_health as decode_health
 from shipdrag_ros.messages.topics import RESISTANCE_CURVE
 from shipdrag_ros.node.inputs import message_class
@@ -124,7 +124,7 @@ class Spectator:
             self._ros.create_subscription(
                 message_class(topic.type),
                 topic.under(node),
-                lambda payload, name=topic.name: self._hear(Output(name, payload)),
+                lambda payload, name=topic.name: self._hear(NodeMessage(name, payload)),
                 _LATCHED if topic.latched else _RELIABLE,
                 raw=True,
             )

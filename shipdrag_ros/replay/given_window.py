@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.bags.run import Inputs, Run
+from shipdrag_ros.bags.run import Run, RunSamples
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.coastdown.examination import Examined, estimate_examined
@@ -36,7 +36,7 @@ class WindowSamples(NamedTuple):
         The window in stamps [ns].
     """
 
-    inputs: Inputs
+    inputs: RunSamples
     block: Block
     reasons: UInt8
     start_ns: int

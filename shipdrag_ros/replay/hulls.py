@@ -18,7 +18,7 @@ from shipdrag_ros.replay.run_result import RunResult
 
 
 @dataclass(frozen=True)
-class Hull:
+class RankedHull:
     """
     One hull in the ranking.
 
@@ -47,7 +47,7 @@ class Hull:
 class Ranking:
     """Hulls, the highest Fr_max first, and what may be concluded."""
 
-    hulls: tuple[Hull, ...]
+    hulls: tuple[RankedHull, ...]
     notes: tuple[str, ...]
 
 
@@ -79,7 +79,7 @@ def rank(runs: Sequence[RunResult]) -> Ranking:
     return Ranking(tuple(hulls), _notes(hulls, missing))
 
 
-def _hull(label: str, estimates: Sequence[Estimate]) -> Hull:
+def _hull(label: str, estimates: Sequence[Estimate]) -> RankedHull:
     # the rule of S1 whatever the estimator: one that is valid to the top has a steepest rise too
     tops = [(*froude_max(item.curve), item.valid_curve) for item in estimates]
     # a steepest rise is a property of the hull; a branch top only bounds it from below
@@ -88,7 +88,7 @@ def _hull(label: str, estimates: Sequence[Estimate]) -> Hull:
     # of several: the middle one of those found, the best of the bounds
     shown = candidates[len(candidates) // 2] if found else candidates[-1]
     top, found_by, curve = shown
-    return Hull(
+    return RankedHull(
         label=label.strip(),
         froude_max=top,
         found_by=found_by,
@@ -97,7 +97,7 @@ def _hull(label: str, estimates: Sequence[Estimate]) -> Hull:
     )
 
 
-def _notes(hulls: Sequence[Hull], missing: Sequence[str]) -> tuple[str, ...]:
+def _notes(hulls: Sequence[RankedHull], missing: Sequence[str]) -> tuple[str, ...]:
     notes = []
     bounds = [hull.label for hull in hulls if hull.found_by is FroudeMax.BRANCH_TOP]
     if bounds:

@@ -22,7 +22,7 @@ _TOLD = 3  # of the stretches that were dismissed
 _LEAD_WINDOWS = 2.0  # lengths of the slope test that a steady lead has at least
 
 
-class _Fall(NamedTuple):
+class _SpeedLoss(NamedTuple):
     """The largest loss of speed within `_GLIDE_S`."""
 
     start_s: float
@@ -125,7 +125,7 @@ def _dismissed(result: ReplayResult) -> str:
     return '; '.join(told)
 
 
-def _largest_fall(block: Block) -> tuple[str, _Fall | None]:
+def _largest_fall(block: Block) -> tuple[str, _SpeedLoss | None]:
     """Return by which input, and the largest fall of its speed; '' where there is no input."""
     try:
         window = Window.from_block(block, int(block.stamp_ns.min()), int(block.stamp_ns.max()))
@@ -152,19 +152,21 @@ def _binned(time_s: Float64, value: Float64) -> tuple[Float64, Float64]:
     return 0.5 * (times[1:] + times[:-1]), gone / np.diff(times)
 
 
-def _fall(time_s: Float64, speed_m_s: Float64) -> _Fall | None:
+def _fall(time_s: Float64, speed_m_s: Float64) -> _SpeedLoss | None:
     """Return the largest fall, of medians over three bins; None where the bins are few."""
     if len(speed_m_s) < 4:
         return None
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(speed_m_s, 3), axis=1)
     time_s = time_s[1:-1]
-    best: _Fall | None = None
+    best: _SpeedLoss | None = None
     for first, fast in enumerate(smooth):
         last = first + int(np.searchsorted(time_s[first:], time_s[first] + _GLIDE_S, side='right'))
         slow = first + int(np.argmin(smooth[first:last]))
         if fast <= 0.0:
             continue
-        found = _Fall(float(time_s[first]), float(time_s[slow]), float(fast), float(smooth[slow]))
+        found = _SpeedLoss(
+            float(time_s[first]), float(time_s[slow]), float(fast), float(smooth[slow])
+        )
         if best is None or found.lost > best.lost:
             best = found
     return best

@@ -16,7 +16,7 @@ from shipdrag_ros.display import speed_unit
 from shipdrag_ros.estimation.pictures import LINES
 from shipdrag_ros.estimation.result import ResistanceCurve
 from shipdrag_ros.replay.cuts import Span, inside, stretch
-from shipdrag_ros.replay.hulls import Hull
+from shipdrag_ros.replay.hulls import RankedHull
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE
 
 _HATCHES = ('///', '\\\\\\', 'xxx', '...')  # told apart in print too
@@ -100,7 +100,7 @@ def _labels(
     return found
 
 
-def comparison_picture(hulls: Sequence[Hull]) -> Figure:
+def comparison_picture(hulls: Sequence[RankedHull]) -> Figure:
     """
     Draw r(Fr) of several hulls, each inside its valid range.
     """

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.bags.run import Inputs, Mark, ResetMark, Run
+from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import Coastdown, Dismissal, Event, NotCoastdown, Update
 from shipdrag_ros.errors import BagError
@@ -258,7 +258,7 @@ def _in_window(
 
 def _counts(
     run: Run,
-    inputs: Inputs,
+    inputs: RunSamples,
     used: Mapping[str, int],
     rejected: Mapping[str, Mapping[str, int]],
 ) -> dict[str, InputCounts]:

@@ -20,7 +20,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.faults import log_flow, log_reading
-from shipdrag_ros.simulation.kernel import Law, Records, follow_columns
+from shipdrag_ros.simulation.kernel import Records, SurgeLaw, follow_columns
 from shipdrag_ros.simulation.scenario import Scenario, Turn
 from shipdrag_ros.simulation.surge import own_action, steps_of
 from shipdrag_ros.simulation.terms import (
@@ -79,7 +79,7 @@ class Columns:
 class _Prepared:
     """What the kernel takes of some columns."""
 
-    law: Law
+    law: SurgeLaw
     records: Records
     extra: Float64
     legs: Records

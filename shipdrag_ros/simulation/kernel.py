@@ -17,7 +17,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 
-class Law(NamedTuple):
+class SurgeLaw(NamedTuple):
     """
     What all columns of a simulation share, per unit ship mass.
 
@@ -90,7 +90,7 @@ Records = NDArray[np.void]
 
 
 @compiled
-def _magnitude_m_s2(law: Law, extra: Float64, magnitude: float) -> float:
+def _magnitude_m_s2(law: SurgeLaw, extra: Float64, magnitude: float) -> float:
     """Look up the resistance at a speed through water."""
     cell = int((magnitude - law.low_m_s) / law.cell_m_s)
     cell = min(max(cell, 0), law.resistance.shape[1] - 1)
@@ -116,7 +116,7 @@ def _magnitude_m_s2(law: Law, extra: Float64, magnitude: float) -> float:
 
 @compiled
 def _retardation_m_s2(
-    law: Law,
+    law: SurgeLaw,
     column: Any,
     extra: Float64,
     speed: float,
@@ -161,7 +161,7 @@ def _yaw_rad(leg: Any, elapsed: float) -> float:
 
 @compiled
 def _rates(
-    law: Law,
+    law: SurgeLaw,
     column: Any,
     extra: Float64,
     leg: Any,
@@ -211,7 +211,7 @@ def _rates(
 
 @compiled
 def follow(
-    law: Law,
+    law: SurgeLaw,
     column: Any,
     extra: Float64,
     legs: Records,
@@ -314,7 +314,7 @@ def follow(
 
 @compiled
 def follow_columns(
-    law: Law,
+    law: SurgeLaw,
     columns: Records,
     extra: Float64,
     legs: Records,

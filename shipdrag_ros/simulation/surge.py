@@ -21,7 +21,7 @@ from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import action_of
-from shipdrag_ros.simulation.kernel import Law, follow
+from shipdrag_ros.simulation.kernel import SurgeLaw, follow
 from shipdrag_ros.simulation.noise import GaussMarkov
 from shipdrag_ros.simulation.scenario import Scenario
 from shipdrag_ros.simulation.terms import (
@@ -253,7 +253,7 @@ def _disturbance(noise: GaussMarkov | None, time: Float64, rng: np.random.Genera
     return np.zeros_like(time) if noise is None else noise.sample(time, rng)
 
 
-def _check_range(law: Law, time: Float64, speed: Float64) -> None:
+def _check_range(law: SurgeLaw, time: Float64, speed: Float64) -> None:
     is_outside = outside(law, speed)
     if np.any(is_outside):
         i = int(np.argmax(is_outside))

@@ -14,7 +14,7 @@ from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.kernel import COLUMN, LEG, Law, Records
+from shipdrag_ros.simulation.kernel import COLUMN, LEG, Records, SurgeLaw
 from shipdrag_ros.simulation.scenario import Scenario
 
 _CELLS = 4000  # of the table of resistance; its error is far below that of any sensor
@@ -22,7 +22,7 @@ _EXTRA_CELLS = 512  # of what effects add to it, which is smooth
 _RANGE = 2.0  # times the steady speed: room for disturbances, and the cells stay fine
 
 
-def law_of(ship: Ship, scenario: Scenario) -> Law:
+def law_of(ship: Ship, scenario: Scenario) -> SurgeLaw:
     """
     Tabulate the baseline.
 
@@ -40,7 +40,7 @@ def law_of(ship: Ship, scenario: Scenario) -> Law:
     speeds = np.linspace(low, min(high, _RANGE * scenario.speed_m_s), _CELLS + 1)
     table = CubicSpline(speeds, ship.resistance_n(speeds) / ship.mass_kg)
     span = float(speeds[-1] - low)
-    return Law(
+    return SurgeLaw(
         low_m_s=low,
         cell_m_s=span / _CELLS,
         resistance=np.ascontiguousarray(table.c),
@@ -50,14 +50,14 @@ def law_of(ship: Ship, scenario: Scenario) -> Law:
     )
 
 
-def top_m_s(law: Law) -> float:
+def top_m_s(law: SurgeLaw) -> float:
     """
     Return the highest speed of the table.
     """
     return law.low_m_s + law.cell_m_s * int(law.resistance.shape[1])
 
 
-def outside(law: Law, speed_m_s: Float64) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def outside(law: SurgeLaw, speed_m_s: Float64) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """
     Tell which speeds the table does not hold; NaN is one.
     """
@@ -67,7 +67,7 @@ def outside(law: Law, speed_m_s: Float64) -> np.ndarray[tuple[int, ...], np.dtyp
     return ~((magnitude >= law.low_m_s - margin) & (magnitude <= top + margin))
 
 
-def extra_of(ship: Ship, law: Law, actions: Sequence[Action]) -> Float64:
+def extra_of(ship: Ship, law: SurgeLaw, actions: Sequence[Action]) -> Float64:
     """
     Tabulate what actions add to the resistance, per ship mass.
 

@@ -55,7 +55,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Series:
+class ShipSeries:
     """
     What is known of one ship's added resistance.
 
@@ -91,7 +91,9 @@ class Series:
         return tuple(point for point in self.points if point.used)
 
 
-def series_of(name: str, rows: Sequence[Row], *, service_speed_m_s: float | None = None) -> Series:
+def series_of(
+    name: str, rows: Sequence[Row], *, service_speed_m_s: float | None = None
+) -> ShipSeries:
     """
     Return the runs of one ship at its reference speed.
 
@@ -117,7 +119,7 @@ def series_of(name: str, rows: Sequence[Row], *, service_speed_m_s: float | None
     else:
         points, clean, note = _over_first_months(points)
         notes += (note,)
-    return Series(
+    return ShipSeries(
         name,
         speed,
         tuple(_with_covariates(points, rows)),

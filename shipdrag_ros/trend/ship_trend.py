@@ -17,7 +17,7 @@ from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend.change_points import FoundStep, search
 from shipdrag_ros.trend.hull_state import Growth, HullState, Mixture, Runs, Steps
 from shipdrag_ros.trend.money import CleaningDate, cleaning_date, fuel_t_per_day, usd_per_year
-from shipdrag_ros.trend.series import YEAR_NS, Point, Row, Series, series_of
+from shipdrag_ros.trend.series import YEAR_NS, Point, Row, ShipSeries, series_of
 
 _OUTLIER = 0.5
 _SISTER_SD = 0.05  # of growth per year, between ships of one drawing
@@ -109,7 +109,7 @@ class ShipTrend:
         1: which hull first.
     """
 
-    series: Series
+    series: ShipSeries
     events: tuple[TrendEvent, ...] = ()
     growth_per_year: Parameter | None = None
     now: Parameter | None = None
@@ -168,7 +168,7 @@ def fleet_trends(
 
 
 def ship_trend(
-    series: Series,
+    series: ShipSeries,
     economics: Economics | None = None,
     known: Sequence[HullEvent] = (),
     *,

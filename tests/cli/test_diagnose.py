@@ -37,12 +37,11 @@ def in_current(ship_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return simulated(path, ship_file, '--effect', 'current=0.4', '--seed', '1')
 
 
-def test_the_example_of_the_readme_works_as_typed(
+def test_the_example_of_the_page_works_as_typed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = (ROOT / 'README.md').read_text(encoding='utf-8')
-    part = text[text.index('**What is missing in the model?**') :]
-    typed = re.findall(r'^    \.venv/bin/shipdrag (.*?)(?: {2,}#.*)?$', part, flags=re.MULTILINE)
+    text = (ROOT / 'docs' / 'diagnosis.md').read_text(encoding='utf-8')
+    typed = re.findall(r'^    \.venv/bin/shipdrag (.*?)(?: {2,}#.*)?$', text, flags=re.MULTILINE)
     (tmp_path / 'config').symlink_to(ROOT / 'config')
     monkeypatch.chdir(tmp_path)
     said = []

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.cli import doctor, main
-from shipdrag_ros.cli.doctor import State, findings
+from shipdrag_ros.cli.doctor import CheckState, findings
 
 
-def by_name(out: Path) -> dict[str, doctor.Finding]:
+def by_name(out: Path) -> dict[str, doctor.CheckResult]:
     return {each.what: each for each in findings(out)}
 
 
@@ -30,7 +30,7 @@ def test_json_and_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_a_folder_to_come_is_judged_by_where_it_will_be(tmp_path: Path) -> None:
-    assert by_name(tmp_path / 'new' / 'deeper')['disk'].state is State.FINE
+    assert by_name(tmp_path / 'new' / 'deeper')['disk'].state is CheckState.FINE
 
 
 def test_a_port_in_use_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -39,7 +39,7 @@ def test_a_port_in_use_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         taken.listen()
         port = taken.getsockname()[1]
         monkeypatch.setattr(doctor, '_PAGE_PORT', port)
-        assert by_name(tmp_path)[f'port {port}'].state is State.LOOK
+        assert by_name(tmp_path)[f'port {port}'].state is CheckState.LOOK
 
 
 def test_a_missing_package_is_told_with_what_does_not_work(
@@ -48,9 +48,9 @@ def test_a_missing_package_is_told_with_what_does_not_work(
     monkeypatch.setattr(doctor, '_OPTIONAL', {'no_such_package': 'the impossible'})
     found = by_name(tmp_path)['no_such_package']
     assert (found.state, found.found) == (
-        State.LOOK,
+        CheckState.LOOK,
         'missing; does not work: the impossible',
     )
     monkeypatch.setattr(doctor, '_NEEDED', ('numpy', 'no.such.package'))
-    assert by_name(tmp_path)['packages'].state is State.BROKEN
+    assert by_name(tmp_path)['packages'].state is CheckState.BROKEN
     assert main(['doctor', '--out', str(tmp_path)]) == 1

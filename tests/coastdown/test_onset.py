@@ -17,7 +17,7 @@ from shipdrag_ros.coastdown.events import (
     State,
 )
 from shipdrag_ros.coastdown.filling import add, close
-from shipdrag_ros.coastdown.onset import bend, change_point, law
+from shipdrag_ros.coastdown.onset import bend, change_point, fit_deceleration
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
@@ -102,7 +102,7 @@ def test_the_end_of_coasting_is_found_in_noise() -> None:
 def test_the_exponent_of_the_law(p: float) -> None:
     time = np.arange(120.0)
     grown = 1.0 + (p - 1.0) * 0.02 * time / 8.2
-    found = law(time, 8.2 * grown ** (-1.0 / (p - 1.0)))
+    found = fit_deceleration(time, 8.2 * grown ** (-1.0 / (p - 1.0)))
     np.testing.assert_allclose(found.exponent, p, rtol=0.05)
 
 

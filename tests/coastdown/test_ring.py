@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.coastdown.ring import Store, append, make_room, since
+from shipdrag_ros.coastdown.ring import RingBuffer, append, make_room, since
 from shipdrag_ros.samples import Block, Channel
 
 LATE_NS = 5
@@ -21,10 +21,10 @@ def block_of(stamps) -> Block:
 
 def fill(
     stamps, *, capacity: int, keep_ns: int, first: int = 4, run: int = 1
-) -> tuple[Store, int]:
+) -> tuple[RingBuffer, int]:
     """Append samples in runs; return the store and the longest it ever was."""
     block = block_of(stamps)
-    store = Store.fresh(first)
+    store = RingBuffer.fresh(first)
     longest, at = first, 0
     while at < len(block):
         room = len(store.stamp_ns) - int(store.end[0])

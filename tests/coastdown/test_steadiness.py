@@ -30,16 +30,16 @@ def noise(seconds: int, seed: int) -> np.ndarray:
 def test_spread_of_white_noise() -> None:
     # 12 sigma^2 / W^3 is the variance of a slope; over 40 records the mean of the spread, of
     # which each is good to 15..35 %, is within 3 standard errors of the longest window, 15 %
-    found = np.mean([learnt(noise(2200, seed)).spread[LOG] for seed in range(40)], axis=0)
+    found = np.mean([learnt(noise(2200, seed)).slope_sd[LOG] for seed in range(40)], axis=0)
     width = 60.0 * 2.0 ** np.arange(SCALES)
     np.testing.assert_allclose(found, 0.05 * np.sqrt(12.0 / width**3), rtol=0.15)
 
 
 def test_a_coastdown_in_the_record_hardly_matters() -> None:
     speed = noise(2200, 3)
-    before = learnt(speed).spread[LOG, 0]
+    before = learnt(speed).slope_sd[LOG, 0]
     time = np.maximum(0.0, np.arange(2200) - 1000.0)
-    after = learnt(speed * 410.0 / (410.0 + time)).spread[LOG, 0]
+    after = learnt(speed * 410.0 / (410.0 + time)).slope_sd[LOG, 0]
     assert before < after < 1.6 * before
 
 
@@ -69,20 +69,20 @@ def test_only_the_last_steady_s_matters() -> None:
     later = 5000 - steady_s - windows - 4 * 60
     whole = learnt(speed)
     part = learnt(speed[later:], first=FIRST + later)
-    assert np.array_equal(whole.spread[LOG], part.spread[LOG])
+    assert np.array_equal(whole.slope_sd[LOG], part.slope_sd[LOG])
     assert np.array_equal(whole.limit[LOG], part.limit[LOG])
 
 
 def test_steady_s_says_how_much_record_is_learnt_from() -> None:
     speed = noise(3000, 6)
     speed[:2000] += 0.3 * np.random.default_rng(7).standard_normal(2000)
-    assert learnt(speed, steady_s=600.0).spread[LOG, 0] < 0.7 * learnt(speed).spread[LOG, 0]
+    assert learnt(speed, steady_s=600.0).slope_sd[LOG, 0] < 0.7 * learnt(speed).slope_sd[LOG, 0]
 
 
 def test_slope_window_s_says_how_long_a_slope_is() -> None:
     speed = noise(3000, 8)
     short, long = learnt(speed, slope_window_s=30.0), learnt(speed, slope_window_s=120.0)
-    np.testing.assert_allclose(short.spread[LOG, 0] / long.spread[LOG, 0], 8.0, rtol=0.5)
+    np.testing.assert_allclose(short.slope_sd[LOG, 0] / long.slope_sd[LOG, 0], 8.0, rtol=0.5)
 
 
 def test_fewer_false_alarms_need_a_higher_limit() -> None:

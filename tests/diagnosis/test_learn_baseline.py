@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
-from shipdrag_ros.diagnosis.learn_baseline import Learnt, learn_baseline
+from shipdrag_ros.diagnosis.learn_baseline import LearntBaseline, learn_baseline
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -70,7 +70,7 @@ def clean_runs(count: int, *, seed: int) -> list[CoastRun]:
 
 
 @cache
-def learnt(count: int, seed: int = 1) -> Learnt:
+def learnt(count: int, seed: int = 1) -> LearntBaseline:
     return learn_baseline(clean_runs(count, seed=seed), SHIP, PARAMETERS)
 
 

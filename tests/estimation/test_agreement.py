@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimators that disagree, and residuals with colour, widen the band and are said."""
+"""Estimators that disagree, and correlated residuals widen the band and are said."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
 from shipdrag_ros.estimation.agreement import widened
-from shipdrag_ros.estimation.ode_fit.colour import colour_of
+from shipdrag_ros.estimation.ode_fit.batch_means import batch_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation.noise import GaussMarkov
@@ -49,14 +49,14 @@ def test_clean_records_are_left_alone(coast, ship) -> None:
         assert not any('disagree' in note for note in found.notes)
 
 
-def test_independent_residuals_have_no_colour_and_slow_ones_have() -> None:
+def test_independent_residuals_are_not_inflated_and_slow_ones_are() -> None:
     # N = 400, seed 0: at most 2 % false alarms
     rng = np.random.default_rng(0)
-    false = sum(colour_of(rng.standard_normal(500)).inflation > 1.0 for _ in range(400))
+    false = sum(batch_means(rng.standard_normal(500)).inflation > 1.0 for _ in range(400))
     assert false <= 8
     time_s = 3.0 * np.arange(500)
     slow = GaussMarkov(1.0, 60.0).sample(time_s, rng) + rng.standard_normal(500)
-    assert colour_of(slow).inflation > 4.0
+    assert batch_means(slow).inflation > 4.0
 
 
 def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.fleet.find import Source, find
+from shipdrag_ros.fleet.find import BagToRead, find
 from shipdrag_ros.fleet.job import Job
 from shipdrag_ros.fleet.local import Identity, content_hash, identify
 
@@ -55,13 +55,13 @@ def fleet_folder(bags: list[Path], tmp_path: Path) -> Path:
     return folder
 
 
-def only_source(path: Path) -> Source:
+def only_source(path: Path) -> BagToRead:
     """Return the one bag at a place."""
     (source,) = find([str(path)]).sources
     return source
 
 
-def job_of(source: Source) -> Job:
+def job_of(source: BagToRead) -> Job:
     """Return what is to be done for one bag."""
     identity = identify(source)
     assert isinstance(identity, Identity), identity

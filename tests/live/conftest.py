@@ -6,7 +6,6 @@ from __future__ import annotations
 import fcntl
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -23,9 +22,6 @@ import pytest
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.serve import listen, serve
 
-REQUIRED = 'SHIPDRAG_BROWSER_REQUIRED'
-NAMES = ('chromium', 'chromium-browser', 'google-chrome')
-FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-dev-shm-usage']
 START_S = 240.0  # the first start of a machine compiles the kernels
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
 
@@ -45,21 +41,6 @@ def _own_domain() -> tuple[int, TextIO]:
         else:
             return domain, lock
     raise RuntimeError('92 test processes run already')
-
-
-@pytest.fixture(scope='session')
-def browser() -> Iterator[Any]:
-    program = next(filter(None, map(shutil.which, NAMES)), None)
-    if program is None:
-        why = f'no browser: none of {", ".join(NAMES)} is installed'
-        if os.environ.get(REQUIRED):
-            pytest.fail(f'{why}, and {REQUIRED} is set')
-        pytest.skip(why)
-    playwright = pytest.importorskip('playwright.sync_api')
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=program, args=FLAGS)
-        yield found
-        found.close()
 
 
 class Viewer:

@@ -20,7 +20,7 @@ from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.earlier import recorded_runs
 from shipdrag_ros.live.source import BagSource
 from shipdrag_ros.live.timeline import Timeline
-from shipdrag_ros.messages.heard import ERROR, Health, Output, Status, health_of
+from shipdrag_ros.messages.heard import ERROR, Health, NodeMessage, Status, health_of
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.ship import Ship
@@ -171,7 +171,7 @@ def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
     bridge = Bridge(Ship.load(SHIP))
     before = bridge.parts(0.0)
     for name in ('speed', 'resistance', 'resistance_curve', 'events'):
-        bridge.hear(Output(name, b'\x00\x01'), 0.0)
+        bridge.hear(NodeMessage(name, b'\x00\x01'), 0.0)
     assert bridge.parts(0.0) == before
 
 

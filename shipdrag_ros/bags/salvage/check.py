@@ -28,8 +28,8 @@ from shipdrag_ros.bags.records import (
 )
 from shipdrag_ros.bags.salvage.damage import Damage, DamageKind, DamageList
 from shipdrag_ros.bags.salvage.layout import KNOWN, name
-from shipdrag_ros.bags.salvage.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
-from shipdrag_ros.bags.salvage.statements import ChunkFacts, Facts, hold_against
+from shipdrag_ros.bags.salvage.scan import GARBAGE, MAGIC_PLACE, ScannedRecord, Scanner, found_name
+from shipdrag_ros.bags.salvage.statements import ChunkFacts, DataContents, hold_against
 from shipdrag_ros.bags.salvage.unpack import Unpacked, opened, unpack_chunk_partly
 from shipdrag_ros.bags.salvage.whole_chunk import WholeChunk, read_whole
 from shipdrag_ros.errors import BagError
@@ -104,7 +104,7 @@ def _check_file(path: Path, progress: Callable[[int, int], None]) -> FileCheck:
     with opened(path, damages) as data:
         if not data:
             return FileCheck(path, 0, 0, tuple(damages.listed), damages.count)
-        walk = _Check(data, damages)
+        walk = _FilePass(data, damages)
         walk.run(progress)
         if not walk.records and data[: len(MAGIC)] != MAGIC:
             raise BagError(
@@ -121,11 +121,11 @@ def _check_file(path: Path, progress: Callable[[int, int], None]) -> FileCheck:
         )
 
 
-class _Check:
+class _FilePass:
     """One pass over a file."""
 
     def __init__(self, data: Buffer, damages: DamageList) -> None:
-        self.facts = Facts()
+        self.facts = DataContents()
         self.records = 0
         self._data = data
         self._damages = damages
@@ -165,7 +165,7 @@ class _Check:
         if self._chunk is not None:
             self._close_chunk()
 
-    def _record(self, data: Buffer, found: Found, offset: int) -> None:
+    def _record(self, data: Buffer, found: ScannedRecord, offset: int) -> None:
         facts = self.facts
         match found.opcode:
             case Opcode.MESSAGE:
@@ -193,7 +193,7 @@ class _Check:
             case _ if found.opcode in KNOWN:
                 facts.summary.append(found)
 
-    def _once(self, found: Found) -> None:
+    def _once(self, found: ScannedRecord) -> None:
         kind = name(found.opcode)
         if kind in self._told:
             self._damages.add(found.offset, kind, DamageKind.DUPLICATE)
@@ -217,7 +217,7 @@ class _Check:
             self._told.add(target)
             self._damages.add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')
 
-    def _open_chunk(self, found: Found) -> None:
+    def _open_chunk(self, found: ScannedRecord) -> None:
         data = self._data
         unpacked = unpack_chunk_partly(data, found.start, found.end)
         if unpacked.damage is not None and unpacked.damage is not found.damage:
@@ -243,7 +243,7 @@ class _Check:
         self._chunk = ChunkFacts(found.end - found.offset, stated, compression, packed, size)
         self.facts.chunks[found.offset] = self._chunk
 
-    def _take_chunk(self, chunk: Found, records: bytes, whole: WholeChunk) -> _InChunk:
+    def _take_chunk(self, chunk: ScannedRecord, records: bytes, whole: WholeChunk) -> _InChunk:
         """Take note of all of a chunk at once."""
         for found in whole.declarations:
             self._record(records, self._scanner.noted(records, found), chunk.offset)
@@ -253,7 +253,7 @@ class _Check:
             self._messages(channel, in_chunk[channel][:, 0].tolist(), chunk.offset)
         return in_chunk
 
-    def _walk_chunk(self, chunk: Found, unpacked: Unpacked) -> _InChunk:
+    def _walk_chunk(self, chunk: ScannedRecord, unpacked: Unpacked) -> _InChunk:
         """Take note of one record after the other, of what is left of a chunk."""
         records = unpacked.records
         in_chunk: dict[int, list[tuple[int, int]]] = {}
@@ -269,7 +269,7 @@ class _Check:
                 in_chunk.setdefault(channel, []).append((log_ns, found.offset))
         return {channel: np.array(entries) for channel, entries in in_chunk.items()}
 
-    def _message_index(self, found: Found) -> None:
+    def _message_index(self, found: ScannedRecord) -> None:
         if self._chunk is None:
             return
         channel, length = _INDEX_HEAD.unpack_from(self._data, found.start)

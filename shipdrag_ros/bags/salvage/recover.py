@@ -30,7 +30,7 @@ from shipdrag_ros.bags.salvage.damage import Damage, DamageKind, DamageList
 from shipdrag_ros.bags.salvage.layout import KNOWN, name
 from shipdrag_ros.bags.salvage.learnt import Learnt, Trust, read_footer
 from shipdrag_ros.bags.salvage.salvaged_bag import SalvagedBag
-from shipdrag_ros.bags.salvage.scan import GARBAGE, MAGIC_PLACE, Found, Scanner, found_name
+from shipdrag_ros.bags.salvage.scan import GARBAGE, MAGIC_PLACE, ScannedRecord, Scanner, found_name
 from shipdrag_ros.bags.salvage.unpack import opened, unpack_chunk_partly
 from shipdrag_ros.bags.salvage.whole_chunk import read_whole
 from shipdrag_ros.errors import BagError
@@ -207,7 +207,7 @@ class _Salvage:
         if read_footer(data) is None:
             self._damages.add(len(data), 'footer', DamageKind.MISSING)
 
-    def _chunk(self, data: Buffer, chunk: Found) -> None:
+    def _chunk(self, data: Buffer, chunk: ScannedRecord) -> None:
         unpacked = unpack_chunk_partly(data, chunk.start, chunk.end)
         kind = chunk.damage or unpacked.damage
         if kind is not None:
@@ -249,7 +249,7 @@ class _Salvage:
             self.sound.write_chunk(records, whole)
         return True
 
-    def _record(self, data: Buffer, found: Found, trust: Trust, offset: int) -> None:
+    def _record(self, data: Buffer, found: ScannedRecord, trust: Trust, offset: int) -> None:
         bag = self.doubtful if trust is Trust.DOUBTFUL else self.sound
         match found.opcode:
             case Opcode.MESSAGE:

@@ -20,7 +20,7 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 from shipdrag_ros.bags.message_index import CHANNELS, HEAD_BYTES
 from shipdrag_ros.bags.salvage.indexed_file import IndexedFile
 from shipdrag_ros.bags.salvage.learnt import Learnt
-from shipdrag_ros.bags.salvage.scan import Found
+from shipdrag_ros.bags.salvage.scan import ScannedRecord
 from shipdrag_ros.bags.salvage.whole_chunk import WholeChunk
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import Int64
@@ -218,7 +218,9 @@ class SalvagedBag:
             ) from error
 
 
-def _without(records: bytes, others: Sequence[Found], offset: Int64) -> tuple[bytes, Int64]:
+def _without(
+    records: bytes, others: Sequence[ScannedRecord], offset: Int64
+) -> tuple[bytes, Int64]:
     """Cut some records out; return what is left, and where the rest lies in it."""
     if not others:
         return records, offset

@@ -48,7 +48,7 @@ _WITH_BODY = frozenset((Opcode.MESSAGE, Opcode.CHUNK, Opcode.ATTACHMENT))
 _IN_CHUNK = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
 
 
-class Found(NamedTuple):
+class ScannedRecord(NamedTuple):
     """
     A record, or what is left of one.
 
@@ -70,7 +70,7 @@ class Found(NamedTuple):
         return read_record(data, self.opcode, self.start, self.end)
 
 
-def found_name(data: Buffer, found: Found) -> str:
+def found_name(data: Buffer, found: ScannedRecord) -> str:
     """
     Name the kind of a record, by its opcode where that may be right.
     """
@@ -96,7 +96,7 @@ class Scanner:
 
     def walk(
         self, data: Buffer, start: int, end: int, *, in_chunk: bool = False
-    ) -> Iterator[Found]:
+    ) -> Iterator[ScannedRecord]:
         """
         Yield what is found between two offsets, without a gap.
 
@@ -112,7 +112,7 @@ class Scanner:
         kinds = _IN_CHUNK if in_chunk else KNOWN
         self._to_vouch += _VOUCHED_TIMES * (end - start)
         at = start
-        held: Found | None = None
+        held: ScannedRecord | None = None
         while at < end:
             here = self._at(data, at, end, kinds)
             if here is None:
@@ -124,7 +124,7 @@ class Scanner:
         if held is not None:
             yield self.noted(data, held)
 
-    def noted(self, data: Buffer, found: Found) -> Found:
+    def noted(self, data: Buffer, found: ScannedRecord) -> ScannedRecord:
         """
         Remember what tells a later record from chance; returns the record.
         """
@@ -135,7 +135,7 @@ class Scanner:
                 self.channels.add(int.from_bytes(data[found.start : found.start + 2], 'little'))
         return found
 
-    def _at(self, data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Found | None:
+    def _at(self, data: Buffer, at: int, end: int, kinds: frozenset[int]) -> ScannedRecord | None:
         """Return the record at an offset, if one begins there and fits."""
         if end - at < HEAD.size:
             return _magic(data, at, end)
@@ -150,12 +150,12 @@ class Scanner:
             or fills(data, opcode, start, stop)
             or not self._mended_opcodes(data, opcode, start, stop, kinds)
         ):
-            return Found(opcode, at, start, stop)
+            return ScannedRecord(opcode, at, start, stop)
         return _magic(data, at, end)
 
     def _damaged(
-        self, data: Buffer, at: int, end: int, kinds: frozenset[int], held: Found | None
-    ) -> tuple[Found | None, Found]:
+        self, data: Buffer, at: int, end: int, kinds: frozenset[int], held: ScannedRecord | None
+    ) -> tuple[ScannedRecord | None, ScannedRecord]:
         """
         Tell what is at an offset where no record fits.
 
@@ -183,7 +183,7 @@ class Scanner:
             return None, self._span(data, held.offset, after, end, kinds)
         return held, self._span(data, at, end if after is None else after, end, kinds)
 
-    def _is_unwitnessed(self, data: Buffer, held: Found) -> bool:
+    def _is_unwitnessed(self, data: Buffer, held: ScannedRecord) -> bool:
         """Say whether nothing vouches for the length of a record that nothing follows."""
         if held.damage is not None:
             return False
@@ -201,7 +201,7 @@ class Scanner:
 
     def _within_bounds(
         self, data: Buffer, at: int, end: int, kinds: frozenset[int]
-    ) -> Found | None:
+    ) -> ScannedRecord | None:
         """Return the record whose length is right while something else is not."""
         if end - at < HEAD.size:
             return None
@@ -214,13 +214,13 @@ class Scanner:
             return None
         mended = self._mended_opcodes(data, opcode, start, stop, kinds)
         if mended:
-            return Found(mended[0], at, start, stop, DamageKind.OPCODE)
+            return ScannedRecord(mended[0], at, start, stop, DamageKind.OPCODE)
         kind = DamageKind.CONTENT if opcode in kinds else DamageKind.OPCODE
-        return Found(opcode if opcode in kinds else GARBAGE, at, start, stop, kind)
+        return ScannedRecord(opcode if opcode in kinds else GARBAGE, at, start, stop, kind)
 
     def _by_own_fields(
         self, data: Buffer, at: int, end: int, kinds: frozenset[int]
-    ) -> Found | None:
+    ) -> ScannedRecord | None:
         """Return the record whose length is wrong, and whose fields tell where it ends."""
         opcode = data[at]
         if opcode not in kinds & _NAMED or (
@@ -231,30 +231,32 @@ class Scanner:
         stop = fields_end(data, opcode, start, end)
         if stop is None or stop > end or not self._is_followed(data, stop, end, kinds):
             return None
-        return Found(opcode, at, start, stop, DamageKind.LENGTH)
+        return ScannedRecord(opcode, at, start, stop, DamageKind.LENGTH)
 
-    def _span(self, data: Buffer, at: int, after: int, end: int, kinds: frozenset[int]) -> Found:
+    def _span(
+        self, data: Buffer, at: int, after: int, end: int, kinds: frozenset[int]
+    ) -> ScannedRecord:
         """Tell what the bytes up to the next record are."""
         start = at + HEAD.size
         if start > after:
-            return Found(GARBAGE, at, at, after, _end_or(DamageKind.GARBAGE, after == end))
+            return ScannedRecord(GARBAGE, at, at, after, _end_or(DamageKind.GARBAGE, after == end))
         opcode, length = HEAD.unpack_from(data, at)
         cut = length > end - start
         if opcode in kinds:
             if _one_bit(after - start ^ length) and fills(data, opcode, start, after):
-                return Found(opcode, at, start, after, DamageKind.LENGTH)
+                return ScannedRecord(opcode, at, start, after, DamageKind.LENGTH)
             if self._is_chunk(data, at, end):
                 kind = _end_or(DamageKind.LENGTH, length < _POSSIBLE_BYTES)
-                return Found(opcode, at, start, after, kind)
+                return ScannedRecord(opcode, at, start, after, kind)
             stop = fields_end(data, opcode, start, min(start + length, end))
             if opcode != Opcode.MESSAGE and stop is not None and start < stop <= after:
                 # the record ends where its fields do; what follows is looked at next
-                return Found(opcode, at, start, stop, DamageKind.LENGTH)
+                return ScannedRecord(opcode, at, start, stop, DamageKind.LENGTH)
             if cut:
                 kind = _end_or(DamageKind.LENGTH, after == end and length < _POSSIBLE_BYTES)
-                return Found(GARBAGE, at, start, after, kind)
-            return Found(GARBAGE, at, start, after, DamageKind.CONTENT)
-        return Found(GARBAGE, at, at, after, DamageKind.GARBAGE)
+                return ScannedRecord(GARBAGE, at, start, after, kind)
+            return ScannedRecord(GARBAGE, at, start, after, DamageKind.CONTENT)
+        return ScannedRecord(GARBAGE, at, at, after, DamageKind.GARBAGE)
 
     def _mended_opcodes(
         self, data: Buffer, opcode: int, start: int, stop: int, kinds: frozenset[int]
@@ -329,9 +331,9 @@ class Scanner:
         return name in (b'\x04\0\0\0zstd', b'\x03\0\0\0lz4' + name[7:]) or name[:4] == bytes(4)
 
 
-def _magic(data: Buffer, at: int, end: int) -> Found | None:
+def _magic(data: Buffer, at: int, end: int) -> ScannedRecord | None:
     if data[at : min(at + len(MAGIC), end)] == MAGIC:
-        return Found(MAGIC_PLACE, at, at, at + len(MAGIC))
+        return ScannedRecord(MAGIC_PLACE, at, at, at + len(MAGIC))
     return None
 
 

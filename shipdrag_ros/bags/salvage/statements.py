@@ -25,7 +25,7 @@ from shipdrag_ros.bags.records import FOOTER_BYTES, Buffer
 from shipdrag_ros.bags.salvage.damage import DamageKind, DamageList
 from shipdrag_ros.bags.salvage.layout import name
 from shipdrag_ros.bags.salvage.learnt import read_footer, summary_checksum
-from shipdrag_ros.bags.salvage.scan import Found
+from shipdrag_ros.bags.salvage.scan import ScannedRecord
 
 
 @dataclass
@@ -60,7 +60,7 @@ class ChunkFacts:
 
 
 @dataclass
-class Facts:
+class DataContents:
     """
     What is in the data of a file.
 
@@ -89,7 +89,7 @@ class Facts:
     attachments: dict[int, int] = field(default_factory=dict)
     metadata: dict[int, int] = field(default_factory=dict)
     ended: int = 0
-    summary: list[Found] = field(default_factory=list)
+    summary: list[ScannedRecord] = field(default_factory=list)
 
     def count(self, channel: int, log_ns: list[int]) -> None:
         """
@@ -101,7 +101,7 @@ class Facts:
         self.counts[channel] += len(log_ns)
 
 
-def hold_against(data: Buffer, facts: Facts, damages: DamageList) -> None:
+def hold_against(data: Buffer, facts: DataContents, damages: DamageList) -> None:
     """
     Note what the end of a file states wrongly, or leaves out.
     """
@@ -123,7 +123,7 @@ def hold_against(data: Buffer, facts: Facts, damages: DamageList) -> None:
 
 
 def _footer(
-    data: Buffer, facts: Facts, footer: Footer, after: list[int], damages: DamageList
+    data: Buffer, facts: DataContents, footer: Footer, after: list[int], damages: DamageList
 ) -> None:
     at = len(data) - FOOTER_BYTES
     begin = min(after, default=0)
@@ -154,13 +154,13 @@ def _footer(
 
 class _Statements:
     def __init__(
-        self, facts: Facts, records: list[tuple[Found, Any]], damages: DamageList
+        self, facts: DataContents, records: list[tuple[ScannedRecord, Any]], damages: DamageList
     ) -> None:
         self._facts = facts
         self._records = records
         self._damages = damages
         self._seen: dict[int, set[int]] = {}
-        self._groups: dict[int, list[Found]] = {}
+        self._groups: dict[int, list[ScannedRecord]] = {}
 
     def run(self) -> None:
         """Hold each record against the facts, then tell what no record states."""
@@ -186,12 +186,14 @@ class _Statements:
                     self._summary_offset(found, record)
         self._complete()
 
-    def _declaration(self, found: Found, record: Schema | Channel, known: dict[int, Any]) -> None:
+    def _declaration(
+        self, found: ScannedRecord, record: Schema | Channel, known: dict[int, Any]
+    ) -> None:
         self._once(found, record.id)
         if known.get(record.id, record) != record:
             self._wrong(found, DamageKind.DISAGREES, f'number {record.id} differs in the data')
 
-    def _chunk(self, found: Found, index: ChunkIndex) -> None:
+    def _chunk(self, found: ScannedRecord, index: ChunkIndex) -> None:
         self._once(found, index.chunk_start_offset)
         facts = self._facts.chunks.get(index.chunk_start_offset)
         if facts is None:
@@ -214,7 +216,7 @@ class _Statements:
             self._wrong(found, DamageKind.MISPLACED, 'message indexes')
 
     def _place(
-        self, found: Found, index: AttachmentIndex | MetadataIndex, known: dict[int, int]
+        self, found: ScannedRecord, index: AttachmentIndex | MetadataIndex, known: dict[int, int]
     ) -> None:
         self._once(found, index.offset)
         if known.get(index.offset) != index.length:
@@ -222,7 +224,7 @@ class _Statements:
                 found, DamageKind.MISPLACED, f'{index.name!r} is not at byte {index.offset}'
             )
 
-    def _statistics(self, found: Found, stated: Statistics) -> None:
+    def _statistics(self, found: ScannedRecord, stated: Statistics) -> None:
         facts = self._facts
         # a topic without messages may be told in the summary alone
         schemas = set(facts.schemas) | self._seen.get(Opcode.SCHEMA, set())
@@ -246,7 +248,7 @@ class _Statements:
         if wrong:
             self._wrong(found, DamageKind.DISAGREES, '; '.join(wrong))
 
-    def _summary_offset(self, found: Found, stated: SummaryOffset) -> None:
+    def _summary_offset(self, found: ScannedRecord, stated: SummaryOffset) -> None:
         group = self._groups.get(stated.group_opcode, [])
         if not group and stated.group_length == 0:
             return
@@ -278,11 +280,11 @@ class _Statements:
                     facts.ended, name(opcode), DamageKind.MISSING, f'{missing} in the summary'
                 )
 
-    def _once(self, found: Found, key: int) -> None:
+    def _once(self, found: ScannedRecord, key: int) -> None:
         seen = self._seen.setdefault(found.opcode, set())
         if key in seen:
             self._wrong(found, DamageKind.DUPLICATE, '')
         seen.add(key)
 
-    def _wrong(self, found: Found, kind: DamageKind, detail: str) -> None:
+    def _wrong(self, found: ScannedRecord, kind: DamageKind, detail: str) -> None:
         self._damages.add(found.offset, name(found.opcode), kind, detail)

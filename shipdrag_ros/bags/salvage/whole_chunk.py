@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import HEAD, MESSAGE_HEAD
 from shipdrag_ros.bags.salvage.layout import fills
-from shipdrag_ros.bags.salvage.scan import Found
+from shipdrag_ros.bags.salvage.scan import ScannedRecord
 from shipdrag_ros.samples import Int64
 
 _ALL = np.ones(CHANNELS, np.uint8)
@@ -39,15 +39,15 @@ class WholeChunk(NamedTuple):
 
     channel: NDArray[np.uint16]
     entries: Int64
-    declarations: tuple[Found, ...]
+    declarations: tuple[ScannedRecord, ...]
 
-    def last_message(self, records: bytes) -> Found:
+    def last_message(self, records: bytes) -> ScannedRecord:
         """
         Return the last message, of which there must be one.
         """
         at = int(self.entries[-1, 1])
         start = at + HEAD.size
-        return Found(Opcode.MESSAGE, at, start, start + HEAD.unpack_from(records, at)[1])
+        return ScannedRecord(Opcode.MESSAGE, at, start, start + HEAD.unpack_from(records, at)[1])
 
 
 def read_whole(records: bytes) -> WholeChunk | None:
@@ -59,7 +59,7 @@ def read_whole(records: bytes) -> WholeChunk | None:
     for at in others.tolist():
         opcode, length = HEAD.unpack_from(records, at)
         start = at + HEAD.size
-        declarations.append(Found(opcode, at, start, start + length))
+        declarations.append(ScannedRecord(opcode, at, start, start + length))
     if damage or not all(_is_in_place(records, each, messages) for each in declarations):
         return None
     offsets = messages.start - (HEAD.size + MESSAGE_HEAD.size)
@@ -67,7 +67,7 @@ def read_whole(records: bytes) -> WholeChunk | None:
     return WholeChunk(messages.channel, entries, tuple(declarations))
 
 
-def _is_in_place(records: bytes, found: Found, messages: Messages) -> bool:
+def _is_in_place(records: bytes, found: ScannedRecord, messages: Messages) -> bool:
     """Say whether a record is a schema, or a channel before its messages."""
     if found.opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
         return False

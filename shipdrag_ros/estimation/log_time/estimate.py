@@ -20,6 +20,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.assemble import AtEnd, assembled
 from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
 from shipdrag_ros.estimation.log_time.inputs import Inputs, gather
+from shipdrag_ros.estimation.log_time.learnt_noise import LearntNoise
 from shipdrag_ros.estimation.log_time.model import (
     CURRENT,
     THRUST,
@@ -30,7 +31,6 @@ from shipdrag_ros.estimation.log_time.model import (
 )
 from shipdrag_ros.estimation.log_time.prior import FREE, coast_priors
 from shipdrag_ros.estimation.log_time.robust import robust_fit
-from shipdrag_ros.estimation.log_time.slow import Slow
 from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.window import Window
@@ -49,7 +49,7 @@ _POLYNOMIALS = 12  # as many as any record needs, the priors do the rest
 _AMPLITUDE, _DECAY, _FREE_SD = 0.03, 0.45, 10.0
 CURRENT_SD_M_S = 1.0  # prior
 SCALE_SD = 0.02  # prior of the factor of the log
-_TOLD = 0.5  # what leaves more than this of the prior sd of a column does not tell it
+_IDENTIFIED = 0.5  # posterior/prior sd above which a parameter counts as unidentified
 _THRUST_SD = 0.3  # prior of the thrust at the stop, of the resistance there
 _SHORTEST_RUN_DOWN_S = 0.1
 
@@ -58,7 +58,7 @@ _NO_DECELERATION = 3.0  # standard deviations of the loss of speed
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _AveragedFit:
     """
     The average over models.
 
@@ -154,7 +154,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     )
 
 
-def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> _Fit:
+def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> _AveragedFit:
     span = inputs.span_s
     kind = next(k for k in (LOG, OVER_GROUND, POSITION) if inputs.count[k])
     part = inputs.part(kind)
@@ -187,7 +187,7 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     )
     start[polynomials:] = 0.0
     residual = inputs.value - combine(rows, start)
-    slow = Slow.of(window, ship, parameters, coast_s=tc, speed_m_s=speed)
+    slow = LearntNoise.of(window, ship, parameters, coast_s=tc, speed_m_s=speed)
     if slow is None:
         products = condense(rows, residual, weight)
     else:
@@ -205,7 +205,7 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
         products, start, families, np.ones(len(families)), *priors
     )
     notes += _scale_note(float(coefficients[-2]), float(share[families[:, -2]].sum()))
-    return _Fit(
+    return _AveragedFit(
         tc,
         coefficients,
         root(covariance),
@@ -241,7 +241,7 @@ def _told(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
     """Say whether the data tell current and factor of the log, and why not."""
     if not inputs.tells_water_from_ground:
         return (False, False), []
-    current, scale = sd[0] < _TOLD * CURRENT_SD_M_S, sd[1] < _TOLD * SCALE_SD
+    current, scale = sd[0] < _IDENTIFIED * CURRENT_SD_M_S, sd[1] < _IDENTIFIED * SCALE_SD
     notes = []
     if not current:
         notes.append(
@@ -287,7 +287,7 @@ def _about_noise(
     return notes
 
 
-def _motion(inputs: Inputs, fit: _Fit) -> Motion:
+def _motion(inputs: Inputs, fit: _AveragedFit) -> Motion:
     """Evaluate the motion at the speeds that the ship had."""
     k = fit.polynomials
     # with the thrust running down the ship is slower at the start than the coast without it
@@ -308,7 +308,7 @@ def _check_deceleration(inputs: Inputs, motion: Motion) -> None:
         )
 
 
-def _tracks(inputs: Inputs, fit: _Fit) -> dict[str, Track]:
+def _tracks(inputs: Inputs, fit: _AveragedFit) -> dict[str, Track]:
     return {
         Input(kind).key: Track(
             inputs.stamps[kind], inputs.value[inputs.part(kind)], fit.fitted[inputs.part(kind)]

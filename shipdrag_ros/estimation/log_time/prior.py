@@ -131,7 +131,7 @@ def _bends(
 
 
 @compiled('f8[:, ::1](f8[:, ::1], f8[::1])', fastmath=_SUMS)
-def _spread(bends: Float64, sd: Float64) -> Float64:
+def _sd_of_bends(bends: Float64, sd: Float64) -> Float64:
     """Return the covariance (k, k) of parts with some sd (b,) on bends (b, k)."""
     k = bends.shape[1]
     covariance = np.zeros((k, k))
@@ -161,8 +161,8 @@ def _priors(
     means, roots = np.zeros((p, len(mean))), np.zeros((p, len(mean), len(mean)))
     of_powers = np.full(first, waves)
     of_powers[0], of_powers[1], of_powers[2] = _START_SD, 0.0, CUBIC_SD
-    powers, linear = _spread(bends[:first], of_powers), _spread(bends[1:2], np.ones(1))
-    hump = _spread(bends[first:], humps)
+    powers, linear = _sd_of_bends(bends[:first], of_powers), _sd_of_bends(bends[1:2], np.ones(1))
+    hump = _sd_of_bends(bends[first:], humps)
     q = 0
     for of_linear in LINEAR_SDS:
         for size in HUMP_SIZES:

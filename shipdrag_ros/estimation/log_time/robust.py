@@ -27,7 +27,7 @@ def _rounding(value: Float64) -> float:
 
 
 @compiled('f8(f8[::1], f8[::1])')
-def _spread(value: Float64, root: Float64) -> float:
+def _sd_about_smooth(value: Float64, root: Float64) -> float:
     """Noise on a smooth curve, from second differences, where the root of the weight is 1."""
     if len(value) < 3:
         return 1.0
@@ -54,7 +54,7 @@ def despike(value: Float64) -> Float64:
     """
     Replace spikes by the median of five, to start from.
     """
-    limit = _SPIKE * _spread(value, np.ones(len(value)))
+    limit = _SPIKE * _sd_about_smooth(value, np.ones(len(value)))
     clean = value.copy()
     for i in range(2, len(value) - 2):
         middle = _median_of_five(value[i - 2], value[i - 1], value[i], value[i + 1], value[i + 2])
@@ -84,7 +84,7 @@ def _robust_sd(residual: Float64) -> float:
 
 
 @compiled('f8(f8[::1], f8[::1])')
-def _inflation(residual: Float64, weight: Float64) -> float:
+def _autocorrelation_time(residual: Float64, weight: Float64) -> float:
     """How many samples of correlated noise are worth one of white noise."""
     n = len(residual)
     weighted = residual * weight
@@ -164,7 +164,7 @@ def robust_fit(
             root = np.sqrt(stated[first:last])
             part = residual[first:last] * root
             if turn == 0:
-                found = _spread(value[first:last], root)
+                found = _sd_about_smooth(value[first:last], root)
             else:
                 found = max(_robust_sd(part), _rounding(value[first:last]))
                 found *= math.sqrt(n / max(n - free, 1.0))
@@ -189,7 +189,7 @@ def robust_fit(
                 of_huber = 1.0
             factor = (last - first) / (max(total, 1.0) * of_huber * scale * scale)
             if turn > 0:
-                factor /= _inflation(part, weight[first:last])
+                factor /= _autocorrelation_time(part, weight[first:last])
             for i in range(first, last):
                 weight[i] *= factor * stated[i]
             noise_sd[kind], used_sd[kind] = found, scale

@@ -16,8 +16,8 @@ import numpy as np
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.assemble import AtEnd, assembled
 from shipdrag_ros.estimation.curve import ValidRange
+from shipdrag_ros.estimation.ode_fit.batch_means import BatchMeans
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_LAG, LOG_SCALE, V0, predict
-from shipdrag_ros.estimation.ode_fit.colour import Colour
 from shipdrag_ros.estimation.ode_fit.first_fits import (
     fit_robustly,
     weigh_disturbed,
@@ -92,12 +92,12 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     found = problem.average(near or whole) or near or first
     full = full.disturbed(noise.typical)
     notes += _noise_notes(noise, record)
-    colours = full.colours(found)
-    most = max(colour.inflation for colour in colours.values())
+    correlated = full.correlated(found)
+    most = max(means.inflation for means in correlated.values())
     if most > 1.0:
         # the figure stays: whether the sensor errs slowly or the ship is pushed is not known
         found = replace(found, covariance=most * found.covariance)
-        notes += _colour_notes(colours)
+        notes += _correlation_notes(correlated)
     return _result(found, full, record, window, ship, parameters, tuple(notes))
 
 
@@ -158,14 +158,14 @@ def _noise_notes(noise: NoisePosterior, record: Record) -> list[str]:
     ]
 
 
-def _colour_notes(colours: dict[int, Colour]) -> list[str]:
+def _correlation_notes(correlated: dict[int, BatchMeans]) -> list[str]:
     names = {kind: name for name, kind in CODES.items()}
     return [
         f'what the fit leaves of {names[kind]} is not independent from sample to sample: its '
-        f'means over {colour.block} scatter {math.sqrt(colour.inflation):.2g} times as much as '
+        f'means over {means.block} scatter {math.sqrt(means.inflation):.2g} times as much as '
         'independent ones; the band is widened for that'
-        for kind, colour in colours.items()
-        if colour.inflation > 1.0
+        for kind, means in correlated.items()
+        if means.inflation > 1.0
     ]
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.estimation.ode_fit.families import PLAIN
-from shipdrag_ros.estimation.ode_fit.law import Law, shape_table, spread
+from shipdrag_ros.estimation.ode_fit.law import Law, shape_table, sums_and_sd
 from shipdrag_ros.inference.gaussian import cholesky_solve
 from shipdrag_ros.samples import Float64
 
@@ -40,7 +40,7 @@ class FittedMotion:
         Return r and its standard deviation at (m,) speeds.
         """
         value, _ = shape_table(self.law, speed_m_s)
-        result: tuple[Float64, Float64] = spread(value, self.unknowns, self.covariance)
+        result: tuple[Float64, Float64] = sums_and_sd(value, self.unknowns, self.covariance)
         return result
 
     def slope(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
@@ -48,7 +48,7 @@ class FittedMotion:
         Return dr/dv and its standard deviation at (m,) speeds.
         """
         _, slope = shape_table(self.law, speed_m_s)
-        result: tuple[Float64, Float64] = spread(slope, self.unknowns, self.covariance)
+        result: tuple[Float64, Float64] = sums_and_sd(slope, self.unknowns, self.covariance)
         return result
 
     def unknown(self, which: int) -> tuple[float, float]:

@@ -99,7 +99,7 @@ def shape_table(law: Law, speed_m_s: Float64) -> tuple[Float64, Float64]:
 
 
 @compiled
-def spread(shape: Float64, unknowns: Float64, covariance: Float64) -> tuple[Float64, Float64]:
+def sums_and_sd(shape: Float64, unknowns: Float64, covariance: Float64) -> tuple[Float64, Float64]:
     """
     Return sums of the coefficients, and their standard deviations.
 

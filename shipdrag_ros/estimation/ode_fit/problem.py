@@ -10,6 +10,7 @@ import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.ode_fit.averaging import Disturbed, average
+from shipdrag_ros.estimation.ode_fit.batch_means import BatchMeans, batch_means
 from shipdrag_ros.estimation.ode_fit.coast import (
     CURRENT,
     EXTRAS,
@@ -22,7 +23,6 @@ from shipdrag_ros.estimation.ode_fit.coast import (
     X0,
     predict,
 )
-from shipdrag_ros.estimation.ode_fit.colour import Colour, colour_of
 from shipdrag_ros.estimation.ode_fit.condensing import means
 from shipdrag_ros.estimation.ode_fit.families import FIRST, POWERS, Humps
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
@@ -188,14 +188,14 @@ class Problem:
         result: Float64 = table[0]
         return result
 
-    def colours(self, found: FittedMotion) -> dict[int, Colour]:
+    def correlated(self, found: FittedMotion) -> dict[int, BatchMeans]:
         """
         Return by how much what a fit leaves of the coastdown is correlated, for each input.
         """
         white = self.residual(found).reshape(1, -1)
         whiten(self.rows, white, self.noise)
         kind, left = self.rows.kind[self.steady :], white[0, self.steady :]
-        return {int(of): colour_of(left[kind == of]) for of in np.unique(kind)}
+        return {int(of): batch_means(left[kind == of]) for of in np.unique(kind)}
 
     def condensed(self, near: FittedMotion) -> Problem:
         """

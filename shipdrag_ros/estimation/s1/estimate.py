@@ -17,7 +17,7 @@ from shipdrag_ros.estimation.assemble import AtEnd, assembled
 from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.s1.problems import (
-    Measured,
+    ScalarInput,
     Solution,
     solve_joint,
     solve_position,
@@ -33,7 +33,7 @@ _GRID = np.linspace(-1.0, 1.0, 257)  # normalised times at which the curve is ev
 
 
 @dataclass(frozen=True)
-class _Problem:
+class _Requirement:
     """What a problem needs."""
 
     speed: bool
@@ -44,23 +44,23 @@ class _Problem:
 
 # joint: fewer stamps of an input do not tell its noise, hence not its weight
 PROBLEMS = {
-    's1_speed': _Problem(speed=True, position=False, stamps=4, order=2),
-    's1_position': _Problem(speed=False, position=True, stamps=4, order=3),
-    's1_joint': _Problem(speed=True, position=True, stamps=12, order=3),
+    's1_speed': _Requirement(speed=True, position=False, stamps=4, order=2),
+    's1_position': _Requirement(speed=False, position=True, stamps=4, order=3),
+    's1_joint': _Requirement(speed=True, position=True, stamps=12, order=3),
 }
 
 
 @dataclass(frozen=True)
-class _Inputs:
+class _Offered:
     """What the window offers, and which problem it is for."""
 
     estimator: str
-    speed: Measured | None
-    position: Measured | None
+    speed: ScalarInput | None
+    position: ScalarInput | None
     notes: tuple[str, ...]
 
     @property
-    def used(self) -> tuple[Measured, ...]:
+    def used(self) -> tuple[ScalarInput, ...]:
         return tuple(data for data in (self.speed, self.position) if data is not None)
 
 
@@ -112,7 +112,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     )
 
 
-def _inputs(window: Window, parameters: Parameters) -> _Inputs:
+def _inputs(window: Window, parameters: Parameters) -> _Offered:
     """Decide which inputs are used, and for which problem."""
     name, speed = 'speed_through_water', window.speed_through_water
     notes: list[str] = []
@@ -139,7 +139,7 @@ def _inputs(window: Window, parameters: Parameters) -> _Inputs:
             'speed over ground was used as the speed, there is none through water: '
             'a current is part of it'
         )
-    return _Inputs(
+    return _Offered(
         estimator,
         _speed(name, speed, parameters) if problem.speed else None,
         _distance(position, parameters) if problem.position else None,
@@ -167,17 +167,17 @@ def _check(name: str, series: Series, enough: int, estimator: str) -> None:
         raise EstimationError(f'{name}: {bad} value(s) are not finite: give accepted samples only')
 
 
-def _speed(name: str, series: Series, parameters: Parameters) -> Measured:
+def _speed(name: str, series: Series, parameters: Parameters) -> ScalarInput:
     scale, basis = _polynomials(series, parameters)
     sigma_m_s = parameters.speed_sigma_m_s
-    return Measured(name, series.time_ns, series.value, sigma_m_s, scale, basis)
+    return ScalarInput(name, series.time_ns, series.value, sigma_m_s, scale, basis)
 
 
-def _distance(series: Series, parameters: Parameters) -> Measured:
+def _distance(series: Series, parameters: Parameters) -> ScalarInput:
     scale, basis = _polynomials(series, parameters)
     distance = along_track(scale.normalise(series.time_ns), series.value, basis)
     sigma_m = parameters.position_sigma_m
-    return Measured('position', series.time_ns, distance, sigma_m, scale, basis)
+    return ScalarInput('position', series.time_ns, distance, sigma_m, scale, basis)
 
 
 def _polynomials(series: Series, parameters: Parameters) -> tuple[TimeScale, OrthogonalBasis]:
@@ -185,7 +185,7 @@ def _polynomials(series: Series, parameters: Parameters) -> tuple[TimeScale, Ort
     return scale, OrthogonalBasis.on(scale.normalise(series.time_ns), parameters.order_max)
 
 
-def _solve(inputs: _Inputs) -> Solution:
+def _solve(inputs: _Offered) -> Solution:
     if inputs.speed is None:
         assert inputs.position is not None
         return solve_position(inputs.position)
@@ -194,7 +194,7 @@ def _solve(inputs: _Inputs) -> Solution:
     return solve_joint(inputs.speed, inputs.position)
 
 
-def _check_deceleration(inputs: _Inputs, solution: Solution) -> None:
+def _check_deceleration(inputs: _Offered, solution: Solution) -> None:
     needed = PROBLEMS[inputs.estimator].order
     if solution.order < needed:
         noise = ', '.join(f'{name} {value:.3g}' for name, value in solution.noise_sd.items())
@@ -206,7 +206,7 @@ def _check_deceleration(inputs: _Inputs, solution: Solution) -> None:
         )
 
 
-def _tracks(inputs: _Inputs, solution: Solution) -> dict[str, Track]:
+def _tracks(inputs: _Offered, solution: Solution) -> dict[str, Track]:
     fit = solution.fit
     result = {}
     if inputs.speed is not None:

@@ -22,7 +22,7 @@ from shipdrag_ros.samples import Float64, Int64
 
 
 @dataclass(frozen=True)
-class Measured:
+class ScalarInput:
     """
     One input as a scalar function of time.
 
@@ -77,7 +77,7 @@ class Solution:
     notes: tuple[str, ...]
 
 
-def solve_speed(speed: Measured) -> Solution:
+def solve_speed(speed: ScalarInput) -> Solution:
     """
     Fit the speed alone.
 
@@ -88,7 +88,7 @@ def solve_speed(speed: Measured) -> Solution:
     return _solve_one(speed, speed_at=0)
 
 
-def solve_position(position: Measured) -> Solution:
+def solve_position(position: ScalarInput) -> Solution:
     """
     Fit the position alone; the speed is its derivative.
 
@@ -99,7 +99,7 @@ def solve_position(position: Measured) -> Solution:
     return _solve_one(position, speed_at=1)
 
 
-def _solve_one(data: Measured, *, speed_at: int) -> Solution:
+def _solve_one(data: ScalarInput, *, speed_at: int) -> Solution:
     basis = data.basis
     coefficients, table = fit_orders(basis, data.value)
     known = data.known_sigma**2
@@ -119,7 +119,7 @@ def _solve_one(data: Measured, *, speed_at: int) -> Solution:
     )
 
 
-def solve_joint(speed: Measured, position: Measured) -> Solution:
+def solve_joint(speed: ScalarInput, position: ScalarInput) -> Solution:
     """
     Fit one polynomial to the position and its derivative to the speed.
 

@@ -26,7 +26,7 @@ LONGEST = 1000.0  # l/d; beyond it nothing was measured, and a C0 should be stat
 PUBLISHED_RANGE = (0.7, 1.5)  # of u, said to hold for 10 %; it does not
 
 
-class Surface(StrEnum):
+class CableSurface(StrEnum):
     """What the flow finds, for the coefficient of a cylinder along it."""
 
     SMOOTH = 'smooth'
@@ -34,10 +34,10 @@ class Surface(StrEnum):
 
 
 # of the base (a disc across the flow), and of l/d
-_COEFFICIENTS = {Surface.SMOOTH: (0.99, 0.0099), Surface.ROUGH: (0.98, 0.0392)}
+_COEFFICIENTS = {CableSurface.SMOOTH: (0.99, 0.0099), CableSurface.ROUGH: (0.98, 0.0392)}
 
 
-def base_coefficient(slenderness: ArrayLike, surface: Surface) -> Float64:
+def base_coefficient(slenderness: ArrayLike, surface: CableSurface) -> Float64:
     """
     Return zeta0, the drag coefficient on the area of the base.
 
@@ -55,7 +55,7 @@ def base_coefficient(slenderness: ArrayLike, surface: Surface) -> Float64:
     return base + side * np.asarray(slenderness, np.float64)
 
 
-def drag_coefficient(slenderness: ArrayLike, surface: Surface) -> Float64:
+def drag_coefficient(slenderness: ArrayLike, surface: CableSurface) -> Float64:
     """
     Return C0, the drag coefficient on the area l d.
 
@@ -106,7 +106,7 @@ class Cable:
 
     length_m: float
     diameter_m: float
-    drag: Surface | float
+    drag: CableSurface | float
 
     def __post_init__(self) -> None:
         problems = [
@@ -116,10 +116,10 @@ class Cable:
                 ('diameter_m', self.diameter_m),
                 ('C0', self.drag),
             )
-            if not (isinstance(value, Surface) or 0.0 < value < math.inf)
+            if not (isinstance(value, CableSurface) or 0.0 < value < math.inf)
         ]
         known = problems or SHORTEST < self.slenderness < math.inf
-        if isinstance(self.drag, Surface) and not known:
+        if isinstance(self.drag, CableSurface) and not known:
             problems.append(
                 f'length over diameter is {self.slenderness:.4g}, and C0 of a {self.drag} one '
                 f'is known above {SHORTEST:g}; state C0 (--c0)'
@@ -135,7 +135,7 @@ class Cable:
     @property
     def c0(self) -> float:
         """Drag coefficient on the area l d."""
-        if isinstance(self.drag, Surface):
+        if isinstance(self.drag, CableSurface):
             return float(drag_coefficient(self.slenderness, self.drag))
         return self.drag
 
@@ -149,13 +149,13 @@ class Cable:
     def warnings(self) -> tuple[str, ...]:
         """Why C0 may not be what the cable has."""
         low, high = ROPES
-        if isinstance(self.drag, Surface) and self.slenderness > LONGEST:
+        if isinstance(self.drag, CableSurface) and self.slenderness > LONGEST:
             return (
                 f'length over diameter is {self.slenderness:.4g}; the formula for a {self.drag} '
                 f'cylinder does not hold much beyond {LONGEST:g}: state C0 (--c0), for ropes '
                 f'{low:g} to {high:g}',
             )
-        if not isinstance(self.drag, Surface) and not low <= self.drag <= high:
+        if not isinstance(self.drag, CableSurface) and not low <= self.drag <= high:
             return (f'C0 is {self.drag:g}; ropes along the flow have {low:g} to {high:g}',)
         return ()
 

@@ -9,7 +9,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.studies.cable.drag import (
     PUBLISHED_RANGE,
     Cable,
-    Surface,
+    CableSurface,
     Tangent,
     compare_errors,
     naive_range_m_s,
@@ -22,7 +22,9 @@ def sentence(cable: Cable, tangent: Tangent) -> str:
     """
     Say what the drag is.
     """
-    kind = f'{cable.drag} cable' if isinstance(cable.drag, Surface) else 'cable with a stated C0'
+    kind = (
+        f'{cable.drag} cable' if isinstance(cable.drag, CableSurface) else 'cable with a stated C0'
+    )
     return (
         f'A {kind}, {cable.length_m:g} m by {cable.diameter_m:g} m, towed along the flow at '
         f'{tangent.speed_m_s:g} m/s: {tangent.drag_n:.4g} N.'

@@ -19,7 +19,7 @@ STATES = 7  # of a path: u, v, r, x, y, heading, rudder
 State = tuple[float, float, float, float, float, float, float]
 
 
-class Hull(NamedTuple):
+class HullModel(NamedTuple):
     """
     What all columns share.
 
@@ -75,7 +75,7 @@ class Helm(NamedTuple):
 
 @compiled
 def _accelerations(
-    hull: Hull, c: Float64, du: float, v: float, r: float, d: float
+    hull: HullModel, c: Float64, du: float, v: float, r: float, d: float
 ) -> tuple[float, float, float]:
     """
     Return du/dt, dv/dt, dr/dt in SI.
@@ -114,7 +114,7 @@ def _accelerations(
 
 
 @compiled
-def _rudder(hull: Hull, d: float, ordered: float, after_s: float) -> float:
+def _rudder(hull: HullModel, d: float, ordered: float, after_s: float) -> float:
     """Return the angle some time later: it moves at its largest rate, then as a lag does."""
     gap = ordered - d
     nearest = hull.rate_rad_s * hull.lag_s
@@ -127,7 +127,7 @@ def _rudder(hull: Hull, d: float, ordered: float, after_s: float) -> float:
 
 
 @compiled
-def _step(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> State:
+def _step(hull: HullModel, c: Float64, state: State, ordered: float, h: float) -> State:
     """Return the state a step later, in which the rudder moves smoothly."""
     du, v, r, x, y, heading, d = state
     e = 0.5 * h
@@ -155,14 +155,14 @@ def _step(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> Sta
 
 
 @compiled
-def _over_ground(hull: Hull, du: float, v: float, heading: float) -> tuple[float, float]:
+def _over_ground(hull: HullModel, du: float, v: float, heading: float) -> tuple[float, float]:
     cos, sin = np.cos(heading), np.sin(heading)
     ahead = hull.speed_m_s + du
     return ahead * cos - v * sin, ahead * sin + v * cos
 
 
 @compiled
-def _advance(hull: Hull, c: Float64, state: State, ordered: float, h: float) -> State:
+def _advance(hull: HullModel, c: Float64, state: State, ordered: float, h: float) -> State:
     """Return the state a time later, in two steps where the rudder leaves its largest rate."""
     ramp_s = abs(ordered - state[6]) / hull.rate_rad_s - hull.lag_s
     if 0.0 < ramp_s < h:
@@ -192,7 +192,9 @@ def _reached(before: State, after: State, heading: float, h: float) -> float:
 
 
 @compiled
-def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Float64) -> None:
+def _follow(
+    hull: HullModel, helm: Helm, c: Float64, steps: int, looks: int, path: Float64
+) -> None:
     """Fill the path (n, STATES) of one ship, with so many looks between two rows."""
     state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(helm.approach):
@@ -223,7 +225,7 @@ def _follow(hull: Hull, helm: Helm, c: Float64, steps: int, looks: int, path: Fl
 
 @compiled
 def follow_columns(
-    hull: Hull, helm: Helm, derivatives: Float64, steps: int, looks: int, paths: Float64
+    hull: HullModel, helm: Helm, derivatives: Float64, steps: int, looks: int, paths: Float64
 ) -> None:
     """
     Follow ships from steady sailing through one manoeuvre.

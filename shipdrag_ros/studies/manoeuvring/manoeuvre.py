@@ -15,7 +15,7 @@ import numpy as np
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.motion import Motion
+from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
 
 _ANGLES_DEG = (1.0, 90.0)
 KINDS = ('zigzag', 'turn')
@@ -97,7 +97,7 @@ def parse(text: str) -> Manoeuvre:
     return zigzag(angle) if kind == 'zigzag' else turn(angle)
 
 
-def overshoots_rad(motion: Motion, manoeuvre: Manoeuvre) -> Float64:
+def overshoots_rad(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> Float64:
     """
     Return by how much the heading exceeds that of the reversal, each time.
 
@@ -123,7 +123,7 @@ def overshoots_rad(motion: Motion, manoeuvre: Manoeuvre) -> Float64:
     return np.array(found)
 
 
-def advance_m(motion: Motion, manoeuvre: Manoeuvre) -> float:
+def advance_m(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> float:
     """
     Return the way ahead from the order to a change of heading by 90 degrees.
 
@@ -132,7 +132,7 @@ def advance_m(motion: Motion, manoeuvre: Manoeuvre) -> float:
     return _at(motion, manoeuvre, 0.5 * pi, motion.position_m[:, 0])
 
 
-def tactical_diameter_m(motion: Motion, manoeuvre: Manoeuvre) -> float:
+def tactical_diameter_m(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> float:
     """
     Return the way abeam from the order to a change of heading by 180 degrees.
 
@@ -141,7 +141,9 @@ def tactical_diameter_m(motion: Motion, manoeuvre: Manoeuvre) -> float:
     return _at(motion, manoeuvre, pi, manoeuvre.first.sign * motion.position_m[:, 1])
 
 
-def _at(motion: Motion, manoeuvre: Manoeuvre, heading_rad: float, value: Float64) -> float:
+def _at(
+    motion: ManoeuvreMotion, manoeuvre: Manoeuvre, heading_rad: float, value: Float64
+) -> float:
     turned = manoeuvre.first.sign * motion.heading_rad
     beyond = np.flatnonzero(turned >= heading_rad)
     if not len(beyond):

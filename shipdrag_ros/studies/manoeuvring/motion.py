@@ -9,7 +9,7 @@ from shipdrag_ros.samples import Float64
 
 
 @dataclass(frozen=True)
-class Motion:
+class ManoeuvreMotion:
     """
     Motion of one ship through a manoeuvre.
 
@@ -48,7 +48,7 @@ class Motions:
         Surge and sway [m/s], yaw rate [rad/s].
     position_m : (k, n, 2)
     heading_rad, rudder_rad : (k, n)
-        All as in `Motion`.
+        All as in `ManoeuvreMotion`.
     """
 
     time_s: Float64
@@ -60,9 +60,9 @@ class Motions:
     def __len__(self) -> int:
         return len(self.speeds)
 
-    def __getitem__(self, column: int) -> Motion:
+    def __getitem__(self, column: int) -> ManoeuvreMotion:
         surge, sway, yaw = self.speeds[column].T
-        return Motion(
+        return ManoeuvreMotion(
             time_s=self.time_s,
             surge_m_s=surge,
             sway_m_s=sway,

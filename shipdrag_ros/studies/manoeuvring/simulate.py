@@ -7,7 +7,7 @@ import numpy as np
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.kernel import STATES, Helm, Hull, follow_columns
+from shipdrag_ros.studies.manoeuvring.kernel import STATES, Helm, HullModel, follow_columns
 from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre
 from shipdrag_ros.studies.manoeuvring.motion import Motions
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
@@ -130,7 +130,7 @@ def steer(
     )
 
 
-def _hull(ship: SteeredShip) -> Hull:
+def _hull(ship: SteeredShip) -> HullModel:
     added, machine = ship.inertial, ship.rudder
     inertia = np.array(
         [
@@ -139,7 +139,7 @@ def _hull(ship: SteeredShip) -> Hull:
         ]
     )
     (sway_by_y, sway_by_n), (yaw_by_y, yaw_by_n) = np.linalg.inv(inertia).tolist()
-    return Hull(
+    return HullModel(
         length_m=ship.length_m,
         speed_m_s=ship.speed_m_s,
         surge_inertia=ship.mass - added.Xudot,

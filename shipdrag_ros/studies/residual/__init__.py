@@ -9,5 +9,6 @@ STUDY = Study(
     (
         'shipdrag residual hulls.csv --form auto --target c_R --predict new_hulls.csv '
         '--report residual.html',
+        'shipdrag residual hulls.csv --form sirotina --target c_R --json residual.json',
     ),
 )

@@ -49,7 +49,7 @@ class ResidualFit:
     spread
         By what factor hulls that were left out miss their standard deviation.
     left_out
-        Mean square error on them; infinite where the others foretell none.
+        Mean square error on them; infinite where the others predict none.
     notes
         What a reader must know, a sentence each.
     """
@@ -145,7 +145,7 @@ class ResidualFit:
 
 def fit_residual(hulls: Hulls, values: Float64, *, form: str) -> ResidualFit:
     """
-    Fit a form, or the one that foretells hulls left out best.
+    Fit a form, or the one that predicts left-out hulls best.
 
     Where no hull can be foretold from the others, the smaller residual
     variance decides.

@@ -238,7 +238,7 @@ def relative(names: Sequence[str], values: Float64, changes: Sequence[float] = C
 
 def partial_contribution(slopes: Float64) -> Float64:
     """
-    Return the part of each response that no mixture of the others makes.
+    Return the part of each response that is orthogonal to all others.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ import numpy as np
 from shipdrag_ros.display import Table
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, overshoots_rad, turn, zigzag
-from shipdrag_ros.studies.manoeuvring.motion import Motion
+from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
 from shipdrag_ros.studies.manoeuvring.simulate import steer
 from shipdrag_ros.studies.sensitivity.loss import (
@@ -73,7 +73,7 @@ class Observations:
 
 
 @dataclass(frozen=True)
-class Check:
+class ReducedModelCheck:
     """
     A manoeuvre of the full and of a reduced model.
 
@@ -85,8 +85,8 @@ class Check:
     """
 
     manoeuvre: Manoeuvre
-    full: Motion
-    reduced: Motion
+    full: ManoeuvreMotion
+    reduced: ManoeuvreMotion
 
     @property
     def overshoots_rad(self) -> tuple[Float64, Float64]:
@@ -136,10 +136,10 @@ class SteeringStudy:
     losses: Losses
     mean_norms: Losses
     selection: Selection
-    check: Check
+    check: ReducedModelCheck
     groups: Losses
     group_selection: Selection
-    group_check: Check
+    group_check: ReducedModelCheck
 
     def summary(self) -> tuple[str, ...]:
         """
@@ -258,7 +258,9 @@ def respond_by_groups(
     return vary(simulate_groups, names, factors, relative(names, factors, changes))
 
 
-def check(ship: SteeredShip, kept: Sequence[str], *, manoeuvre: Manoeuvre = CHECKED_BY) -> Check:
+def check(
+    ship: SteeredShip, kept: Sequence[str], *, manoeuvre: Manoeuvre = CHECKED_BY
+) -> ReducedModelCheck:
     """
     Sail a manoeuvre without the derivatives that are not kept.
 
@@ -268,7 +270,7 @@ def check(ship: SteeredShip, kept: Sequence[str], *, manoeuvre: Manoeuvre = CHEC
     reduced = np.where([name in kept for name in FORM], ship.values, 0.0)
     sets = np.array([ship.values, reduced])
     both = steer(ship, manoeuvre, sets, control_s=CONTROL_S, approach_s=APPROACH_S)
-    return Check(manoeuvre, both[0], both[1])
+    return ReducedModelCheck(manoeuvre, both[0], both[1])
 
 
 def study(ship: SteeredShip, manoeuvre: Manoeuvre, *, keep: int) -> SteeringStudy:

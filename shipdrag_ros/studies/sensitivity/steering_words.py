@@ -10,9 +10,9 @@ from shipdrag_ros.studies.manoeuvring.ship import meaning
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     CONTROL_S,
-    Check,
     Experiment,
     Observations,
+    ReducedModelCheck,
     SteeringStudy,
 )
 
@@ -116,7 +116,7 @@ def check_table(found: SteeringStudy) -> Table:
     return Table(heads, tuple(rows))
 
 
-def _degrees(check: Check, model: int) -> tuple[str, ...]:
+def _degrees(check: ReducedModelCheck, model: int) -> tuple[str, ...]:
     over = [f'{value:.2f}' for value in np.degrees(check.overshoots_rad[model])]
     over += ['-'] * (2 - len(over))
     if model == 0:

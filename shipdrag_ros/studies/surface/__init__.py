@@ -6,5 +6,8 @@ from shipdrag_ros.studies.study import Study
 STUDY = Study(
     'surface',
     'polynomial surface of coefficients, with the degree they show',
-    ('shipdrag surface table.csv --inputs alpha,beta --target c_x --report surface.html',),
+    (
+        'shipdrag surface table.csv --inputs alpha,beta --target c_x --report surface.html',
+        'shipdrag surface table.csv --inputs alpha,beta --target c_x --json surface.json',
+    ),
 )

@@ -11,7 +11,7 @@ from scipy import stats
 
 from shipdrag_ros.estimation.motion import sigma
 from shipdrag_ros.estimation.s1.problems import (
-    Measured,
+    ScalarInput,
     Solution,
     solve_joint,
     solve_position,
@@ -24,10 +24,10 @@ START_NS = 1_700_000_000_123_456_789
 
 def measured(
     name: str, time_ns: np.ndarray, value: np.ndarray, *, order: int, sigma: float = 0.0
-) -> Measured:
+) -> ScalarInput:
     scale = TimeScale.of(time_ns)
     basis = OrthogonalBasis.on(scale.normalise(time_ns), order)
-    return Measured(name, time_ns, value, sigma, scale, basis)
+    return ScalarInput(name, time_ns, value, sigma, scale, basis)
 
 
 def stamps(n: int, *, seed: int | None = None) -> np.ndarray:
@@ -46,7 +46,7 @@ def cubic(time_ns: np.ndarray, *, derivative: int = 0) -> np.ndarray:
 
 def pair(
     n: int, rng: np.random.Generator, *, order: int, known: bool = False, same: bool = True
-) -> tuple[Measured, Measured]:
+) -> tuple[ScalarInput, ScalarInput]:
     x_ns, v_ns = stamps(n), stamps(n) if same else stamps(2 * n, seed=3)
     x = cubic(x_ns) + 10.0 * rng.normal(size=len(x_ns))
     v = cubic(v_ns, derivative=1) + 0.05 * rng.normal(size=len(v_ns))
@@ -57,13 +57,13 @@ def pair(
 
 
 def exact_joint(
-    speed: Measured, position: Measured, order: int, at: list[Fraction]
+    speed: ScalarInput, position: ScalarInput, order: int, at: list[Fraction]
 ) -> tuple[list[Fraction], list[Fraction]]:
     """Speed and acceleration at normalised times, by powers of t, in rational arithmetic."""
     scale = TimeScale.of(position.time_ns, speed.time_ns)
     half_s = Fraction(scale.span_ns, 2 * 10**9)
 
-    def rows(data: Measured, derivative: int) -> list[tuple[list[Fraction], Fraction]]:
+    def rows(data: ScalarInput, derivative: int) -> list[tuple[list[Fraction], Fraction]]:
         weight = 1 / Fraction(data.known_sigma)
         result = []
         for time_ns, value in zip(data.time_ns, data.value):

@@ -15,7 +15,7 @@ from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.simulation.hydrodynamics import QuadraticDrag
 from shipdrag_ros.studies.cable.drag import (
     Cable,
-    Surface,
+    CableSurface,
     Tangent,
     base_coefficient,
     compare_errors,
@@ -26,7 +26,7 @@ from shipdrag_ros.studies.cable.drag import (
     tangent_range,
 )
 
-SURFACE = pytest.mark.parametrize('surface', Surface)
+SURFACE = pytest.mark.parametrize('surface', CableSurface)
 FEW = settings(max_examples=60, deadline=None)
 SLENDERNESS = st.floats(20.0, 1e5, exclude_min=True)
 SPEED = st.floats(1e-2, 50.0)
@@ -36,10 +36,10 @@ TOLERANCE = st.floats(1e-8, 0.99)
 @pytest.mark.parametrize(
     ('surface', 'slenderness', 'zeta0', 'c0'),
     [  # pi/4 zeta0 / lambda, by hand
-        (Surface.SMOOTH, 100.0, 1.98, 0.015550883635269476),
-        (Surface.SMOOTH, 1000.0, 10.89, 0.008552985999398212),
-        (Surface.ROUGH, 100.0, 4.90, 0.03848451000647496),
-        (Surface.ROUGH, 1000.0, 40.18, 0.03155729820530947),
+        (CableSurface.SMOOTH, 100.0, 1.98, 0.015550883635269476),
+        (CableSurface.SMOOTH, 1000.0, 10.89, 0.008552985999398212),
+        (CableSurface.ROUGH, 100.0, 4.90, 0.03848451000647496),
+        (CableSurface.ROUGH, 1000.0, 40.18, 0.03155729820530947),
     ],
 )
 def test_the_coefficient_is_that_of_the_source(surface, slenderness, zeta0, c0):
@@ -48,7 +48,8 @@ def test_the_coefficient_is_that_of_the_source(surface, slenderness, zeta0, c0):
 
 
 @pytest.mark.parametrize(
-    ('surface', 'base', 'side'), [(Surface.SMOOTH, 0.777, 0.008), (Surface.ROUGH, 0.769, 0.031)]
+    ('surface', 'base', 'side'),
+    [(CableSurface.SMOOTH, 0.777, 0.008), (CableSurface.ROUGH, 0.769, 0.031)],
 )
 def test_the_rounded_formulas_of_the_source_are_near(surface, base, side):
     slenderness = np.geomspace(20.0, 1000.0, 50)
@@ -69,7 +70,7 @@ def test_a_longer_cable_has_a_smaller_coefficient_and_more_drag(surface, a, b):
     one, other = (Cable(0.1 * value, 0.1, surface) for value in (short, long))
     assert one.in_water(1025.0).drag_area_m2 < other.in_water(1025.0).drag_area_m2
     assert drag_coefficient(long, surface) > 0.25 * math.pi * (
-        0.0392 if surface is Surface.ROUGH else 0.0099
+        0.0392 if surface is CableSurface.ROUGH else 0.0099
     )
 
 
@@ -77,7 +78,8 @@ def test_a_longer_cable_has_a_smaller_coefficient_and_more_drag(surface, a, b):
 @given(slenderness=SLENDERNESS)
 def test_a_rough_cable_has_more(slenderness):
     rough, smooth = (
-        drag_coefficient(slenderness, surface) for surface in (Surface.ROUGH, Surface.SMOOTH)
+        drag_coefficient(slenderness, surface)
+        for surface in (CableSurface.ROUGH, CableSurface.SMOOTH)
     )
     assert rough > smooth
 
@@ -169,7 +171,7 @@ def test_the_tangent_touches_at_v0_and_nowhere_else(area, density, v0, u):
 
 
 def test_the_tangent_may_begin_anywhere():
-    drag = Cable(50.0, 0.1, Surface.SMOOTH).in_water(1025.0)
+    drag = Cable(50.0, 0.1, CableSurface.SMOOTH).in_water(1025.0)
     assert Tangent(drag, 2.0).gain_n_per_m_s == 2.0 * Tangent(drag, 1.0).gain_n_per_m_s
 
 
@@ -190,9 +192,9 @@ def test_all_impossible_values_are_told_at_once():
     for part in ('length_m is -1.0', 'diameter_m is nan', 'C0 is 0.0'):
         assert part in str(told.value)
     with pytest.raises(SimulationError, match='length_m is inf'):
-        Cable(math.inf, 0.1, Surface.ROUGH)
+        Cable(math.inf, 0.1, CableSurface.ROUGH)
     with pytest.raises(SimulationError, match='length over diameter is inf'):
-        Cable(1e200, 1e-200, Surface.ROUGH)
+        Cable(1e200, 1e-200, CableSurface.ROUGH)
 
 
 @SURFACE
@@ -206,9 +208,9 @@ def test_a_short_cable_needs_a_stated_coefficient(surface, slenderness):
 @pytest.mark.parametrize(
     ('slenderness', 'drag', 'warned'),
     [
-        (1000.0, Surface.SMOOTH, ''),
-        (1001.0, Surface.SMOOTH, '1001; the formula for a smooth cylinder'),
-        (5e4, Surface.ROUGH, '5e+04; the formula for a rough cylinder'),
+        (1000.0, CableSurface.SMOOTH, ''),
+        (1001.0, CableSurface.SMOOTH, '1001; the formula for a smooth cylinder'),
+        (5e4, CableSurface.ROUGH, '5e+04; the formula for a rough cylinder'),
         (5e4, 0.01, ''),
         (5e4, 0.04, ''),
         (100.0, 1.2, 'C0 is 1.2; ropes along the flow have 0.01 to 0.04'),

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.studies.cable import words
-from shipdrag_ros.studies.cable.drag import Cable, Surface, Tangent, tangent_range
+from shipdrag_ros.studies.cable.drag import Cable, CableSurface, Tangent, tangent_range
 from shipdrag_ros.studies.cable.face import page as cable_page
 from shipdrag_ros.studies.cable.face import pictures as cable_pictures
 
-CABLE = Cable(50.0, 0.1, Surface.ROUGH)
+CABLE = Cable(50.0, 0.1, CableSurface.ROUGH)
 TANGENT = Tangent(CABLE.in_water(1025.0), 2.0)
 
 

@@ -130,10 +130,10 @@ def test_errors_say_what_to_mend(
         fit(table, form='cubic')
 
 
-def test_the_example_of_the_readme(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_example_of_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
     root = Path(__file__).resolve().parents[3]
     line = 'residual docs/data/river_ships.csv --form auto --target c_R'
-    assert f'shipdrag {line}' in (root / 'README.md').read_text(encoding='utf-8')
+    assert f'shipdrag {line}' in (root / 'docs' / 'method.md').read_text(encoding='utf-8')
     verb, data, *rest = line.split()
     assert main([verb, str(root / data), *rest, '--json']) == 0
     found = json.loads(capsys.readouterr().out)

@@ -150,7 +150,7 @@ def test_slopes_are_those_of_opposite_steps():
     np.testing.assert_allclose(slopes[0], 1e-4 * swinging(VALUES[None])[0], rtol=1e-6, atol=1e-12)
 
 
-def test_own_share_of_known_vectors():
+def test_partial_contribution_of_known_vectors():
     x, y, z = np.eye(3)
     shares = partial_contribution(np.array([x, x + y, 5.0 * z, 0.0 * x]))
     np.testing.assert_allclose(shares, [np.sqrt(0.5), np.sqrt(0.5), 1.0, 0.0], atol=1e-11)

@@ -27,7 +27,7 @@ _CENTURY_TURNS = 80  # 80 to 99 are years of the 20th century
 _ROLLOVER_DAYS = 1024 * 7  # a week number of GPS has ten bits
 
 
-class Moment:
+class SentenceTime:
     """
     The time in a sentence.
 
@@ -143,7 +143,7 @@ class Clock:
         self.dates_put_right = 0
         self.now_ns: int | None = None
 
-    def resolve(self, moment: Moment, receive_ns: int | None) -> int:
+    def resolve(self, moment: SentenceTime, receive_ns: int | None) -> int:
         """
         Return the time of a sentence [ns since the epoch].
 

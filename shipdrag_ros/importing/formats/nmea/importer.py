@@ -22,7 +22,7 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import ATTACHMENT, BATCH_SAMPLES, Rejected, new_bag
 from shipdrag_ros.importing.formats.nmea.clock import Clock
 from shipdrag_ros.importing.formats.nmea.log import NmeaLog
-from shipdrag_ros.importing.formats.nmea.record import Record
+from shipdrag_ros.importing.formats.nmea.record import SentenceConverter
 from shipdrag_ros.importing.formats.nmea.survey import Survey
 from shipdrag_ros.nmea.framing import Checksum
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
@@ -143,7 +143,7 @@ def import_nmea(
     for sentence in log.sentences(_part(progress, 0)):
         survey.take(sentence)
     clock = survey.clock(log, day)
-    record = Record(survey.chosen(), clock, mounting)
+    record = SentenceConverter(survey.chosen(), clock, mounting)
     with new_bag(out, attachments) as bag:
         text_of_log = log.text(LOG_LIMIT_BYTES)
         if text_of_log is not None:
@@ -171,7 +171,7 @@ def _part(
 
 
 def _result(
-    log: NmeaLog, survey: Survey, record: Record, clock: Clock, *, attached: bool
+    log: NmeaLog, survey: Survey, record: SentenceConverter, clock: Clock, *, attached: bool
 ) -> NmeaResult:
     """Sum up; ImportDataError if there is nothing."""
     rejected = {
@@ -218,7 +218,7 @@ def _result(
     )
 
 
-def _sources(record: Record) -> dict[str, str]:
+def _sources(record: SentenceConverter) -> dict[str, str]:
     """Say what each input is taken from; of several shafts and pitches, each once."""
     told: dict[str, dict[str, None]] = {}
     for channel, source in sorted(record.chosen.items()):
@@ -226,7 +226,7 @@ def _sources(record: Record) -> dict[str, str]:
     return {name: ', '.join(sources) for name, sources in told.items()}
 
 
-def _not_taken(survey: Survey, record: Record) -> dict[str, dict[str, int]]:
+def _not_taken(survey: Survey, record: SentenceConverter) -> dict[str, dict[str, int]]:
     """Count by input the values of the sources that nothing is taken from."""
     counts: dict[str, dict[str, int]] = {}
     for channel, of_channel in sorted(survey.values.items()):

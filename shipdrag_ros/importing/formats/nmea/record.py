@@ -12,16 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from shipdrag_ros.importing.bag import Rejected
-from shipdrag_ros.importing.formats.nmea.clock import GAP_NS, Clock, Moment
+from shipdrag_ros.importing.formats.nmea.clock import GAP_NS, Clock, SentenceTime
 from shipdrag_ros.nmea.framing import Sentence
 from shipdrag_ros.nmea.sentences import (
     TIMED,
     Fields,
-    Measured,
+    MeasuredValue,
     Mounting,
     NoValue,
 )
-from shipdrag_ros.nmea.values import Source, read_values
+from shipdrag_ros.nmea.values import SentenceSource, read_values
 from shipdrag_ros.samples import Block, Channel
 
 _WAITING_SAMPLES = 16384  # in GAP_NS, of all inputs
@@ -33,14 +33,14 @@ class _Waiting:
     """A sample; its time is None until the next time is told."""
 
     channel: Channel
-    value: Measured
+    value: MeasuredValue
     line: int
     text: str
     stamp_ns: int | None
 
 
 @dataclass
-class Record:
+class SentenceConverter:
     """
     Turns sentences into samples and counts what becomes of them.
 
@@ -64,7 +64,7 @@ class Record:
         First and largest stamp [ns].
     """
 
-    chosen: Mapping[Channel, Source]
+    chosen: Mapping[Channel, SentenceSource]
     clock: Clock
     mounting: Mounting
     written: Counter[str] = field(default_factory=Counter)
@@ -119,7 +119,7 @@ class Record:
         fields = Fields(sentence.kind, sentence.fields) if sentence.kind in TIMED else None
         if fields is None or not fields['time']:
             return self.clock.since(sentence.receive_ns)
-        time_ns = self.clock.resolve(Moment(fields), sentence.receive_ns)
+        time_ns = self.clock.resolve(SentenceTime(fields), sentence.receive_ns)
         now_ns = self.clock.now_ns
         # a little earlier: sentences of one fix, or of two receivers, out of order
         if now_ns is None or time_ns > now_ns or time_ns < now_ns - GAP_NS:

@@ -11,11 +11,17 @@ from collections import Counter
 from datetime import date
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.formats.nmea.clock import DAY_NS, Clock, Moment, days_of, rollover_days
+from shipdrag_ros.importing.formats.nmea.clock import (
+    DAY_NS,
+    Clock,
+    SentenceTime,
+    days_of,
+    rollover_days,
+)
 from shipdrag_ros.importing.formats.nmea.log import NmeaLog
 from shipdrag_ros.nmea.framing import Sentence
 from shipdrag_ros.nmea.sentences import TIMED, Fields, Mounting, NoValue
-from shipdrag_ros.nmea.values import Source, best, read_values
+from shipdrag_ros.nmea.values import SentenceSource, best, read_values
 from shipdrag_ros.samples import Channel
 
 
@@ -35,9 +41,9 @@ class Survey:
         self._mounting = mounting
         self._received = False
         self._timed = False
-        self._first: Moment | None = None
+        self._first: SentenceTime | None = None
         self.addresses: Counter[tuple[str, str]] = Counter()
-        self.values: dict[Channel, Counter[Source]] = {}
+        self.values: dict[Channel, Counter[SentenceSource]] = {}
 
     def take(self, sentence: Sentence) -> None:
         """
@@ -55,14 +61,14 @@ class Survey:
         if self._first is not None:
             return
         try:
-            moment = Moment(fields)
+            moment = SentenceTime(fields)
         except NoValue:
             return
         self._timed = True
         if moment.trusted and moment.day is not None:
             self._first = moment
 
-    def chosen(self) -> dict[Channel, Source]:
+    def chosen(self) -> dict[Channel, SentenceSource]:
         """
         Return the one source of each input.
         """

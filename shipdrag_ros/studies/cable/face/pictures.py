@@ -15,7 +15,7 @@ from shipdrag_ros.studies.cable.drag import (
     LONGEST,
     SHORTEST,
     Cable,
-    Surface,
+    CableSurface,
     Tangent,
     drag_coefficient,
     naive_error,
@@ -28,9 +28,9 @@ LINES: dict[str, dict[str, Any]] = {
     'C V': {'color': GREEN, 'linestyle': ':'},
     'tangent': {'color': VERMILION, 'linestyle': '--'},
 }
-SURFACES: dict[Surface, dict[str, Any]] = {
-    Surface.SMOOTH: {'color': BLUE, 'linestyle': '-'},
-    Surface.ROUGH: {'color': VERMILION, 'linestyle': '--'},
+SURFACES: dict[CableSurface, dict[str, Any]] = {
+    CableSurface.SMOOTH: {'color': BLUE, 'linestyle': '-'},
+    CableSurface.ROUGH: {'color': VERMILION, 'linestyle': '--'},
 }
 RANGE_COLOR = '#eef3f7'
 _HIGHEST_U = 2.5

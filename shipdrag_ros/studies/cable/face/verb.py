@@ -9,7 +9,13 @@ from typing import Any
 from shipdrag_ros.cli.arguments import add_json, add_report, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.studies.cable import words
-from shipdrag_ros.studies.cable.drag import Cable, Surface, Tangent, compare_errors, tangent_range
+from shipdrag_ros.studies.cable.drag import (
+    Cable,
+    CableSurface,
+    Tangent,
+    compare_errors,
+    tangent_range,
+)
 from shipdrag_ros.studies.cable.face import page as cable_page
 
 
@@ -38,8 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     surface.add_argument(
         '--rough',
         action='store_const',
-        const=Surface.ROUGH,
-        default=Surface.SMOOTH,
+        const=CableSurface.ROUGH,
+        default=CableSurface.SMOOTH,
         dest='drag',
         help='C0 of a very rough cylinder (a log) in place of a smooth one',
     )

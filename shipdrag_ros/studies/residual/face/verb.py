@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--form',
         required=True,
         choices=(*FORMS, AUTO),
-        help=f'{AUTO}: the one that foretells hulls left out best',
+        help=f'{AUTO}: the one that predicts left-out hulls best',
     )
     parser.add_argument(
         '--target',

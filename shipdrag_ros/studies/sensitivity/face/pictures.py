@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.motion import Motion
+from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.steering import Experiment, SteeringStudy
 
@@ -60,7 +60,7 @@ def check_picture(found: SteeringStudy) -> Figure:
     """
     full, kept = found.check.full, found.check.reduced
     by_group = found.group_check.reduced
-    lines: Sequence[tuple[Motion, str, str, str]] = (
+    lines: Sequence[tuple[ManoeuvreMotion, str, str, str]] = (
         (full, 'full', '#444444', '-'),
         (kept, f'{len(found.selection.kept)} derivatives kept', VERMILION, '--'),
         (by_group, f'{found.independent} measurements kept', BLUE, ':'),

@@ -67,7 +67,7 @@ def contour_picture(surface: Surface, points: Float64, target: str) -> Figure:
 
 def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
     """
-    Draw how far each hull is off when the others foretell it.
+    Draw how far each hull is off when the others predict it.
 
     Parameters
     ----------

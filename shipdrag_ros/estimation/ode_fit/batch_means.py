@@ -13,7 +13,7 @@ _LEAST_BLOCKS = 16  # of a size: fewer do not tell their scatter
 _BY_CHANCE = 3.5  # standard deviations of that scatter: less is chance
 
 
-class Colour(NamedTuple):
+class BatchMeans(NamedTuple):
     """
     What means of neighbours scatter more than those of independent residuals.
 
@@ -29,7 +29,7 @@ class Colour(NamedTuple):
     block: int
 
 
-def colour_of(white: Float64) -> Colour:
+def batch_means(white: Float64) -> BatchMeans:
     """
     Return the largest excess scatter of means over blocks that chance does not explain.
 
@@ -44,7 +44,7 @@ def colour_of(white: Float64) -> Colour:
     relative standard deviation of sqrt(2 B / n). Blocks of 2, 4, 8 ..: 2 or 3 false
     alarms in 1000 (n = 500, 2000).
     """
-    found = Colour(1.0, 1)
+    found = BatchMeans(1.0, 1)
     n = len(white)
     # less than 1 where the correlation is in the standard deviation already
     mean_square = max(float((white * white).mean()), 1.0) if n else 0.0
@@ -54,6 +54,6 @@ def colour_of(white: Float64) -> Colour:
         means = white[: count * block].reshape(count, block).mean(axis=1)
         ratio = block * float((means * means).mean()) / mean_square
         if ratio > max(found.inflation, 1.0 + _BY_CHANCE * np.sqrt(2.0 * block / n)):
-            found = Colour(ratio, block)
+            found = BatchMeans(ratio, block)
         block *= 2
     return found

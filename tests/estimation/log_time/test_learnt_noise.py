@@ -10,7 +10,7 @@ import numpy as np
 
 from shipdrag_ros.estimation import Window, log_time
 from shipdrag_ros.estimation.log_time.inputs import gather
-from shipdrag_ros.estimation.log_time.slow import Slow
+from shipdrag_ros.estimation.log_time.learnt_noise import LearntNoise
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Series
 from shipdrag_ros.inference.noise import GaussMarkovNoise
@@ -114,7 +114,9 @@ def test_whitening_is_that_of_the_dense_covariance(coast: Any, ship: Ship) -> No
     rng = np.random.default_rng(3)
     rows, residual = rng.normal(size=(5, n)), rng.normal(size=n)
     sizes = {'position': 10.0, 'speed_through_water': 0.05}
-    slow = Slow(GaussMarkovNoise(log_m_s=WANDER_M_S, log_s=WANDER_S), sizes, 240.0, 8.2, STEADY_S)
+    slow = LearntNoise(
+        GaussMarkovNoise(log_m_s=WANDER_M_S, log_s=WANDER_S), sizes, 240.0, 8.2, STEADY_S
+    )
     weight = rng.uniform(0.1, 1.0, n)
     weight[0] = weight[first] = 1.0
     white_rows, white = slow.whitened(rows, residual, weight, inputs, ship)

@@ -30,7 +30,7 @@ _LOST = 1e-6  # weight of a gross outlier, of a good sample's: none, but finite
 
 
 @dataclass(frozen=True)
-class Slow:
+class LearntNoise:
     """
     What disturbs a coastdown slowly.
 
@@ -61,7 +61,7 @@ class Slow:
         *,
         coast_s: float,
         speed_m_s: float,
-    ) -> Slow | None:
+    ) -> LearntNoise | None:
         """
         Learn from the record before a window; None where it shows nothing.
         """

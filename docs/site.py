@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pages of the site that are made when it is built: the help of each verb, the notebooks."""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+from shipdrag_ros.cli import VERBS, parser
+
+NOTEBOOKS = Path(__file__).parent / 'notebooks'
+WIDTH = 92  # characters, of a line of help
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """
+    Add the pages; called by MkDocs.
+    """
+    files.append(File.generated(config, 'commands.md', content=commands()))
+    for path in sorted(NOTEBOOKS.glob('*.ipynb')):
+        page = f'notebooks/{path.stem}.md'
+        files.append(File.generated(config, page, content='\n\n'.join(cells(path))))
+    return files
+
+
+def commands() -> str:
+    """
+    Return the page of the command line, from the help of each verb.
+    """
+    os.environ['COLUMNS'] = str(WIDTH)
+    parts = [
+        '# Commands',
+        'What `shipdrag VERB --help` prints. Exit status: 0 done, 1 user error, 2 usage.',
+    ]
+    whole = parser(*(verb.name for verb in VERBS))
+    (below,) = (it.choices for it in whole._actions if it.dest == 'verb')
+    assert isinstance(below, dict)
+    for verb in VERBS:
+        parts += [f'## {verb.name}', f'```text\n{below[verb.name].format_help().strip()}\n```']
+    return '\n\n'.join(parts)
+
+
+def cells(path: Path) -> Iterator[str]:
+    """
+    Yield the cells of a notebook, and what they printed and drew, as Markdown.
+    """
+    for cell in json.loads(path.read_text(encoding='utf-8'))['cells']:
+        source = ''.join(cell['source'])
+        if cell['cell_type'] == 'markdown':
+            yield source
+            continue
+        yield f'```python\n{source}\n```'
+        for output in cell.get('outputs', []):
+            yield from _output(output)
+
+
+def _output(output: dict[str, Any]) -> Iterator[str]:
+    data = output.get('data', {})
+    if 'image/png' in data:
+        image = ''.join(data['image/png']).replace('\n', '')
+        base64.b64decode(image, validate=True)
+        yield f'![output](data:image/png;base64,{image})'
+    elif text := ''.join(output.get('text', data.get('text/plain', ''))).rstrip():
+        yield f'```text\n{text}\n```'

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag completion`: verbs, options and files are completed by the shell."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import shtab
+
+from shipdrag_ros import cli
+
+SHELLS = ('bash', 'zsh', 'fish')
+_FOLDER = ('DIR', 'STORE', 'DIR_OR_URL')
+_FILE = ('FILE', 'BAG', 'SOURCE')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add what the verb takes.
+    """
+    parser.description = (
+        'Print the script that completes verbs, options and files. Where a shell looks for it: '
+        'bash: ~/.local/share/bash-completion/completions/shipdrag; zsh: a file _shipdrag in a '
+        'folder of $fpath; fish: ~/.config/fish/completions/shipdrag.fish.'
+    )
+    parser.add_argument('shell', choices=SHELLS, help='for which shell')
+    parser.add_argument(
+        '-o', '--out', type=Path, metavar='FILE', help='write it there (default: to stdout)'
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Print or write the script.
+    """
+    text = script(options.shell)
+    if options.out is None:
+        print(text)
+    else:
+        options.out.write_text(text + '\n', encoding='utf-8')
+        print(f'{options.out} completes shipdrag in {options.shell} once it is read')
+    return 0
+
+
+def script(shell: str) -> str:
+    """
+    Return the script for a shell, one of `SHELLS`.
+    """
+    whole = cli.parser(*(verb.name for verb in cli.VERBS))
+    for parser in (whole, *_below(whole)):
+        for action in parser._actions:
+            metavar = str(action.metavar or '').partition('.')[0]
+            if metavar in _FOLDER:
+                action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
+            elif metavar in _FILE:
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+    return shtab.complete(whole, shell)
+
+
+def _below(parser: argparse.ArgumentParser) -> list[argparse.ArgumentParser]:
+    """Return the parsers of the verbs."""
+    return [
+        verb
+        for action in parser._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for verb in action.choices.values()
+    ]
