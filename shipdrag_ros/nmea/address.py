@@ -99,8 +99,8 @@ class Address:
             return
         if not self.is_multicast:
             raise ShipdragError(
-                f'NMEA source {self.text!r}: an interface is expected for a multicast group alone, '
-                'udp://224.0.0.0 to 239.255.255.255'
+                f'NMEA source {self.text!r}: no interface is expected but for a multicast '
+                'group, udp://224.0.0.0 to 239.255.255.255'
             )
         try:
             ipaddress.IPv4Address(self.interface)

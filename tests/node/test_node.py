@@ -224,9 +224,9 @@ def test_two_nodes_are_told_apart_and_silence_names_what_may_be_meant(
     start_node: Any, peer: Any, diagnostics: Any, ship_file: Path
 ) -> None:
     ship_file.write_text(f'name: Sea Worthy\n{ship_file.read_text()}')
-    node = start_node('-r', '__ns:=/ship')
     peer.advertise('/gps/speed_log', SPEED_TYPE)
     peer.advertise('/rudder_angle', 'sensor_msgs/msg/JointState')
+    node = start_node('-r', '__ns:=/ship')
     status = diagnostics.wait_for('state', '/gps/speed_log')
     assert status.name == 'ship/coastdown_node: state'
     assert status.hardware_id == 'Sea Worthy'
