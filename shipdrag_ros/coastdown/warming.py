@@ -12,6 +12,7 @@ from shipdrag_ros.samples import SECOND_NS, Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
 
 _STEADY_S, _COAST_S = 300, 400
+_UPDATE_S = 150.0  # one estimate shows what all of them call
 _SPEED_M_S = 8.0
 _SLOWING_1_S = 0.003  # speed over speed falls by so much a second
 _START_NS = 1_700_000_000 * SECOND_NS
@@ -33,7 +34,8 @@ def warm(parameters: Parameters) -> None:
     """
     compile_all()
     ship = Ship(length_m=150.0, displaced_volume_m3=20200.0)
-    monitor = Monitor(ship, Parameters(estimator=parameters.estimator))
+    few = Parameters(estimator=parameters.estimator, update_s=_UPDATE_S)
+    monitor = Monitor(ship, few)
     monitor.update(_coastdown())
     monitor.heading_doubt()
     monitor.finish()
