@@ -295,6 +295,28 @@ def _offset(offset_s: float) -> str:
     return f'{figure} {side} that of this computer'
 
 
+def convention_doubt(convention: str, *, stamped: bool, fed: bool) -> str:
+    """
+    Say that a heading would be turned twice, '' if it is not.
+
+    Parameters
+    ----------
+    convention
+        `Parameters.heading_convention`.
+    stamped
+        Whether its type holds a time; the one that does not is degrees of a compass.
+    fed
+        Whether NMEA feeds it.
+    """
+    if convention == 'rep103' or (stamped and not fed):
+        return ''
+    source = 'NMEA' if fed else 'its type'
+    return (
+        f'heading_convention is {convention}, but {source} is known to count from north and is '
+        'turned already: set it to rep103'
+    )
+
+
 def behind_others(offsets_s: Mapping[str, float | None]) -> dict[str, tuple[str, float]]:
     """
     Return by how much each input of the motion lags the one with the least lag [s].
