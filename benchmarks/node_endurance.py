@@ -4,8 +4,8 @@ What the node keeps of what is sent to it, and what it keeps of memory.
 
 Bursts and floods over DDS on loopback, a node that is stopped meanwhile; a thousand
 cycles of its life; a day of sailing at 10 Hz through monitor and recorder. Prints the
-table of docs/node_faults.md, `--write` puts it there: `python benchmarks/node_endurance.py`,
-some ten minutes of one core, most of it the day (`--hours 3` for less).
+tables of docs/node_faults.md, `--write` puts them there: some ten minutes of one core,
+most of it the day (`--hours 3` for less).
 """
 
 from __future__ import annotations
@@ -60,6 +60,8 @@ CYCLES = 1000
 RATE_HZ = 10.0
 EVERY_S, STOPPED_ENGINE_S = 7200.0, 1500.0  # a coastdown every two hours
 FULL_HOURS = 2.5  # by then all rings are full
+
+PARTS = ('flood', 'cycles', 'day')
 
 Row = tuple[str, str]
 
@@ -257,13 +259,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--hours', type=float, default=24.0, help='of simulated sailing')
     parser.add_argument('--cycles', type=int, default=CYCLES, help='of the life of a node')
-    parser.add_argument('--write', action='store_true', help='put the table into the page')
+    parser.add_argument(
+        '--parts', nargs='+', choices=PARTS, default=PARTS, help='what to do (default: all)'
+    )
+    parser.add_argument('--write', action='store_true', help='put the tables into the page')
     options = parser.parse_args()
-    rows = [*burst_and_flood(), *cycles(options.cycles), *day(options.hours)]
-    made = '\n'.join(table(['what', 'what comes of it'], rows))
-    print(made)
-    if options.write:
-        put(PAGE, {'endurance': made})
+    does = {
+        'flood': burst_and_flood,
+        'cycles': lambda: cycles(options.cycles),
+        'day': lambda: day(options.hours),
+    }
+    for part in options.parts:
+        made = '\n'.join(table(['what', 'what comes of it'], does[part]()))
+        print(made, flush=True)
+        if options.write:
+            put(PAGE, {part: made})
 
 
 if __name__ == '__main__':

@@ -26,7 +26,6 @@ from shipdrag_ros.ship import Ship
 MARGIN_NS = 600_000_000_000
 BEGIN_S = 0.5  # an answer to a start waits so long for the disk
 CLOSE_S = 5.0
-COMPACT_S = 1.0  # who ends the node waits for what is whole, not for what is small
 SLOW_S = 2.0
 DEFAULT_LIMITS = PartLimits()
 EVERYTHING = Keep()
@@ -150,16 +149,21 @@ class Recorder:
             self._ended.append(self._recording)
             self._recording = None
 
-    def close(self) -> None:
+    def close(self, compact_s: float = CLOSE_S) -> None:
         """
         End the recording and wait for the disk, a few seconds at most.
+
+        Parameters
+        ----------
+        compact_s
+            How long to wait, once the recording is whole, for it to be made compact [s].
         """
         self.stop()
         self._housekeeping.close()
         end_s = monotonic() + CLOSE_S
         for recording in self._ended:
             recording.wait_written(max(end_s - monotonic(), 0.0))
-        end_s = monotonic() + COMPACT_S
+        end_s = monotonic() + compact_s
         for recording in self._ended:
             recording.wait_ended(max(end_s - monotonic(), 0.0))
 
