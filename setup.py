@@ -46,7 +46,7 @@ DEVELOPMENT = [
 
 setup(
     name=PACKAGE,
-    version='0.1.0',
+    version='0.2.0',
     description='Hydrodynamic resistance of a ship from its coastdowns, live and from bags',
     author='shipdrag_ros maintainers',
     author_email='maintainers@shipdrag.example.org',

@@ -1,4 +1,77 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hydrodynamic resistance of a ship from its coastdowns, live and from bags."""
+"""
+Hydrodynamic resistance of a ship from its coastdowns, live and from bags.
 
-__version__ = '0.1.0'
+    import shipdrag_ros as sd
+
+    record = sd.read('coastdown.mcap', ship='ship.yaml')
+    sd.estimate(record).plot()
+    sd.diagnose(record).summary()
+
+Names are imported when they are first used, so that the command line and the
+node pay for none of them. docs/python.md shows how they go together.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from shipdrag_ros.errors import ShipdragError
+    from shipdrag_ros.library.diagnosis import Diagnosis, diagnose
+    from shipdrag_ros.library.reading import read
+    from shipdrag_ros.library.record import Record
+    from shipdrag_ros.library.resistance import Coastdown, Resistance, estimate
+    from shipdrag_ros.library.simulated import simulate
+    from shipdrag_ros.library.trends import Trends, trends
+    from shipdrag_ros.parameters import Parameters
+    from shipdrag_ros.ship import Ship
+
+__version__ = '0.2.0'
+
+__all__ = [
+    'Coastdown',
+    'Diagnosis',
+    'Parameters',
+    'Record',
+    'Resistance',
+    'Ship',
+    'ShipdragError',
+    'Trends',
+    'diagnose',
+    'estimate',
+    'read',
+    'simulate',
+    'trends',
+]
+
+_HOME = {
+    'Coastdown': 'library.resistance',
+    'Diagnosis': 'library.diagnosis',
+    'Parameters': 'parameters',
+    'Record': 'library.record',
+    'Resistance': 'library.resistance',
+    'Ship': 'ship',
+    'ShipdragError': 'errors',
+    'Trends': 'library.trends',
+    'diagnose': 'library.diagnosis',
+    'estimate': 'library.resistance',
+    'read': 'library.reading',
+    'simulate': 'library.simulated',
+    'trends': 'library.trends',
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import an exported name on its first use."""
+    if name not in _HOME:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    found = getattr(import_module(f'{__name__}.{_HOME[name]}'), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """List the exported names with what is here already."""
+    return sorted({*globals(), *__all__})

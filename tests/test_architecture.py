@@ -32,6 +32,7 @@ PICTURE = (
     ('node', 'replay', 'importing'),
     ('fleet',),
     ('trend',),
+    ('library',),
     ('live',),
     ('cli',),
     ('face',),  # of a study or of a format that is imported; found by cli, imported by none

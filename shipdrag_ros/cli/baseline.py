@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
-from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.windowed import HELP, open_windowed, refuse_overlaps, windowed_bag
+from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, LearntBaseline, learn_baseline
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.library.diagnosing import coasts_of
+from shipdrag_ros.library.windowed import refuse_overlaps
 from shipdrag_ros.ship import Ship
 
 
@@ -118,7 +119,7 @@ def _show(output: Output, found: LearntBaseline) -> None:
         f'{found.ship.name or "The ship"}: baseline from {len(found.runs)} run(s) over '
         f'{low:.2f} to {high:.2f} m/s.'
     )
-    output.heading('Learnt over stated')
+    output.heading('LearntBaseline over stated')
     stated = found.stated_sd
     rows = []
     for i, name in enumerate(found.names):

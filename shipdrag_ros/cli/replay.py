@@ -5,24 +5,20 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.bags import Run
 from shipdrag_ros.cli import replay_json, replay_text
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number
 from shipdrag_ros.cli.output import Output, json_text
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
-from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import replay
 from shipdrag_ros.replay.hulls import Ranking, rank
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import together
 from shipdrag_ros.ship import Ship
 
-_LATE_S = 10.0
 REPORT, JSON, CURVES = 'report.html', 'result.json', 'curves.csv'
 
 
@@ -112,50 +108,6 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'{REPORT}, {JSON} and {CURVES} in {options.out}')
     output.json(replay_json.document(results, ranking=ranking))
     return 0
-
-
-def replay_run(
-    each: Run,
-    output: Output,
-    *,
-    ship: Ship | None = None,
-    parameters: Parameters | None = None,
-    window: tuple[float, float] | None = None,
-) -> RunResult:
-    """
-    Replay one run; its progress is shown.
-
-    Raises
-    ------
-    EstimationError
-        If a window was given and nothing can be estimated from it.
-    """
-    with output.progress(f'replaying {each.name}') as progress:
-        result = RunResult.of(
-            replay(each, ship=ship, parameters=parameters, window=window, progress=progress)
-        )
-    if window is not None:
-        for coastdown in result.coastdowns:
-            if coastdown.estimate is None:
-                raise EstimationError(
-                    f'{each.name!r}: no estimate from {window[0]:g} to {window[1]:g} s: '
-                    f'{coastdown.failure}; give another --window'
-                )
-        beyond = _beyond(each, window[1])
-        if beyond:
-            result = replace(result, warnings=(*result.warnings, beyond))
-    return result
-
-
-def _beyond(run: Run, end_s: float) -> str:
-    """Say that a window reaches beyond the bag, by more than a sample may come late."""
-    assert run.span_ns is not None  # an estimate was made
-    length_s = (run.span_ns[1] - run.span_ns[0]) * 1e-9
-    if end_s <= length_s + _LATE_S:
-        return ''
-    return (
-        f'the window ends at {end_s:g} s; the bag ends at {length_s:.1f} s, and the window there'
-    )
 
 
 def write_results(

@@ -12,11 +12,10 @@ from shipdrag_ros.cli import trend_json
 from shipdrag_ros.cli.arguments import add_json, add_report
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
-from shipdrag_ros.errors import FleetError, ShipFileError
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.errors import FleetError
+from shipdrag_ros.library.trending import trends_of
 
 if TYPE_CHECKING:
-    from shipdrag_ros.fleet.events import HullEvent
     from shipdrag_ros.trend import ShipTrend
 
 
@@ -58,53 +57,6 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'report in {options.report}')
     output.json(trend_json.document(trends, skipped))
     return 0
-
-
-def trends_of(output: Output, store: Path) -> tuple[list[ShipTrend], list[tuple[str, str]]]:
-    """
-    Return the trend of every ship of a store, and what the fleet could not use.
-
-    Parameters
-    ----------
-    output
-        Told what of the ship files and of the events cannot be used.
-    store
-        Folder that `shipdrag fleet` has written.
-
-    Returns
-    -------
-    trends, skipped
-        In the order of their rank; bag and reason.
-    """
-    # Parquet takes long to import
-    from shipdrag_ros.fleet.store import read_bags, read_coastdowns
-    from shipdrag_ros.trend import fleet_trends
-
-    ships, events = _ships(output, store)
-    rows = read_coastdowns(store).to_pylist()
-    bags = read_bags(store).to_pylist()
-    skipped = [(row['bag'], row['error']) for row in bags if row['error'] is not None]
-    return fleet_trends(rows, ships, events), skipped
-
-
-def _ships(output: Output, store: Path) -> tuple[dict[str, Ship], dict[str, Sequence[HullEvent]]]:
-    """Return ship files and events that the store keeps; say which cannot be used."""
-    from shipdrag_ros.fleet.events import read_events
-    from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE
-    from shipdrag_ros.fleet.store import ship_texts
-
-    ships: dict[str, Ship] = {}
-    events: dict[str, Sequence[HullEvent]] = {}
-    for name, files in ship_texts(store).items():
-        if SHIP_FILE in files:
-            try:
-                ships[name] = Ship.from_yaml(files[SHIP_FILE], subject=f'ship file of {name!r}')
-            except ShipFileError as error:
-                output.log(f'{error}\nits prices are not used')
-        events[name], problems = read_events(files.get(EVENTS_FILE, ''))
-        for problem in problems:
-            output.log(f'{name}: {problem}')
-    return ships, events
 
 
 def _show(output: Output, trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]]) -> None:

@@ -16,8 +16,8 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import add_remap, bag, number
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.trend import trends_of
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
 from shipdrag_ros.live.serve import listen, serve

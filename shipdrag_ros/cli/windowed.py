@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import bag
-from shipdrag_ros.errors import BagError
+from shipdrag_ros.library.windowed import Span, WindowedRun
 
-Span = tuple[float, float]
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
 
 
@@ -21,13 +20,6 @@ class WindowedBag(NamedTuple):
     """A bag, and the window of it that was given, [s] from its start."""
 
     path: Path
-    window: Span | None
-
-
-class WindowedRun(NamedTuple):
-    """A run, and the window of it that was given, [s] from its start."""
-
-    run: Run
     window: Span | None
 
 
@@ -57,31 +49,6 @@ def windowed_bag(text: str) -> WindowedBag:
             'END, in s from the start of the bag'
         )
     return WindowedBag(bag(name), span)
-
-
-def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:
-    """
-    Refuse windows of one bag that overlap: what they share would count twice.
-
-    Raises
-    ------
-    BagError
-        If two runs hold the same part of a recording.
-    """
-    for number, one in enumerate(runs):
-        for other in runs[:number]:
-            if set(one.run.paths).isdisjoint(other.run.paths):
-                continue
-            first, second = (each.window or (0.0, math.inf) for each in (other, one))
-            if first[0] < second[1] and second[0] < first[1]:
-                raise BagError(
-                    f'{one.run.name!r} is given twice, {_told(first)} and {_told(second)}: they '
-                    'share a part, which is one run and not two; give windows that do not overlap'
-                )
-
-
-def _told(window: Span) -> str:
-    return 'whole' if math.isinf(window[1]) else f'{window[0]:g} to {window[1]:g} s'
 
 
 def open_windowed(

@@ -53,7 +53,7 @@ def motion_pictures(trace: RunTrace, *, after: str, mass_kg: float) -> tuple[Fig
             label, unit = TRACK_LABELS[compared.quantity]
             scale = speed_unit(mass_kg) if unit == 'm/s' else (1.0, unit)
             _draw_motion(top, compared, after, scale)
-            _draw_difference(bottom, compared, scale)
+            draw_difference(bottom, compared, scale)
             top.set_title(label, loc='left', fontsize=10)
             _legend(figure, top, bottom)
         figures.append(figure)
@@ -76,12 +76,34 @@ def _draw_motion(axis: Axes, compared: Compared, after: str, scale: tuple[float,
     axis.axvline(0.0, color='#777777', linewidth=0.8)
 
 
-def _draw_difference(axis: Axes, compared: Compared, scale: tuple[float, str]) -> None:
+def draw_difference(
+    axis: Axes,
+    compared: Compared,
+    scale: tuple[float, str],
+    *,
+    labels: tuple[str, str] = ('', ''),
+) -> None:
+    """
+    Draw measured less model on axes, over the band of the noise.
+
+    Parameters
+    ----------
+    axis
+    compared
+        What was measured, and both models.
+    scale
+        SI units in what is shown, and its name.
+    labels
+        Of the model before and after; empty ones stand in no legend.
+    """
     minutes = compared.time_s / 60.0
     spread = 2.0 * compared.sd / scale[0]
     axis.fill_between(minutes, -spread, spread, color=_BAND, linewidth=0, label=_BAND_LABEL)
-    axis.plot(minutes, (compared.measured - compared.before) / scale[0], **_BEFORE)
-    axis.plot(minutes, (compared.measured - compared.after) / scale[0], **_AFTER)
+    for values, label, style in (
+        (compared.before, labels[0], _BEFORE),
+        (compared.after, labels[1], _AFTER),
+    ):
+        axis.plot(minutes, (compared.measured - values) / scale[0], label=label or None, **style)
     axis.axvline(0.0, color='#777777', linewidth=0.8)
     axis.set_title('measured - model', loc='left', fontsize=9)
     axis.set_ylabel(f'[{scale[1]}]')

@@ -178,11 +178,44 @@ def clean_hull(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:
     return newtons, sd
 
 
-def usual_speed_m_s(estimates: Sequence[Estimate]) -> float:
+def usual_speed_m_s(estimates: Sequence[Estimate], ship: Ship | None) -> float:
     """
-    Return the speed that a ship is told at: 0.75 of the speed at the stop, median over runs.
+    Return the speed at which the figures of a ship are stated [m/s].
+
+    Parameters
+    ----------
+    estimates
+        Of one ship, at least one.
+    ship
+        Her `service_speed_m_s` (`economics`) holds where every run reaches it.
+
+    Returns
+    -------
+    float
+        Otherwise 0.75 of the speed at the stop, the median over runs.
     """
-    return _USUAL * float(np.median([each.curve.speed_m_s[-1] for each in estimates]))
+    spans = [(each.curve.speed_m_s[0], each.curve.speed_m_s[-1]) for each in estimates]
+    return usual_within(np.array(spans), ship)
+
+
+def usual_within(spans_m_s: Float64, ship: Ship | None) -> float:
+    """
+    Return the speed at which figures are stated, of curves that are known over these spans.
+
+    Parameters
+    ----------
+    spans_m_s : (n, 2)
+        Lowest and highest speed of each curve.
+    ship
+        As for `usual_speed_m_s`.
+    """
+    low, high = spans_m_s[:, 0].max(), spans_m_s[:, 1]
+    service = None
+    if ship is not None and ship.economics is not None:
+        service = ship.economics.service_speed_m_s
+    if service is not None and low <= service <= high.min():
+        return service
+    return _USUAL * float(np.median(high))
 
 
 def over_text(over: float, sd: float) -> str:

@@ -159,41 +159,53 @@ def resistance_picture(
     truth
         Speeds [m/s] and r [m/s²] of the simulation, where the record is simulated.
     """
-    scale = _PictureUnits.of(ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
-        axis = figure.subplots()
-        valid, whole = estimate.valid_curve, estimate.curve
-        if len(valid):
-            axis.axvspan(
-                valid.speed_m_s[0] / scale.speed,
-                valid.speed_m_s[-1] / scale.speed,
-                color='#eef3f7',
-                zorder=0,
-                label='valid range, Fr {:.3f} to {:.3f}'.format(*estimate.froude_valid),
-            )
-        if len(valid) < len(whole):
-            axis.plot(
-                whole.speed_m_s / scale.speed,
-                ship.mass_kg * whole.resistance_m_s2 / scale.force,
-                color='#777777',
-                linestyle=':',
-                label='outside: not to be used',
-            )
-        _draw_clean(axis, ship, scale, whole.speed_m_s)
-        _draw_force(axis, Force.of(valid, ship), scale, label='today')
-        if truth is not None:
-            axis.plot(
-                truth[0] / scale.speed,
-                ship.mass_kg * truth[1] / scale.force,
-                color=GREEN,
-                linestyle=(0, (1, 1)),
-                label='truth of the simulation',
-            )
-        _frame(axis, whole, valid, ship, scale)
-        _label(axis, scale, ship, speed_name(estimate))
-        axis.legend(loc='upper left')
+        draw_resistance(figure.subplots(), estimate, ship, truth=truth)
     return figure
+
+
+def draw_resistance(
+    axis: Axes,
+    estimate: Estimate,
+    ship: Ship,
+    *,
+    truth: tuple[Float64, Float64] | None = None,
+) -> None:
+    """
+    Draw on axes what `resistance_picture` shows.
+    """
+    scale = _PictureUnits.of(ship)
+    valid, whole = estimate.valid_curve, estimate.curve
+    if len(valid):
+        axis.axvspan(
+            valid.speed_m_s[0] / scale.speed,
+            valid.speed_m_s[-1] / scale.speed,
+            color='#eef3f7',
+            zorder=0,
+            label='valid range, Fr {:.3f} to {:.3f}'.format(*estimate.froude_valid),
+        )
+    if len(valid) < len(whole):
+        axis.plot(
+            whole.speed_m_s / scale.speed,
+            ship.mass_kg * whole.resistance_m_s2 / scale.force,
+            color='#777777',
+            linestyle=':',
+            label='outside: not to be used',
+        )
+    _draw_clean(axis, ship, scale, whole.speed_m_s)
+    _draw_force(axis, Force.of(valid, ship), scale, label='today')
+    if truth is not None:
+        axis.plot(
+            truth[0] / scale.speed,
+            ship.mass_kg * truth[1] / scale.force,
+            color=GREEN,
+            linestyle=(0, (1, 1)),
+            label='truth of the simulation',
+        )
+    _frame(axis, whole, valid, ship, scale)
+    _label(axis, scale, ship, speed_name(estimate))
+    axis.legend(loc='upper left')
 
 
 def power_picture(curve: ForceCurve, ship: Ship) -> Figure:
@@ -241,32 +253,44 @@ def curves_picture(
     combined
         The one curve of all; None where they are not combined.
     """
-    scale = _PictureUnits.of(ship)
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout='constrained')
-        axis = figure.subplots()
-        highest = max(float(curve.speed_m_s[-1]) for _, curve in dated)
-        _draw_clean(axis, ship, scale, np.linspace(0.02 * highest, highest, 101))
-        for number, (label, curve) in enumerate(dated):
-            color, style = _DATED[number % len(_DATED)]
-            force = Force.of(curve, ship)
-            if len(dated) == 1:
-                _draw_force(axis, force, scale, label=label)
-                continue
-            axis.plot(
-                force.speed_m_s / scale.speed,
-                force.newtons / scale.force,
-                color=color,
-                linestyle=style,
-                linewidth=0.9,
-                label=label if len(dated) <= _NAMED or number == 0 else '',
-            )
-        if combined is not None:
-            _draw_force(axis, Force.of(combined, ship), scale, label='all together')
-        _label(axis, scale, ship, 'speed through water')
-        axis.set_ylim(bottom=0.0)
-        axis.legend(loc='upper left', fontsize=7)
+        draw_curves(figure.subplots(), dated, ship, combined=combined)
     return figure
+
+
+def draw_curves(
+    axis: Axes,
+    dated: Sequence[tuple[str, ResistanceCurve]],
+    ship: Ship,
+    *,
+    combined: Combined | None = None,
+) -> None:
+    """
+    Draw on axes what `curves_picture` shows.
+    """
+    scale = _PictureUnits.of(ship)
+    highest = max(float(curve.speed_m_s[-1]) for _, curve in dated)
+    _draw_clean(axis, ship, scale, np.linspace(0.02 * highest, highest, 101))
+    for number, (label, curve) in enumerate(dated):
+        color, style = _DATED[number % len(_DATED)]
+        force = Force.of(curve, ship)
+        if len(dated) == 1:
+            _draw_force(axis, force, scale, label=label)
+            continue
+        axis.plot(
+            force.speed_m_s / scale.speed,
+            force.newtons / scale.force,
+            color=color,
+            linestyle=style,
+            linewidth=0.9,
+            label=label if len(dated) <= _NAMED or number == 0 else '',
+        )
+    if combined is not None:
+        _draw_force(axis, Force.of(combined, ship), scale, label='all together')
+    _label(axis, scale, ship, 'speed through water')
+    axis.set_ylim(bottom=0.0)
+    axis.legend(loc='upper left', fontsize=7)
 
 
 @dataclass(frozen=True)

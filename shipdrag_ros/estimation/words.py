@@ -80,7 +80,7 @@ def in_service(estimates: Sequence[Estimate], ship: Ship) -> tuple[str, ...]:
     usable = [each for each in estimates if len(each.valid_curve)]
     if not usable:
         return ()
-    usual = usual_speed_m_s(usable)
+    usual = usual_speed_m_s(usable, ship)
     lines, missing = [], ''
     for each in usable:
         curve = each.valid_curve

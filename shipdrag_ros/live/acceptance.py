@@ -163,13 +163,24 @@ def course_check(turned_rad: float | None, *, coasting: bool) -> Check:
     return Check(name, Held.YES if held else Held.NO, text)
 
 
-def reciprocal_check(steer_deg: float | None, *, paired: bool) -> Check:
+def reciprocal_check(steer_deg: float | None, *, paired: bool, coasting: bool = False) -> Check:
     """
     Say whether the run on the other heading is made.
+
+    Parameters
+    ----------
+    steer_deg
+        The heading that it needs; None where there is no first run.
+    paired
+        Whether it is made.
+    coasting
+        Whether a run is under way.
     """
     name = 'Reciprocal run'
     if paired:
         return Check(name, Held.YES, 'done: current and log are told apart')
     if steer_deg is None:
         return Check(name, Held.WAIT, 'after the first run')
+    if coasting:
+        return Check(name, Held.WAIT, f'this run, if on {heading(steer_deg)}')
     return Check(name, Held.WAIT, f'still to do: steer {heading(steer_deg)}')

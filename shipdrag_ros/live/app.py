@@ -199,14 +199,13 @@ class LivePage:
         )
 
     async def _deltas(self, request: Request) -> Response:
-        found = signal_k.delta(self._source.bridge, time.monotonic())
-        return JSONResponse([signal_k.units(), *([] if found is None else [found])])
+        return JSONResponse([signal_k.units(), *self.deltas()])
 
-    def delta(self) -> dict[str, Any] | None:
+    def deltas(self) -> list[dict[str, Any]]:
         """
-        Return the latest figures as a Signal K delta.
+        Return the latest figures as Signal K deltas.
         """
-        return signal_k.delta(self._source.bridge, time.monotonic())
+        return signal_k.deltas(self._source.bridge, time.monotonic())
 
 
 class _Stream:

@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-import numpy as np
-
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, verdicts
 from shipdrag_ros.live.earlier import PastRun
+from shipdrag_ros.live.figures import at_usual_speed, curve_part, past_part, ship_part
 from shipdrag_ros.live.headline import ENDED_S, GOAL, Ended, Situation, headline
 from shipdrag_ros.live.outlook import to_go_s
 from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
@@ -26,8 +25,6 @@ from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
 PAST_RUNS = 50  # that are listed
-_CLEAN_POINTS = 60
-_PAST_POINTS = 24
 _MESSAGES = 20
 _COURSE_S = 300
 
@@ -172,7 +169,7 @@ class Bridge:
                 self._curve = curve
                 if self._coast_ns is not None and curve.stamp_ns > self._coast_ns:
                     age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
-                    self._bands.append((age_s, curve.band))
+                    self._bands.append((age_s, curve.band(self._ship)))
         elif name == 'events':
             self._take_event(payload)
 
@@ -182,7 +179,10 @@ class Bridge:
         if note.kind is EventKind.ONSET:
             self._begin(int(note.values['start_ns']))
         elif note.kind is EventKind.COASTDOWN:
-            self.add_past(PastRun.of(note, self._curve, bag=self._bag))
+            run = PastRun.of(note, self._curve, bag=self._bag)
+            self.add_past(run)
+            if run.curve is None:
+                self._curve = None  # what was drawn of it is no result
             self._coast_ns = None
         elif note.kind is EventKind.RESET:
             self._coast_ns = None
@@ -216,13 +216,13 @@ class Bridge:
         said = headline(now)
         return {
             'headline': {'tone': said.tone.value, 'text': said.text, 'action': said.action},
-            'ship': self._ship_part(),
+            'ship': ship_part(self._ship),
             'figures': self._figures(),
-            'curve': _curve_part(self._curve),
+            'curve': curve_part(self._curve),
             'inputs': self._inputs(),
             'checks': self._checks(now),
             'verdict': self._verdict_part(),
-            'past': [self._past_part(run) for run in self.past[-PAST_RUNS:]],
+            'past': [past_part(run, self._ship) for run in self.past[-PAST_RUNS:]],
             'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
         }
 
@@ -259,7 +259,7 @@ class Bridge:
         return Ended(
             by=last.ended_by,
             ago_s=self._now_s - last.end_ns * 1e-9,
-            band=None if last.curve is None else last.curve.band,
+            band=None if last.curve is None else last.curve.band(self._ship),
             why_not=last.why_not,
         )
 
@@ -274,39 +274,18 @@ class Bridge:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
-    def _ship_part(self) -> Part:
-        ship = self._ship
-        if ship is None:
-            return None
-        part: dict[str, Any] = {'name': ship.name, 'mass_kg': ship.mass_kg, 'clean': None}
-        if ship.baseline is not None:
-            low, high = ship.baseline_range_m_s
-            speed = np.linspace(max(low, 0.02 * high), high, _CLEAN_POINTS)
-            part['clean'] = {
-                'speed_m_s': _rounded(speed),
-                'resistance_n': _rounded(ship.resistance_n(speed)),
-            }
-        return part
-
     def _figures(self) -> Part:
         figures: dict[str, Any] = {'speed_m_s': self.speed_m_s}
         if self._resistance is not None:
             figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
+        ended = [run for run in self.past if run.curve is not None]
         if self._curve is not None:
-            at = self._curve.usual_m_s
-            r, sigma = self._curve.at(at)
-            figures['usual'] = {'speed_m_s': at, 'r': r, 'r_sigma': sigma, **self._over(at, r)}
+            figures['usual'] = at_usual_speed(self._curve, self._ship)
+        elif ended and self._coast_ns is None and ended[-1].curve is not None:
+            figures['usual'] = at_usual_speed(ended[-1].curve, self._ship)
+        if 'usual' in figures and self._coast_ns is None and ended:
+            figures['usual']['run_s'] = ended[-1].start_ns // 1_000_000_000  # not of now
         return figures
-
-    def _over(self, speed_m_s: float, r: float) -> dict[str, float]:
-        """Return r over the clean hull at a speed, where that is known."""
-        ship = self._ship
-        if ship is None or ship.baseline is None:
-            return {}
-        low, high = ship.baseline_range_m_s
-        if not low < speed_m_s <= high:
-            return {}
-        return {'over_clean': r * ship.mass_kg / float(ship.resistance_n(speed_m_s)) - 1.0}
 
     def _inputs(self) -> Part:
         if self._health is None:
@@ -350,7 +329,7 @@ class Bridge:
             acceptance.depth_check(depth and depth[0], self.speed_m_s, self._ship),
             acceptance.rudder_check(rudder and rudder[0]),
             acceptance.course_check(turned, coasting=coasting),
-            acceptance.reciprocal_check(now.steer_deg, paired=self._is_paired),
+            acceptance.reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
         ]
         return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]
 
@@ -363,34 +342,3 @@ class Bridge:
             'probabilities': [list(each) for each in view.probabilities],
             'decide': list(view.decide),
         }
-
-    def _past_part(self, run: PastRun) -> Part:
-        part: dict[str, Any] = {
-            'start_s': run.start_ns // 1_000_000_000,
-            'length_s': (run.end_ns - run.start_ns) * 1e-9,
-            'heading_deg': run.compass_deg,
-            'ended_by': run.ended_by,
-            'why_not': run.why_not,
-            'bag': run.bag,
-        }
-        if run.curve is not None:
-            at = run.curve.usual_m_s
-            r, sigma = run.curve.at(at)
-            part |= {'speed_m_s': at, 'r': r, 'r_sigma': sigma, **self._over(at, r)}
-            part['curve'] = _curve_part(run.curve, points=_PAST_POINTS)
-        return part
-
-
-def _curve_part(curve: Curve | None, *, points: int = 60) -> Part:
-    if curve is None:
-        return None
-    speed = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], points)
-    return {
-        'speed_m_s': _rounded(speed),
-        'r': _rounded(np.interp(speed, curve.speed_m_s, curve.resistance_m_s2)),
-        'r_sigma': _rounded(np.interp(speed, curve.speed_m_s, curve.sigma_m_s2)),
-    }
-
-
-def _rounded(values: Any) -> list[float]:
-    return [float(f'{value:.5g}') for value in np.asarray(values).tolist()]

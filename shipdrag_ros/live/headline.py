@@ -205,7 +205,7 @@ def _then(now: Situation) -> str:
 def _before(now: Situation) -> Headline:
     hold = 'Hold course and revolutions.'
     if now.steer_deg is not None:
-        hold = f'Hold {heading(now.steer_deg)} (reciprocal) and revolutions.'
+        hold = f'Steer {heading(now.steer_deg)} (reciprocal) and hold it and the revolutions.'
     if now.lead_s is None or now.lead_full_s is None:
         return Headline(Tone.WATCH, 'STEADY' if now.monitor == 'steady' else 'WAITING', hold)
     if now.monitor != 'steady' or now.lead_s <= 0.0:
@@ -215,7 +215,8 @@ def _before(now: Situation) -> Headline:
     if now.lead_s < ready_s:
         more = math.ceil((ready_s - now.lead_s) / 60.0)
         return Headline(Tone.WATCH, text, f'{hold} Ready in {more} min.')
-    action = 'The engine may be stopped, if the master decides so. Until then hold course.'
+    course = 'course' if now.steer_deg is None else f'{heading(now.steer_deg)} (reciprocal)'
+    action = f'The engine may be stopped, if the master decides so. Until then hold {course}.'
     return Headline(Tone.GOOD, f'{text}: record ready', action)
 
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.estimation.force import usual_within
 from shipdrag_ros.messages import MalformedMessage, types
 from shipdrag_ros.messages.reporting import CURVE_FIELDS
 from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE, SPEED
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
 
 
 @dataclass(frozen=True)
@@ -46,15 +48,18 @@ class Curve:
         r = np.interp(speed_m_s, self.speed_m_s, self.resistance_m_s2)
         return float(r), float(np.interp(speed_m_s, self.speed_m_s, self.sigma_m_s2))
 
-    @property
-    def usual_m_s(self) -> float:
-        """Three quarters of the highest speed; where the curve ends above it, its lowest."""
-        return max(0.75 * float(self.speed_m_s[-1]), float(self.speed_m_s[0]))
+    def usual_m_s(self, ship: Ship | None) -> float:
+        """
+        Return the speed at which figures are stated; where the curve ends above it, its lowest.
+        """
+        span = np.array([[self.speed_m_s[0], self.speed_m_s[-1]]])
+        return max(usual_within(span, ship), float(self.speed_m_s[0]))
 
-    @property
-    def band(self) -> float:
-        """Two standard deviations over r, at the usual speed."""
-        r, sigma = self.at(self.usual_m_s)
+    def band(self, ship: Ship | None) -> float:
+        """
+        Return two standard deviations over r, at the speed at which figures are stated.
+        """
+        r, sigma = self.at(self.usual_m_s(ship))
         return 2.0 * sigma / r if r > 0.0 else math.inf
 
 

@@ -99,7 +99,7 @@ def serve(
     async def run() -> None:
         sending = None
         if deltas is not None:
-            sending = asyncio.create_task(serve_deltas(page.delta, deltas))
+            sending = asyncio.create_task(serve_deltas(page.deltas, deltas))
         if until is not None:
             asyncio.create_task(_end_when(until, server))  # noqa: RUF006
         await server.serve(sockets=sockets)

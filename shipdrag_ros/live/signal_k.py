@@ -9,6 +9,7 @@ the path that every instrument knows.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
@@ -39,9 +40,9 @@ def hello() -> dict[str, Any]:
     }
 
 
-def delta(bridge: Bridge, now_s: float) -> dict[str, Any] | None:
+def deltas(bridge: Bridge, now_s: float) -> list[dict[str, Any]]:
     """
-    Return the latest figures as a delta; None before there are any.
+    Return the latest figures and the state as deltas; none before there are any.
 
     Parameters
     ----------
@@ -49,19 +50,12 @@ def delta(bridge: Bridge, now_s: float) -> dict[str, Any] | None:
         On the clock of the bridge.
     """
     if not bridge.now_ns:
-        return None
+        return []
     parts = bridge.parts(now_s)
     figures, said = parts['figures'], parts['headline']
     assert isinstance(figures, dict)
     assert isinstance(said, dict)
-    values: dict[str, Any] = {
-        'navigation.speedThroughWater': figures['speed_m_s'],
-        'notifications.performance.shipdrag': {
-            'state': _ALARMS[said['tone']],
-            'method': ['visual'],
-            'message': f'{said["text"]}. {said["action"]}',
-        },
-    }
+    values: dict[str, Any] = {'navigation.speedThroughWater': figures['speed_m_s']}
     ship, r = bridge.ship, bridge.resistance
     if r is not None:
         values['performance.shipdrag.specificResistance'] = r.value
@@ -71,9 +65,22 @@ def delta(bridge: Bridge, now_s: float) -> dict[str, Any] | None:
         values['performance.shipdrag.resistance'] = force_n
         values['performance.shipdrag.effectivePower'] = force_n * usual['speed_m_s']
         values['performance.shipdrag.overCleanHull'] = usual.get('over_clean')
-    told = [{'path': path, 'value': value} for path, value in values.items() if _is_known(value)]
-    update = {'source': SOURCE, 'timestamp': _time(bridge.now_ns * 1e-9), 'values': told}
-    return {'context': 'vessels.self', 'updates': [update]}
+    notice = {
+        'state': _ALARMS[said['tone']],
+        'method': ['visual'],
+        'message': f'{said["text"]}. {said["action"]}',
+    }
+    time = _time(bridge.now_ns * 1e-9)
+    # apart: signalk-server names itself as the source of all that stands beside a notification
+    told = (_values(values), _values({'notifications.performance.shipdrag': notice}))
+    return [
+        {
+            'context': 'vessels.self',
+            'updates': [{'source': SOURCE, 'timestamp': time, 'values': each}],
+        }
+        for each in told
+        if each
+    ]
 
 
 def units() -> dict[str, Any]:
@@ -82,6 +89,10 @@ def units() -> dict[str, Any]:
     """
     meta = [{'path': path, 'value': {'units': unit}} for path, unit in UNITS.items()]
     return {'context': 'vessels.self', 'updates': [{'source': SOURCE, 'meta': meta}]}
+
+
+def _values(values: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [{'path': path, 'value': value} for path, value in values.items() if _is_known(value)]
 
 
 def _is_known(value: object) -> bool:

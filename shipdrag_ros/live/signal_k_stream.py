@@ -17,7 +17,7 @@ _BEHIND_BYTES = 65536  # a listener who is further behind is let go
 
 
 async def serve_deltas(
-    latest: Callable[[], dict[str, Any] | None], listening: socket.socket
+    latest: Callable[[], list[dict[str, Any]]], listening: socket.socket
 ) -> None:
     """
     Send deltas to whoever connects, until cancelled.
@@ -25,7 +25,7 @@ async def serve_deltas(
     Parameters
     ----------
     latest
-        Returns the latest figures, None before there are any.
+        Returns the latest figures, none before there are any.
     listening
         A socket that listens.
     """
@@ -42,8 +42,8 @@ async def serve_deltas(
     try:
         while True:
             await asyncio.sleep(EVERY_S)
-            found = latest()
-            if found is None:
+            found = b''.join(_line(each) for each in latest())
+            if not found:
                 continue
             for writer in list(listeners):
                 transport = writer.transport
@@ -51,7 +51,7 @@ async def serve_deltas(
                     transport.abort()
                     listeners.discard(writer)
                 else:
-                    writer.write(_line(found))
+                    writer.write(found)
     finally:
         server.close()
         for writer in listeners:

@@ -66,7 +66,7 @@ def common_speed_m_s(runs: Sequence[RunResult]) -> float:
     Return the speed at which coastdowns are compared; 0 where none gave an estimate.
     """
     found = [part.estimate for run in runs for part in run.coastdowns if part.estimate is not None]
-    return usual_speed_m_s(found) if found else 0.0
+    return usual_speed_m_s(found, runs[0].ship) if found else 0.0
 
 
 def inputs_table(inputs: Mapping[str, InputCounts]) -> Table:

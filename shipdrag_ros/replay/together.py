@@ -91,7 +91,7 @@ def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
     high = min(each.valid_curve.speed_m_s[-1] for each in usable)
     if low > high:
         return ''  # no speed in common: `combine` says so
-    speed = float(np.clip(usual_speed_m_s(usable), low, high))
+    speed = float(np.clip(usual_speed_m_s(usable, ship), low, high))
     means = [_mean(campaign, speed) for campaign in campaigns]
     far = max(
         abs(one[0] - other[0]) / np.hypot(one[1], other[1])

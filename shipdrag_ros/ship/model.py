@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import MISSING, dataclass
 from functools import cached_property
+from importlib import resources
 from os import PathLike
 
 import numpy as np
@@ -114,6 +115,18 @@ class Ship:
         """
         content = text_of(path, what='a ship file', error=ShipFileError)
         return cls.from_yaml(content, subject=str(path))
+
+    @classmethod
+    def example(cls) -> Ship:
+        """
+        Return the ship of the examples, a cargo ship of 150 m with a baseline.
+
+        Returns
+        -------
+        Ship
+            That of `config/vitus_bering.yaml`.
+        """
+        return cls.load(str(resources.files('shipdrag_ros') / 'data' / 'vitus_bering.yaml'))
 
     @classmethod
     def from_yaml(cls, content: str, *, subject: str) -> Ship:

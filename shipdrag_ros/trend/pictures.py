@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from shipdrag_ros.display import Picture
@@ -24,54 +25,60 @@ def added_resistance(trend: ShipTrend) -> Picture:
     trend
         With a curve.
     """
-    assert trend.curve is not None
     with rc_context(STYLE):
         figure = Figure(figsize=_SIZE, layout='constrained')
-        axes = figure.add_subplot()
-        days = _days(trend.curve.time_ns)
-        value, sd = 100.0 * trend.curve.value, 100.0 * trend.curve.sd
-        axes.fill_between(days, value - 2.0 * sd, value + 2.0 * sd, color=BLUE, alpha=0.2, lw=0)
-        axes.plot(days, value, color=BLUE, label='hull, with its band of two sd')
-        shown = trend.points
-        for used, colour, marker, label in (
-            (True, '#333333', 'o', 'a coastdown, one sd'),
-            (False, VERMILION, 'x', 'outlier, or not used'),
-        ):
-            points = [each for each in shown if each.used is used and np.isfinite(each.value)]
-            if points:
-                axes.errorbar(
-                    _days(np.array([each.time_ns for each in points])),
-                    [100.0 * each.value for each in points],
-                    yerr=[100.0 * each.sd_repeatable for each in points],
-                    fmt=marker,
-                    ms=4,
-                    lw=0.8,
-                    color=colour,
-                    label=label,
-                )
-        for event in trend.events:
-            day = float(_days(np.array([event.time_ns]))[0])
-            axes.axvline(day, color=ORANGE, ls='-' if event.known else '--', lw=1.2)
-            text = event.kind.replace('_', ' ') if event.known else 'step found'
-            axes.annotate(
-                text,
-                (day, 1.0),
-                xycoords=('data', 'axes fraction'),
-                rotation=90,
-                va='top',
-                ha='right',
-                fontsize=8,
-            )
-        axes.axhline(0.0, color='#333333', lw=0.8)
-        axes.set_ylabel('resistance over the clean hull [%]')
-        axes.set_xlabel('date (UTC)')
-        axes.xaxis_date()
-        axes.legend(loc='upper left')
+        draw_added_resistance(figure.add_subplot(), trend)
     return picture(
         figure,
         'Each point is a coastdown. Where the line rises, the hull fouls; where it drops at a '
         'vertical line, something was taken off it: solid, by the log book; dashed, found here.',
     )
+
+
+def draw_added_resistance(axes: Axes, trend: ShipTrend) -> None:
+    """
+    Draw on axes what `added_resistance` shows.
+    """
+    assert trend.curve is not None
+    days = _days(trend.curve.time_ns)
+    value, sd = 100.0 * trend.curve.value, 100.0 * trend.curve.sd
+    axes.fill_between(days, value - 2.0 * sd, value + 2.0 * sd, color=BLUE, alpha=0.2, lw=0)
+    axes.plot(days, value, color=BLUE, label='hull, with its band of two sd')
+    shown = trend.points
+    for used, colour, marker, label in (
+        (True, '#333333', 'o', 'a coastdown, one sd'),
+        (False, VERMILION, 'x', 'outlier, or not used'),
+    ):
+        points = [each for each in shown if each.used is used and np.isfinite(each.value)]
+        if points:
+            axes.errorbar(
+                _days(np.array([each.time_ns for each in points])),
+                [100.0 * each.value for each in points],
+                yerr=[100.0 * each.sd_repeatable for each in points],
+                fmt=marker,
+                ms=4,
+                lw=0.8,
+                color=colour,
+                label=label,
+            )
+    for event in trend.events:
+        day = float(_days(np.array([event.time_ns]))[0])
+        axes.axvline(day, color=ORANGE, ls='-' if event.known else '--', lw=1.2)
+        text = event.kind.replace('_', ' ') if event.known else 'step found'
+        axes.annotate(
+            text,
+            (day, 1.0),
+            xycoords=('data', 'axes fraction'),
+            rotation=90,
+            va='top',
+            ha='right',
+            fontsize=8,
+        )
+    axes.axhline(0.0, color='#333333', lw=0.8)
+    axes.set_ylabel('resistance over the clean hull [%]')
+    axes.set_xlabel('date (UTC)')
+    axes.xaxis_date()
+    axes.legend(loc='upper left')
 
 
 def _days(time_ns: Int64) -> Float64:

@@ -13,9 +13,9 @@ import pytest
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli import main
-from shipdrag_ros.cli.diagnose import coasts_of
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import WindowedBag, open_windowed
+from shipdrag_ros.library.diagnosing import coasts_of
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors

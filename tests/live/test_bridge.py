@@ -112,16 +112,17 @@ def test_two_bags_make_a_pair_and_seeking_back_shows_what_was(bags: list[Path]) 
 def test_deltas_are_what_signal_k_asks_for(bags: list[Path]) -> None:
     source = BagSource(open_runs(bags[:1]), ship=None, speed=100.0)
     try:
-        assert signal_k.delta(Bridge(), 0.0) is None
-        found = signal_k.delta(source.bridge, settled(source, 0.0))
+        assert signal_k.deltas(Bridge(), 0.0) == []
+        found = signal_k.deltas(source.bridge, settled(source, 0.0))
     finally:
         source.close()
-    assert found is not None
     assert json.loads(json.dumps(found, allow_nan=False)) == found
-    assert found['context'] == 'vessels.self'
-    (update,) = found['updates']
-    assert update['timestamp'].endswith('Z')
-    values = {each['path']: each['value'] for each in update['values']}
+    values = {}
+    for delta in found:
+        assert delta['context'] == 'vessels.self'
+        (update,) = delta['updates']
+        assert update['timestamp'].endswith('Z')
+        values |= {each['path']: each['value'] for each in update['values']}
     told = {path for path in values if not path.startswith('notifications.')}
     (meta,) = signal_k.units()['updates']
     assert told == {each['path'] for each in meta['meta']}
@@ -209,6 +210,7 @@ def test_a_verdict_is_read_from_the_status_of_the_node() -> None:
         (acceptance.course_check(math.radians(359.0), coasting=True), Held.YES),
         (acceptance.course_check(math.radians(-30.0), coasting=True), Held.NO),
         (acceptance.reciprocal_check(270.0, paired=False), Held.WAIT),
+        (acceptance.reciprocal_check(270.0, paired=False, coasting=True), Held.WAIT),
         (acceptance.reciprocal_check(None, paired=True), Held.YES),
     ],
 )

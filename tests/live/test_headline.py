@@ -28,7 +28,7 @@ ENDED = Ended(by='turn', ago_s=20.0, band=0.04)
         (STEADY, 'STEADY 24 of 30 min: record ready', 'if the master decides so'),
         (replace(STEADY, lead_s=130.0), 'STEADY 2 of 30 min', 'Ready in 8 min'),
         (replace(STEADY, lead_s=0.0), 'NOT STEADY YET', 'Hold course'),
-        (replace(STEADY, lead_s=0.0, steer_deg=269.6), 'NOT STEADY YET', 'Hold 270'),
+        (replace(STEADY, lead_s=0.0, steer_deg=269.6), 'NOT STEADY YET', 'Steer 270'),
         (replace(STEADY, monitor='candidate'), 'SLOWING', 'rudder amidships'),
         (COASTING, 'COASTDOWN 6:40', 'Hold the rudder'),
         (replace(COASTING, band=0.09, to_go_s=299.0), 'COASTDOWN 6:40, ±9 %', '5 more minutes'),

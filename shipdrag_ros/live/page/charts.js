@@ -54,7 +54,8 @@ export class Chart {
 
   draw(key, options, data) {
     const whole = `${key} ${document.documentElement.dataset.mode}`;
-    if (this.plot && this.key === whole) { this.plot.setData(data); return; }
+    this.data = data;
+    if (this.plot && this.key === whole) { this.plot.setData(data); this.name(); return; }
     this.clear();
     this.key = whole;
     const made = options();
@@ -68,6 +69,14 @@ export class Chart {
         this.legend.append(item);
       }
       return value;
+    });
+    this.name();
+  }
+
+  /** A line of which there is nothing has no name in the legend. */
+  name() {
+    this.values.forEach((value, i) => {
+      if (i && value.parentElement) value.parentElement.hidden = !this.data[i].some(v => v != null);
     });
   }
 

@@ -2,7 +2,7 @@
 // The page: one picture, kept by frames from the server, drawn where it has changed.
 
 import { Chart, drawCurve, drawShafts, drawSpeeds } from './charts.js';
-import { BRIDGE, SI, dayAndTime, figure, heading, length, percent, timeOfDay } from './units.js';
+import { BRIDGE, SI, day, dayAndTime, figure, heading, length, percent, timeOfDay } from './units.js';
 
 const OLD_MS = 4000; // the server says something every second
 const AGAIN_MS = 2000;
@@ -104,7 +104,7 @@ function showClock(part) {
   const live = !part.ship_s || Math.abs(part.ship_s - part.machine_s) < 120;
   const seconds = live ? part.machine_s : part.ship_s;
   text('clock-kind', live ? 'Ship' : 'Record');
-  text('ship-time', timeOfDay(seconds, zone));
+  text('ship-time', live ? timeOfDay(seconds, zone) : `${day(seconds, zone)} ${timeOfDay(seconds, zone)}`);
   text('utc-time', timeOfDay(seconds, 0));
 }
 
@@ -127,7 +127,8 @@ function showFigures(part) {
   }
   const force = units.toForce(usual.r, mass);
   const spread = 2 * units.toForce(usual.r_sigma, mass);
-  const where = `at ${units.toSpeed(usual.speed_m_s).toFixed(1)} ${units.speed}`;
+  const run = usual.run_s == null ? 'this run' : `run of ${dayAndTime(usual.run_s, zone)}`;
+  const where = `at ${units.toSpeed(usual.speed_m_s).toFixed(1)} ${units.speed}, ${run}`;
   setFigure('figure-force', figure(force, spread), units.force, ` ± ${figure(spread, spread)}`);
   const share = usual.r_sigma / usual.r;
   text('note-force', where);
@@ -138,7 +139,7 @@ function showFigures(part) {
     setFigure('figure-over', '–', '', '');
     text('note-over', picture.ship?.clean ? 'outside of the baseline' : 'no baseline in the ship file');
   } else {
-    setFigure('figure-over', percent(usual.over_clean), '', ` ± ${(200 * share * (1 + usual.over_clean)).toFixed(0)} %`);
+    setFigure('figure-over', percent(usual.over_clean), '', ` ± ${(200 * usual.over_clean_sd).toFixed(0)} %`);
     text('note-over', where);
   }
 }
@@ -172,7 +173,9 @@ function showVerdict(part) {
   if (part.state === 'done') {
     shown.push(make('p', part.sentence));
     if (part.sizes.length) shown.push(make('h3', 'How large'), make('ul', part.sizes.map(([name, size]) => make('li', `${name}: ${size}`))));
-    if (part.probabilities.length) shown.push(make('h3', 'How probable'), make('ul', part.probabilities.filter(([, share]) => share >= 0.005).slice(0, 6).map(([name, share]) => make('li', `${name.replaceAll('_', ' ')}: ${(100 * share).toFixed(0)} %`))));
+    // what the sentence says already is not said twice
+    const probable = part.probabilities.filter(([name, share]) => share >= 0.005 && !part.sentence.includes(`${name.replaceAll('_', ' ')} (`)).slice(0, 6);
+    if (probable.length) shown.push(make('h3', 'How probable'), make('ul', probable.map(([name, share]) => make('li', `${name.replaceAll('_', ' ')}: ${(100 * share).toFixed(0)} %`))));
     if (part.decide.length) shown.push(make('h3', 'What would decide'), make('ul', part.decide.map(line => make('li', line))));
   } else {
     shown.push(make('p', WAITING[part.state] ?? `No diagnosis: ${part.sentence}`, { class: 'quiet' }));
@@ -215,11 +218,12 @@ function showCurve() {
   if (!mass && units !== SI) { text('curve-say', 'The ship is not known yet: no curve can be drawn in kN.'); return; }
   drawCurve(charts.curve, { curve, clean: ship?.clean, past, units, mass });
   const usual = picture.figures?.usual;
-  if (!curve || !usual) { text('curve-say', 'No curve yet: it grows while the ship coasts.'); return; }
+  if (!usual) { text('curve-say', 'No curve yet: it grows while the ship coasts.'); return; }
   const over = usual.over_clean;
+  const whose = usual.run_s == null ? 'this run' : `the run of ${dayAndTime(usual.run_s, zone)}`;
   const compared = over == null ? 'There is no clean hull to compare with.'
-    : `At ${units.toSpeed(usual.speed_m_s).toFixed(1)} ${units.speed} it lies ${Math.abs(100 * over).toFixed(0)} % ${over >= 0 ? 'over' : 'under'} the clean hull (dashed).`;
-  text('curve-say', `${compared} Band ± ${(200 * usual.r_sigma / usual.r).toFixed(0)} %.`);
+    : `At ${units.toSpeed(usual.speed_m_s).toFixed(1)} ${units.speed} ${whose} lies ${Math.abs(100 * over).toFixed(0)} % ${over >= 0 ? 'over' : 'under'} the clean hull (dashed).`;
+  text('curve-say', `${compared} Band of the curve ± ${(200 * usual.r_sigma / usual.r).toFixed(0)} %.`);
 }
 
 function sameCurve(one, other) {
@@ -238,7 +242,7 @@ function showTraces() {
   el('shafts').hidden = !turning;
   if (turning) {
     drawShafts(charts.shafts, rows, span, zone);
-    text('shaft-say', last[4] == null ? 'Not read in the last second.' : `Now: ${(last[4] * 60 / (2 * Math.PI)).toFixed(0)} rpm.`);
+    text('shaft-say', last[4] == null ? 'Not read in the last second.' : `Now: ${Math.round(last[4] * 60 / (2 * Math.PI)) || 0} rpm.`);
   }
   requestAnimationFrame(() => { window.shipdrag.late.push(Date.now()); if (window.shipdrag.late.length > 1000) window.shipdrag.late.shift(); });
 }
@@ -272,7 +276,7 @@ async function control(action, value = 0) {
 
 function setMode(mode) {
   document.documentElement.dataset.mode = mode;
-  text('mode', mode[0].toUpperCase() + mode.slice(1));
+  text('mode', `Display: ${mode}`);
   keep('mode', mode);
   if (picture.headline) showAll();
 }
@@ -282,7 +286,7 @@ function nextMode() { setMode(MODES[(MODES.indexOf(document.documentElement.data
 function nextUnits() {
   units = units === SI ? BRIDGE : SI;
   keep('units', units === SI ? 'si' : 'bridge');
-  text('units', units.name);
+  text('units', `Units: ${units.name}`);
   showAll();
 }
 
@@ -295,7 +299,7 @@ function nextSpan() {
 function setUp() {
   const dark = matchMedia('(prefers-color-scheme: dark)').matches ? 'dusk' : 'day';
   setMode(MODES.includes(recall('mode')) ? recall('mode') : dark);
-  text('units', units.name);
+  text('units', `Units: ${units.name}`);
   const halves = Array.from({ length: 53 }, (_, i) => i / 2 - 12);
   el('zone').replaceChildren(...halves.map(h => make('option', `UTC${h < 0 ? '−' : '+'}${Math.abs(h)}`, { value: h })));
   el('zone').value = String(zone);

@@ -35,9 +35,13 @@ export function timeOfDay(seconds, offset, withSeconds = true) {
   return new Date((seconds + offset * 3600) * 1000).toISOString().slice(11, withSeconds ? 19 : 16);
 }
 
-export function dayAndTime(seconds, offset) {
+export function day(seconds, offset) {
   const moment = new Date((seconds + offset * 3600) * 1000);
-  return `${moment.getUTCDate()} ${MONTHS[moment.getUTCMonth()]} ${moment.toISOString().slice(11, 16)}`;
+  return `${moment.getUTCDate()} ${MONTHS[moment.getUTCMonth()]}`;
+}
+
+export function dayAndTime(seconds, offset) {
+  return `${day(seconds, offset)} ${timeOfDay(seconds, offset, false)}`;
 }
 
 export function length(seconds) {

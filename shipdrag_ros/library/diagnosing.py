@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs diagnosed together, by what they hold: coastdowns with a baseline or without, or none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from shipdrag_ros.bags import Run
+from shipdrag_ros.diagnosis import (
+    CoastRun,
+    Diagnosis,
+    SailingRecord,
+    diagnose,
+    diagnose_fitted,
+    diagnose_sailing,
+)
+from shipdrag_ros.diagnosis.result import ToldFact
+from shipdrag_ros.diagnosis.together import with_log_track
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.library.listener import Listener
+from shipdrag_ros.library.windowed import Span, WindowedRun
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import (
+    ReplayResult,
+    accepted_samples,
+    clocks_apart,
+    coast_windows,
+    replay,
+    why_no_coastdown,
+)
+from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.playback import SHIP_FILE
+from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
+from shipdrag_ros.ship.facts import overriding
+
+
+def diagnose_runs(
+    listener: Listener,
+    runs: Sequence[WindowedRun],
+    given: Ship | None,
+    facts: Sequence[Fact],
+) -> tuple[Diagnosis, Ship | None]:
+    """
+    Diagnose by what the records hold: coastdowns, or sailing alone.
+
+    Parameters
+    ----------
+    listener
+        Told what is found on the way.
+    runs
+        Together; effects of the earth are stated along the first.
+    given
+        The ship; None: the one attached to the first run that has one.
+    facts
+        Of all runs.
+
+    Returns
+    -------
+    found, ship
+        None where no ship is known.
+
+    Raises
+    ------
+    DiagnosisError
+        If neither a coastdown nor the log and the track can be examined.
+    """
+    windowed = any(window is not None for _, window in runs)
+    if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
+        why = 'without a ship file none is looked for; give one with --ship FILE'
+        return _unused(_sailing(runs, f'No coastdown was found: {why}.'), facts), None
+    seen = _found(listener, runs, given)
+    if not seen.coasts:
+        why = f'No coastdown was found {"; ".join(seen.without)}.'
+        return _unused(_sailing(runs, why), (*seen.ship.facts, *facts)), seen.ship
+    if seen.ship.baseline is None:
+        found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
+        found = _with_log_track(found, runs)
+    else:
+        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts)
+    unused = tuple(f'no coastdown was found {each}' for each in seen.without)
+    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
+
+
+def _with_log_track(found: Diagnosis, runs: Sequence[WindowedRun]) -> Diagnosis:
+    """Hold the logs against the ways over ground besides; a note says why not."""
+    try:
+        return with_log_track(found, _sailing(runs, ''))
+    except DiagnosisError as error:
+        why = f'the log was not held against the way over ground: {str(error).strip()}'
+        return replace(found, notes=(*found.notes, why))
+
+
+def _unused(found: Diagnosis, facts: Sequence[Fact]) -> Diagnosis:
+    """Say of facts that they were told and not used."""
+    return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
+
+
+def _sailing(runs: Sequence[WindowedRun], no_coastdown: str) -> Diagnosis:
+    """Hold the logs against the ways over ground."""
+    read = [(run.name, *accepted_samples(run, zeros=True)) for run, _ in runs]
+    records = [SailingRecord(name, block) for name, block, _ in read]
+    try:
+        return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
+    except DiagnosisError as error:
+        said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)
+        raise DiagnosisError(said) from error
+
+
+def coasts_of(
+    listener: Listener, runs: Sequence[WindowedRun], given: Ship | None
+) -> tuple[list[CoastRun], Ship, Parameters]:
+    """
+    Find the coastdowns of all bags.
+
+    Parameters
+    ----------
+    listener
+        Told what is found on the way.
+    runs
+        Where to look.
+    given
+        The ship; None: the one attached to the first run.
+
+    Returns
+    -------
+    coasts, ship, parameters
+        The ship given, or that of the first bag; the parameters of the first.
+
+    Raises
+    ------
+    DiagnosisError
+        If there is none.
+    """
+    seen = _found(listener, runs, given)
+    if not seen.coasts:
+        raise DiagnosisError(
+            f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
+            'was stopped after steady sailing'
+        )
+    for each in seen.without:
+        listener.log(f'no coastdown was found {each}')
+    return seen.coasts, seen.ship, seen.parameters
+
+
+@dataclass(frozen=True)
+class _Coastdowns:
+    """The coastdowns of all bags, their estimates, and of each bag without one why."""
+
+    coasts: list[CoastRun]
+    ship: Ship
+    parameters: Parameters
+    without: tuple[str, ...]
+    estimates: tuple[Estimate, ...]
+
+
+def _found(
+    listener: Listener,
+    runs: Sequence[WindowedRun],
+    given: Ship | None,
+) -> _Coastdowns:
+    """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
+    coasts: list[CoastRun] = []
+    without: list[str] = []
+    estimates: list[Estimate] = []
+    ship, parameters = given, None
+    for each, window in runs:
+        with listener.progress(f'replaying {each.name}') as progress:
+            result = replay(each, ship=ship, window=window, progress=progress)
+        ship, parameters = ship or result.ship, parameters or result.parameters
+        sheet, of_run = _sheet(listener, each, ship)
+        for name in clocks_apart(result):
+            listener.log(
+                f'{each.name}: the clock of {name} is too slow or too fast, and on board it is '
+                'rejected; it is diagnosed all the same'
+            )
+        _tell_cuts(listener, result, window)
+        windows = coast_windows(result)
+        estimates += [part.estimate for part, _ in windows if part.estimate is not None]
+        if not windows:
+            without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
+        for place, (_, found) in enumerate(windows, start=1):
+            name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
+            coasts.append(CoastRun(name, found, sheet.facts, of_run))
+    assert ship is not None
+    assert parameters is not None
+    return _Coastdowns(coasts, ship, parameters, tuple(without), tuple(estimates))
+
+
+def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:
+    """Return what is known of a run alone, and the ship where she was another in it."""
+    path = run_sheet.find(run.paths)
+    if path is None:
+        return RunSheet(), None
+    sheet = RunSheet.load(path)
+    listener.log(f'{run.name}: {path} holds for this run')
+    of_run = sheet.of(ship, subject=str(path))
+    return sheet, None if of_run == ship else of_run
+
+
+def _tell_cuts(listener: Listener, result: ReplayResult, window: Span | None) -> None:
+    """Say what of the coastdowns was cut; a window of which nothing is left is an error."""
+    name = result.run.name
+    for coastdown in result.coastdowns:
+        if window is not None and coastdown.withdrawn:
+            raise DiagnosisError(
+                f'{name!r}: no coastdown from {window[0]:g} to {window[1]:g} s: '
+                f'{coastdown.failure}; give another window'
+            )
+        for line in cut_lines(coastdown, result.run.span_ns):
+            listener.log(f'{name}: {line}')

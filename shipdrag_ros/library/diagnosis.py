@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is missing in the model of a ship, from the coastdowns of records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from shipdrag_ros.diagnosis import Candidate, Compared, EffectEstimate, Gap, tables, with_effects
+from shipdrag_ros.diagnosis import Diagnosis as Found
+from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.display import Table, speed_unit
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.library.diagnosing import diagnose_runs
+from shipdrag_ros.library.listener import Notes
+from shipdrag_ros.library.record import Record
+from shipdrag_ros.library.resistance import records_of
+from shipdrag_ros.library.shown import Shown, drawing
+from shipdrag_ros.library.windowed import Span, WindowedRun, refuse_overlaps
+from shipdrag_ros.ship import Fact, Ship, parse_fact
+from shipdrag_ros.simulation.effects import LIBRARY
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
+    """
+    Which effect is missing in the model, how large it is, and the gap before and after.
+
+    Attributes
+    ----------
+    found
+        All that the diagnosis says.
+    ship
+        That the runs were held against; None where none is known.
+    notes
+        What was found on the way, a line each.
+
+    Raises
+    ------
+    DiagnosisError
+        By `ship_with_effects` where nothing is named, by `plot` without a run.
+
+    Notes
+    -----
+    Source: docs/architecture.md, the diagnosis.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> ship = sd.Ship.example()
+    >>> record = sd.simulate(ship, {'log_scale': -0.15}, duration_s=900.0, lead_in_s=400.0)
+    >>> found = sd.diagnose(record)
+    >>> found.verdict in ('named', 'one_of')
+    True
+    >>> found.gap_after.chi2_per_sample < found.gap_before.chi2_per_sample
+    True
+    """
+
+    found: Found
+    ship: Ship | None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """`none`, `named`, `one_of` or `unknown`."""
+        return str(self.found.verdict)
+
+    @property
+    def effects(self) -> tuple[EffectEstimate, ...]:
+        """What is missing, where it is named; otherwise empty."""
+        return self.found.effects
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The smallest set that holds 99 %, most probable first, with sizes."""
+        return self.found.candidates
+
+    @property
+    def gap_before(self) -> Gap:
+        """How far the model as stated and the data are apart."""
+        return self.found.before
+
+    @property
+    def gap_after(self) -> Gap | None:
+        """The same with what explains the runs; None where nothing was added."""
+        return self.found.after
+
+    def ship_with_effects(self) -> Ship:
+        """
+        Return the ship with the effect added that was named.
+
+        Raises
+        ------
+        DiagnosisError
+            If nothing is named.
+        """
+        if self.ship is None or not self.found.effects:
+            raise DiagnosisError(
+                f'the verdict is {self.verdict!r}, and nothing is named that could be added; '
+                'summary() says what would decide'
+            )
+        return with_effects(self.ship, self.found.effects)
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say the verdict, what was examined and where, and what would decide.
+        """
+        return (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
+
+    def table(self) -> Table:
+        """
+        Show how probable each answer is.
+        """
+        return self.found.table()
+
+    def gaps(self) -> Table:
+        """
+        Show how far model and data are apart, before and after.
+        """
+        return tables.gaps(self.found)
+
+    def plot(self, ax: Axes | None = None, *, run: int = 0, quantity: str | None = None) -> Axes:
+        """
+        Draw measured less model against time: as stated, and with what explains the run.
+
+        Parameters
+        ----------
+        ax
+            To draw on; None: new axes.
+        run
+            Which of the runs, from 0.
+        quantity
+            An input; None: the first of speeds and position that was measured.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            A good model stays inside the band of the noise.
+        """
+        from shipdrag_ros.diagnosis.pictures import draw_difference
+
+        compared = self._compared(run, quantity)
+        scale = (1.0, 'm')
+        if compared.quantity.startswith('speed'):
+            scale = speed_unit(0.0 if self.ship is None else self.ship.mass_kg)
+        added = diagnosis_words.added(self.found)
+        with drawing(ax) as axis:
+            draw_difference(axis, compared, scale, labels=('model as stated', added))
+            axis.legend()
+        return axis
+
+    def report(self, path: str | PathLike[str]) -> None:
+        """
+        Write the page that `shipdrag diagnose --report` writes.
+
+        Parameters
+        ----------
+        path
+            HTML file; an existing one is replaced.
+        """
+        from shipdrag_ros.diagnosis.page import write_diagnosis
+        from shipdrag_ros.diagnosis.score import Score
+
+        write_diagnosis(Path(path), self.found, self.ship, score=Score.published())
+
+    def _compared(self, run: int, quantity: str | None) -> Compared:
+        from shipdrag_ros.diagnosis.pictures import ALONG
+
+        traces = self.found.traces
+        if not 0 <= run < len(traces):
+            raise DiagnosisError(f'run {run} is not there; the diagnosis has {len(traces)} run(s)')
+        known = {each.quantity: each for each in traces[run].compared}
+        wanted = (quantity,) if quantity is not None else ALONG
+        for name in wanted:
+            if name in known:
+                return known[name]
+        raise DiagnosisError(f'{quantity!r} was not compared in this run, but {", ".join(known)}')
+
+    def _title(self) -> str:
+        name = '' if self.ship is None else self.ship.name
+        return f'{name or "a ship without a name"}, {self.verdict}: {_first(self.found)}'
+
+    def _columns(self) -> Mapping[str, Any]:
+        """Return a line for each size of each candidate; one without a size has one line."""
+        rows: list[tuple[Any, ...]] = []
+        for each in self.found.candidates:
+            names = ' and '.join(each.names) or 'none'
+            sized = [
+                (names, each.probability, effect.name, size.name, value.value, value.sd, size.unit)
+                for effect in each.effects
+                for size in LIBRARY[effect.name].parameters
+                for value in (effect.parameters[size.name],)
+            ]
+            rows += sized or [(names, each.probability, '', '', None, None, '')]
+        if self.found.unnamed:
+            rows.append(('unknown', self.found.unnamed, '', '', None, None, ''))
+        heads = ('candidate', 'probability', 'effect', 'parameter', 'value', 'sd', 'unit')
+        return {head: [row[place] for row in rows] for place, head in enumerate(heads)}
+
+
+def _first(found: Found) -> str:
+    """Name the most probable answer."""
+    answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
+    return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
+
+
+def diagnose(
+    records: Record | Sequence[Record],
+    *,
+    ship: Ship | None = None,
+    facts: Sequence[str] = (),
+    window: Span | None = None,
+) -> Diagnosis:
+    """
+    Name the effect that is missing in the model of a ship, as `shipdrag diagnose` does.
+
+    Parameters
+    ----------
+    records
+        Of one ship, from `read` or `simulate`; all their coastdowns are taken together,
+        and effects of the earth are stated along the first.
+    ship
+        To hold them against; None: that of the records.
+    facts
+        What a log book knows of all runs: `no_towed_cable`, `shaft=locked`.
+    window
+        Begin and end of the coastdown [s from the start of each run], instead of
+        looking for one.
+
+    Returns
+    -------
+    Diagnosis
+        A name only where the data can tell; a set and what would decide otherwise.
+
+    Raises
+    ------
+    BagError
+        If the same part of a recording is given twice.
+    DiagnosisError
+        If neither a coastdown nor the log and the track can be examined.
+    ShipFileError
+        If a fact or an attached ship file cannot be used.
+
+    Notes
+    -----
+    Source: docs/architecture.md, the diagnosis. The figures are those of the command
+    line, to the last bit.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)
+    >>> found = sd.diagnose(record, facts=['no_towed_cable', 'deep_water'])
+    >>> found.verdict
+    'none'
+    """
+    parts = records_of(records)
+    runs = [WindowedRun(run, window) for record in parts for run in record.runs]
+    refuse_overlaps(runs)
+    listener = Notes()
+    given: Sequence[Fact] = [parse_fact(text) for text in facts]
+    found, used = diagnose_runs(listener, runs, ship or parts[0].given, given)
+    return Diagnosis(found, used, tuple(listener.lines))

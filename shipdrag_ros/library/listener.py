@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who is told what happens while something long is done: a terminal, or nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Protocol
+
+Progress = Callable[[int, int], None]
+"""Told how much is done, and of how much."""
+
+
+class Listener(Protocol):
+    """Hears what is worth a line, and how far the work is."""
+
+    def log(self, text: str) -> None:
+        """
+        Take a line that is not part of the result.
+        """
+
+    def progress(self, text: str) -> AbstractContextManager[Progress]:
+        """
+        Hear how far the work is that `text` names.
+        """
+
+
+class Notes:
+    """
+    A listener that shows nothing and keeps the lines.
+
+    Attributes
+    ----------
+    lines
+        In the order they came.
+    """
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def log(self, text: str) -> None:
+        """
+        Keep a line.
+        """
+        self.lines.append(text)
+
+    def progress(self, text: str) -> AbstractContextManager[Progress]:
+        """
+        Show nothing.
+        """
+        return nullcontext(_ignore)
+
+
+def _ignore(done: int, total: int) -> None:
+    pass

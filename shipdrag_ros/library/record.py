@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was measured on one ship: the runs that a user has read or simulated."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shipdrag_ros.bags import Run
+from shipdrag_ros.display import Table, duration, speed_unit, utc
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.library.shown import Shown, drawing
+from shipdrag_ros.replay.playback import SHIP_FILE
+from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
+from shipdrag_ros.samples import SECOND_NS, Block, Channel, concatenate
+from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from shipdrag_ros.library.resistance import Coastdown
+
+_SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
+
+
+class Record(Shown):
+    """
+    What was measured on one ship, in one run or several.
+
+    `read` and `simulate` return it; it is not made directly.
+
+    Parameters
+    ----------
+    runs
+        In the order given.
+    given
+        The ship; None: the one attached to each run.
+    notes
+        What of the sources was not used, and why, a line each.
+    folder
+        Of bags that were made for this record; it goes when the record does.
+
+    Raises
+    ------
+    BagError
+        If there is no run.
+
+    Notes
+    -----
+    Source: docs/architecture.md, one sequence of samples in arrival order.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)
+    >>> record
+    <Record: Vitus Bering, 1 run, 5204 messages>
+    >>> print(record.summary()[1])
+    simulated: 1300 s (22 min) from 2026-06-01 08:00:00 UTC
+    >>> [coastdown.ended_by for coastdown in record.coastdowns()]
+    ['record_end']
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[Run],
+        *,
+        given: Ship | None = None,
+        notes: Sequence[str] = (),
+        folder: TemporaryDirectory[str] | None = None,
+    ) -> None:
+        if not runs:
+            raise BagError('no run was read; give a bag, a log or a table of measurements')
+        self.runs = tuple(runs)
+        self.given = given
+        self.notes = tuple(notes)
+        self._folder = folder
+
+    @property
+    def ship(self) -> Ship | None:
+        """The ship given, or the one attached to the first run; None: not known."""
+        text = self.runs[0].attachments.get(SHIP_FILE)
+        if self.given is not None or text is None:
+            return self.given
+        return Ship.from_yaml(text, subject=f'{self.runs[0].name}: {SHIP_FILE}')
+
+    @property
+    def truth(self) -> TrueCurve | None:
+        """The true r(v) of a simulated record; None of a measured one."""
+        text = self.runs[0].attachments.get(ATTACHMENT)
+        return None if text is None else TrueCurve.from_yaml(text, subject=self.runs[0].name)
+
+    def coastdowns(self) -> tuple[Coastdown, ...]:
+        """
+        Find the coastdowns and estimate r(v) from each, as the node would have.
+
+        Raises
+        ------
+        BagError
+            Without a ship, or without a usable input.
+        """
+        from shipdrag_ros.library.resistance import estimate
+
+        return estimate(self).coastdowns
+
+    def samples(self) -> Block:
+        """
+        Return all that was measured, in order of arrival, plausible or not.
+        """
+        items = (item for run in self.runs for item in run.inputs())
+        return concatenate([item for item in items if isinstance(item, Block)])
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """
+        Write a record of one run as a bag, which `read` and the command line take.
+
+        Raises
+        ------
+        BagError
+            If the file exists, or the record has several runs or files.
+        """
+        out = Path(path)
+        files = [file for run in self.runs for file in run.paths]
+        if len(files) != 1:
+            raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
+        if out.exists():
+            raise BagError(f'{str(out)!r} exists; choose another name or remove it')
+        shutil.copyfile(files[0], out)
+        return out
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say which ship it is, what each run holds, and what could not be used.
+        """
+        ship = self.ship
+        known = 'no ship is known: give one with ship=' if ship is None else ship.summary()
+        told = [f'{run.name}: {_when(run)}' for run in self.runs]
+        return (known, *told, *self.notes)
+
+    def table(self) -> Table:
+        """
+        Show the messages of each input.
+        """
+        counts: Counter[str] = Counter()
+        for run in self.runs:
+            for topic in run.topics:
+                counts[topic.input or f'{topic.topic} (not used)'] += topic.messages
+        rows = tuple((name, f'{count}') for name, count in counts.items())
+        return Table(('input', 'messages'), rows)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """
+        Draw the measured speed against time.
+
+        Parameters
+        ----------
+        ax
+            To draw on; None: new axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Speed in knots, of a model ship in m/s.
+        """
+        block, ship = self.samples(), self.ship
+        unit, unit_name = speed_unit(0.0 if ship is None else ship.mass_kg)
+        with drawing(ax) as axis:
+            for channel in _SPEEDS:
+                part = block[block.channel == channel]
+                if len(part):
+                    minutes = (part.stamp_ns - block.stamp_ns[0]) / (60.0 * SECOND_NS)
+                    label = channel.input.replace('_', ' ')
+                    axis.plot(minutes, part.value[:, 0] / unit, '.', markersize=2, label=label)
+            axis.set_xlabel('time [min]')
+            axis.set_ylabel(f'speed [{unit_name}]')
+            if axis.lines:
+                axis.legend()
+        return axis
+
+    def _title(self) -> str:
+        ship = self.ship
+        name = (ship.name if ship is not None else '') or 'a ship without a name'
+        messages = sum(topic.messages for run in self.runs for topic in run.topics if topic.input)
+        runs = 'run' if len(self.runs) == 1 else 'runs'
+        return f'{name}, {len(self.runs)} {runs}, {messages} messages'
+
+    def _columns(self) -> Mapping[str, Any]:
+        block = self.samples()
+        names = np.array([channel.name.lower() for channel in Channel])
+        return {
+            'time': block.stamp_ns.astype('datetime64[ns]'),
+            'arrival': block.receive_ns.astype('datetime64[ns]'),
+            'channel': names[block.channel],
+            'value': block.value[:, 0],
+            'value_2': block.value[:, 1],
+        }
+
+
+def _when(run: Run) -> str:
+    if run.span_ns is None:
+        return 'no message'
+    start_ns, end_ns = run.span_ns
+    return f'{duration((end_ns - start_ns) / SECOND_NS)} from {utc(start_ns)}'

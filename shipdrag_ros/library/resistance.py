@@ -1,0 +1,404 @@
+# SPDX-License-Identifier: Apache-2.0
+"""r(v) of a record: each coastdown, and all of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shipdrag_ros.coastdown import events
+from shipdrag_ros.display import Table, utc
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation import tables as estimate_tables
+from shipdrag_ros.estimation.force import Force, ForceCurve
+from shipdrag_ros.estimation.reciprocal import Combined
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.library.listener import Notes
+from shipdrag_ros.library.record import Record
+from shipdrag_ros.library.replaying import replay_run
+from shipdrag_ros.library.shown import Shown, drawing
+from shipdrag_ros.library.windowed import Span
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import tables, words
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.together import together
+from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, repr=False)
+class Coastdown(Shown):
+    """
+    One coastdown and what it gave.
+
+    Attributes
+    ----------
+    event
+        As the monitor reports it.
+    ship
+        As she was in the run.
+    bag
+        Name of its run.
+    run
+        All that the run gave.
+
+    Raises
+    ------
+    EstimationError
+        By `curve` and `plot`, if nothing could be estimated.
+
+    Notes
+    -----
+    Source: S1, tuple (8); `estimate` holds all of it.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)
+    >>> coastdown, = record.coastdowns()
+    >>> round(coastdown.duration_s, -1), coastdown.ended_by
+    (900.0, 'record_end')
+    >>> coastdown.curve.speed_m_s.shape == coastdown.curve.resistance_m_s2.shape
+    True
+    """
+
+    event: events.Coastdown
+    ship: Ship
+    bag: str
+    run: RunResult
+
+    @property
+    def start_ns(self) -> int:
+        """When the engine stopped [ns since the epoch]."""
+        return self.event.start_ns
+
+    @property
+    def end_ns(self) -> int:
+        """When it ended [ns since the epoch]."""
+        return self.event.end_ns
+
+    @property
+    def duration_s(self) -> float:
+        """Its length [s]."""
+        return (self.end_ns - self.start_ns) * 1e-9
+
+    @property
+    def ended_by(self) -> str:
+        """Why it ended: `speed turn engine brake astern data_stop record_end given ...`."""
+        return self.event.ended_by.value
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """All that was estimated; None where nothing could be."""
+        return self.event.estimate
+
+    @property
+    def curve(self) -> ResistanceCurve:
+        """r(v) inside its valid range, ascending in speed."""
+        if self.event.estimate is None:
+            raise EstimationError(
+                f'the coastdown of {utc(self.start_ns)} in {self.bag!r} gave no estimate: '
+                f'{self.event.failure or "no reason given"}'
+            )
+        return self.event.estimate.valid_curve
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what it gave, in the engineer's units, then in SI; or why nothing.
+        """
+        return words.summary(self.event, self.ship)
+
+    def table(self) -> Table:
+        """
+        Show about ten points of the curve, over the clean hull where it is known.
+        """
+        if self.event.estimate is None:
+            return tables.facts(self.event)
+        return self.event.estimate.table(self.ship)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """
+        Draw resistance against speed with its band, over the clean hull.
+
+        Parameters
+        ----------
+        ax
+            To draw on; None: new axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Knots and kN, of a model ship m/s and N.
+        """
+        from shipdrag_ros.estimation.pictures import draw_resistance
+
+        assert len(self.curve) >= 0  # raises where there is none
+        assert self.event.estimate is not None
+        truth = self.run.truth
+        shown = None if truth is None else (truth.speed_m_s, truth.resistance_m_s2)
+        with drawing(ax) as axis:
+            draw_resistance(axis, self.event.estimate, self.ship, truth=shown)
+        return axis
+
+    def _title(self) -> str:
+        ended = words.ENDED_BY[self.event.ended_by]
+        return f'{utc(self.start_ns)}, {self.duration_s:.0f} s, until {ended}'
+
+    def _columns(self) -> Mapping[str, Any]:
+        return {'coastdown': utc(self.start_ns), **force_columns(self.curve, self.ship)}
+
+
+@dataclass(frozen=True, repr=False)
+class Resistance(Shown):
+    """
+    r(v) of a ship, from all coastdowns of a record.
+
+    Attributes
+    ----------
+    runs
+        What each run gave, as `shipdrag replay` tells it.
+
+    Raises
+    ------
+    EstimationError
+        By `curve` and `plot`, if no coastdown gave an estimate.
+
+    Notes
+    -----
+    Source: S1; several coastdowns are combined as `estimation.reciprocal` does.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)
+    >>> found = sd.estimate(record)
+    >>> len(found.coastdowns), found.combined is None
+    (1, True)
+    >>> found.to_frame().columns.tolist()[:4]
+    ['speed_m_s', 'froude', 'resistance_m_s2', 'sigma_m_s2']
+    """
+
+    runs: tuple[RunResult, ...]
+
+    @property
+    def ship(self) -> Ship:
+        """The ship of the first run."""
+        return self.runs[0].ship
+
+    @property
+    def coastdowns(self) -> tuple[Coastdown, ...]:
+        """In the order of the runs."""
+        return tuple(
+            Coastdown(event, run.ship, run.bag, run)
+            for run in self.runs
+            for event in run.coastdowns
+        )
+
+    @property
+    def combined(self) -> Combined | None:
+        """One r(v) of several coastdowns; None of one, and where they are not one ship's state."""
+        return together(self.runs).combined
+
+    @property
+    def curve(self) -> ForceCurve:
+        """The one r(v): of the only coastdown, or of all together."""
+        usable = [each for each in self.coastdowns if each.estimate is not None]
+        if len(usable) == 1:
+            return usable[0].curve
+        whole = together(self.runs)
+        if whole.combined is not None:
+            return whole.combined
+        if usable:
+            raise EstimationError(
+                f'{len(usable)} coastdowns have no r(v) together: {whole.why_not}; take the curve '
+                'of each of `coastdowns`'
+            )
+        raise EstimationError(' '.join(self.summary()))
+
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what each coastdown gave, or why there is none, and what all gave together.
+        """
+        told = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]
+        whole = together(self.runs)
+        if whole.why_not:
+            told.append(f'Not combined: {whole.why_not}.')
+        if whole.combined is not None:
+            force = Force.of(whole.combined, self.ship)
+            place = force.near(tables.common_speed_m_s(self.runs))
+            told.append(f'{whole.combined.runs} coastdowns together. {force.at(place)}')
+            told += words.combined_notes(whole.combined)
+        return tuple(told)
+
+    def table(self) -> Table:
+        """
+        Show points of the one r(v); of several coastdowns that have none, a line each.
+        """
+        try:
+            return estimate_tables.force_table(self.curve, self.ship)
+        except EstimationError:
+            return tables.coastdowns_table(self.runs)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """
+        Draw resistance against speed with its band, over the clean hull.
+
+        Parameters
+        ----------
+        ax
+            To draw on; None: new axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Knots and kN, of a model ship m/s and N.
+        """
+        from shipdrag_ros.estimation.pictures import draw_curves
+
+        usable = [each for each in self.coastdowns if each.estimate is not None]
+        if not usable:
+            raise EstimationError(' '.join(self.summary()))
+        if len(usable) == 1:
+            return usable[0].plot(ax)
+        dated = [(utc(each.start_ns), each.curve) for each in usable]
+        with drawing(ax) as axis:
+            draw_curves(axis, dated, self.ship, combined=self.combined)
+        return axis
+
+    def report(self, path: str | PathLike[str]) -> None:
+        """
+        Write the page that `shipdrag replay --report` writes.
+
+        Parameters
+        ----------
+        path
+            HTML file; an existing one is replaced.
+        """
+        from shipdrag_ros.replay.page import write_report
+
+        write_report(Path(path), self.runs)
+
+    def _title(self) -> str:
+        name = self.ship.name or 'a ship without a name'
+        many = len(self.coastdowns)
+        counted = f'{many or "no"} coastdown{"" if many == 1 else "s"}'
+        try:
+            force = Force.of(self.curve, self.ship)
+        except EstimationError:
+            return f'{name}, {counted}'
+        if not len(force.speed_m_s):
+            return f'{name}, {counted}'
+        speed, newtons, _, over = force.cells(force.near(tables.common_speed_m_s(self.runs)))
+        return f'{name}, {counted}; {newtons} at {speed}{", " if over else ""}{over}'
+
+    def _columns(self) -> Mapping[str, Any]:
+        return force_columns(self.curve, self.ship)
+
+
+def force_columns(curve: ForceCurve, ship: Ship) -> dict[str, Any]:
+    """
+    Return a curve in SI units, with the force, the clean hull and the share over it.
+    """
+    force = Force.of(curve, ship)
+    return {
+        'speed_m_s': curve.speed_m_s,
+        'froude': ship.froude(curve.speed_m_s),
+        'resistance_m_s2': curve.resistance_m_s2,
+        'sigma_m_s2': curve.sigma_m_s2,
+        'sigma_repeatable_m_s2': curve.sigma_repeatable_m_s2,
+        'resistance_n': force.newtons,
+        'sigma_n': force.sigma_n,
+        'clean_hull_n': force.clean_n,
+        'over_clean_hull': force.over,
+        'over_clean_hull_sd': force.over_sd,
+    }
+
+
+def estimate(
+    records: Record | Sequence[Record],
+    *,
+    window: Span | None = None,
+    parameters: Parameters | None = None,
+) -> Resistance:
+    """
+    Find the coastdowns and estimate r(v), as `shipdrag replay` does.
+
+    Parameters
+    ----------
+    records
+        Of one ship, from `read` or `simulate`.
+    window
+        Begin and end of the coastdown [s from the start of each run], instead of
+        looking for one; what in it is no coastdown is cut.
+    parameters
+        Of the monitor and the estimator; None: those attached to each run.
+
+    Returns
+    -------
+    Resistance
+        With no coastdown in it where none was found: `summary()` then says why.
+
+    Raises
+    ------
+    BagError
+        Without a ship, or without a usable input.
+    EstimationError
+        If a window was given and nothing can be estimated from it.
+
+    Notes
+    -----
+    Source: S1 (1) to (13), docs/accuracy.md. The figures are those of the command line
+    and of the node, to the last bit.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0, seed=1)
+    >>> found = sd.estimate(record)
+    >>> true = record.truth.at(found.curve.speed_m_s)
+    >>> bool(abs(found.curve.resistance_m_s2 / true - 1.0).min() < 0.05)
+    True
+    """
+    listener = Notes()
+    return Resistance(
+        tuple(
+            replay_run(run, listener, ship=record.given, parameters=parameters, window=window)
+            for record in records_of(records)
+            for run in record.runs
+        )
+    )
+
+
+def records_of(records: Record | Sequence[Record]) -> tuple[Record, ...]:
+    """
+    Return one record or several as several.
+
+    Raises
+    ------
+    EstimationError
+        If there is none, or one is no record.
+    """
+    found = (records,) if isinstance(records, Record) else tuple(records)
+    if not found or not all(isinstance(each, Record) for each in found):
+        raise EstimationError(
+            'expected a record or a list of records; make one with shipdrag_ros.read(...)'
+        )
+    return found
+
+
+def _warnings(run: RunResult) -> list[str]:
+    return [f'Warning: {warning}' for warning in run.warnings]
+
+
+def time_column(times_ns: Sequence[int]) -> Any:
+    """
+    Return times as numpy dates, in UTC.
+    """
+    return np.array(times_ns, np.int64).astype('datetime64[ns]')

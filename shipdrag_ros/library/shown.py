@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a result shows itself: in a line, in a notebook, as a frame, as a picture."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from shipdrag_ros.display import Table
+from shipdrag_ros.errors import ShipdragError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
+
+_SIZE = (6.4, 4.2)  # of a picture [inches]
+
+
+class Shown(ABC):
+    """
+    A result that says what it holds.
+
+    A short `repr`, `summary()` in sentences, `table()` as text, both of them in a
+    notebook, `to_frame()` in pandas and `plot()` in matplotlib.
+    """
+
+    @abstractmethod
+    def summary(self) -> tuple[str, ...]:
+        """
+        Say what was found, a paragraph each.
+        """
+
+    @abstractmethod
+    def table(self) -> Table:
+        """
+        Show the main figures as text.
+        """
+
+    @abstractmethod
+    def _title(self) -> str:
+        """Say in some words what this is."""
+
+    @abstractmethod
+    def _columns(self) -> Mapping[str, Any]:
+        """Return the columns of the frame, in SI units."""
+
+    def to_frame(self) -> DataFrame:
+        """
+        Return the figures as a pandas frame, in the units that the columns name.
+
+        Raises
+        ------
+        ShipdragError
+            Without pandas.
+        """
+        return frame_of(self._columns())
+
+    def __repr__(self) -> str:
+        return f'<{type(self).__name__}: {self._title()}>'
+
+    def _repr_html_(self) -> str:
+        return html_of(self._title(), self.summary(), self.table())
+
+
+def frame_of(columns: Mapping[str, Any]) -> DataFrame:
+    """
+    Return columns as a pandas frame.
+
+    Raises
+    ------
+    ShipdragError
+        Without pandas.
+    """
+    try:
+        import pandas
+    except ImportError as error:
+        raise ShipdragError(
+            'to_frame() needs pandas, which is not installed: pip install pandas'
+        ) from error
+    return pandas.DataFrame(dict(columns))
+
+
+def html_of(title: str, lines: Sequence[str], table: Table) -> str:
+    """
+    Return a title, paragraphs and a table for a notebook; all of them are text.
+    """
+    parts = [f'<p><strong>{escape(title)}</strong></p>']
+    parts += [f'<p>{escape(line)}</p>' for line in lines]
+    if table.rows:
+        parts.append('<table>')
+        if any(table.columns):
+            parts.append(_row(table.columns, 'th'))
+        parts += [_row(row, 'td') for row in table.rows]
+        parts.append('</table>')
+    return f'<div>{"".join(parts)}</div>'
+
+
+def _row(cells: Sequence[str], tag: str) -> str:
+    return f'<tr>{"".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells)}</tr>'
+
+
+@contextmanager
+def drawing(ax: Axes | None) -> Iterator[Axes]:
+    """
+    Give the axes to draw on: those given, or new ones that a notebook shows.
+    """
+    import matplotlib.pyplot as plt  # takes long to import
+
+    from shipdrag_ros.report.drawing import STYLE
+
+    with plt.rc_context(STYLE):
+        yield plt.subplots(figsize=_SIZE, layout='constrained')[1] if ax is None else ax

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures of the page: the ship, a curve, a run that has ended; plain numbers in SI units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from shipdrag_ros.estimation.force import clean_hull
+from shipdrag_ros.live.earlier import PastRun
+from shipdrag_ros.live.outputs import Curve
+from shipdrag_ros.ship import Ship
+
+_CLEAN_POINTS = 60
+_CURVE_POINTS = 60
+_PAST_POINTS = 24
+
+Part = dict[str, Any]
+
+
+def ship_part(ship: Ship | None) -> Part | None:
+    """
+    Return the ship's name, mass and clean hull; None where she is not known.
+    """
+    if ship is None:
+        return None
+    part: Part = {'name': ship.name, 'mass_kg': ship.mass_kg, 'clean': None}
+    if ship.baseline is not None:
+        low, high = ship.baseline_range_m_s
+        speed = np.linspace(max(low, 0.02 * high), high, _CLEAN_POINTS)
+        part['clean'] = {
+            'speed_m_s': _rounded(speed),
+            'resistance_n': _rounded(ship.resistance_n(speed)),
+        }
+    return part
+
+
+def at_usual_speed(curve: Curve, ship: Ship | None) -> Part:
+    """
+    Return r at the speed at which figures are stated, and its share over the clean hull.
+
+    Parameters
+    ----------
+    curve
+        Of a run.
+    ship
+        None where she is not known: no share is given.
+    """
+    at = curve.usual_m_s(ship)
+    r, sigma = curve.at(at)
+    part: Part = {'speed_m_s': at, 'r': r, 'r_sigma': sigma}
+    if ship is not None:
+        (clean,), (clean_sd,) = clean_hull(ship, np.array([at]))
+        if np.isfinite(clean):
+            ratio = r * ship.mass_kg / float(clean)
+            spread = ratio * float(np.hypot(sigma / r, clean_sd / clean)) if r > 0.0 else np.inf
+            part |= {'over_clean': ratio - 1.0, 'over_clean_sd': spread}
+    return part
+
+
+def past_part(run: PastRun, ship: Ship | None) -> Part:
+    """
+    Return a run that has ended, for the list and for the chart.
+    """
+    part: Part = {
+        'start_s': run.start_ns // 1_000_000_000,
+        'length_s': (run.end_ns - run.start_ns) * 1e-9,
+        'heading_deg': run.compass_deg,
+        'ended_by': run.ended_by,
+        'why_not': run.why_not,
+        'bag': run.bag,
+    }
+    if run.curve is not None:
+        part |= at_usual_speed(run.curve, ship)
+        part['curve'] = curve_part(run.curve, points=_PAST_POINTS)
+    return part
+
+
+def curve_part(curve: Curve | None, *, points: int = _CURVE_POINTS) -> Part | None:
+    """
+    Return a curve by a few points; None where there is none.
+    """
+    if curve is None:
+        return None
+    speed = np.linspace(curve.speed_m_s[0], curve.speed_m_s[-1], points)
+    return {
+        'speed_m_s': _rounded(speed),
+        'r': _rounded(np.interp(speed, curve.speed_m_s, curve.resistance_m_s2)),
+        'r_sigma': _rounded(np.interp(speed, curve.speed_m_s, curve.sigma_m_s2)),
+    }
+
+
+def _rounded(values: Any) -> list[float]:
+    return [float(f'{value:.5g}') for value in np.asarray(values).tolist()]
