@@ -12,7 +12,18 @@ from collections.abc import Sequence
 
 
 class ShipdragError(Exception):
-    """Base of all errors that a user can mend; the command line exits with 1."""
+    """
+    Base of all errors that a user can mend; the command line exits with 1.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> try:
+    ...     sd.read('missing.mcap')
+    ... except sd.ShipdragError as error:
+    ...     print(error)
+    'missing.mcap' does not exist; give a .mcap file or a rosbag2 directory
+    """
 
 
 class ProblemsError(ShipdragError):

@@ -39,7 +39,6 @@ ESTIMATORS = (
         module.name
         for module in iter_modules([str(Path(__file__).parent / 'estimation' / 'estimators')])
     ),
-    *FORMER_ESTIMATORS,
 )
 """Values of the parameter `estimator`."""
 
@@ -54,7 +53,7 @@ def _parameter(
     choices: tuple[str, ...] = (),
 ) -> Any:
     if isinstance(default, str):
-        kind = choice(*choices)
+        kind = choice(*choices, former=FORMER_ESTIMATORS if choices is ESTIMATORS else ())
     elif isinstance(default, int):
         kind = whole_number(int(low), int(high), unit)
     else:
@@ -71,6 +70,12 @@ class Parameters:
     ------
     ParameterError
         If a value is of the wrong type or out of its range.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> sd.Parameters(update_s=5.0).update_s
+    5.0
     """
 
     frozen_s: float = _parameter(

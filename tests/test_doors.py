@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+import shipdrag_ros
+
 DOORS = (
     ('ship.model', 'Ship.load'),
     ('ship.model', 'Ship.from_yaml'),
@@ -32,7 +34,19 @@ DOORS = (
     ('estimation.final', 'estimate_final'),
     ('coastdown.monitor', 'Monitor'),
     ('diagnosis.diagnose', 'diagnose'),
+    ('library.reading', 'read'),
+    ('library.record', 'Record'),
+    ('library.coastdown', 'Coastdown'),
+    ('library.resistance', 'Resistance'),
+    ('library.resistance', 'estimate'),
+    ('library.diagnosis', 'Diagnosis'),
+    ('library.diagnosis', 'diagnose'),
+    ('library.simulated', 'simulate'),
+    ('library.trends', 'Trends'),
+    ('library.trends', 'trends'),
 )
+# exported too, and described where their fields are declared
+MORE = (('ship.model', 'Ship'), ('parameters', 'Parameters'), ('errors', 'ShipdragError'))
 
 
 SHAPES = ('Float64', 'ArrayLike', 'Int64')
@@ -84,7 +98,13 @@ def test_says_all_that_must_be_known(room: str, door: str) -> None:
     assert re.search(r'Source|S[1-5]\b|WGS84|CDR|m du/dt|Variances', found['Notes'])
 
 
-@pytest.mark.parametrize(('room', 'door'), DOORS)
+def test_every_exported_name_is_a_door() -> None:
+    assert {id(getattr(shipdrag_ros, name)) for name in shipdrag_ros.__all__} <= {
+        id(opened(*each)) for each in (*DOORS, *MORE)
+    }
+
+
+@pytest.mark.parametrize(('room', 'door'), DOORS + MORE)
 def test_shows_an_example_that_runs(room: str, door: str) -> None:
     module = importlib.import_module(f'shipdrag_ros.{room}')
     target = opened(room, door)

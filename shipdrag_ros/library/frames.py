@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,8 @@ def write_table(frame: Any, path: Path) -> tuple[str, ...]:
     ----------
     frame
         With `columns` and, for each, something that `to_numpy()` or numpy can turn
-        into an array. Dates without a zone are UTC. An index of dates becomes a
-        column of its name, or `index`.
+        into an array. Dates without a zone are UTC. An index of dates becomes the
+        first column, of its name where no other column has it.
     path
         File to make.
 
@@ -51,7 +51,7 @@ def write_table(frame: Any, path: Path) -> tuple[str, ...]:
     named = [(str(name), frame[name]) for name in frame.columns]
     index = getattr(frame, 'index', None)
     if str(getattr(index, 'dtype', '')).startswith('datetime64'):
-        named.insert(0, (str(getattr(index, 'name', None) or INDEX), index))
+        named.insert(0, (_free(str(getattr(index, 'name', None) or INDEX), named), index))
     dates, columns = [], []
     for name, values in named:
         array = _array(values)
@@ -65,6 +65,14 @@ def write_table(frame: Any, path: Path) -> tuple[str, ...]:
         writer.writerow([name for name, _ in named])
         writer.writerows(zip(*columns, strict=True))
     return tuple(dates)
+
+
+def _free(name: str, named: Sequence[tuple[str, Any]]) -> str:
+    """Return a name that no column has."""
+    taken = {each for each, _ in named}
+    while name in taken:
+        name = f'{name} (index)'
+    return name
 
 
 def _array(values: Any) -> NDArray[Any]:

@@ -9,15 +9,12 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from shipdrag_ros.coastdown import events
 from shipdrag_ros.display import Table, utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
-from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.library.coastdown import Coastdown, force_columns
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import replay_run
@@ -31,128 +28,6 @@ from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-@dataclass(frozen=True, repr=False)
-class Coastdown(Shown):
-    """
-    One coastdown and what it gave.
-
-    Attributes
-    ----------
-    event
-        As the monitor reports it.
-    ship
-        As she was in the run.
-    bag
-        Name of its run.
-    run
-        All that the run gave.
-
-    Raises
-    ------
-    EstimationError
-        By `curve` and `plot`, if nothing could be estimated.
-
-    Notes
-    -----
-    Source: S1, tuple (8); `estimate` holds all of it.
-
-    Examples
-    --------
-    >>> import shipdrag_ros as sd
-    >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)
-    >>> coastdown, = record.coastdowns()
-    >>> round(coastdown.duration_s, -1), coastdown.ended_by
-    (900.0, 'record_end')
-    >>> coastdown.curve.speed_m_s.shape == coastdown.curve.resistance_m_s2.shape
-    True
-    """
-
-    event: events.Coastdown
-    ship: Ship
-    bag: str
-    run: RunResult
-
-    @property
-    def start_ns(self) -> int:
-        """When the engine stopped [ns since the epoch]."""
-        return self.event.start_ns
-
-    @property
-    def end_ns(self) -> int:
-        """When it ended [ns since the epoch]."""
-        return self.event.end_ns
-
-    @property
-    def duration_s(self) -> float:
-        """Its length [s]."""
-        return (self.end_ns - self.start_ns) * 1e-9
-
-    @property
-    def ended_by(self) -> str:
-        """Why it ended: `speed turn engine brake astern data_stop record_end given ...`."""
-        return self.event.ended_by.value
-
-    @property
-    def estimate(self) -> Estimate | None:
-        """All that was estimated; None where nothing could be."""
-        return self.event.estimate
-
-    @property
-    def curve(self) -> ResistanceCurve:
-        """r(v) inside its valid range, ascending in speed."""
-        if self.event.estimate is None:
-            raise EstimationError(
-                f'the coastdown of {utc(self.start_ns)} in {self.bag!r} gave no estimate: '
-                f'{self.event.failure or "no reason given"}'
-            )
-        return self.event.estimate.valid_curve
-
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say what it gave, in the engineer's units, then in SI; or why nothing.
-        """
-        return words.summary(self.event, self.ship)
-
-    def table(self) -> Table:
-        """
-        Show about ten points of the curve, over the clean hull where it is known.
-        """
-        if self.event.estimate is None:
-            return tables.facts(self.event)
-        return self.event.estimate.table(self.ship)
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """
-        Draw resistance against speed with its band, over the clean hull.
-
-        Parameters
-        ----------
-        ax
-            To draw on; None: new axes.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            Knots and kN, of a model ship m/s and N.
-        """
-        from shipdrag_ros.estimation.pictures import draw_resistance
-
-        assert len(self.curve) >= 0  # raises where there is none
-        assert self.event.estimate is not None
-        truth = self.run.truth
-        shown = None if truth is None else (truth.speed_m_s, truth.resistance_m_s2)
-        with drawing(ax) as axis:
-            draw_resistance(axis, self.event.estimate, self.ship, truth=shown)
-        return axis
-
-    def _title(self) -> str:
-        ended = words.ENDED_BY[self.event.ended_by]
-        return f'{utc(self.start_ns)}, {self.duration_s:.0f} s, until {ended}'
-
-    def _columns(self) -> Mapping[str, Any]:
-        return {'coastdown': utc(self.start_ns), **force_columns(self.curve, self.ship)}
 
 
 @dataclass(frozen=True, repr=False)
@@ -302,25 +177,6 @@ class Resistance(Shown):
         return force_columns(self.curve, self.ship)
 
 
-def force_columns(curve: ForceCurve, ship: Ship) -> dict[str, Any]:
-    """
-    Return a curve in SI units, with the force, the clean hull and the share over it.
-    """
-    force = Force.of(curve, ship)
-    return {
-        'speed_m_s': curve.speed_m_s,
-        'froude': ship.froude(curve.speed_m_s),
-        'resistance_m_s2': curve.resistance_m_s2,
-        'sigma_m_s2': curve.sigma_m_s2,
-        'sigma_repeatable_m_s2': curve.sigma_repeatable_m_s2,
-        'resistance_n': force.newtons,
-        'sigma_n': force.sigma_n,
-        'clean_hull_n': force.clean_n,
-        'over_clean_hull': force.over,
-        'over_clean_hull_sd': force.over_sd,
-    }
-
-
 def estimate(
     records: Record | Sequence[Record],
     *,
@@ -395,10 +251,3 @@ def records_of(records: Record | Sequence[Record]) -> tuple[Record, ...]:
 
 def _warnings(run: RunResult) -> list[str]:
     return [f'Warning: {warning}' for warning in run.warnings]
-
-
-def time_column(times_ns: Sequence[int]) -> Any:
-    """
-    Return times as numpy dates, in UTC.
-    """
-    return np.array(times_ns, np.int64).astype('datetime64[ns]')

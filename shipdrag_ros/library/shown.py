@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ShipdragError
 
@@ -113,3 +115,10 @@ def drawing(ax: Axes | None) -> Iterator[Axes]:
 
     with plt.rc_context(STYLE):
         yield plt.subplots(figsize=_SIZE, layout='constrained')[1] if ax is None else ax
+
+
+def time_column(times_ns: Sequence[int]) -> Any:
+    """
+    Return times as numpy dates, in UTC.
+    """
+    return np.array(times_ns, np.int64).astype('datetime64[ns]')

@@ -90,8 +90,8 @@ def simulate(
         2026-06-01T08:00:00.
     seed
         Of the noise: the same seed gives the same readings.
-    **sensing
-        `lead_in_s` [s], `first_heading_rad` [rad], `rate_hz` [Hz], `noise` and
+    sensing
+        By name: `lead_in_s` [s], `first_heading_rad` [rad], `rate_hz` [Hz], `noise` and
         `inputs`, as `shipdrag simulate` has them.
 
     Returns

@@ -13,8 +13,8 @@ from shipdrag_ros import __version__
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.library.listener import Notes
-from shipdrag_ros.library.resistance import Resistance, time_column
-from shipdrag_ros.library.shown import Shown, drawing
+from shipdrag_ros.library.resistance import Resistance
+from shipdrag_ros.library.shown import Shown, drawing, time_column
 from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
 

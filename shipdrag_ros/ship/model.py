@@ -51,6 +51,13 @@ class Ship:
     `load` and `from_yaml` check every value; constructing one directly does
     not. Only the length and the volume are needed to estimate r(v); the
     baseline is needed to simulate.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> coaster = sd.Ship(name='Coaster', length_m=80.0, displaced_volume_m3=4000.0)
+    >>> coaster.summary()
+    'Coaster: length 80 m, displacement 4000 m³ (4,100 t)'
     """
 
     name: str = declare(text(), 'name of the ship', default='')

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every block of Python in docs/python.md runs, in the order it stands there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import pytest
+
+PAGE = Path(__file__).resolve().parents[2] / 'docs' / 'python.md'
+
+
+def test_the_blocks_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = PAGE.read_text(encoding='utf-8')
+    blocks = re.findall(r'^```python\n([\s\S]*?)^```', text, flags=re.MULTILINE)
+    assert len(blocks) == text.count('```') // 2 > 10
+    known: dict[str, Any] = {}
+    try:
+        for block in blocks:
+            exec(compile(block, PAGE.name, 'exec'), known)
+    finally:
+        plt.close('all')
+    printed = capsys.readouterr().out
+    assert '<Record: Vitus Bering, 1 run, 8404 messages>' in printed
+    assert "'missing.mcap' does not exist" in printed
+    assert {path.name for path in tmp_path.glob('*.png')} == {
+        'resistance.png',
+        'gap.png',
+        'months.png',
+    }
+    assert (tmp_path / 'report.html').stat().st_size > 10_000

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A release: wheel and sdist are built, and the wheel works alone, without ROS."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+import shipdrag_ros
+
+pytest.importorskip('build')
+
+ROOT = Path(__file__).resolve().parents[1]
+PARTS = (
+    *('package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'MANIFEST.in'),
+    *('LICENSE', 'README.md', 'CHANGELOG.md'),
+)
+FOLDERS = ('resource', 'shipdrag_ros', 'launch', 'config')
+LIMIT_S = 200
+SHIPDRAG = '@shipdrag'
+WITHOUT_ROS = """
+import sys
+
+class WithoutRos:
+    def find_spec(self, name, path=None, target=None):
+        top = name.partition('.')[0]
+        if top == 'rclpy' or top.endswith(('_msgs', '_srvs', '_interfaces')):
+            raise ModuleNotFoundError(f'No module named {top!r}', name=top)
+
+sys.meta_path.insert(0, WithoutRos())
+"""
+
+
+@pytest.fixture(scope='module')
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build a copy of the tree; return the folder with the sdist, and the wheel made from it."""
+    source = tmp_path_factory.mktemp('source')
+    for name in PARTS:
+        shutil.copy(ROOT / name, source)
+    for name in FOLDERS:
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns('__pycache__'))
+    line = [sys.executable, '-m', 'build', '--no-isolation', str(source)]
+    environment = {key: text for key, text in os.environ.items() if key != 'PYTHONPATH'}
+    done = subprocess.run(
+        line, env=environment, capture_output=True, text=True, timeout=LIMIT_S, check=False
+    )
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    return source / 'dist'
+
+
+@pytest.fixture(scope='module')
+def alone(
+    built: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Install the wheel by itself; return what runs Python with it, where no ROS can be had."""
+    target = tmp_path_factory.mktemp('installed')
+    (wheel,) = built.glob('*.whl')
+    line = [sys.executable, '-m', 'pip', 'install', '--quiet', '--no-deps', '--no-index']
+    subprocess.run(
+        [*line, '--disable-pip-version-check', '--target', str(target), str(wheel)],
+        timeout=LIMIT_S,
+        check=True,
+    )
+    (target / 'sitecustomize.py').write_text(WITHOUT_ROS)
+
+    def run(*words: str) -> subprocess.CompletedProcess[str]:
+        line = [
+            sys.executable,
+            *(word.replace(SHIPDRAG, f'{target}/bin/shipdrag') for word in words),
+        ]
+        return subprocess.run(
+            line,
+            cwd=target,
+            env=os.environ | {'PYTHONPATH': str(target)},
+            capture_output=True,
+            text=True,
+            timeout=LIMIT_S,
+            check=False,
+        )
+
+    return run
+
+
+def test_the_wheel_holds_all_of_the_package(built: Path) -> None:
+    (wheel,) = built.glob('*.whl')
+    assert wheel.name.startswith(f'shipdrag_ros-{shipdrag_ros.__version__}-py3-none-any')
+    with zipfile.ZipFile(wheel) as file:
+        held = set(file.namelist())
+    package = ROOT / 'shipdrag_ros'
+    expected = {
+        str(path.relative_to(ROOT))
+        for path in package.rglob('*')
+        if path.is_file() and '__pycache__' not in path.parts
+    }
+    assert expected - held == set()
+    assert 'shipdrag_ros/py.typed' in held
+    assert any(name.startswith('shipdrag_ros/live/page/vendor/') for name in held)
+    share = f'shipdrag_ros-{shipdrag_ros.__version__}.data/data/share/'
+    assert f'{share}ament_index/resource_index/packages/shipdrag_ros' in held
+    assert f'{share}shipdrag_ros/package.xml' in held
+
+
+def test_the_sdist_holds_what_colcon_needs(built: Path) -> None:
+    (sdist,) = built.glob('*.tar.gz')
+    with tarfile.open(sdist) as file:
+        held = {name.partition('/')[2] for name in file.getnames()}
+    wanted = {'package.xml', 'setup.py', 'setup.cfg', 'resource/shipdrag_ros', 'LICENSE'}
+    wanted |= {'CHANGELOG.md', 'README.md', 'config/vitus_bering.yaml'}
+    wanted |= {f'launch/{path.name}' for path in (ROOT / 'launch').glob('*.launch.py')}
+    assert wanted - held == set()
+
+
+def test_all_but_the_node_runs_without_ros(
+    alone: Callable[..., subprocess.CompletedProcess[str]], built: Path
+) -> None:
+    where = alone('-c', 'import shipdrag_ros; print(shipdrag_ros.__file__)')
+    assert not where.stdout.startswith(str(ROOT))
+    ros = alone('-c', 'import rclpy')
+    assert 'ModuleNotFoundError' in ros.stderr
+    told = alone(SHIPDRAG, '--help')
+    assert told.returncode == 0, told.stderr
+    assert 'diagnose' in told.stdout
+    ship, bag, out = ROOT / 'config' / 'vitus_bering.yaml', built / 'run.mcap', built / 'run.json'
+    made = alone(SHIPDRAG, 'simulate', '--ship', str(ship), '-o', str(bag), '--lead-in', '400')
+    assert made.returncode == 0, made.stderr
+    found = alone(SHIPDRAG, 'replay', str(bag), f'--json={out}')
+    assert found.returncode == 0, found.stderr
+    assert 'knots' in found.stdout
+    (coastdown,) = json.loads(out.read_text())['coastdowns']
+    assert len(coastdown['speed_m_s']) > 10
+    node = alone(SHIPDRAG, 'node', '--ship', str(ship), '--out', str(built))
+    assert node.returncode == 1
+    assert node.stderr.startswith('ERROR: ')
+    assert 'Traceback' not in node.stderr
+
+
+def test_the_citation_is_of_this_version() -> None:
+    cited = yaml.safe_load((ROOT / 'CITATION.cff').read_text(encoding='utf-8'))
+    assert cited['version'] == shipdrag_ros.__version__
+    assert cited['license'] == 'Apache-2.0'
+    assert {'cff-version', 'message', 'title', 'authors', 'type'} <= set(cited)
+
+
+@pytest.mark.parametrize('name', ['bug', 'wrong_estimate', 'question'])
+def test_the_issue_forms_are_such(name: str) -> None:
+    path = ROOT / '.github' / 'ISSUE_TEMPLATE' / f'{name}.yml'
+    form = yaml.safe_load(path.read_text(encoding='utf-8'))
+    assert {'name', 'description', 'body'} <= set(form)
+    asked = [part for part in form['body'] if part['type'] != 'markdown']
+    assert asked
+    assert len({part['id'] for part in asked}) == len(asked)
+    if name != 'question':
+        assert 'shipdrag doctor' in path.read_text(encoding='utf-8')
