@@ -148,7 +148,6 @@ class DurableRecording:
         self._compactor: threading.Thread | None = None
         self._ending = threading.Event()
         self._tried = threading.Event()
-        self._written = threading.Event()
         # a disk that hangs for ever must not keep the process: what is on it is whole
         self._thread = threading.Thread(target=self._run, name='recording', daemon=True)
         self._thread.start()
@@ -192,12 +191,6 @@ class DurableRecording:
         Wait until the first file is there, or has been refused.
         """
         self._tried.wait(timeout_s)
-
-    def wait_written(self, timeout_s: float) -> None:
-        """
-        Wait after `stop` until the last part is whole; it is then made compact.
-        """
-        self._written.wait(timeout_s)
 
     def wait_ended(self, timeout_s: float) -> bool:
         """
@@ -383,7 +376,6 @@ class DurableRecording:
             if self._wanted:
                 self._lost += self._accepted - self._safe
             self._accepted = self._safe
-        self._written.set()
         if self._compactor is not None:
             self._compactor.join()
         self._compact()

@@ -35,7 +35,7 @@ from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.mailbox import Mailbox
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
-from shipdrag_ros.node.recorder import CLOSE_S, Recorder
+from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.service_guard import guard_services
 from shipdrag_ros.node.services import add_services
 from shipdrag_ros.node.session import Session
@@ -48,7 +48,6 @@ NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 FIRST_S = 0.3  # by then who listens is found; compiling begins behind it
-END_S = 1.0  # who ends the node waits for what is whole, and so long for what is small
 WAITING_MOST = 200_000  # messages that wait for compiled code: some 100 MB
 RELIABLE = ReliabilityPolicy.RELIABLE
 # who joins late still gets the last message
@@ -125,7 +124,7 @@ class CoastdownNode(LifecycleNode):
         """
         End what is running and destroy the node; ROS may be gone already.
         """
-        self._deactivate('the process ends', compact_s=END_S)
+        self._deactivate('the process ends')
         self._end_what_runs_beside()
         self.destroy_node()
 
@@ -239,11 +238,11 @@ class CoastdownNode(LifecycleNode):
         self.get_logger().info(f'active; {recording.text}')
         self._announcer.status(diagnostics.recording_status(recording))
 
-    def _deactivate(self, why: str, compact_s: float = CLOSE_S) -> None:
+    def _deactivate(self, why: str) -> None:
         if self._session is not None:
             session, self._session = self._session, None
             session.note_lifecycle(why, self._now_ns())
-            session.finish(compact_s)
+            session.finish()
             self.get_logger().info(f'{why}; {session.recorder.status().text}')
 
     def _end_what_runs_beside(self) -> None:

@@ -149,21 +149,13 @@ class Recorder:
             self._ended.append(self._recording)
             self._recording = None
 
-    def close(self, compact_s: float = CLOSE_S) -> None:
+    def close(self) -> None:
         """
         End the recording and wait for the disk, a few seconds at most.
-
-        Parameters
-        ----------
-        compact_s
-            How long to wait, once the recording is whole, for it to be made compact [s].
         """
         self.stop()
         self._housekeeping.close()
         end_s = monotonic() + CLOSE_S
-        for recording in self._ended:
-            recording.wait_written(max(end_s - monotonic(), 0.0))
-        end_s = monotonic() + compact_s
         for recording in self._ended:
             recording.wait_ended(max(end_s - monotonic(), 0.0))
 

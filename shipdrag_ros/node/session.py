@@ -35,7 +35,7 @@ from shipdrag_ros.messages import (
     silence_mark,
     types,
 )
-from shipdrag_ros.node.recorder import CLOSE_S, Recorder
+from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.ring import RawMessage
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
@@ -233,17 +233,10 @@ class Session:
         self.watch_clock(now_ns)
         self._note(EventKind.MESSAGE_LOST, text)
 
-    def finish(self, compact_s: float = CLOSE_S) -> None:
+    def finish(self) -> None:
         """
         Give the last figures and close the recording; needs no ROS.
 
-        Parameters
-        ----------
-        compact_s
-            See `Recorder.close`.
-
-        Notes
-        -----
         What still waits for compiled code stays in the recording, for a replay.
         """
         try:
@@ -252,7 +245,7 @@ class Session:
             if not self._waiting:
                 self._report(self.monitor.finish())
         finally:  # whatever is wrong, the bag is closed
-            self.recorder.close(compact_s)
+            self.recorder.close()
 
     def _reset(self, reason: str) -> None:
         # first the request, at whose place a replay resets too
