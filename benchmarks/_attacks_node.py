@@ -66,7 +66,7 @@ class Node:
         self.peer = rclpy.create_node('attacker', context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.peer)
-        self.until(lambda: 'active;' in self.log, START_S)
+        self.until(lambda: 'ready to estimate' in self.log, START_S)
 
     @property
     def log(self) -> str:

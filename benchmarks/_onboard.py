@@ -62,6 +62,9 @@ def onboard(**parameters: object) -> Iterator[Onboard]:
         command = [sys.executable, '-m', 'shipdrag_ros.node.main', '--ros-args', *words]
         with (Path(folder) / 'log').open('w') as log:
             node = subprocess.Popen(command, stdout=log, stderr=log)
+        while 'ready to estimate' not in (Path(folder) / 'log').read_text():
+            assert node.poll() is None, (Path(folder) / 'log').read_text()
+            time.sleep(0.1)
         context = rclpy.Context()
         rclpy.init(context=context)
         peer = rclpy.create_node('peer', context=context)

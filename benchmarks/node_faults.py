@@ -3,11 +3,12 @@
 Faults on the topics of a running node, and what /diagnostics says of each.
 
 Starts the node as a user does, talks to it over DDS on loopback, and prints the
-table of docs/node_faults.md: `python benchmarks/node_faults.py`, about two minutes.
+table of docs/node_faults.md, `--write` puts it there: about two minutes.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 import os
 import signal
@@ -23,10 +24,12 @@ os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 os.environ.setdefault('ROS_DOMAIN_ID', '97')
 
 import rclpy
+from _tables import put, table
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, TwistStamped
 from rclpy.executors import SingleThreadedExecutor
 
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'node_faults.md'
 SHIP = 'name: test\nlength_m: 150.0\ndisplaced_volume_m3: 20200.0\n'
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 SECONDS = 6.0
@@ -95,7 +98,7 @@ class Bench:
         self.executor.add_node(self.node)
         self.latest: dict[str, Any] = {}
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._hear, 10)
-        self._spin(lambda: self._lifecycle() == 'active', START_S)
+        self._spin(self._is_ready, START_S)
 
     def of(self, fault: Fault) -> tuple[str, str]:
         """Publish a fault and return level and message."""
@@ -143,10 +146,10 @@ class Bench:
     def _hear(self, message: DiagnosticArray) -> None:
         self.latest |= {status.name: status for status in message.status}
 
-    def _lifecycle(self) -> str:
+    def _is_ready(self) -> bool:
         status = self.latest.get('coastdown_node: state')
         values = {} if status is None else {item.key: item.value for item in status.values}
-        return values.get('lifecycle', '')
+        return values.get('lifecycle') == 'active' and 'compiling [s]' not in values
 
     def _spin(self, done: Callable[[], bool], within_s: float) -> None:
         end = time.monotonic() + within_s
@@ -155,8 +158,11 @@ class Bench:
 
 
 def main() -> None:
-    """Print the table."""
-    print('| fault | before | now |\n| --- | --- | --- |')
+    """Print the table, and write it if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--write', action='store_true', help='put the table into the page')
+    options = parser.parse_args()
+    rows = []
     for fault in FAULTS:
         # a node for each: what one leaves behind is no part of the next
         with tempfile.TemporaryDirectory() as directory:
@@ -165,7 +171,12 @@ def main() -> None:
                 level, text = bench.of(fault)
             finally:
                 bench.close()
-        print(f'| {fault.name} | {fault.before} | {level}: {text} |', flush=True)
+        rows.append((fault.name, fault.before, f'{level}: {text}'))
+        print(rows[-1], file=sys.stderr, flush=True)
+    made = '\n'.join(table(['fault', 'before', 'now'], rows))
+    print(made)
+    if options.write:
+        put(PAGE, {'faults': made})
 
 
 if __name__ == '__main__':

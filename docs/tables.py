@@ -26,7 +26,8 @@ _INPUT_MEANING = {
     'speed_over_ground': 'radar or GNSS, `hypot(linear.x, linear.y)` [m/s], frame not trusted',
     'position': 'radar-derived from a fixed mark, or GNSS: metres in a fixed frame, or latitude '
     'and longitude',
-    'heading': 'yaw',
+    'heading': 'yaw; as Float64 degrees of a true compass, which hold no time: they count from '
+    'their arrival',
     'shaft': 'joints `shaft...`, up to four: `velocity` [rad/s], negative astern; joints '
     '`pitch...` of controllable propellers: `position`, a ratio or an angle, 0 no thrust',
     'rudder': 'joint `rudder`, `position` [rad]',

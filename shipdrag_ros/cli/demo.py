@@ -107,12 +107,12 @@ def run(options: argparse.Namespace) -> int:
         f'stopped. {seconds:.0f} s of data take {seconds / options.speed_up:.0f} s.\n'
     )
     output.log('starting the node; the first start on a machine compiles for some seconds')
-    before = set(recordings.iterdir())
+    before = set(recordings.glob('*.mcap'))
     with _ended_by_sigterm(), _node(ship_file, recordings, out / 'node.log') as node:
         live = _Live(truth, block, output)
         with Rehearsal(live.show) as rehearsal:
             _sail(rehearsal, node, block, speed_up=options.speed_up, output=output)
-    bags = sorted(set(recordings.iterdir()) - before)
+    bags = sorted(set(recordings.glob('*.mcap')) - before)
     if not bags:
         raise node.failed('the node recorded nothing')
 

@@ -292,14 +292,3 @@ def speeds(bins: Bins, source: int, first: int, last: int) -> tuple[Float64, Flo
     there = each[:, COUNT] != 0
     time = (each[there, TIME] - last * PER_SECOND) / PER_SECOND
     return time, each[there, SPEED] / PER_UNIT
-
-
-def warm(bins: Bins) -> None:
-    """
-    Compile what Python calls, so that no coastdown waits for it.
-    """
-    line(bins, 0, 0, 1)
-    mean_place(bins, 0, 0, 1)
-    displacement(bins, 0, 0, 1)
-    mean_turning(bins, 0, 0, 1)
-    newest_bin(bins, 0)

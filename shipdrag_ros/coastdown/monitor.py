@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import SOURCES, warm
+from shipdrag_ros.coastdown.bins import SOURCES
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.ending import End, cut_short, end_of, withdrawn
@@ -37,7 +37,7 @@ from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
-from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
+from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block
 from shipdrag_ros.ship import Ship
@@ -104,9 +104,6 @@ class Monitor:
             round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
         )
         self._memory = self._fresh(Tally.fresh())
-        warm(self._memory.bins)
-        alive_ns(self._memory.guard, self._tuning.limits, 0)  # compiled now, too
-        ode_fit.warm()
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._candidate: OnsetCandidate | None = None
         self._running: RunningCoastdown | None = None

@@ -157,6 +157,8 @@ def decode_batch(
             unreadable.append(_count(found[place], joints.surplus))
             continue
         code[place] = reading.channel
+        if not reading.stamped:
+            stamp_ns[place] = receive_ns[place]
         for by in reading.steps:
             gather(data, start, end, place, by, stamp_ns, rows, found)
             if reading.columns is not None:
@@ -222,12 +224,15 @@ class _Reading:
         Values and variances of the extra fields; None where they are as sent.
     width
         Number of values, variances and extra fields.
+    stamped
+        Whether the type holds a time; what has none counts from its arrival.
     """
 
     channel: Channel
     steps: tuple[Int64, ...]
     columns: Columns | None
     width: int
+    stamped: bool = True
 
 
 def _table(*columns: Float64 | float) -> Float64:
@@ -282,6 +287,13 @@ def _imu(extra: Float64) -> Float64:
     return table
 
 
+def _compass(extra: Float64) -> Float64:
+    """Return yaw [rad] of degrees clockwise from north."""
+    with np.errstate(invalid='ignore'):
+        yaw_deg = np.remainder(270.0 - extra[:, 0], 360.0) - 180.0
+    return _table(np.radians(yaw_deg), 0.0, np.nan, np.nan)
+
+
 _FIX = types.class_of(types.NAV_SAT_FIX)
 _FIX_STATUS = types.class_of('sensor_msgs/msg/NavSatStatus')
 
@@ -314,7 +326,7 @@ def _computed(
     """Pair a source with how its fields are read, and with what is made of them."""
     behind = (*[''] * _COLUMNS, *fields)
     way = steps(type_name, behind)
-    reading = _Reading(channel, (way,), columns, len(behind))
+    reading = _Reading(channel, (way,), columns, len(behind), types.is_stamped(type_name))
     return Source(channel.input, type_name), reading
 
 
@@ -353,6 +365,8 @@ def _readings() -> Iterator[tuple[Source, _Reading]]:
     imu = [f'orientation.{axis}' for axis in 'xyzw']
     imu += [f'orientation_covariance[{i}]' for i in (8, 0)]
     yield _computed(Channel.HEADING, types.IMU, _imu, *imu)
+
+    yield _computed(Channel.HEADING, types.FLOAT64, _compass, 'data')
 
     yield _joints(Channel.SHAFT)
     yield _joints(Channel.RUDDER)

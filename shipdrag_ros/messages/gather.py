@@ -37,6 +37,7 @@ _FLOAT64 = int(Step.FLOAT64)
 _FLOAT32 = int(Step.FLOAT32)
 _UINT8 = int(Step.UINT8)
 _INT8 = int(Step.INT8)
+_UNSTAMPED = int(Step.UNSTAMPED)
 COLUMNS = 4
 _VARIANCES = 2  # from this column on
 BODY = ENCAPSULATION_BYTES
@@ -134,10 +135,16 @@ def string_end(data: Any, body: int, at: int, size: int, big: bool) -> Any:
 
 
 @compiled
+def _is_cdr(data: Any, start: int, end: int, least: int) -> bool:
+    """Say whether bytes begin as a message does, with so many behind it at least."""
+    return end - start - BODY >= least and data[_U(start)] == 0 and data[_U(start + 1)] <= 1
+
+
+@compiled
 def read_stamp(data: Any, start: int, end: int, i: Any, stamp_ns: Any) -> bool:
     """Read the stamp of a message; False if it is none."""
     body = start + BODY
-    if end - body < TIME_BYTES or data[_U(start)] != 0 or data[_U(start + 1)] > 1:
+    if not _is_cdr(data, start, end, TIME_BYTES):
         return False
     big = data[_U(start + 1)] == 0
     seconds = np.int64(np.int32(word(data, body, big)))
@@ -147,16 +154,20 @@ def read_stamp(data: Any, start: int, end: int, i: Any, stamp_ns: Any) -> bool:
 
 @compiled
 def _read(data: Any, start: int, end: int, steps: Any, i: Any, stamp_ns: Any, rows: Any) -> int:
-    if not read_stamp(data, start, end, i, stamp_ns):
+    unstamped = steps[0, 0] == _UNSTAMPED
+    if unstamped:
+        if not _is_cdr(data, start, end, 0):
+            return _MALFORMED
+    elif not read_stamp(data, start, end, i, stamp_ns):
         return _MALFORMED
     body = start + BODY
     size = end - body
     big = data[_U(start + 1)] == 0
-    at = string_end(data, body, TIME_BYTES, size, big)
+    at = 0 if unstamped else string_end(data, body, TIME_BYTES, size, big)
     if at == BAD:
         return _MALFORMED
     base = at
-    for k in range(len(steps)):
+    for k in range(1 if unstamped else 0, len(steps)):
         step, first, second = steps[k, 0], steps[k, 1], steps[k, 2]
         if step == _SECTION:
             base = aligned(at, first)
@@ -220,7 +231,7 @@ def gather(
     steps : (k, 3) int64
         From `layout.steps`.
     stamp_ns : (n,) int64
-        Filled with the stamps [ns].
+        Filled with the stamps [ns]; left as it is by a type that holds none.
     rows : (n, c) float64
         Filled with the fields. The first four are two values and two variances: a
         value that the type lacks is 0, a variance that says nothing NaN.

@@ -38,6 +38,7 @@ class Step(IntEnum):
     UINT8 = 3
     INT8 = 4
     STRING = 5
+    UNSTAMPED = 6  # the first, of a type without a header
 
 
 _TAKEN = {
@@ -50,12 +51,12 @@ _TAKEN = {
 
 def steps(type_name: str, fields: Sequence[str]) -> Int64:
     """
-    Return the steps through a message, behind its header.
+    Return the steps through a message, behind its header if it has one.
 
     Parameters
     ----------
     type_name
-        A type that begins with a `std_msgs/Header`.
+        A type; where it has a `std_msgs/Header`, it begins with it.
     fields
         What goes into which column, `pose.pose.position.x` or `twist.covariance[7]`
         for instance; '' for nothing.
@@ -67,6 +68,8 @@ def steps(type_name: str, fields: Sequence[str]) -> Int64:
     """
     column = {field: number for number, field in enumerate(fields) if field}
     listed: list[list[int]] = []
+    if not types.is_stamped(type_name):
+        listed.append([Step.UNSTAMPED, 0, 0])
     section: list[int] = []  # the row of the one that is open
     for leaf in types.leaves(type_name):
         if leaf.path.startswith('header.'):

@@ -33,7 +33,7 @@ TOPICS: Mapping[str, tuple[str, ...]] = {
         types.ODOMETRY,
         types.NAV_SAT_FIX,
     ),
-    'heading': (types.QUATERNION, types.IMU, types.POSE),
+    'heading': (types.QUATERNION, types.IMU, types.POSE, types.FLOAT64),
     'shaft': (types.JOINT_STATE,),
     'rudder': (types.JOINT_STATE,),
     'wind_apparent': (types.TWIST,),

@@ -21,6 +21,7 @@ from shipdrag_ros.samples import SECOND_NS
 
 ACCEL_WITH_COVARIANCE = 'geometry_msgs/msg/AccelWithCovarianceStamped'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
+FLOAT64 = 'std_msgs/msg/Float64'
 IMU = 'sensor_msgs/msg/Imu'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 NAV_SAT_FIX = 'sensor_msgs/msg/NavSatFix'
@@ -42,6 +43,8 @@ _LITTLE_ENDIAN = b'\x00\x01'
 # Fast DDS counts an alignment to 8 behind each empty sequence of doubles and then writes none, so
 # that up to 15 bytes follow a JointState; rosbags' own check would refuse what rclpy sends
 PADDING_BYTES = 15
+
+_TIME = struct.Struct('iI')  # builtin_interfaces/Time: the first that a header holds
 
 RANGE_BEFORE_IRON = 'shipdrag_ros/msg/RangeBeforeIron'
 
@@ -194,6 +197,22 @@ def from_ros1(type_name: str, payload: bytes) -> bytes:
         return bytes(_store.ros1_to_cdr(payload, name))
     except Exception as error:  # the code that is generated for a type raises what it happens to
         raise MalformedMessage(f'{type(error).__name__}: {error}') from error
+
+
+def stated_stamp_ns(type_name: str, payload: bytes, arrival_ns: int) -> int:
+    """
+    Return the time that CDR bytes state, without looking at the rest of them.
+
+    Parameters
+    ----------
+    arrival_ns
+        For a type that holds no time, and for bytes that are too short [ns].
+    """
+    if not is_stamped(type_name) or len(payload) < ENCAPSULATION_BYTES + _TIME.size:
+        return arrival_ns
+    order = '<' if payload[:2] == _LITTLE_ENDIAN else '>'
+    seconds, nanoseconds = struct.unpack_from(order + _TIME.format, payload, ENCAPSULATION_BYTES)
+    return int(seconds * SECOND_NS + nanoseconds)
 
 
 def is_known(type_name: str) -> bool:

@@ -30,6 +30,7 @@ _WAKE_S = 0.25  # how often a wait looks whether it shall end
 _CONNECT_S = 5.0
 _RETRY_S = (0.5, 1.0, 2.0, 5.0)
 _READ_BYTES = 4096
+_IEC_61162_450 = b'UdPbC\0'  # stands before the sentences of a datagram
 _SO_RXQ_OVFL = 40  # Linux: the kernel says how many datagrams it dropped
 
 # lines that arrived together
@@ -105,11 +106,17 @@ class Listener:
         """
         self._thread.start()
 
+    def stop(self) -> None:
+        """
+        Ask for the end.
+        """
+        self._closing.set()
+
     def close(self) -> None:
         """
         End, and wait for it a second at most.
         """
-        self._closing.set()
+        self.stop()
         self._thread.join(1.0)
 
     def _run(self) -> None:
@@ -172,7 +179,11 @@ def _udp(address: Address, counts: SourceCounts) -> Iterator[Read]:
     dropped_before = counts.dropped
     with socket.socket(family, socket.SOCK_DGRAM) as heard:
         heard.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+        if address.is_multicast:
+            heard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # others may hear it too
         heard.bind(where)
+        if address.is_multicast:
+            _join(heard, address)
         heard.settimeout(_WAKE_S)
 
         def read() -> bytes | None:
@@ -183,9 +194,22 @@ def _udp(address: Address, counts: SourceCounts) -> Iterator[Read]:
             for level, kind, value in extra:
                 if level == socket.SOL_SOCKET and kind == _SO_RXQ_OVFL:
                     counts.dropped = dropped_before + struct.unpack('=I', value[:4])[0]
-            return data
+            return data.removeprefix(_IEC_61162_450)
 
         yield read
+
+
+def _join(heard: socket.socket, address: Address) -> None:
+    interface = address.interface or '0.0.0.0'
+    group = socket.inet_aton(address.place) + socket.inet_aton(interface)
+    try:
+        heard.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
+    except OSError as error:
+        raise OSError(
+            error.errno,
+            f'the group cannot be joined on interface {interface} ({error.strerror}); name one '
+            f'by its address, {address.text.partition("@")[0]}@ADDRESS',
+        ) from error
 
 
 @contextmanager

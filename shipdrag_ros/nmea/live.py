@@ -68,6 +68,8 @@ class LiveNmea:
         End all threads.
         """
         for listener in self._listeners:
+            listener.stop()
+        for listener in self._listeners:
             listener.close()
 
     def take(self, most: int) -> list[Line]:

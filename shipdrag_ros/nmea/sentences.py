@@ -29,6 +29,9 @@ _NO_HEADING = {'E': 'estimated', 'M': 'manual', 'S': 'simulated', 'V': 'not vali
 _NO_FIX = {'0': 'no fix', '6': 'dead reckoning', '7': 'manual', '8': 'simulated'}
 MAGNETIC = 'magnetic'
 _GLL_OF_OLD = 4  # fields
+OWN_OFFSET = 'with its own offset'
+STATED_DEPTH = 'with the stated depth of the transducer'
+NOT_TOLD = 'depth of the transducer not told'
 
 
 class NoValue(Exception):
@@ -255,18 +258,18 @@ def _depth_dpt(fields: Fields, mounting: Mounting) -> MeasuredValue:
     depth_m = fields.number('depth')
     # negative: to the keel, whose depth is not told
     if fields['offset'] and (offset_m := fields.number('offset')) >= 0.0:
-        return MeasuredValue(depth_m + offset_m)
-    return MeasuredValue(depth_m + _transducer(mounting))
+        return MeasuredValue(depth_m + offset_m, detail=OWN_OFFSET)
+    return MeasuredValue(depth_m + _transducer(mounting), detail=STATED_DEPTH)
 
 
 def _depth_dbt(fields: Fields, mounting: Mounting) -> MeasuredValue:
     depth_m = fields.first(('depthm', 1.0), ('depthf', _FOOT_M), ('depthfath', _FATHOM_M))
-    return MeasuredValue(depth_m + _transducer(mounting))
+    return MeasuredValue(depth_m + _transducer(mounting), detail=STATED_DEPTH)
 
 
 def _transducer(mounting: Mounting) -> float:
     if mounting.transducer_m is None:
-        raise NoValue('depth of the transducer not told')
+        raise NoValue(NOT_TOLD)
     return mounting.transducer_m
 
 

@@ -15,12 +15,14 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from shipdrag_ros.coastdown.events import Event
+from shipdrag_ros.node.compiling import Compiling
 from shipdrag_ros.node.health import InputState
 from shipdrag_ros.node.judging import Level
 from shipdrag_ros.node.log_lines import line_of
 from shipdrag_ros.samples import MOTION_INPUTS
 
 SILENCE_SAID_AFTER_S = 10.0
+COMPILING_SAID_AFTER_S = 3.0  # to load what was kept is faster
 AGAIN_S = 10.0  # a finding that comes and goes is said this often at most
 
 
@@ -40,6 +42,33 @@ class Announcer:
         self._inputs: dict[str, tuple[Level, float]] = {}
         self._silent_since_s: float | None = None
         self._silence_said = False
+        self._compiling_said = False
+        self._compiled: Compiling | None = None
+
+    def compiling(self, work: Compiling | None, waiting: int) -> None:
+        """
+        Tell that it takes a while until the first estimate can be made, and its end.
+
+        Parameters
+        ----------
+        waiting
+            Messages that wait for it.
+        """
+        if work is None or work is self._compiled:
+            return
+        if work.done():
+            self._compiled = work
+            if work.failure:
+                self._logger.error(f'compiling failed:\n{work.failure}')
+            after = f'ready to estimate, {work.seconds:.0f} s after the start'
+            self._logger.info(f'{after}; {waiting} messages waited')
+        elif work.seconds > COMPILING_SAID_AFTER_S and not self._compiling_said:
+            self._compiling_said = True
+            self._logger.info(
+                'compiling, as on the first start of each version: one to three minutes without '
+                'an estimate. What is heard is recorded, waits and is then used; `make warm` '
+                'compiles beforehand'
+            )
 
     def event(self, event: Event) -> None:
         """

@@ -71,6 +71,10 @@ class Standing:
         The longest that the ship was seen to be steady, and what an onset needs.
     progress
         How far the monitor is by now, None while not active.
+    compiling_s
+        Since when code is being compiled; None where it is.
+    waiting
+        Messages that wait for it.
     """
 
     lifecycle: str
@@ -81,6 +85,8 @@ class Standing:
     steady_lead_s: float = 0.0
     steady_needed_s: float = 0.0
     progress: Progress | None = None
+    compiling_s: float | None = None
+    waiting: int = 0
 
 
 def state_status(standing: Standing, inputs: Sequence[InputState]) -> DiagnosticStatus:
@@ -94,11 +100,19 @@ def state_status(standing: Standing, inputs: Sequence[InputState]) -> Diagnostic
         'clock': 'simulated' if standing.sim_time else 'system',
         **({} if standing.progress is None else standing.progress.values),
     }
+    if standing.compiling_s is not None:
+        values |= {'compiling [s]': standing.compiling_s, 'messages that wait': standing.waiting}
     if standing.sim_time and standing.clock_ns == 0:
         text = 'use_sim_time is true but no /clock: messages are not used'
         return _status('state', ERROR, text, values)
     if monitor is None:
         return _status('state', WARN, f'{standing.lifecycle}: not estimating', values)
+    if standing.compiling_s is not None:
+        text = (
+            f'compiling, {standing.compiling_s:.0f} s: no estimates yet, one to three minutes on '
+            f'a first start; {standing.waiting} messages are recorded and wait'
+        )
+        return _status('state', WARN, text, values)
     values['longest steady sailing [s]'] = standing.steady_lead_s
     motion = [each for each in inputs if each.topic.name in MOTION_INPUTS]
     fresh = [each for each in motion if each.fresh]

@@ -128,6 +128,8 @@ class InputStates:
             topic.name,
             needed=topic.name in MOTION_INPUTS and not any(fresh.get(name) for name in others),
             type=topic.type or topic.fed_by or None,
+            fed=bool(topic.fed_by),
+            may_be_fed=topic.may_be_fed,
             stamped=topic.type is None or is_stamped(topic.type),
             other_types=topic.other_types,
             accepted=topic.accepted,

@@ -32,6 +32,7 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 
 from shipdrag_ros.messages import Decoded
+from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.losses import Sequences
 
 # As deep as Fast DDS goes unless told otherwise, some seconds of a flood: one estimate may take
@@ -93,6 +94,8 @@ class InputTopic:
         Messages that gave no sample, by reason, and joints that have no place.
     fed_by
         What feeds the input instead of its topic, '' if nothing does.
+    may_be_fed
+        Whether something else than the topic could feed it.
     unstamped
         Readings whose header holds no time.
     """
@@ -123,6 +126,7 @@ class InputTopic:
         self.unstamped = 0
         self.unreadable: Counter[str] = Counter()
         self.fed_by = ''
+        self.may_be_fed = False
         if fixed:
             self._subscribe(fixed, reliable=True)
 
@@ -210,6 +214,8 @@ class InputTopic:
         """
         for reason, times in decoded.unreadable.items():
             self.unreadable[reason.value] += times
+        if self.type is not None and not is_stamped(self.type):
+            return  # arrivals tell nothing of a clock
         for stamp_ns, receive_ns in zip(
             decoded.block.stamp_ns.tolist(), decoded.block.receive_ns.tolist(), strict=True
         ):

@@ -131,6 +131,8 @@ class InputFacts:
         Heard; None while there is none.
     stamped
         Whether that type carries a time.
+    fed, may_be_fed
+        Whether NMEA feeds it, or could.
     other_types, accepted
         Types published and not heard; types that could be.
     senders
@@ -156,6 +158,8 @@ class InputFacts:
     needed: bool
     type: str | None = None
     stamped: bool = True
+    fed: bool = False
+    may_be_fed: bool = False
     other_types: tuple[str, ...] = ()
     accepted: tuple[str, ...] = ()
     senders: tuple[str, ...] = ()
@@ -175,7 +179,8 @@ def judge(facts: InputFacts) -> Finding:
     """
     found = sorted(_findings(facts), key=lambda finding: -finding.level)
     if not found:
-        return Finding(Level.OK, 'receiving')
+        stamped = '' if facts.stamped else '; its type holds no time: it counts from its arrival'
+        return Finding(Level.OK, f'receiving{stamped}')
     return Finding(found[0].level, '; '.join(finding.text for finding in found))
 
 
@@ -188,7 +193,8 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
         return
     if facts.type is None or (facts.age_s is None and not facts.senders and not others):
         level = Level.WARN if facts.needed else Level.OK
-        yield Finding(level, 'no publisher')
+        nor = ', and nothing by NMEA so far' if facts.may_be_fed else ''
+        yield Finding(level, f'no publisher{nor}')
         return
     if others:
         text = f'wrong type: also published as {others}, heard is only {facts.type}'
@@ -202,7 +208,7 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
         yield Finding(Level.WARN, 'no data')
         return
     if facts.age_s > SILENT_S:
-        gone = '' if facts.senders else ', no publisher any more'
+        gone = '' if facts.senders or facts.fed else ', no publisher any more'
         yield Finding(Level.STALE, f'no data for {facts.age_s:.0f} s{gone}')
         return
     yield from _of_readings(facts)
@@ -287,6 +293,28 @@ def _offset(offset_s: float) -> str:
     size = abs(offset_s)
     figure = f'{size:.1f} s' if size < 1e4 else f'{size / 86400.0:.3g} days'
     return f'{figure} {side} that of this computer'
+
+
+def convention_doubt(convention: str, *, stamped: bool, fed: bool) -> str:
+    """
+    Say that a heading would be turned twice, '' if it is not.
+
+    Parameters
+    ----------
+    convention
+        `Parameters.heading_convention`.
+    stamped
+        Whether its type holds a time; the one that does not is degrees of a compass.
+    fed
+        Whether NMEA feeds it.
+    """
+    if convention == 'rep103' or (stamped and not fed):
+        return ''
+    source = 'NMEA' if fed else 'its type'
+    return (
+        f'heading_convention is {convention}, but {source} is known to count from north and is '
+        'turned already: set it to rep103'
+    )
 
 
 def behind_others(offsets_s: Mapping[str, float | None]) -> dict[str, tuple[str, float]]:

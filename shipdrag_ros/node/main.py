@@ -25,8 +25,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-from shipdrag_ros.compiled import compile_all
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.node.compiling import leave_if_compiling
 from shipdrag_ros.node.console import terminal_line
 from shipdrag_ros.node.node import CoastdownNode
 
@@ -50,10 +50,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     line = list(sys.argv if arguments is None else arguments)
     try:
-        return _run(line)
+        status = _run(line)
     except ShipdragError as error:
         print(f'ERROR: {error}', file=sys.stderr)
-        return 1
+        status = 1
+    leave_if_compiling(status)
+    return status
 
 
 def run(
@@ -103,8 +105,6 @@ def _run(line: list[str]) -> int:
                 executor.add_node(node)
                 node.shown = terminal_line(sys.stderr)
                 node.start()
-                # while ROS finds the topics; a message that needs a function first waits for it
-                threading.Thread(target=compile_all, name='compiling', daemon=True).start()
                 while not stop.is_set():
                     executor.spin_once()
             except ExternalShutdownException:

@@ -22,11 +22,19 @@ from shipdrag_ros.nmea.address import Address, parse_addresses
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.listener import SourceCounts
 from shipdrag_ros.nmea.live import LiveNmea
+from shipdrag_ros.nmea.sentences import NOT_TOLD, READERS, Mounting
 from shipdrag_ros.node.diagnostics import ERROR, OK, STALE, WARN, nmea_status
 from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.judging import SILENT_S
 from shipdrag_ros.node.session import Session
+from shipdrag_ros.node.settings import NodeSettings
+from shipdrag_ros.samples import MOTION_INPUTS
 
+_MOTION = ', '.join(
+    kind
+    for kind, readers in READERS.items()
+    if any(channel.input in MOTION_INPUTS for channel, _ in readers)
+)
 AT_ONCE = 200  # lines between two turns of everything else
 BAD_SHARE = 0.05  # of the lines of a healthy line fewer are damaged
 
@@ -39,8 +47,8 @@ class NmeaFeed:
     ----------
     node
         Whose clock stamps what is heard.
-    sources
-        Addresses, separated by blanks.
+    settings
+        `nmea`, addresses separated by blanks, and `nmea_transducer_m` are used.
     session
         Returns the session, None while the node is not active.
 
@@ -50,11 +58,15 @@ class NmeaFeed:
         If an address is none.
     """
 
-    def __init__(self, node: Node, sources: str, *, session: Callable[[], Session | None]) -> None:
+    def __init__(
+        self, node: Node, settings: NodeSettings, *, session: Callable[[], Session | None]
+    ) -> None:
         self._node = node
         self._session = session
         self._topics: dict[str, InputTopic] = {}
-        self._interpreter = Interpreter()
+        transducer_m = settings.nmea_transducer_m
+        self._mounting = Mounting(transducer_m if transducer_m >= 0.0 else None)
+        self._interpreter = Interpreter(self._mounting)
         self._fed_by_topic: set[str] = set()
         self._fed_by_nmea: set[str] = set()
         self._topic_refused: Counter[str] = Counter()
@@ -62,7 +74,7 @@ class NmeaFeed:
         self._unused = 0
         self._problems: dict[str, str] = {}
         self._live = LiveNmea(
-            parse_addresses(sources),
+            parse_addresses(settings.nmea),
             clock_ns=lambda: int(node.get_clock().now().nanoseconds),
             wake=self._wake,
         )
@@ -73,6 +85,8 @@ class NmeaFeed:
         Begin to hear, for these inputs.
         """
         self._topics = {topic.name: topic for topic in topics}
+        for topic in topics:
+            topic.may_be_fed = bool(self._live.counts())
         self._live.start()
         for address in self._live.counts():
             self._node.get_logger().info(f'hearing NMEA 0183 on {address}')
@@ -88,7 +102,7 @@ class NmeaFeed:
         """
         Choose anew who feeds what: the node was activated.
         """
-        self._interpreter = Interpreter()
+        self._interpreter = Interpreter(self._mounting)
         for one in (self._fed_by_topic, self._fed_by_nmea):
             one.clear()
         self._topic_refused.clear()
@@ -105,6 +119,26 @@ class NmeaFeed:
             return False
         self._fed_by_topic.add(topic.name)
         return True
+
+    def silence(self) -> str:
+        """
+        Say what is heard of each source while no motion is known; '' without sources.
+        """
+        return '; '.join(
+            f'NMEA {address}: {self._heard(count)}'
+            for address, count in self._live.counts().items()
+        )
+
+    def _heard(self, counts: SourceCounts) -> str:
+        if counts.problem:
+            return counts.problem
+        if not counts.lines:
+            return 'open, nothing heard yet'
+        if not self._interpreter.sentences:
+            return f'{counts.lines} lines heard, none a sentence: look at baud rate and wiring'
+        if counts.age_s is not None and counts.age_s > SILENT_S:
+            return f'no line for {counts.age_s:.0f} s'
+        return f'{counts.lines} lines heard, none of use yet for speed or position ({_MOTION})'
 
     def statuses(self) -> list[DiagnosticStatus]:
         """
@@ -146,7 +180,7 @@ class NmeaFeed:
                     continue
                 self._fed_by_nmea.add(source.input)
                 topic.feed(f'NMEA {line.address}')
-                topic.count(session.receive(source, message.payload, now_ns))
+                session.receive(source, message.payload, now_ns, topic.count)
         if self._live.waiting:
             self._wake()
 
@@ -199,4 +233,8 @@ class NmeaFeed:
             return WARN, f'{names}: also published as a topic, which is not used; NMEA was first'
         feeding = found.feeding()
         named = '; '.join(f'{name} from {source}' for name, source in feeding.items())
+        untold = any(each.endswith(NOT_TOLD) for each in found.no_value)
+        if untold and 'depth' not in feeding:
+            named += '; ' if named else ''
+            named += 'depth is not used: set nmea_transducer_m, as the sentences state no offset'
         return OK, named or 'heard, nothing used yet'

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock
@@ -20,7 +20,6 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.bags.retention import Keep
@@ -29,14 +28,16 @@ from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
 from shipdrag_ros.node import diagnostics
 from shipdrag_ros.node.announcer import Announcer
+from shipdrag_ros.node.compiling import Compiling
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
 from shipdrag_ros.node.health import InputStates, candidates, candidates_text
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.mailbox import Mailbox
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
-from shipdrag_ros.node.recorder import Recorder, RecordingState
+from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.service_guard import guard_services
+from shipdrag_ros.node.services import add_services
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.node.watching import Watching
@@ -46,7 +47,8 @@ from shipdrag_ros.ship import Ship
 NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
-INACTIVE = 'the node is not active'
+FIRST_S = 0.3  # by then who listens is found; compiling begins behind it
+WAITING_MOST = 200_000  # messages that wait for compiled code: some 100 MB
 RELIABLE = ReliabilityPolicy.RELIABLE
 # who joins late still gets the last message
 LATCHED = QoSProfile(depth=1, reliability=RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -84,6 +86,7 @@ class CoastdownNode(LifecycleNode):
         self._recorder: Recorder | None = None
         self._announcer = Announcer(self.get_logger())
         self._session: Session | None = None
+        self._compiling: Compiling | None = None
         self._diagnosing: Diagnosing | None = None
         self._diagnosed: DiagnosisStatus | None = None
         self._input_topics: list[InputTopic] = []
@@ -96,13 +99,9 @@ class CoastdownNode(LifecycleNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
+        self._first = self.create_timer(FIRST_S, self._publish_first, clock=steady)
         self.create_timer(LOOK_S, self._look, clock=steady)
-        for name, action in (
-            ('start_recording', self._start_recording),
-            ('stop_recording', self._stop_recording),
-            ('reset', self._reset),
-        ):
-            self.create_service(Trigger, f'~/{name}', action)
+        add_services(self, lambda: self._session)
         guard_services(self.services, self._service_change_state, self.get_logger().warning)
 
     def start(self) -> None:
@@ -195,9 +194,11 @@ class CoastdownNode(LifecycleNode):
         ]
         self._input_states = InputStates()
         self._mailbox = Mailbox(self._input_topics, ahead=not self._simulated)
-        self._nmea = NmeaFeed(self, settings.nmea, session=lambda: self._session)
+        self._nmea = NmeaFeed(self, settings, session=lambda: self._session)
         self._nmea.start(self._input_topics)
         self._node_parameters.fixed = True
+        if self._compiling is None or self._compiling.estimator != settings.parameters.estimator:
+            self._compiling = Compiling(settings.parameters)
         effective = ', '.join(f'{name}={value!r}' for name, value in settings.to_mapping().items())
         self.get_logger().info(f'configured: {effective}')
 
@@ -205,6 +206,7 @@ class CoastdownNode(LifecycleNode):
         assert self._ship is not None
         assert self._settings is not None
         assert self._diagnosing is not None
+        assert self._compiling is not None
         assert self._nmea is not None
         self._nmea.renew()
         monitor = Monitor(self._ship, self._settings.parameters)
@@ -224,6 +226,7 @@ class CoastdownNode(LifecycleNode):
             node=self.get_fully_qualified_name(),
             ended=self._diagnosing.begin,
             told=self._announcer.event,
+            ready=self._compiling.done,
         )
         self._watching = Watching(
             self._input_topics, self._settings.parameters, simulated=self._simulated
@@ -262,6 +265,11 @@ class CoastdownNode(LifecycleNode):
         self._node_parameters.fixed = False
 
     @property
+    def _compiling_s(self) -> float | None:
+        work = self._compiling
+        return None if work is None or work.done() else work.seconds
+
+    @property
     def _simulated(self) -> bool:
         return bool(self.get_parameter('use_sim_time').value)
 
@@ -280,6 +288,8 @@ class CoastdownNode(LifecycleNode):
 
     def _hear(self) -> None:
         """Take what has come on all topics, in its order."""
+        if self._session is not None and self._session.waiting > WAITING_MOST:
+            return  # the middleware keeps some more, and tells what it loses
         for topic, data, received_ns in self._mailbox.take():
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
@@ -290,13 +300,16 @@ class CoastdownNode(LifecycleNode):
             assert topic.type is not None
             assert self._watching is not None
             self._watching.watch_clock(self._session, now_ns)
-            decoded = self._session.receive(Source(topic.name, topic.type), data, now_ns)
-            topic.count(decoded, 0 if self._simulated else received_ns)
+            count = partial(topic.count, received_ns=0 if self._simulated else received_ns)
+            self._session.receive(Source(topic.name, topic.type), data, now_ns, count)
 
     def _look(self) -> None:
         for topic in self._input_topics:
             topic.look()
         self._hear()  # what a changed subscription left, and what a limit held back
+        if self._session is not None:
+            self._announcer.compiling(self._compiling, self._session.waiting)
+            self._session.go_on()
 
     # health
 
@@ -342,9 +355,16 @@ class CoastdownNode(LifecycleNode):
         if self.shown is not None:
             self.shown(message)
 
+        if self._compiling is not None:
+            self._compiling.begin()
+
+    def _publish_first(self) -> None:
+        self.destroy_timer(self._first)
+        self._publish_diagnostics()
+
     def _doubts(self) -> dict[str, str]:
         """Say what is odd about inputs besides what became of their readings."""
-        if self._session is None or self._watching is None:
+        if self._session is None or self._watching is None or self._compiling_s is not None:
             return {}
         heading = self._session.monitor.heading_doubt()
         return {'heading': heading} | self._watching.doubts()
@@ -354,16 +374,14 @@ class CoastdownNode(LifecycleNode):
         motion = [each for each in states if each.topic.name in MOTION_INPUTS]
         hint = ''
         if not any(each.fresh for each in motion):
-            hint = candidates_text(
-                candidates(
-                    self.get_topic_names_and_types(),
-                    MOTION_INPUTS,
-                    taken=[
-                        *(each.topic.topic for each in states),
-                        *(topic.under(self.get_fully_qualified_name()) for topic in OUTPUT_TOPICS),
-                    ],
-                )
-            )
+            name = self.get_fully_qualified_name()
+            taken = [
+                *(each.topic.topic for each in states),
+                *(it.under(name) for it in OUTPUT_TOPICS),
+            ]
+            found = candidates(self.get_topic_names_and_types(), MOTION_INPUTS, taken=taken)
+            by_nmea = '' if self._nmea is None else self._nmea.silence()
+            hint = '; '.join(filter(None, [by_nmea, candidates_text(found)]))
         return diagnostics.Standing(
             self._state_machine.current_state[1],
             None if session is None else session.monitor.state,
@@ -371,37 +389,10 @@ class CoastdownNode(LifecycleNode):
             self._simulated,
             candidates=hint,
             progress=None if session is None else session.monitor.progress,
+            compiling_s=self._compiling_s,
+            waiting=0 if session is None else session.waiting,
             steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
             steady_needed_s=0.0
             if self._settings is None
             else self._settings.parameters.slope_window_s,
         )
-
-    # services
-
-    def _start_recording(self, request: Any, response: Any) -> Any:
-        if self._session is not None:
-            self._session.recorder.start()
-        return self._answer_recording(response)
-
-    def _stop_recording(self, request: Any, response: Any) -> Any:
-        if self._session is not None:
-            self._session.recorder.stop()
-        return self._answer_recording(response)
-
-    def _answer_recording(self, response: Any) -> Any:
-        if self._session is None:
-            return _answer(response, False, INACTIVE)
-        status = self._session.recorder.status()
-        return _answer(response, status.state is not RecordingState.FAILED, status.text)
-
-    def _reset(self, request: Any, response: Any) -> Any:
-        if self._session is None:
-            return _answer(response, False, INACTIVE)
-        self._session.reset('asked for', self._now_ns())
-        return _answer(response, True, 'all memory is dropped')
-
-
-def _answer(response: Any, success: bool, message: str) -> Any:
-    response.success, response.message = success, message
-    return response

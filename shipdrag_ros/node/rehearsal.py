@@ -10,11 +10,13 @@ from types import TracebackType
 from typing import Any, Self
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import DEFAULT_NODE
+from shipdrag_ros.messages.heard import health_of
 from shipdrag_ros.messages.topics import RESISTANCE, SPEED
 from shipdrag_ros.node.inputs import message_class
 from shipdrag_ros.node.player import Player
@@ -58,6 +60,8 @@ class Rehearsal:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._player = Player(self._node, self._executor)
+        self._ready = False
+        self._node.create_subscription(DiagnosticArray, '/diagnostics', self._hear_health, 10)
         for topic, callback in ((SPEED, self._hear_speed), (RESISTANCE, self._hear_resistance)):
             self._node.create_subscription(
                 message_class(topic.type), topic.under(DEFAULT_NODE), callback, 1000
@@ -65,7 +69,7 @@ class Rehearsal:
 
     def wait_for_node(self, block: Block, *, alive: Callable[[], None], timeout_s: float) -> None:
         """
-        Wait until the node hears every input of a block.
+        Wait until the node hears every input of a block, and is ready to estimate.
 
         Parameters
         ----------
@@ -81,10 +85,15 @@ class Rehearsal:
         while True:
             alive()
             try:
-                return self._player.connect(block, timeout_s=1.0)
+                self._player.connect(block, timeout_s=1.0)
             except ShipdragError:
                 if time.monotonic() > end_s:
                     raise
+            else:
+                break
+        while not self._ready:  # a first start compiles, which ends by itself
+            alive()
+            self._executor.spin_once(timeout_sec=0.1)
 
     def play(self, block: Block, *, speed: float, progress: Callable[[float], None]) -> None:
         """
@@ -119,6 +128,13 @@ class Rehearsal:
         self._executor.shutdown()
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
+
+    def _hear_health(self, message: DiagnosticArray) -> None:
+        for health in health_of(message.status):
+            state = health.of('state')
+            assert state is not None  # by which a node is known
+            compiling = 'compiling [s]' in state.values
+            self._ready = state.values['lifecycle'] == 'active' and not compiling
 
     def _hear_speed(self, message: Any) -> None:
         self._speeds[_stamp_ns(message)] = message.twist.twist.linear.x

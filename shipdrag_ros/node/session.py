@@ -7,7 +7,9 @@ Free of ROS, so that what a replay must reproduce can be tested without it.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
@@ -31,6 +33,7 @@ from shipdrag_ros.messages import (
     outputs,
     reset_request,
     silence_mark,
+    types,
 )
 from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.ring import RawMessage
@@ -39,6 +42,9 @@ from shipdrag_ros.samples import BACKWARD_JUMP_NS
 Publish = Callable[[OutputMessage], None]
 Ended = Callable[[Coastdown, Window], None]
 Told = Callable[[Event], None]
+Count = Callable[[Decoded], None]
+
+AT_ONCE = 2000  # of what waited, between two turns of everything else
 
 
 class Session:
@@ -58,6 +64,9 @@ class Session:
         was withdrawn, or that a reset ended, which has dropped them.
     told
         Called with every event of the monitor.
+    ready
+        Says whether compiled code is there. What comes before that is recorded as it comes, and
+        waits in its order for the monitor.
 
     Attributes
     ----------
@@ -76,6 +85,7 @@ class Session:
         node: str,
         ended: Ended | None = None,
         told: Told | None = None,
+        ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self.monitor = monitor
         self.recorder = recorder
@@ -85,20 +95,64 @@ class Session:
         self._ended = ended
         self._told = told
         self.why_none = ''
+        self._ready = ready
+        self._waiting: deque[tuple[int, Callable[[], None]]] = deque()
         self._arrival_ns = 0
+        self._cause_ns = 0  # arrival of what the messages out come of, if not the last
 
-    def receive(self, source: Source, payload: bytes, now_ns: int) -> Decoded:
+    @property
+    def waiting(self) -> int:
+        """What was heard and recorded, and waits for the monitor."""
+        return len(self._waiting)
+
+    def receive(
+        self, source: Source, payload: bytes, now_ns: int, count: Count | None = None
+    ) -> None:
         """
-        Take one message; `now_ns` is the clock of the node [ns].
+        Take one message.
+
+        Parameters
+        ----------
+        now_ns
+            Clock of the node [ns].
+        count
+            Called with what became of it.
         """
         arrival_ns = self.watch_clock(now_ns)
-        decoded = decode(source, [payload], [arrival_ns])
-        stamps = decoded.block.stamp_ns
-        stamp_ns = int(stamps[0]) if len(stamps) else arrival_ns
         # also what will be rejected: the bag holds what came, not what was liked
-        self.recorder.input(RawMessage(source.input, source.type, payload, arrival_ns, stamp_ns))
-        self._report(self.monitor.update(decoded.block))
-        return decoded
+        keep = partial(RawMessage, source.input, source.type, payload, arrival_ns)
+        waits = bool(self._waiting) or not self._ready()
+        if waits:  # nothing compiled may be called
+            self.recorder.input(keep(types.stated_stamp_ns(source.type, payload, arrival_ns)))
+
+        def use() -> None:
+            decoded = decode(source, [payload], [arrival_ns])
+            if not waits:
+                stamps = decoded.block.stamp_ns
+                self.recorder.input(keep(int(stamps[0]) if len(stamps) else arrival_ns))
+            self._report(self.monitor.update(decoded.block))
+            if count is not None:
+                count(decoded)
+
+        self._in_turn(use)
+
+    def go_on(self) -> None:
+        """
+        Use what waits, some of it, once compiled code is there.
+        """
+        try:
+            for _ in range(min(len(self._waiting), AT_ONCE)):
+                if not self._ready():
+                    return
+                self._cause_ns, use = self._waiting.popleft()
+                use()
+        finally:
+            self._cause_ns = 0
+
+    def _in_turn(self, use: Callable[[], None]) -> None:
+        """Do it behind what waits."""
+        self._waiting.append((self._arrival_ns, use))
+        self.go_on()
 
     def keep(self, source: Source, payload: bytes, now_ns: int) -> None:
         """
@@ -133,7 +187,7 @@ class Session:
         self._publish(mark)
         if arrival_ns:
             self.recorder.request(mark, arrival_ns)
-        self._report(self.monitor.fall_silent())
+        self._in_turn(lambda: self._report(self.monitor.fall_silent()))
 
     def reset(self, reason: str, now_ns: int) -> None:
         """
@@ -182,18 +236,28 @@ class Session:
     def finish(self) -> None:
         """
         Give the last figures and close the recording; needs no ROS.
+
+        What still waits for compiled code stays in the recording, for a replay.
         """
         try:
-            self._report(self.monitor.finish())
+            while self._waiting and self._ready():
+                self.go_on()
+            if not self._waiting:
+                self._report(self.monitor.finish())
         finally:  # whatever is wrong, the bag is closed
             self.recorder.close()
 
     def _reset(self, reason: str) -> None:
         # first the request, at whose place a replay resets too
-        self._send(reset_request(self._arrival_ns, reason, node=self._node))
-        self._report(self.monitor.reset(self._arrival_ns, reason))
+        arrival_ns = self._arrival_ns
+        self._send(reset_request(arrival_ns, reason, node=self._node))
         self.recorder.forget()
-        self.latest = None
+
+        def use() -> None:
+            self._report(self.monitor.reset(arrival_ns, reason))
+            self.latest = None
+
+        self._in_turn(use)
 
     def _note(self, kind: EventKind, text: str) -> None:
         self._send(event_message(EventNote(kind, self._arrival_ns, text, {}), node=self._node))
@@ -217,5 +281,6 @@ class Session:
 
     def _send(self, message: OutputMessage) -> None:
         self._publish(message)
-        if self._arrival_ns:  # 0: sim time before the first /clock
-            self.recorder.output(message, self._arrival_ns)
+        cause_ns = self._cause_ns or self._arrival_ns
+        if cause_ns:  # 0: sim time before the first /clock
+            self.recorder.output(message, cause_ns)

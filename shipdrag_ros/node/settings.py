@@ -87,6 +87,15 @@ OWN: tuple[Setting, ...] = (
         start_only=True,
     ),
     Setting(
+        'nmea_transducer_m',
+        -1.0,
+        'depth of the echo sounder below the surface, added to DBT, and to DPT without an offset '
+        'from the surface; negative: not known, and such a depth is not used',
+        unit='m',
+        low=-1.0,
+        high=50.0,
+    ),
+    Setting(
         'part_size_bytes',
         PartLimits().size_bytes,
         'a recording goes on in a new file when one has grown to this; it is then rewritten '
@@ -180,6 +189,7 @@ class NodeSettings:
     record: bool
     output_directory: str
     nmea: str
+    nmea_transducer_m: float
     part_size_bytes: int
     part_duration_s: float
     keep_days: float

@@ -13,8 +13,10 @@ from collections.abc import Mapping, Sequence
 
 from shipdrag_ros.coastdown import InputHealth
 from shipdrag_ros.coastdown.events import State
+from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.clocks import OwnClock, SensorClock, both_ns, set_by
 from shipdrag_ros.node.inputs import InputTopic
+from shipdrag_ros.node.judging import convention_doubt
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import BACKWARD_JUMP_NS, MOTION_INPUTS
@@ -33,7 +35,7 @@ class Watching:
     topics
         All inputs.
     parameters
-        `data_stop_s` and `frozen_s` are used.
+        `data_stop_s`, `frozen_s` and `heading_convention` are used.
     simulated
         Whether the clock is simulated, and may stand or run as it likes.
     """
@@ -88,12 +90,20 @@ class Watching:
 
     def doubts(self) -> dict[str, str]:
         """
-        Say of which inputs the clock was set lately.
+        Say of which inputs the clock was set lately, and whether a heading is turned twice.
         """
         now_s = time.monotonic()
-        return {
+        found = {
             name: text for name, (at_s, text) in self._stepped.items() if now_s < at_s + _SAID_S
         }
+        for topic in self._topics:
+            if topic.name == 'heading' and (topic.type or topic.fed_by):
+                stamped = topic.type is None or is_stamped(topic.type)
+                convention = self._parameters.heading_convention
+                text = convention_doubt(convention, stamped=stamped, fed=bool(topic.fed_by))
+                if text:
+                    found[topic.name] = text
+        return found
 
     def _watch_sensors(self, session: Session, now_ns: int) -> None:
         for topic in self._topics:

@@ -70,7 +70,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     file = tmp_path / 'parameters.yaml'
     file.write_text(yaml.safe_dump({'/**': {'ros__parameters': parameters}}))
     node = start('shipdrag_ros.node.main', '--ros-args', '--params-file', file)
-    node.wait_for('active;')
+    node.wait_for('ready to estimate')
     scenario = Scenario(speed_m_s=8.2, lead_in_s=420.0, duration_s=420.0)
     block = sense(simulate(Ship.load(SHIP), scenario), standard_sensors(), seed=1)
     said: list[str] = []

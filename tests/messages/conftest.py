@@ -30,6 +30,8 @@ class Reference:
     def message(self, type_name: str, stamp_ns: int, frame_id: str, numbers: list[float]) -> Any:
         """Fill a message of an accepted type with eight numbers."""
         a, b, c, d, e, f, g, h = numbers
+        if type_name == 'std_msgs/msg/Float64':
+            return self.make(type_name, data=a)
         covariance = np.arange(36.0)
         covariance[[0, 1, 6, 7]] = c, d, d, e
         twist = self.make(

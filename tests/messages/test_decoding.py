@@ -12,7 +12,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.messages import TOPICS, Source, Unreadable, decode
+from shipdrag_ros.messages import TOPICS, Source, Unreadable, decode, types
+from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.samples import Block, Channel, concatenate
 
 SOURCES = [Source(name, type_name) for name, accepted in TOPICS.items() for type_name in accepted]
@@ -49,6 +50,12 @@ def expected(source: Source, numbers: list[float]) -> tuple[Channel, list[float]
             return Channel.POSITION_GEODETIC, [a, b], [f, e]
         case 'position':
             return Channel.POSITION, [a, b], [c, e] if with_covariance else [nan, nan]
+        case 'heading' if 'Float64' in source.type:
+            return (
+                Channel.HEADING,
+                [math.remainder(math.radians(90.0 - a), math.tau), 0],
+                [nan] * 2,
+            )
         case 'heading':
             yaw = math.atan2(2 * (d * c + a * b), d * d + a * a - b * b - c * c)
             variance = g if 'Imu' in source.type else nan
@@ -75,7 +82,9 @@ def test_every_accepted_type(reference: Any, source: Source, little_endian: bool
     decoded = decode(source, [payload], [STAMP_NS + 7])
     assert decoded.block.channel.tolist() == [channel]
     assert channel.input == source.input
-    assert decoded.block.stamp_ns.tolist() == [STAMP_NS]
+    # what holds no time counts from its arrival
+    stamp_ns = STAMP_NS if is_stamped(source.type) else STAMP_NS + 7
+    assert decoded.block.stamp_ns.tolist() == [stamp_ns]
     assert decoded.block.receive_ns.tolist() == [STAMP_NS + 7]
     np.testing.assert_allclose(decoded.block.value[0], value, rtol=1e-15, atol=0)
     if source.input != 'speed_over_ground':
@@ -101,7 +110,10 @@ def test_a_batch_gives_the_bits_of_single_messages(
     batch = decode(source, payloads, received).block
     singles = [decode(source, [p], [t]).block for p, t in zip(payloads, received, strict=True)]
     assert same_bits(batch, concatenate(singles))
-    assert batch.stamp_ns.tolist() == [s for s, *_ in rows]
+    stated = [s for s, *_ in rows]
+    assert batch.stamp_ns.tolist() == (stated if is_stamped(source.type) else received)
+    read = [types.stated_stamp_ns(source.type, p, t) for p, t in zip(payloads, received)]
+    assert batch.stamp_ns.tolist() == read
 
 
 @settings(max_examples=60, deadline=None)
@@ -154,7 +166,7 @@ def test_broken_bytes_are_counted_and_spoil_no_neighbour(
     flips = data.draw(st.lists(st.tuples(st.integers(0, 39), st.integers(0, 255)), max_size=6))
     flipped = bytearray(good)
     for place, byte in flips:
-        flipped[place] = byte
+        flipped[place % len(flipped)] = byte
     junk = data.draw(st.binary(max_size=80))
     payloads = [good, good[:cut], bytes(flipped), junk, good]
     decoded = decode(source, payloads, [1, 2, 3, 4, 5])
@@ -288,6 +300,19 @@ def test_a_range_of_before_iron_is_read() -> None:
     assert block.value[0, 0] == 4.5
     assert block.stamp_ns.tolist() == [1_000_000_002]
     assert np.isnan(block.variance).all()
+
+
+@pytest.mark.parametrize(
+    ('compass_deg', 'yaw_deg'),
+    [(0.0, 90.0), (90.0, 0.0), (180.0, -90.0), (359.0, 91.0), (-9.0, 99.0)],
+)
+def test_degrees_of_a_compass_become_yaw(
+    reference: Any, compass_deg: float, yaw_deg: float
+) -> None:
+    source = Source('heading', 'std_msgs/msg/Float64')
+    payload = reference.serialize(source.type, reference.make(source.type, data=compass_deg))
+    block = decode(source, [payload], [5]).block
+    assert np.degrees(block.value[0, 0]) == pytest.approx(yaw_deg, abs=1e-12)
 
 
 def test_no_messages_give_no_samples() -> None:

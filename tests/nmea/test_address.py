@@ -26,8 +26,30 @@ def test_each_form() -> None:
 
 @pytest.mark.parametrize(
     'text',
-    ['udp://:1', 'udp://a', 'udp://a:0', 'tcp://a:65536', 'serial:ttyUSB0:4800', 'http://a:1'],
+    [
+        'udp://127.0.0.1:1@127.0.0.1',
+        'udp://239.192.0.1:1@999.0.0.1',
+        'udp://:1',
+        'udp://a',
+        'udp://a:0',
+        'tcp://a:65536',
+        'serial:ttyUSB0:4800',
+        'http://a:1',
+    ],
 )
 def test_what_is_no_address_says_what_is(text: str) -> None:
     with pytest.raises(ShipdragError, match='expected'):
         Address.parse(text)
+
+
+def test_a_group_may_name_its_interface() -> None:
+    group, one, other = parse_addresses(
+        'udp://239.192.0.1:60001@127.0.0.1 udp://224.0.0.1:1 udp://10.0.0.1:1'
+    )
+    assert group.is_multicast
+    assert (group.place, group.number, group.interface) == ('239.192.0.1', 60001, '127.0.0.1')
+    assert str(group) == 'udp://239.192.0.1:60001@127.0.0.1'
+    assert one.is_multicast
+    assert not other.is_multicast
+    with pytest.raises(ShipdragError, match='groups of IPv6 are not joined'):
+        Address.parse('udp://[ff02::1]:60001')

@@ -13,6 +13,7 @@ from pynmeagps.nmeahelpers import calc_checksum
 
 from shipdrag_ros.messages import Source, decode
 from shipdrag_ros.nmea.interpreter import SETTLE_NS, SILENT_NS, Interpreter, raw_message
+from shipdrag_ros.nmea.sentences import Mounting
 from shipdrag_ros.samples import Channel
 
 START_NS = 1_700_000_000 * 10**9
@@ -66,6 +67,21 @@ def settled(*contents: str) -> tuple[Interpreter, dict[Channel, tuple[float, flo
 def test_each_sentence(content: str, channel: Channel, value: tuple[float, float]) -> None:
     _, found = settled(content)
     np.testing.assert_allclose(found[channel], value, atol=1e-9)
+
+
+def test_a_depth_says_what_makes_it_one_from_the_surface() -> None:
+    own, _ = settled('SDDPT,20.0,5.0')
+    assert own.feeding() == {'depth': 'SDDPT with its own offset'}
+    none, found = settled('SDDPT,20.0,')
+    assert none.feeding() == found == {}
+    assert none.no_value == {'depth DPT: depth of the transducer not told': 2}
+    stated = Interpreter(Mounting(3.0))
+    for stamp_ns in (START_NS, START_NS + SETTLE_NS):
+        (*_, message) = [None, *stated.messages(sentence('SDDPT,20.0,-1.0'), LINE, stamp_ns)]
+    assert message is not None
+    block = decode(Source('depth', message.type), [message.payload], [0]).block
+    assert block.value[0, 0] == 23.0
+    assert stated.feeding() == {'depth': 'SDDPT with the stated depth of the transducer'}
 
 
 def test_a_heading_that_is_not_measured_is_not_used() -> None:

@@ -73,6 +73,28 @@ def test_udp_lines_in_their_order() -> None:
     assert 0 <= time.time_ns() - taken[-1].read_ns < WITHIN_S * 1e9
 
 
+def test_a_multicast_group_is_joined() -> None:
+    group, port = '239.192.0.1', free_port(socket.SOCK_DGRAM)
+    with (
+        hearing(f'udp://{group}:{port}@127.0.0.1') as heard,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+    ):
+        until(lambda: not counts(heard).problem)
+        interface = socket.inet_aton('127.0.0.1')
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
+        # as IEC 61162-450 has it
+        sender.sendto(b'UdPbC\0\\s:HE0001*1C\\$HEHDT,90.0,T*18\r\n', (group, port))
+        until(lambda: heard.waiting)
+        assert heard.take(2)[0].text.endswith(TEXT)
+        assert counts(heard).binary == 0
+
+
+def test_a_group_that_cannot_be_joined_says_where() -> None:
+    with hearing('udp://239.192.0.1:60001@192.0.2.1') as heard:  # no interface of this computer
+        until(lambda: 'cannot be joined on interface 192.0.2.1' in counts(heard).problem)
+        assert 'udp://239.192.0.1:60001@ADDRESS' in counts(heard).problem
+
+
 def test_hostile_datagrams_are_counted_and_end_nothing() -> None:
     port = free_port(socket.SOCK_DGRAM)
     with hearing(f'udp://127.0.0.1:{port}') as heard, to_udp(heard, port) as send:

@@ -16,8 +16,9 @@ from typing import Any
 import pytest
 import yaml
 
-START_S = 240.0  # the first start of a machine compiles the kernels
+START_S = 400.0  # the first start of a machine compiles the kernels
 ANSWER_S = 60.0
+READY = 'ready to estimate'
 
 
 class NodeProcess:
@@ -260,7 +261,10 @@ def start_node(tmp_path: Path, ship_file: Path) -> Iterator[StartNode]:
     started: list[NodeProcess] = []
 
     def start(
-        *arguments: str, up: str | None = 'active;', ship: bool = True, **parameters: object
+        *arguments: str,
+        up: str | None = 'ready to estimate',
+        ship: bool = True,
+        **parameters: object,
     ) -> NodeProcess:
         directory = tmp_path / f'node{len(started)}'
         directory.mkdir()

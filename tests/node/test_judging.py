@@ -14,6 +14,7 @@ from shipdrag_ros.node.judging import (
     Level,
     Recently,
     behind_others,
+    convention_doubt,
     judge,
 )
 
@@ -112,3 +113,12 @@ def test_the_one_with_the_least_lag_is_the_measure() -> None:
     offsets = {'speed_through_water': 6.2, 'position': 0.2, 'rudder': 99.0}
     assert behind_others(offsets) == {'speed_through_water': ('position', 6.0)}
     assert behind_others({'position': 5.0, 'speed_over_ground': None}) == {}
+
+
+def test_a_heading_that_is_turned_twice_is_said() -> None:
+    assert convention_doubt('rep103', stamped=False, fed=True) == ''
+    assert convention_doubt('compass', stamped=True, fed=False) == ''
+    assert 'its type is known to count from north' in convention_doubt(
+        'compass', stamped=False, fed=False
+    )
+    assert 'NMEA' in convention_doubt('compass', stamped=True, fed=True)

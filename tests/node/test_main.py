@@ -165,6 +165,31 @@ def test_starts_from_a_call_with_any_path(tmp_path: Path, ship_file: Path) -> No
     assert 'keep_days=2.0' in said
 
 
+def test_a_start_without_compiled_code_hears_records_and_ends_when_asked(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv('SHIPDRAG_CACHE_DIR', str(tmp_path / 'nothing compiled'))
+    node = start_node(up='active;')
+    publisher = peer.advertise('/speed_through_water', 'geometry_msgs/msg/TwistStamped')
+    peer.wait_for_listener(publisher)
+    sent = [b'\x00\x01\x00\x00' + bytes([k, 0, 0, 101]) + bytes(60) for k in range(5)]
+    for payload in sent:
+        publisher.publish(payload)
+    status = diagnostics.wait_for('state', '5 messages are recorded and wait')
+    assert status.message.startswith('compiling, ')
+    assert status.level == b'\x01'
+    diagnostics.wait_for('input speed_through_water', '5', value='messages')
+    diagnostics.wait_for('recording', '6', value='messages')
+    node.wait_for_log('compiling, as on the first start')
+    assert peer.trigger('start_recording').success
+    assert node.stop() == 0
+    assert 'ready to estimate' not in node.log
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    with bag.open('rb') as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        assert [m.data for _, _, m in reader.iter_messages(['/speed_through_water'])] == sent
+
+
 def test_the_bag_is_closed_also_when_ros_is_gone(tmp_path: Path, ship_file: Path) -> None:
     context = rclpy.Context()
     line = ['--ros-args', '-p', f'ship_file:={ship_file}', '-p', f'output_directory:={tmp_path}']

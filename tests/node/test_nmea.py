@@ -79,6 +79,12 @@ def test_what_is_heard_is_used_recorded_and_replayed(
     node = start_node(nmea=instruments.source)
     part = f'nmea {instruments.source}'
     diagnostics.wait_for(part, 'nothing heard yet')
+    silent = diagnostics.wait_for('state', f'NMEA {instruments.source}: open, nothing heard yet')
+    assert silent.level == b'\x02'
+    diagnostics.wait_for('input position', 'no publisher, and nothing by NMEA so far')
+    instruments.say(sentence('SDDPT,20.0,'))
+    diagnostics.wait_for('state', '1 lines heard, none of use yet for speed or position (RMC, GGA')
+    diagnostics.wait_for(part, 'depth is not used: set nmea_transducer_m')
     used = lambda: (  # noqa: E731
         diagnostics.of('input speed_through_water') is not None
         and int(values(diagnostics.of('input speed_through_water')).get('used', '0')) >= 5

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.messages import EventKind, encode, read_event
+from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
 
 pytest.importorskip('rclpy')
@@ -145,6 +147,28 @@ def test_reports_why_an_input_is_silent(start_node: Any, peer: Any, diagnostics:
     assert 'also published as geometry_msgs/msg/TwistStamped' in status.message
 
 
+def test_a_heading_in_degrees_counts_from_its_arrival(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+) -> None:
+    from std_msgs.msg import Float64
+
+    node = start_node()
+    publisher = peer.advertise('/heading', 'std_msgs/msg/Float64')
+    peer.wait_for_listener(publisher)
+    for degrees in (90.0, 91.0, 92.0):
+        publisher.publish(Float64(data=degrees))
+        peer.spin_for(0.05)
+    status = diagnostics.wait_for('input heading', '3', value='used')
+    assert status.level == b'\x00'
+    assert status.message == 'receiving; its type holds no time: it counts from its arrival'
+    values = {item.key: item.value for item in status.values}
+    assert values['type'] == 'std_msgs/msg/Float64'
+    assert values['clock offset [s]'] == 'none'
+    assert node.stop() == 0
+    (run,) = open_runs([the_bag(tmp_path)])
+    assert replay(run).inputs['heading'].used == 3
+
+
 def test_hears_reliably_what_is_sent_so_and_counts_what_is_lost(
     start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
 ) -> None:
@@ -200,9 +224,9 @@ def test_two_nodes_are_told_apart_and_silence_names_what_may_be_meant(
     start_node: Any, peer: Any, diagnostics: Any, ship_file: Path
 ) -> None:
     ship_file.write_text(f'name: Sea Worthy\n{ship_file.read_text()}')
-    node = start_node('-r', '__ns:=/ship')
     peer.advertise('/gps/speed_log', SPEED_TYPE)
     peer.advertise('/rudder_angle', 'sensor_msgs/msg/JointState')
+    node = start_node('-r', '__ns:=/ship')
     status = diagnostics.wait_for('state', '/gps/speed_log')
     assert status.name == 'ship/coastdown_node: state'
     assert status.hardware_id == 'Sea Worthy'

@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.messages import EventKind, OutputMessage, Source, encode, read_event
+from shipdrag_ros.messages import Decoded, EventKind, OutputMessage, Source, encode, read_event
 from shipdrag_ros.node.recorder import Recorder
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.parameters import Parameters
@@ -41,6 +41,7 @@ class Desk:
     """A session with what it published."""
 
     def __init__(self, directory: Path) -> None:
+        self.ready = True
         monitor = Monitor(SHIP, PARAMETERS)
         self.published: list[OutputMessage] = []
         self.directory = directory
@@ -51,7 +52,13 @@ class Desk:
             parameters=PARAMETERS,
             history_ns=monitor.history_ns,
         )
-        self.session = Session(monitor, self.recorder, publish=self.published.append, node=NODE)
+        self.session = Session(
+            monitor,
+            self.recorder,
+            publish=self.published.append,
+            node=NODE,
+            ready=lambda: self.ready,
+        )
 
     def feed(self, block: Block) -> None:
         for message in encode(block):
@@ -142,8 +149,9 @@ def test_a_later_recording_begins_after_the_reset(tmp_path: Path) -> None:
 
 def test_what_is_not_understood_is_recorded_too(desk: Desk) -> None:
     source = Source('depth', 'sensor_msgs/msg/Range')
-    decoded = desk.session.receive(source, b'rubbish', START_NS)
-    assert sum(decoded.unreadable.values()) == 1
+    counted: list[Decoded] = []
+    desk.session.receive(source, b'rubbish', START_NS, counted.append)
+    assert [sum(decoded.unreadable.values()) for decoded in counted] == [1]
     (bag,) = desk.bags()
     assert [row.payload for row in bag] == [b'rubbish']
 
@@ -163,3 +171,35 @@ def test_nothing_is_recorded_at_time_0(desk: Desk) -> None:
     desk.feed(speeds([0]))
     (bag,) = desk.bags()
     assert [row.topic for row in bag] == ['/speed_through_water']
+
+
+def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_order(
+    tmp_path: Path,
+) -> None:
+    arrivals = [float(k) for k in range(20)]
+    prompt, patient = Desk(tmp_path / 'prompt'), Desk(tmp_path / 'patient')
+    patient.ready = False
+    for desk in (prompt, patient):
+        desk.recorder.start()
+        desk.feed(speeds(arrivals[:9]))
+        desk.session.reset('asked for', START_NS + 9 * SECOND_NS)
+        desk.feed(speeds(arrivals[10:15]))
+    assert patient.session.waiting == 15
+    assert patient.session.monitor.health()['speed_through_water'].used == 0
+    assert EventKind.RESET not in patient.kinds()
+    patient.ready = True
+    for desk in (prompt, patient):
+        desk.feed(speeds(arrivals[15:]))
+    assert patient.session.waiting == 0
+    assert patient.session.monitor.health() == prompt.session.monitor.health()
+    assert [it.payload for it in patient.published] == [it.payload for it in prompt.published]
+    (one,), (other,) = prompt.bags(), patient.bags()
+    assert sorted(one) == sorted(other)
+
+
+def test_what_still_waits_at_the_end_is_in_the_recording(desk: Desk) -> None:
+    desk.ready = False
+    desk.feed(speeds([0, 1, 2]))
+    (bag,) = desk.bags()
+    assert [row.log_ns for row in bag] == [START_NS + k * SECOND_NS for k in range(3)]
+    assert desk.published == []

@@ -2,6 +2,5 @@
 """r(v) by a fit of the equation of motion, with what disturbs it learnt apart."""
 
 from shipdrag_ros.estimation.ode_fit.estimate import NAME, estimate
-from shipdrag_ros.estimation.ode_fit.warming import warm
 
-__all__ = ['NAME', 'estimate', 'warm']
+__all__ = ['NAME', 'estimate']
