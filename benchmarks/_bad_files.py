@@ -208,11 +208,12 @@ TABLES = (
         arguments=('--time', 'time', '--map', 'position=speed'),
     ),
     _csv(
-        'neither --time nor --rate',
-        _TABLE,
-        2,
-        'one of the arguments --time --rate is required',
-        arguments=_MAP[2:],
+        'no column of a time',
+        'count,speed\n0,8.0\n1,7.9\n',
+        1,
+        "has no column that is known as a time; it has 'count', 'speed'",
+        'Give --time COLUMN[:unit], or --rate HZ',
+        arguments=('--map', 'speed_through_water=speed'),
     ),
     _csv(
         'words in some cells',
@@ -238,11 +239,11 @@ TABLES = (
         'empty cells', _TABLE.replace(',7.9\n', ',\n'), 0, "1 cell(s) rejected, empty: line 12: ''"
     ),
     _csv(
-        'dates as text',
-        _HEADER + '2026-06-01 08:00:00,8.0\n2026-06-01 08:00:01,7.9\n',
+        'dates whose day and month cannot be told apart',
+        _HEADER + '03/04/2026 08:00:00,8.0\n03/04/2026 08:00:01,7.9\n',
         1,
-        "time: not a number 2 times, line 2: '2026-06-01 08:00:00'",
-        'times in seconds or in the unit given',
+        'day and month cannot be told apart',
+        'give --date-order dmy or --date-order mdy',
     ),
     _csv(
         'equal times',
@@ -257,10 +258,10 @@ TABLES = (
         'In 1 rows the time is before that of an earlier row; a replay rejects those.',
     ),
     _csv(
-        'separated by |',
-        _TABLE.replace(',', '|'),
+        'separated by *',
+        _TABLE.replace(',', '*'),
         1,
-        "it has 'time|speed', and no comma, semicolon or tab",
+        "it has 'time*speed', and no comma, semicolon or tab",
     ),
     _csv('a byte-order mark', b'\xef\xbb\xbf' + _TABLE.encode(), 0, '100 messages of 100 rows'),
     _csv(
@@ -270,10 +271,10 @@ TABLES = (
         "'table.csv' is in UTF-16; save it as UTF-8",
     ),
     _csv(
-        'decimal commas',
-        _TABLE.replace(',', ';').replace('.', ','),
+        'commas that may be those of thousands',
+        'time;speed\n' + ''.join(f'{t};8,{100 + t}\n' for t in range(100)),
         1,
-        "not a number 100 times, line 2: '8,0'",
+        "not a number 100 times, line 2: '8,100'",
         'expected numbers with a decimal point',
     ),
     _csv(

@@ -35,7 +35,7 @@ PICTURE = (
     ('library',),
     ('live',),
     ('cli',),
-    ('face',),  # of a study or of a format that is imported; found by cli, imported by none
+    ('face',),  # of a study; found by cli, imported by none
 )
 FLOORS = {room: number for number, floor in enumerate(PICTURE) for room in floor}
 ESTIMATING = {'coastdown', 'estimation', 'diagnosis', 'simulation'}
@@ -78,7 +78,7 @@ FILES = {'bags', 'bags.salvage'}
 FLEET = ('dask', 'distributed', 'pyarrow', 'fsspec', 's3fs')
 ONLY_IN = {
     'mcap': FILES,
-    'rosbags': {'messages', *FILES},
+    'rosbags': {'messages', 'importing', *FILES},  # a bag of ROS 1 is imported
     **{name: {'node'} for name in ROS},
     **{name: {'fleet', 'trend'} for name in FLEET},  # no other verb pays for them
 }

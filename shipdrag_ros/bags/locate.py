@@ -18,6 +18,7 @@ from shipdrag_ros.bags.mcap_file import CONVERT
 from shipdrag_ros.errors import BagError
 
 _SUFFIXES = ('.mcap', '.mcap.zstd')
+_MAGIC = b'\x89MCAP0\r\n'
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,21 @@ class BagFiles:
     files: tuple[Path, ...]
     message_compression: str = ''
     warnings: tuple[str, ...] = field(default=())
+
+
+def is_bag(path: Path) -> bool:
+    """
+    Say whether a path is to be opened as a bag, and not as a log that could be made one.
+
+    What is not there is a bag too, so that the error is that of a bag.
+    """
+    if path.is_dir() or path.name == 'metadata.yaml':
+        folder = path if path.is_dir() else path.parent
+        return not any(folder.glob('*.db3')) or any(folder.glob('*.mcap*'))
+    if not path.is_file() or path.name.endswith(_SUFFIXES):
+        return True
+    with path.open('rb') as file:
+        return file.read(len(_MAGIC)) == _MAGIC
 
 
 def locate(path: Path) -> list[BagFiles]:

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag import`: a log or a table of measurements as a bag."""
+"""`shipdrag import`: logs or tables of measurements as a bag."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from shipdrag_ros.cli.arguments import add_json
-from shipdrag_ros.cli.log_format import LogFormat, found
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing import formats
+from shipdrag_ros.importing.format import Format, Job, Option, best_of, head_of
+from shipdrag_ros.importing.join import import_joined
 from shipdrag_ros.ship import Ship
 
 
@@ -17,13 +22,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     Add the arguments of the verb.
     """
+    known = formats.found()
     parser.description = (
-        'Write the measurements of an NMEA 0183 log, or with --map of a CSV file, as a bag for '
-        'replay. What a sentence or a cell holds is never mended: what cannot be read is counted '
-        'and told.'
+        'Write the measurements of logs or tables as a bag for replay. The format is known by the '
+        'content of a file; what was understood is told, and what was not used is counted. What a '
+        'sentence or a cell holds is never mended. `replay` and `diagnose` take such files too, '
+        'where no option is needed.'
     )
     parser.add_argument(
-        'source', type=Path, metavar='SOURCE', help='NMEA 0183 log, also as .gz, or CSV file'
+        'sources',
+        nargs='+',
+        type=Path,
+        metavar='SOURCE',
+        help=f'{", ".join(each.kind for each in known)}; text also packed as .gz. Several are put '
+        'together: of an input that two tell for the same time, the first file is taken',
     )
     parser.add_argument(
         '-o',
@@ -39,39 +51,109 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='FILE',
         help='ship file (YAML) to attach, so that replay needs no --ship',
     )
+    parser.add_argument(
+        '--format',
+        choices=[each.name for each in known],
+        help='format of the sources (default: known by their content)',
+    )
     add_json(parser)
-    for each in found():
-        each.add_arguments(parser.add_argument_group(each.title))
+    added: set[str] = set()
+    for each in known:
+        group = parser.add_argument_group(f'{each.kind} ({each.name})', each.about)
+        for option in each.options:
+            if option.flag not in added:
+                _add_option(group, option)
+                added.add(option.flag)
     parser.set_defaults(misused=parser.error)
+
+
+def _add_option(group: argparse._ArgumentGroup, option: Option) -> None:
+    if not option.metavar:
+        group.add_argument(option.flag, action='store_const', const=True, help=option.help)
+        return
+    group.add_argument(
+        option.flag,
+        action='append' if option.many else 'store',
+        type=_reader(option),
+        metavar=option.metavar,
+        help=option.help,
+    )
+
+
+def _reader(option: Option) -> Callable[[str], Any]:
+    """Return what argparse calls; a mistake in a value is one in the use of the command."""
+
+    def read(text: str) -> Any:
+        try:
+            return option.read(text)
+        except (ValueError, ImportDataError) as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+
+    return read
 
 
 def run(options: argparse.Namespace) -> int:
     """
-    Write the bag and tell what became of the source.
+    Write the bag and tell what became of the sources.
     """
-    chosen = _chosen(options)
     output = Output(options.json)
+    given = {
+        option.key: value
+        for each in formats.found()
+        for option in each.options
+        if (value := getattr(options, option.key)) is not None
+    }
+    chosen = [_chosen(options, source, given) for source in options.sources]
+    for key in given:
+        if not any(key in _keys(each) for each in chosen):
+            options.misused(_foreign(key, chosen))
+    if 'time' in given and 'rate' in given:
+        options.misused('argument --rate: not allowed with argument --time')
     attachments = {}
     if options.ship is not None:
         attachments['ship.yaml'] = Ship.load(options.ship).to_yaml()
-    with output.progress(f'reading {options.source}') as progress:
-        result = chosen.write(options, attachments, progress)
-    chosen.show(output, options.out, result)
-    output.json({'bag': str(options.out), **asdict(result)})
+    parts = []
+    for source, each in zip(options.sources, chosen, strict=True):
+        own = {key: value for key, value in given.items() if key in _keys(each)}
+        parts.append((each, Job(source, options.out, own, attachments)))
+    with output.progress(f'reading {options.sources[0]}') as progress:
+        found = import_joined(parts, options.out, attachments, progress)
+    for source, each, result in zip(options.sources, chosen, found.results, strict=True):
+        output.log(f'{source}: {each.kind}')
+        for understood in result.understood:
+            output.log(f'  {understood}')
+        for line in result.summary(options.out):
+            output.say(line)
+        output.table(result.table())
+        for line in result.details():
+            output.say(line)
+    for line in found.notes:
+        output.say(line)
+    documents = [
+        {'source': str(source), 'format': each.name, **asdict(result)}  # type: ignore[call-overload]
+        for source, each, result in zip(options.sources, chosen, found.results, strict=True)
+    ]
+    whole = documents[0] if len(documents) == 1 else {'files': documents, 'notes': found.notes}
+    output.json({'bag': str(options.out), **whole})
     return 0
 
 
-def _chosen(options: argparse.Namespace) -> LogFormat:
-    """Return the format of the source; what that one does not know is refused."""
-    known = found()
-    chosen = next((each for each in known if each.is_chosen(options)), known[0])
-    lacking = chosen.missing(options)
-    if lacking:
-        options.misused(lacking)
-    for other in known:
-        for name in other.given(options) if other is not chosen else ():
-            instead = f', not of {chosen.kind} ({chosen.chosen_by})'
-            if not chosen.chosen_by:
-                instead = f', which requires {other.chosen_by}'
-            options.misused(f'argument {name}: of {other.kind}{instead}')
-    return chosen
+def _keys(each: Format) -> set[str]:
+    return {option.key for option in each.options}
+
+
+def _chosen(options: argparse.Namespace, source: Path, given: dict[str, Any]) -> Format:
+    known = formats.found()
+    named = next((each for each in known if each.name == options.format), None)
+    if named is not None:
+        return named
+    asked = next((each for each in known if each.chosen_by in given), None)
+    return asked or best_of(known, head_of(source))
+
+
+def _foreign(key: str, chosen: Sequence[Format]) -> str:
+    owners = [each for each in formats.found() if key in _keys(each)]
+    flag = next(option.flag for each in owners for option in each.options if option.key == key)
+    kinds = ' or '.join(each.kind for each in owners)
+    here = ' and '.join(dict.fromkeys(each.kind for each in chosen))
+    return f'argument {flag}: of {kinds}, and this is {here} (--format says otherwise)'

@@ -88,7 +88,9 @@ def run(options: argparse.Namespace) -> int:
     window = None if options.window is None else tuple(options.window)
     results = [
         replay_run(each, output, ship=ship, parameters=parameters, window=own)
-        for each, own in open_windowed(options.bags, remap=dict(options.remap), window=window)
+        for each, own in open_windowed(
+            options.bags, remap=dict(options.remap), window=window, output=output
+        )
     ]
     ranking = rank(results) if options.compare else None
 

@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import bag
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.sources import open_sources
 from shipdrag_ros.library.windowed import Span, WindowedRun
 
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
@@ -52,7 +53,11 @@ def windowed_bag(text: str) -> WindowedBag:
 
 
 def open_windowed(
-    bags: Sequence[WindowedBag], *, remap: Mapping[str, str], window: Span | None = None
+    bags: Sequence[WindowedBag],
+    *,
+    remap: Mapping[str, str],
+    window: Span | None = None,
+    output: Output | None = None,
 ) -> list[WindowedRun]:
     """
     Open bags in the order given.
@@ -66,18 +71,21 @@ def open_windowed(
         Recorded topic -> input.
     window
         Of the bags without a window of their own.
+    output
+        Told what was understood of a log that is no bag; stderr by default.
 
     Raises
     ------
     BagError
         If one cannot be read.
     """
+    output = output or Output()
     whole = [each.path for each in bags if each.window is None]
-    left = open_runs(whole, remap=remap) if whole else []
+    left = open_sources(whole, output, remap=remap) if whole else []
     found = []
     for each in bags:
         if each.window is not None:
-            runs = open_runs([each.path], remap=remap)
+            runs = open_sources([each.path], output, remap=remap)
             found += [WindowedRun(run, each.window) for run in runs]
             continue
         files = each.path.parent if each.path.name == 'metadata.yaml' else each.path

@@ -12,19 +12,18 @@ import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
-from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags import Run
 from shipdrag_ros.coastdown.events import Coastdown
 from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose, diagnose_fitted
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.fleet.find import LOGS, RUN_FILE, SHIP_FILE, TABLES, BagToRead
+from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
 from shipdrag_ros.fleet.local import fetched
 from shipdrag_ros.fleet.rows import BagResult, Row, coastdown_row
-from shipdrag_ros.fleet.sources import import_log, import_table
+from shipdrag_ros.importing.reading import read_any
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship
@@ -211,15 +210,8 @@ def _failed(job: Job, why: str) -> BagResult:
 @contextmanager
 def _runs(sources: Sequence[BagToRead]) -> Iterator[list[Run]]:
     """Open the runs of a bag, whatever it is written in."""
-    if len(sources) == 1 and sources[0].bag.endswith((*LOGS, *TABLES)):
-        with fetched(sources[0]) as (path,), TemporaryDirectory(prefix='shipdrag-fleet-') as made:
-            bag = Path(made) / f'{path.name}.mcap'
-            make = import_log if sources[0].bag.endswith(LOGS) else import_table
-            make(path, bag)
-            yield open_runs([bag])
-        return
     with _all_fetched(sources) as paths:
-        yield open_runs(paths)
+        yield read_any(paths)
 
 
 @contextmanager

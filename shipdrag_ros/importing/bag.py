@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from shipdrag_ros.bags.writer import BagWriter
-from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
 LIMIT_NS = 2**31 * SECOND_NS
 """Of the stamp of a message."""
@@ -41,8 +43,74 @@ class Rejected:
             self.first.append(f'line {line}: {shown!r}')
 
 
+@dataclass(frozen=True)
+class Understood:
+    """
+    What an input was taken from.
+
+    Attributes
+    ----------
+    input
+    source
+        Column, sentence or message.
+    unit
+        In which it stands there; '' where the format fixes it.
+    first
+        First value, in the unit of `Channel`.
+    """
+
+    input: str
+    source: str
+    unit: str
+    first: tuple[float, ...]
+
+    def __str__(self) -> str:
+        unit = f' [{self.unit}]' if self.unit else ''
+        values = ', '.join(f'{value:.6g}' for value in self.first)
+        return f'{self.input} <- {self.source}{unit}, first {values} {_SI[self.input]}'
+
+
+_SI = {
+    'speed_through_water': 'm/s',
+    'speed_over_ground': 'm/s',
+    'position': '(m, or deg of latitude and longitude)',
+    'heading': 'rad (yaw)',
+    'shaft': 'rad/s (pitch: ratio or rad)',
+    'rudder': 'rad',
+    'wind_apparent': 'm/s (forward, to port)',
+    'depth': 'm',
+}
+_TWO_VALUES = (Channel.POSITION, Channel.POSITION_GEODETIC, Channel.WIND_APPARENT)
+
+
+class ImportBag(BagWriter):
+    """
+    The bag that a log becomes.
+
+    Attributes
+    ----------
+    first
+        First value of each channel, in its unit.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self.first: dict[Channel, tuple[float, ...]] = {}
+
+    def write_samples(self, block: Block) -> None:
+        """
+        Write samples, and keep the first of each channel.
+        """
+        for number, place in zip(*np.unique(block.channel, return_index=True), strict=True):
+            channel = Channel(number)
+            if channel not in self.first:
+                values = block.value[place, : 2 if channel in _TWO_VALUES else 1]
+                self.first[channel] = tuple(values.tolist())
+        super().write_samples(block)
+
+
 @contextmanager
-def new_bag(out: Path, attachments: Mapping[str, str] | None) -> Iterator[BagWriter]:
+def new_bag(out: Path, attachments: Mapping[str, str] | None) -> Iterator[ImportBag]:
     """
     Open a bag to import into; where that fails, none is left.
 
@@ -58,7 +126,7 @@ def new_bag(out: Path, attachments: Mapping[str, str] | None) -> Iterator[BagWri
     BagError
         If the bag cannot be made.
     """
-    writer = BagWriter(out)
+    writer = ImportBag(out)
     try:
         with writer:
             for name, text in (attachments or {}).items():

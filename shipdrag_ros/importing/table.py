@@ -5,21 +5,50 @@ from __future__ import annotations
 
 import codecs
 import csv
+import gzip
+import re
+import zlib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple, cast
 
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing.opened import check_unpacked, opened
 
-DELIMITERS = ',;\t'
+DELIMITERS = ',;\t|'
+BLANKS = ' '
+"""Delimiter of a table whose columns stand apart by blanks alone."""
+
+_SAMPLE_LINES = 40
+_LINE = 1 << 20  # characters; no row of a table is as long
+_DATE = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d\d(:\d\d.*)?')
+UNITS = (
+    *('m/s', 'mps', 'kn', 'kt', 'kts', 'knot', 'knots', 'km/h', 'kmh', 'kph', 'ft/s', 'fps'),
+    'mph',
+    *('rad', 'deg', '°', 'rad/s', 'rpm', '1/min', 'min-1', 'rps', 'rev/s', '1/s', 's-1', 'hz'),
+    *('s', 'ms', 'us', 'ns', 'sec', 'm', 'km', 'ft', 'nmi', 'nm', '%', 'utc', 'hh:mm:ss'),
+)
+"""What stands in a line of units."""
+
+_UNIT = re.compile(r'[\[(]?\s*([^\[\]()]*?)\s*[\])]?')
 
 
 class Row(NamedTuple):
     """The cells of a row, stripped, and the line it ends on."""
 
     line: int
+    cells: Sequence[str]
+
+
+class _Layout(NamedTuple):
+    """How the lines of a table hang together: lines of a title before it, and its delimiter."""
+
+    titles: int
+    delimiter: str
     cells: Sequence[str]
 
 
@@ -30,15 +59,20 @@ class Table:
     Parameters
     ----------
     path
-        UTF-8, with or without a byte-order mark; separated by comma, semicolon
-        or tab, which the first line tells.
+        UTF-8, with or without a byte-order mark, plain or packed with gzip;
+        separated by comma, semicolon, tab or bar, or by blanks alone. Lines of a
+        title may stand before it, and a line of units below the header.
 
     Attributes
     ----------
     delimiter
-        One of `DELIMITERS`.
+        One of `DELIMITERS`, or `BLANKS`.
     header
-        Names of the columns; None if the first line holds numbers only.
+        Names of the columns; None if the first line holds measurements.
+    units
+        What stands below the header in a line of units; None without one.
+    titles
+        Lines before the table.
     width
         Number of columns.
 
@@ -50,26 +84,75 @@ class Table:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        blank = DELIMITERS + ' \r\n'
-        try:
-            with path.open('rb') as read, self._decoded(read) as file:
-                first = next((line for line in file if line.strip(blank)), '')
-        except OSError as error:
-            raise ImportDataError(
-                f'{str(path)!r} cannot be read: {error.strerror}; give a CSV file'
-            ) from error
+        lines = self._first_lines()
+        first = lines[0][1] if lines else ''
         if not first:
             raise ImportDataError(f'{str(path)!r} is empty; give a table with a line a sample')
         if '\0' in first or first.startswith('PK'):  # as spreadsheets begin, which are archives
             raise ImportDataError(
                 f'{str(path)!r} is no text, it begins with {first[:4]!r}; save it as CSV'
             )
-        # a delimiter in quotes is none
-        self.delimiter = max(DELIMITERS, key=lambda mark: len(self._cells(first, mark)))
-        cells = self._cells(first, self.delimiter)
-        numbers = all(NUMBER.fullmatch(cell) for cell in cells if cell)
-        self.header: tuple[str, ...] | None = None if numbers else tuple(cells)
+        layout = self._layout([line for _, line in lines])
+        self.delimiter = layout.delimiter
+        self.titles = tuple(line.strip() for _, line in lines[: layout.titles])
+        self._skip = lines[layout.titles][0] - 1
+        if not layout.cells:
+            raise ImportDataError(
+                f'{str(path)!r} holds no cell; give a table with a line a sample'
+            )
+        cells = [layout.cells[0].lstrip('# '), *layout.cells[1:]]
+        measured = [
+            bool(NUMBER.fullmatch(cell) or _DATE.fullmatch(cell)) for cell in cells if cell
+        ]
+        self.header: tuple[str, ...] | None = None
+        if 2 * sum(measured) < len(measured):
+            self.header = tuple(cells)
         self.width = len(cells)
+        below = lines[layout.titles + 1][1] if len(lines) > layout.titles + 1 else ''
+        self.units = None if self.header is None else _units(self._cells(below, self.delimiter))
+
+    def _first_lines(self) -> list[tuple[int, str]]:
+        """Return the first lines that are not blank, with their numbers."""
+        blank = DELIMITERS + ' \r\n'
+        found = []
+        try:
+            with self._decoded() as (_, file):
+                for number, line in enumerate(self._lines(file), start=1):
+                    if line.strip(blank).strip():
+                        found.append((number, line))
+                    if len(found) >= _SAMPLE_LINES or number > 10_000:
+                        break
+        except OSError as error:
+            raise ImportDataError(
+                f'{str(self.path)!r} cannot be read: {error.strerror or error}; give a CSV file'
+            ) from error
+        return found
+
+    def _layout(self, lines: Sequence[str]) -> _Layout:
+        """Find the delimiter that makes rows of the lines, and the first of these."""
+        best: tuple[tuple[int, int], _Layout] | None = None
+        for mark in DELIMITERS:
+            rows = [self._cells(line, mark) for line in lines]
+            start = next((place for place, row in enumerate(rows) if len(row) > 1), None)
+            if start is None:
+                continue
+            rest = rows[start:]
+            usual = Counter(map(len, rest)).most_common(1)[0][0]
+            near = [len(row) > 1 and abs(len(row) - usual) <= 1 for row in rest]
+            if sum(near) < 0.6 * len(rest) or sum(near[:5]) < 0.7 * len(near[:5]):
+                continue  # as in a title with a comma
+            score = (-start, len(rows[start]))
+            if best is None or score > best[0]:
+                best = (score, _Layout(start, mark, rows[start]))
+        if best is not None:
+            return best[1]
+        rows = [line.split() for line in lines]
+        width = len(rows[-1])
+        start = next(place for place, row in enumerate(rows) if len(row) == width)
+        same = sum(len(row) == width for row in rows[start:])
+        if width > 1 and same >= 0.8 * len(rows[start:]) and _DATE.match(rows[-1][0]):
+            return _Layout(start, BLANKS, rows[start])
+        return _Layout(0, DELIMITERS[0], self._cells(lines[0], DELIMITERS[0]))
 
     def column(self, name: str) -> int:
         """
@@ -109,31 +192,73 @@ class Table:
             Told how many bytes are read, and of how many.
         """
         total = self.path.stat().st_size
-        with self.path.open('rb') as read, self._decoded(read) as file:
-            for count, row in enumerate(self._rows(file, self.delimiter)):
-                if count == 0 and self.header is not None:
+        above = (self.header is not None) + (self.units is not None)
+        with self._decoded() as (raw, file):
+            lines = self._lines(file, raw)
+            for _ in range(self._skip):
+                next(lines, None)
+            for count, row in enumerate(self._rows(lines, self.delimiter, self._skip)):
+                if count < above:
                     continue
                 if progress is not None and count % 1000 == 0:
-                    progress(read.tell(), total)
+                    progress(raw.tell(), total)
                 yield row
 
     def _cells(self, line: str, delimiter: str) -> Sequence[str]:
         return next((row.cells for row in self._rows([line], delimiter)), ())
 
-    def _rows(self, lines: Iterable[str], delimiter: str) -> Iterator[Row]:
+    def _rows(self, lines: Iterable[str], delimiter: str, above: int = 0) -> Iterator[Row]:
+        if delimiter == BLANKS:
+            for number, line in enumerate(lines, start=above + 1):
+                if line.strip():
+                    yield Row(number, line.split())
+            return
         reader = csv.reader(lines, delimiter=delimiter)
         try:
             for cells in reader:
                 stripped = [cell.strip() for cell in cells]
                 if any(stripped):
-                    yield Row(reader.line_num, stripped)
+                    yield Row(above + reader.line_num, stripped)
         except csv.Error as error:
             raise ImportDataError(
-                f'{str(self.path)!r} line {reader.line_num} is no row of a table: {error}'
+                f'{str(self.path)!r} line {above + reader.line_num} is no row of a table: {error}'
             ) from error
 
-    def _decoded(self, file: BufferedReader) -> TextIOWrapper:
-        if file.peek(2).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            raise ImportDataError(f'{str(self.path)!r} is in UTF-16; save it as UTF-8')
-        # a name that is not UTF-8 may still be given by its number
-        return TextIOWrapper(file, encoding='utf-8-sig', errors='replace', newline='')
+    def _lines(self, file: TextIOWrapper, raw: IO[bytes] | None = None) -> Iterator[str]:
+        """Yield lines of a sane length, of a packed file that unpacks to a sane size."""
+        number = size = 0
+        try:
+            while line := file.readline(_LINE):
+                number += 1
+                size += len(line)
+                if len(line) == _LINE:
+                    raise ImportDataError(
+                        f'{str(self.path)!r} line {number} is no row of a table: it is longer '
+                        f'than {_LINE} characters'
+                    )
+                if raw is not None and file.buffer is not raw:
+                    check_unpacked(self.path, size, raw.tell())
+                yield line
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise ImportDataError(
+                f'{str(self.path)!r} cannot be unpacked after line {number}: {error}'
+            ) from error
+
+    @contextmanager
+    def _decoded(self) -> Iterator[tuple[IO[bytes], TextIOWrapper]]:
+        with opened(self.path) as (raw, file):
+            reader = cast(BufferedReader, file)
+            if reader.peek(2).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+                raise ImportDataError(f'{str(self.path)!r} is in UTF-16; save it as UTF-8')
+            # a name that is not UTF-8 may still be given by its number
+            with TextIOWrapper(reader, encoding='utf-8-sig', errors='replace', newline='') as text:
+                yield raw, text
+
+
+def _units(cells: Sequence[str]) -> tuple[str, ...] | None:
+    """Return the units of a line that holds nothing else; None of any other line."""
+    found = [match[1] if (match := _UNIT.fullmatch(cell)) else cell for cell in cells]
+    known = sum(each.lower() in UNITS for each in found)
+    if not known or any(NUMBER.fullmatch(cell) or _DATE.fullmatch(cell) for cell in cells):
+        return None
+    return tuple(found)

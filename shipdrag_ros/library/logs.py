@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from shipdrag_ros.importing.bag import Rejected
-
 BAGS = ('.mcap', '.zstd')
 
 
@@ -73,7 +71,7 @@ def import_log(source: Path, bag: Path, told: Told, attachments: Mapping[str, st
     Parameters
     ----------
     source
-        NMEA 0183, also packed with gzip, or a table.
+        In any format of `importing.formats`.
     bag
         MCAP file to make.
     told
@@ -86,37 +84,17 @@ def import_log(source: Path, bag: Path, told: Told, attachments: Mapping[str, st
     ImportDataError
         If it cannot be read.
     """
-    from shipdrag_ros.fleet.sources import import_table
-    from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
-    from shipdrag_ros.importing.formats.csv.importer import import_csv
-    from shipdrag_ros.importing.formats.nmea.importer import import_nmea
+    from shipdrag_ros.importing.formats.csv.columns import parse_time
+    from shipdrag_ros.importing.reading import import_file
 
-    if not told.columns and _is_nmea(source):
-        of_log = import_nmea(source, bag, attachments=attachments)
-        return Imported(bag, True, _notes(source, of_log.rejected))
-    if not told.columns:
-        import_table(source, bag)
-        return Imported(bag, False, ())
-    result = import_csv(
-        source,
-        bag,
-        inputs=[parse_input(text) for text in told.maps],
-        time=None if told.time is None else parse_time(told.time),
-        rate_hz=told.rate_hz,
-        attachments=attachments,
-    )
-    return Imported(bag, result.base_ns is None, _notes(source, result.rejected))
-
-
-def _is_nmea(source: Path) -> bool:
-    with source.open('rb') as file:
-        head = file.read(2)
-    return head[:1] in (b'$', b'!') or head == b'\x1f\x8b'
-
-
-def _notes(source: Path, rejected: Mapping[str, Mapping[str, Rejected]]) -> tuple[str, ...]:
-    return tuple(
-        f'{source.name}: {name}: {each.count} rejected, {reason}: {", ".join(each.first)}'
-        for name, reasons in rejected.items()
-        for reason, each in reasons.items()
-    )
+    options: dict[str, object] = {}
+    if told.maps:
+        options['map'] = told.maps
+    if told.time is not None:
+        options['time'] = parse_time(told.time)
+    if told.rate_hz is not None:
+        options['rate'] = told.rate_hz
+    found = import_file(source, bag, options=options, attachments=attachments)
+    notes = [*found.result.summary(source)[1:], *found.result.details()]
+    dated = getattr(found.result, 'base_ns', None) is None
+    return Imported(bag, dated, tuple(f'{source.name}: {note}' for note in notes))

@@ -180,6 +180,22 @@ def is_stamped(type_name: str) -> bool:
     return any(name == 'header' for name, _ in _store.fielddefs[type_name][1][:1])
 
 
+def from_ros1(type_name: str, payload: bytes) -> bytes:
+    """
+    Return the CDR bytes of a message of ROS 1.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none of this type.
+    """
+    name = RANGE_BEFORE_IRON if type_name == RANGE else type_name
+    try:
+        return bytes(_store.ros1_to_cdr(payload, name))
+    except Exception as error:  # the code that is generated for a type raises what it happens to
+        raise MalformedMessage(f'{type(error).__name__}: {error}') from error
+
+
 def is_known(type_name: str) -> bool:
     """
     Say whether the store has a definition of this type.

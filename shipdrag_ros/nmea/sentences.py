@@ -28,6 +28,7 @@ _NO_MEASUREMENT = {'N': 'no fix', 'E': 'dead reckoning', 'M': 'manual', 'S': 'si
 _NO_HEADING = {'E': 'estimated', 'M': 'manual', 'S': 'simulated', 'V': 'not valid'}
 _NO_FIX = {'0': 'no fix', '6': 'dead reckoning', '7': 'manual', '8': 'simulated'}
 MAGNETIC = 'magnetic'
+_GLL_OF_OLD = 4  # fields
 
 
 class NoValue(Exception):
@@ -298,6 +299,8 @@ def _check_fix(fields: Fields) -> None:
             raise NoValue(f'quality {quality}: {_NO_FIX[quality]}', quality)
         return
     if not fields['status']:
+        if fields.kind == 'GLL' and len(fields.texts) <= _GLL_OF_OLD:
+            return  # before NMEA 0183 2.0 it had neither time nor status
         raise NoValue('status empty')
     fields.check('status', allowed='AD')
     _check_mode(fields)
@@ -307,6 +310,15 @@ def _check_mode(fields: Fields) -> None:
     mode = fields['posMode']
     if mode in _NO_MEASUREMENT:
         raise NoValue(f'mode {mode}: {_NO_MEASUREMENT[mode]}', mode)
+
+
+def _water_uhaw(fields: Fields, mounting: Mounting) -> MeasuredValue:
+    """Return the part along the heading of what an ADCP measures east and north [kn]."""
+    if fields['kind'] != 'UVH':
+        raise NoValue('not of east, north and heading', fields['kind'])
+    heading = radians(fields.number('heading'))
+    east, north = fields.number('east'), fields.number('north')
+    return MeasuredValue((east * sin(heading) + north * cos(heading)) * M_S_PER_KNOT)
 
 
 READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
@@ -322,6 +334,7 @@ READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
         (Channel.SPEED_OVER_GROUND, _ground_vbw),
     ),
     'VHW': ((Channel.SPEED_THROUGH_WATER, _water_vhw),),
+    'PUHAW': ((Channel.SPEED_THROUGH_WATER, _water_uhaw),),
     'HDT': ((Channel.HEADING, _yaw_hdt),),
     'THS': ((Channel.HEADING, _yaw_ths),),
     'HDG': ((Channel.HEADING, _yaw_hdg),),
@@ -339,4 +352,5 @@ TIMED = ('RMC', 'GGA', 'GLL', 'ZDA')
 _PLACES = {
     kind: {name: place for place, name in enumerate(NMEA_PAYLOADS_GET[kind])}
     for kind in (*READERS, 'ZDA')
-}
+    if kind in NMEA_PAYLOADS_GET
+} | {'PUHAW': {'kind': 0, 'east': 1, 'north': 2, 'heading': 3}}

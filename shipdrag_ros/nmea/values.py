@@ -34,8 +34,9 @@ def read_values(
     Return what a sentence measures, or why it does not.
     """
     found: list[tuple[Channel, SentenceSource | None, MeasuredValue | NoValue]] = []
-    fields = Fields(sentence.kind, sentence.fields)
-    for told, read in READERS.get(sentence.kind, ()):
+    kind = sentence.kind or sentence.talker  # a proprietary one is all talker
+    fields = Fields(kind, sentence.fields)
+    for told, read in READERS.get(kind, ()):
         channel = told
         try:
             value = read(fields, mounting)
@@ -46,7 +47,7 @@ def read_values(
                 continue
             if value.channel is not None:
                 channel = value.channel
-            rank = _RANK[sentence.kind]
+            rank = _RANK[kind]
             source = SentenceSource(rank, value.detail, sentence.talker, sentence.kind)
             found.append((channel, source, value))
     return found

@@ -130,9 +130,9 @@ def test_a_log_and_a_table_are_read_without_options(tmp_path: Path) -> None:
     [
         ('a.mcap', b'', 'is empty'),
         ('a.mcap', b'no bag at all', 'is no MCAP file'),
-        ('a.nmea', b'no sentence\n', 'holds no sentence of NMEA 0183'),
-        ('a.csv', b'port,price\n1,2\n', 'Make a bag of it with `shipdrag import`'),
-        ('a.bag', b'#ROSBAG V2.0\n', 'ROS 1'),
+        ('a.nmea', b'no sentence\n', 'is of no format known here'),
+        ('a.csv', b'port,price\n1,2\n', 'make a bag of it with `shipdrag import`'),
+        ('a.bag', b'#ROSBAG V2.0\n', 'a.bag'),
     ],
 )
 def test_what_cannot_be_read_says_why_and_not_where(

@@ -280,7 +280,7 @@ def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -
         ('shaft=a,', r'expected 1 to 4 column\(s\)'),
         ('shaft=', r'expected 1 to 4 column\(s\)'),
         ('shaft', r'expected 1 to 4 column\(s\)'),
-        ('shaft=n:rps', "no unit 'rps' here; units are rad/s, rev/s, rpm"),
+        ('shaft=n:hz', "no unit 'hz' here; units are rad/s, rev/s, rpm, rps"),
         ('pitch=p:rpm', "no unit 'rpm' here; units are %, deg, rad, ratio"),
         ('depth=d:kn', "no unit 'kn' here"),
         ('position=x:m,y:deg', 'both columns in deg'),

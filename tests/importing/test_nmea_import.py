@@ -230,7 +230,7 @@ def test_every_form(body: str, channel: Channel, value: float) -> None:
         ('GPVTG,,T,,M,1.0,N,,K,E', 'speed_over_ground', 'GPVTG: mode E: dead reckoning'),
         ('GPGLL,4612.9,N,00610.1,E,120000,V,N', 'position', 'GPGLL: status V'),
         ('GPGLL,4612.9,N,00610.1,E,120000,A,S', 'position', 'GPGLL: mode S: simulated'),
-        ('GPGLL,4612.9,N,00610.1,E', 'position', 'GPGLL: status empty'),
+        ('GPGLL,4612.9,N,00610.1,E,120000,', 'position', 'GPGLL: status empty'),
         ('GPGLL,4660.0,N,00610.1,E,120000,A', 'position', 'GPGLL: no latitude and longitude'),
         ('GPGLL,9100.0,N,00610.1,E,120000,A', 'position', 'GPGLL: no latitude and longitude'),
         ('GPGLL,4612.9,X,00610.1,E,120000,A', 'position', 'GPGLL: no latitude and longitude'),

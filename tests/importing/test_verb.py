@@ -99,20 +99,22 @@ def test_times_that_go_back_are_told(
         (('--map', 'speed=v', '--time', 't'), 1, "ERROR: --map 'speed=v': no input 'speed'"),
         (('--map', 'depth=v:furlong', '--time', 't'), 1, "no unit 'furlong'"),
         (('--map', 'depth=z', '--time', 't'), 1, "'z'"),
-        (('--map', 'depth=v', '--time', 't:year'), 1, "no unit 'year'"),
+        (('--map', 'depth=v', '--time', 't:year'), 2, "no unit 'year'"),
         (('--map', 'depth=v', '--time', 't', '--where', 'run=c'), 1, 'chooses none of them'),
         (('--map', 'depth=v', '--time', 't', '--ship', 'no.yaml'), 1, 'no.yaml: 1 problem'),
-        (('--map', 'depth=v'), 2, 'one of the arguments --time --rate is required'),
         (('--map', 'depth=v', '--time', 't', '--rate', '1'), 2, 'not allowed with'),
-        (('--map', 'depth=v', '--rate', '0'), 2, 'above 0 [Hz]'),
+        (('--map', 'depth=v', '--rate', '0'), 2, 'expected a number above 0'),
         (('--map', 'depth=v', '--time', 't', '--where', 'run'), 2, 'expected COLUMN=VALUE'),
-        (('--time', 't'), 2, 'argument --time: of a CSV file, which requires --map'),
-        (('--where', 'run=a'), 2, 'argument --where: of a CSV file'),
-        (('--map', 'depth=v', '--rate', '1', '--transducer', '2'), 2, 'of an NMEA 0183 log'),
+        (('--format', 'nmea', '--time', 't'), 2, 'argument --time: of a CSV file, and this is'),
+        (('--speed-unit', 'furlong'), 2, 'expected one of m/s, kn'),
+        (('--date-order', 'my'), 2, 'expected one of ymd, dmy, mdy'),
+        (('--zone', 'Mars'), 2, "'Mars' is no time zone"),
+        (('--map', 'depth=v', '--rate', '1', '--transducer', '2'), 2, 'and this is a CSV file'),
         (('--map', 'depth=v', '--rate', '1', '--no-checksum'), 2, 'of an NMEA 0183 log'),
-        (('--map', 'depth=v', '--rate', '1', '--date', '2026-01-01'), 2, 'of an NMEA 0183 log'),
+        (('--map', 'depth=v', '--rate', '1', '--date', '2026-01-01'), 2, 'and this is a CSV file'),
         (('--date', '1.1.2026'), 2, 'expected YYYY-MM-DD'),
-        ((), 1, 'holds no sentence of NMEA 0183 in 2401 line(s)'),
+        (('--format', 'nmea'), 1, 'holds no sentence of NMEA 0183 in 2401 line(s)'),
+        ((), 1, "'x', 'y': unit not known; --map position=x,y:m"),
     ],
 )
 def test_a_mistake_is_told_and_leaves_no_bag(
@@ -197,42 +199,40 @@ def test_dates_and_checksums_that_a_log_lacks_are_given(
     assert '--date YYYY-MM-DD' in capsys.readouterr().err
 
 
-def test_a_format_is_one_package_and_is_found(
+def test_a_format_is_one_module_and_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A third format, of lines `seconds speed`, without a word of it anywhere else."""
-    package = tmp_path / 'spaced'
-    package.mkdir()
-    (package / '__init__.py').write_text('')
-    (package / 'face.py').write_text(
-        'from dataclasses import dataclass\n'
-        'from shipdrag_ros.cli.log_format import LogFormat\n'
-        'from shipdrag_ros.importing.bag import new_bag\n'
-        'from shipdrag_ros.samples import SECOND_NS, Block, Channel\n'
-        '@dataclass\n'
-        'class Result:\n'
-        '    lines: int\n'
-        'def write(options, attachments, progress):\n'
-        '    rows = [map(float, line.split()) for line in options.source.open()]\n'
-        '    times, speeds = zip(*rows)\n'
-        '    stamps = [int((options.epoch + t) * SECOND_NS) for t in times]\n'
-        '    with new_bag(options.out, attachments) as bag:\n'
-        '        bag.write_samples(Block.of(Channel.SPEED_THROUGH_WATER, stamps, speeds))\n'
-        '    return Result(len(rows))\n'
-        'def add(group):\n'
-        '    group.add_argument("--spaced", action="store_true")\n'
-        '    group.add_argument("--epoch", type=float)\n'
-        'FORMAT = LogFormat("Spaced", "a spaced log", "--spaced", {"--epoch": "epoch"}, add,\n'
-        '    lambda options: "", write, lambda output, bag, result: output.say("spaced out"))\n'
+    """One more format, of lines `> seconds speed`, without a word of it anywhere else."""
+    (tmp_path / 'arrows.py').write_text(
+        'from shipdrag_ros.importing.format import CERTAIN, NO, Format, Option\n'
+        'from shipdrag_ros.importing.stream import Origin, Reading, import_stream\n'
+        'from shipdrag_ros.samples import SECOND_NS, Channel\n'
+        'def write(job):\n'
+        '    epoch = job.options.get("epoch", 1e9)\n'
+        '    def read(tally):\n'
+        '        for line in job.source.open():\n'
+        '            tally.records += 1\n'
+        '            t, v = map(float, line[2:].split())\n'
+        '            stamp_ns = int((epoch + t) * SECOND_NS)\n'
+        '            origin = Origin(0, "arrow")\n'
+        '            yield Reading(Channel.SPEED_THROUGH_WATER, origin, stamp_ns, v)\n'
+        '    return import_stream(job, "arrows", read)\n'
+        'FORMAT = Format("arrows", "a log of arrows", "", lambda head: CERTAIN if '
+        'head.lines[:1] and head.lines[0].startswith("> ") else NO, write,\n'
+        '    (Option("--epoch", "S", "of time 0", float),))\n'
     )
     monkeypatch.setattr(formats, '__path__', [*formats.__path__, str(tmp_path)])
     source, bag = tmp_path / 'a.log', tmp_path / 'a.mcap'
-    source.write_text('0 8.0\n1 7.9\n2 7.8\n')
-    assert main(['import', str(source), '-o', str(bag), '--spaced', '--epoch', '1e9']) == 0
-    assert capsys.readouterr().out == 'spaced out\n'
+    source.write_text('> 0 8.0\n> 1 7.9\n> 2 7.8\n')
+    assert main(['import', str(source), '-o', str(bag), '--epoch', '2e9']) == 0
+    captured = capsys.readouterr()
+    assert 'speed_through_water <- arrow, first 8 m/s' in captured.err
+    assert '3 messages of 3 records, 2 s' in captured.out
     (run,) = open_runs([bag])
     (block,) = run.inputs()
     assert [float(v) for v in block.value[:, 0]] == [8.0, 7.9, 7.8]
+    other = tmp_path / 'b.csv'
+    other.write_text('time,speed_through_water\n0,8\n')
     with pytest.raises(SystemExit):
-        main(['import', str(source), '-o', str(bag), '--epoch', '1e9'])
-    assert 'argument --epoch: of a spaced log, which requires --spaced' in capsys.readouterr().err
+        main(['import', str(other), '-o', str(tmp_path / 'b.mcap'), '--epoch', '1e9'])
+    assert 'argument --epoch: of a log of arrows, and this is a CSV' in capsys.readouterr().err

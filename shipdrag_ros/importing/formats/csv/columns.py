@@ -3,33 +3,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, tzinfo
 from decimal import Decimal
 from math import pi
 
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing.formats.csv.cells import Form
 from shipdrag_ros.samples import PITCHES, SHAFTS, Channel
 
-_SPEED = {'m/s': 1.0, 'kn': 1852.0 / 3600.0, 'km/h': 1.0 / 3.6, 'ft/s': 0.3048}
+_KNOT, _KMH, _MPH = 1852.0 / 3600.0, 1.0 / 3.6, 0.44704
+_SPEED = {'m/s': 1.0, 'kn': _KNOT, 'km/h': _KMH, 'ft/s': 0.3048, 'mph': _MPH}
+SPEED_UNITS: Mapping[str, float] = _SPEED
+"""Units of speed [m/s]."""
 _LENGTH = {'m': 1.0, 'km': 1000.0, 'ft': 0.3048, 'nmi': 1852.0}
 _ANGLE = {'rad': 1.0, 'deg': pi / 180.0}
-_TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0, 'rev/s': 2.0 * pi}
+_TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0, 'rev/s': 2.0 * pi, 'rps': 2.0 * pi}
 _PITCH = {'ratio': 1.0, '%': 0.01, **_ANGLE}
+COMPASS = 'compass'
 _LATITUDE = {'deg': 1.0}  # as they are sent
 _UNITS: Mapping[Channel, Mapping[str, float]] = {
     Channel.SPEED_THROUGH_WATER: _SPEED,
     Channel.SPEED_OVER_GROUND: _SPEED,
     Channel.POSITION: _LENGTH,
     Channel.POSITION_GEODETIC: _LATITUDE,
-    Channel.HEADING: _ANGLE,
+    Channel.HEADING: {**_ANGLE, COMPASS: pi / 180.0},
     Channel.SHAFT: _TURN_RATE,
     Channel.PITCH: _PITCH,
     Channel.RUDDER: _ANGLE,
-    Channel.WIND_APPARENT: _SPEED,
+    Channel.WIND_APPARENT: {**_SPEED, **_ANGLE},
     Channel.DEPTH: _LENGTH,
 }
-_COUNTS = {'position': (2,), 'wind_apparent': (2,), 'shaft': (1, 2, 3, 4), 'pitch': (1, 2, 3, 4)}
+_COUNTS = {
+    'position': (2,),
+    'wind_apparent': (2,),
+    'speed_over_ground': (1, 2),
+    'shaft': (1, 2, 3, 4),
+    'pitch': (1, 2, 3, 4),
+}
 NANOSECONDS: Mapping[str, Decimal] = {
     's': Decimal(10**9),
     'ms': Decimal(10**6),
@@ -51,11 +63,17 @@ class InputColumns:
         Names or numbers, counted from 1; of one value, or of one a shaft.
     factors
         What each is multiplied by for the unit of `Channel`.
+    units
+        In which they stand, as `--map` takes them.
+    form
+        How several make one value.
     """
 
     channel: Channel
     names: tuple[str, ...]
     factors: tuple[float, ...]
+    units: tuple[str, ...] = ()
+    form: Form = Form.PLAIN
 
     @property
     def name(self) -> str:
@@ -68,29 +86,50 @@ class InputColumns:
         """
         for channels in (SHAFTS, PITCHES):
             if self.channel is channels[0]:
-                for channel, name, factor in zip(channels, self.names, self.factors, strict=False):
-                    yield InputColumns(channel, (name,), (factor,))
+                columns = zip(channels, self.names, self.factors, self.units, strict=False)
+                for channel, name, factor, unit in columns:
+                    yield InputColumns(channel, (name,), (factor,), (unit,))
                 return
         yield self
 
 
 @dataclass(frozen=True)
 class TimeColumn:
-    """The column of the time of measurement, and its unit in nanoseconds."""
+    """
+    The column of the time of measurement.
 
-    name: str
+    Attributes
+    ----------
+    names
+        One column, or one of the date and one of the time of day.
+    unit_ns
+        Of a count [ns]; s where none is given.
+    given
+        Whether the unit was given.
+    order
+        Of year, month and day in a date, see `dates.ORDERS`; '' to be found.
+    zone
+        Of dates that tell none.
+    """
+
+    names: tuple[str, ...]
     unit_ns: Decimal
+    given: bool = False
+    order: str = ''
+    zone: tzinfo = UTC
 
 
 def parse_input(text: str) -> InputColumns:
     """
     Read `INPUT=COLUMN[:unit]`.
 
-    `position` and `wind_apparent` take two columns, `shaft` and `pitch` up to
-    four, one a shaft. A unit given once holds for all, `position=x,y:km` as much
-    as `position=x:km,y`; several are taken as written, `position=x:km,y:m`. A
-    position in `deg` is latitude and longitude. Without a unit the values are SI,
-    a pitch is a ratio.
+    `position` and `wind_apparent` take two columns, `speed_over_ground` one or the
+    components east and north, `shaft` and `pitch` up to four, one a shaft. An
+    apparent wind `aws:kn,awa:deg` is its speed and where it comes from, clockwise
+    from ahead. A heading in `compass` is in degrees clockwise from north. A unit
+    given once holds for all, `position=x,y:km` as much as `position=x:km,y`; several are
+    taken as written, `position=x:km,y:m`. A position in `deg` is
+    latitude and longitude. Without a unit the values are SI, a pitch is a ratio.
 
     Raises
     ------
@@ -109,27 +148,64 @@ def parse_input(text: str) -> InputColumns:
         expected = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
         example = f'{name}={",".join(["COLUMN[:unit]"] * counts[0])}'
         raise ImportDataError(f'--map {text!r}: expected {expected} column(s), {example}')
-    given = [unit for _, unit in columns if unit is not None]
-    channel = channels[0]
+    return columns_of(name, [column for column, _ in columns], [unit for _, unit in columns])
+
+
+def columns_of(name: str, columns: Sequence[str], stated: Sequence[str | None]) -> InputColumns:
+    """
+    Return the columns of an input.
+
+    Parameters
+    ----------
+    name
+        Of the input, as `--map` takes it.
+    columns
+        Their names.
+    stated
+        Unit of each, None where none is stated.
+
+    Raises
+    ------
+    ImportDataError
+        If the units do not go together.
+    """
+    text = f'{name}={",".join(columns)}'
+    given = [unit for unit in stated if unit is not None]
+    channel = next(channel for channel in _UNITS if _name(channel) == name)
     if 'deg' in given and channel is Channel.POSITION:
         channel = Channel.POSITION_GEODETIC
-    factors = _UNITS[channel]
-    if any(unit not in factors for unit in given):
+    known = _UNITS[channel]
+    if any(unit not in known for unit in given):
         raise ImportDataError(
             f'--map {text!r}: expected both columns in deg, or both in {", ".join(_LENGTH)}'
         )
-    common = given[0] if given else None  # a unit given once holds for all columns
-    units = [unit or common for _, unit in columns]
+    common = given[0] if given else next(iter(known))
+    units = tuple(unit or common for unit in stated)  # a unit given once holds for all
+    form = Form.PLAIN
+    if channel is Channel.WIND_APPARENT:
+        angles = [unit in _ANGLE for unit in units]
+        if angles == [False, True]:
+            form = Form.POLAR
+        elif any(angles):
+            raise ImportDataError(
+                f'--map {text!r}: expected both columns in a unit of speed, or the second in deg'
+            )
+    elif COMPASS in units:
+        form = Form.COMPASS
+    elif channel is Channel.SPEED_OVER_GROUND and len(columns) == 2:
+        form = Form.HYPOT
     return InputColumns(
         channel,
-        tuple(column for column, _ in columns),
-        tuple(1.0 if unit is None else factors[unit] for unit in units),
+        tuple(columns),
+        tuple(known[unit] for unit in units),
+        units,
+        form,
     )
 
 
 def parse_time(text: str) -> TimeColumn:
     """
-    Read `COLUMN[:unit]` of the time; s without a unit.
+    Read `COLUMN[:unit]` of the time, or `DATE,TIME` of two columns; s without a unit.
 
     Raises
     ------
@@ -137,9 +213,10 @@ def parse_time(text: str) -> TimeColumn:
         If the unit is not known.
     """
     column, unit = _split_unit(text, NANOSECONDS)
-    if not column:
-        raise ImportDataError(f'--time {text!r}: expected COLUMN[:unit]')
-    return TimeColumn(column, NANOSECONDS[unit or 's'])
+    names = tuple(name.strip() for name in column.split(',')) if unit is None else (column,)
+    if not all(names) or len(names) > 2:
+        raise ImportDataError(f'--time {text!r}: expected COLUMN[:unit], or DATE,TIME')
+    return TimeColumn(names, NANOSECONDS[unit or 's'], given=unit is not None)
 
 
 def _name(channel: Channel) -> str:

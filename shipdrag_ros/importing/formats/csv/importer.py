@@ -9,33 +9,40 @@ can be read is written, plausible or not, for the monitor to judge.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
-from fractions import Fraction
-from math import isfinite
+from itertools import islice
 from pathlib import Path
 
-from shipdrag_ros import strict_yaml
-from shipdrag_ros.display import NUMBER
+from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import (
     ATTACHMENT,
     BATCH_SAMPLES,
-    LIMIT_NS,
+    ImportBag,
     Rejected,
+    Understood,
     new_bag,
 )
+from shipdrag_ros.importing.formats.csv.cells import (
+    BadCell,
+    combined,
+    degrees_of,
+    has_decimal_commas,
+    is_in_minutes,
+    minutes_of,
+    number,
+    number_with_comma,
+)
 from shipdrag_ros.importing.formats.csv.columns import InputColumns, TimeColumn
+from shipdrag_ros.importing.formats.csv.row_clock import BASE_NS, RowClock
 from shipdrag_ros.importing.table import Row, Table
-from shipdrag_ros.samples import SECOND_NS, Block
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel
 
-BASE_NS = 946_684_800 * SECOND_NS
-"""2000-01-01, where a time that counts from the start of a test begins."""
-
-# a count of seconds below this, March 1973, is no date
-_RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _FEW = 10
+_SAMPLE_ROWS = 2000  # by which the way of writing is told
+_SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
+Reader = Callable[[str], float]
 
 
 @dataclass(frozen=True)
@@ -67,6 +74,12 @@ class ImportResult:
         That of the table.
     header
         Whether the table has one.
+    understood
+        What each input was taken from.
+    notes
+        What is to be known of it, a sentence each.
+    not_used
+        Columns that nothing is taken from.
     """
 
     rows: int
@@ -80,6 +93,58 @@ class ImportResult:
     repeated: int
     delimiter: str
     header: bool
+    understood: tuple[Understood, ...]
+    notes: tuple[str, ...]
+    not_used: tuple[str, ...]
+
+    def summary(self, bag: Path) -> list[str]:
+        """
+        Say how much was read, and what is to be known of it.
+        """
+        length_s = (self.end_ns - self.start_ns) * 1e-9
+        told = [
+            f'{bag}: {sum(self.written.values())} messages of {self.rows - self.left_out} rows, '
+            f'{display.duration(length_s)}, from {display.utc(self.start_ns)}'
+        ]
+        if self.base_ns is not None:
+            told.append(
+                f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
+            )
+        told += self.notes
+        if self.left_out:
+            told.append(f'{self.left_out} rows were not chosen by --where.')
+        if self.backward:
+            told.append(
+                f'In {self.backward} rows the time is before that of an earlier row; a replay '
+                'rejects those.'
+            )
+        if self.repeated:
+            told.append(
+                f'In {self.repeated} rows the time is that of an earlier row; a replay rejects '
+                'those.'
+            )
+        return told
+
+    def table(self) -> display.Table:
+        """
+        Return messages by input.
+        """
+        return display.Table(
+            ('input', 'messages'), tuple((name, f'{n}') for name, n in self.written.items())
+        )
+
+    def details(self) -> list[str]:
+        """
+        Say what was not used, and why.
+        """
+        told = [
+            f'{name}: {rejected.count} cell(s) rejected, {reason}: {", ".join(rejected.first)}'
+            for name, reasons in self.rejected.items()
+            for reason, rejected in reasons.items()
+        ]
+        if self.not_used:
+            told.append(f'Columns not used: {", ".join(map(repr, self.not_used))}')
+        return told
 
 
 def import_csv(
@@ -125,18 +190,21 @@ def import_csv(
     BagError
         If the bag cannot be made.
     """
-    clock = _clock(time, rate_hz, start_ns)
+    if (time is None) == (rate_hz is None):
+        raise ImportDataError('the times of the rows: give either --time COLUMN[:unit] or --rate')
     _check_inputs(inputs)
     table = Table(source)
+    places = [] if time is None else [table.column(name) for name in time.names]
+    channels = [each for mapped in inputs for each in mapped.by_channel()]
+    mapped_places = [[table.column(name) for name in each.names] for each in channels]
+    chosen = [(table.column(name), text) for name, text in where]
+    sample = list(islice(table.rows(), _SAMPLE_ROWS))
+    clock = RowClock.of(time, rate_hz, start_ns, [row_text(row, places) for row in sample], table)
     record = _Record(
-        [
-            (each, [table.column(name) for name in each.names])
-            for mapped in inputs
-            for each in mapped.by_channel()
-        ],
-        [(table.column(name), text) for name, text in where],
+        list(zip(channels, mapped_places, _readers(channels, mapped_places, sample), strict=True)),
+        chosen,
         clock,
-        None if time is None else table.column(time.name),
+        places,
         table.width,
     )
     with new_bag(out, attachments) as bag:
@@ -146,45 +214,14 @@ def import_csv(
             if len(record) >= BATCH_SAMPLES:
                 bag.write_samples(record.pop())
         bag.write_samples(record.pop())
-        return record.result(table)
+        return record.result(table, bag)
 
 
-class _BadCell(Exception):
-    """A cell without a usable number."""
-
-    def __init__(self, reason: str, cell: str) -> None:
-        super().__init__(reason)
-        self.reason = reason
-        self.cell = cell
-
-
-class _Clock:
-    """Times of rows [ns], from their number or from a cell."""
-
-    def __init__(self, unit_ns: Decimal | None, row_ns: Fraction | None, start_ns: int) -> None:
-        self._unit_ns = unit_ns
-        self._row_ns = row_ns
-        self._start_ns = start_ns
-        self.base_ns: int | None = start_ns if row_ns is not None else None
-        self._known = row_ns is not None
-
-    def time_ns(self, index: int, cell: str) -> int:
-        if self._row_ns is not None:
-            time_ns = self._start_ns + round(index * self._row_ns)
-        else:
-            assert self._unit_ns is not None
-            _number(cell)
-            exact = Decimal(cell) * self._unit_ns
-            if exact.copy_abs() >= LIMIT_NS:
-                raise _BadCell('no possible date', cell)
-            time_ns = int(exact.to_integral_value())
-            if not self._known:
-                self.base_ns = self._start_ns if time_ns < _RELATIVE_BELOW_NS else None
-                self._known = True
-            time_ns += self.base_ns or 0
-        if not 0 <= time_ns < LIMIT_NS:
-            raise _BadCell('no possible date', cell)
-        return time_ns
+def row_text(row: Row, places: Sequence[int]) -> str:
+    """
+    Return the text of one or two cells of a row, as a date and its time of day stand in them.
+    """
+    return ' '.join(_cell(row, place) for place in places)
 
 
 class _Record:
@@ -192,17 +229,19 @@ class _Record:
 
     def __init__(
         self,
-        inputs: Sequence[tuple[InputColumns, Sequence[int]]],
+        inputs: Sequence[tuple[InputColumns, Sequence[int], Sequence[Reader]]],
         where: Sequence[tuple[int, str]],
-        clock: _Clock,
-        time_place: int | None,
+        clock: RowClock,
+        time_places: Sequence[int],
         width: int,
     ) -> None:
         self._inputs = inputs
         self._width = width
         self._where = where
         self._clock = clock
-        self._time_place = time_place
+        self._time_places = time_places
+        self._too_fast: dict[Channel, int] = {}
+        self._used = {place for _, places, _ in inputs for place in places} | {*time_places}
         self._rows = 0
         self._left_out = 0
         self._backward = 0
@@ -228,9 +267,9 @@ class _Record:
                 return
         try:
             _check_width(row, self._width)
-            cell = '' if self._time_place is None else _cell(row, self._time_place)
+            cell = row_text(row, self._time_places).strip()
             time_ns = self._clock.time_ns(self._rows - self._left_out - 1, cell)
-        except _BadCell as bad:
+        except BadCell as bad:
             self._reject('time', row, bad)
             return
         if self._first_ns is None:
@@ -239,12 +278,18 @@ class _Record:
         self._backward += time_ns < self._newest_ns
         self._repeated += time_ns == self._newest_ns
         self._newest_ns = max(self._newest_ns, time_ns)
-        for columns, places in self._inputs:
+        for columns, places, readers in self._inputs:
             try:
-                a, b = self._values(row, columns, places)
-            except _BadCell as bad:
+                values = [
+                    read(_cell(row, place)) * factor
+                    for read, place, factor in zip(readers, places, columns.factors, strict=True)
+                ]
+            except BadCell as bad:
                 self._reject(columns.channel.input, row, bad)
             else:
+                a, b = combined(columns.form, values)
+                if columns.channel in _SPEEDS and abs(a) > ABSURD_SPEED_M_S:
+                    self._too_fast[columns.channel] = self._too_fast.get(columns.channel, 0) + 1
                 self._samples.append((columns.channel, time_ns, self._newest_ns, a, b))
                 self._written[columns.channel.input] += 1
 
@@ -253,7 +298,7 @@ class _Record:
         samples, self._samples = self._samples, []
         return Block.of_samples(samples)
 
-    def result(self, table: Table) -> ImportResult:
+    def result(self, table: Table, bag: ImportBag) -> ImportResult:
         """Sum up; ImportDataError if there is nothing."""
         if self._first_ns is None or not self._written:
             raise ImportDataError(
@@ -271,7 +316,34 @@ class _Record:
             repeated=self._repeated,
             delimiter=table.delimiter,
             header=table.header is not None,
+            understood=self._understood(bag),
+            notes=tuple(self._notes(table)),
+            not_used=tuple(
+                name for place, name in enumerate(table.header or ()) if place not in self._used
+            ),
         )
+
+    def _understood(self, bag: ImportBag) -> tuple[Understood, ...]:
+        return tuple(
+            Understood(
+                columns.name,
+                ', '.join(repr(name) for name in columns.names),
+                ', '.join(dict.fromkeys(columns.units)),
+                bag.first[columns.channel],
+            )
+            for columns, _, _ in self._inputs
+            if columns.channel in bag.first
+        )
+
+    def _notes(self, table: Table) -> Iterator[str]:
+        if table.titles:
+            yield f'{len(table.titles)} line(s) above the table were left out.'
+        yield from self._clock.notes
+        for channel, count in self._too_fast.items():
+            yield (
+                f'{channel.input}: {count} of {self._written[channel.input]} values are above '
+                f'{ABSURD_SPEED_M_S:g} m/s, faster than any displacement ship; is the unit right?'
+            )
 
     def _why_not(self) -> str:
         if self._left_out == self._rows and self._seen:
@@ -288,16 +360,7 @@ class _Record:
             'times in seconds or in the unit given'
         )
 
-    def _values(
-        self, row: Row, columns: InputColumns, places: Sequence[int]
-    ) -> tuple[float, float]:
-        values = [
-            _number(_cell(row, place)) * factor
-            for place, factor in zip(places, columns.factors, strict=True)
-        ]
-        return values[0], values[1] if len(values) > 1 else 0.0
-
-    def _reject(self, name: str, row: Row, bad: _BadCell) -> None:
+    def _reject(self, name: str, row: Row, bad: BadCell) -> None:
         by_reason = self._rejected.setdefault(name, {})
         by_reason.setdefault(bad.reason, Rejected()).add(row.line, bad.cell)
 
@@ -310,26 +373,33 @@ def _check_width(row: Row, width: int) -> None:
     """Refuse a row that does not fit the columns, as decimal commas make it."""
     beyond = [cell for cell in row.cells[width:] if cell]
     if beyond:
-        raise _BadCell(f'more than {width} columns', ','.join(row.cells))
+        raise BadCell(f'more than {width} columns', ','.join(row.cells))
 
 
-def _number(cell: str) -> float:
-    if not cell:
-        raise _BadCell('empty', cell)
-    if not NUMBER.fullmatch(cell):
-        raise _BadCell('not a number', cell)
-    return float(cell)
+def _readers(
+    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: Sequence[Row]
+) -> list[list[Reader]]:
+    """Return what reads the cells of each column, as they are written in the first rows."""
+    cells = {place: [_cell(row, place) for row in sample] for each in places for place in each}
+    plain = number
+    if has_decimal_commas(cell for row in sample for cell in row.cells):
+        plain = number_with_comma
+    found: list[list[Reader]] = []
+    for columns, here in zip(inputs, places, strict=True):
+        if columns.channel is Channel.POSITION_GEODETIC:
+            found.append([_coordinate(cells[each], s) for each, s in zip(here, ('NS', 'EW'))])
+        else:
+            found.append([plain] * len(here))
+    return found
 
 
-def _clock(time: TimeColumn | None, rate_hz: float | None, start_ns: int) -> _Clock:
-    if (time is None) == (rate_hz is None):
-        raise ImportDataError('the times of the rows: give either --time COLUMN[:unit] or --rate')
-    if time is not None:
-        return _Clock(time.unit_ns, None, start_ns)
-    assert rate_hz is not None
-    if not (isfinite(rate_hz) and rate_hz > 0.0):
-        raise ImportDataError(f'--rate {rate_hz!r}: expected a number of rows a second above 0')
-    return _Clock(None, SECOND_NS / Fraction(rate_hz), start_ns)
+def _coordinate(cells: Sequence[str], side: str) -> Reader:
+    if is_in_minutes(cells, side):
+        return minutes_of(side)
+    if has_decimal_commas(cells):
+        read = degrees_of(side)
+        return lambda cell: read(cell.replace(',', '.', 1))
+    return degrees_of(side)
 
 
 def _check_inputs(inputs: Sequence[InputColumns]) -> None:
@@ -351,7 +421,7 @@ def _provenance(
     about = {
         'source': source.name,
         'inputs': {each.name: list(each.names) for each in inputs},
-        'time': None if time is None else time.name,
+        'time': None if time is None else ', '.join(time.names),
         'rate_hz': rate_hz,
         'where': dict(where),
     }

@@ -17,13 +17,25 @@ from pathlib import Path
 
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
-from shipdrag_ros import strict_yaml
+from shipdrag_ros import display, strict_yaml
+from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.bag import ATTACHMENT, BATCH_SAMPLES, Rejected, new_bag
-from shipdrag_ros.importing.formats.nmea.clock import Clock
+from shipdrag_ros.importing.bag import (
+    ATTACHMENT,
+    BATCH_SAMPLES,
+    ImportBag,
+    Rejected,
+    Understood,
+    new_bag,
+)
 from shipdrag_ros.importing.formats.nmea.log import NmeaLog
 from shipdrag_ros.importing.formats.nmea.record import SentenceConverter
 from shipdrag_ros.importing.formats.nmea.survey import Survey
+from shipdrag_ros.importing.words import (
+    backward_and_repeated,
+    not_taken_words,
+    rejected_words,
+)
 from shipdrag_ros.nmea.framing import Checksum
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
 from shipdrag_ros.samples import INPUTS, Channel
@@ -69,6 +81,10 @@ class NmeaResult:
         Whether the log is attached to the bag.
     damage
         Why the log could not be read to its end; empty if it could.
+    checksums
+        Whether its sentences had to have one.
+    understood
+        What each input was taken from.
     """
 
     lines: int
@@ -88,6 +104,66 @@ class NmeaResult:
     shift_days: int
     log_attached: bool
     damage: str
+    checksums: bool
+    understood: tuple[Understood, ...]
+
+    def summary(self, bag: Path) -> list[str]:
+        """
+        Say how much was read, and what is to be known of it.
+        """
+        length_s = (self.end_ns - self.start_ns) * 1e-9
+        told = [
+            f'{bag}: {sum(self.written.values())} messages of {self.sentences} sentences in '
+            f'{self.lines} lines, {display.duration(length_s)}, from {display.utc(self.start_ns)}'
+        ]
+        if not self.checksums:
+            told.append('The sentences have no checksums: a damaged digit is not noticed.')
+        if self.damage:
+            told.append(
+                f'The log could not be read to its end, {self.damage}; this is what is left.'
+            )
+        if self.shift_days:
+            told.append(
+                f'All dates were shifted by {self.shift_days} days, whole cycles of the GPS week.'
+            )
+        if self.dates_put_right:
+            told.append(
+                f'{self.dates_put_right} date(s) were a day off at midnight and put right.'
+            )
+        if self.magnetic_heading:
+            told.append(
+                'The heading is MAGNETIC, as the log states no variation: good for finding turns, '
+                'not for directions over ground.'
+            )
+        told += backward_and_repeated(self.backward, self.repeated)
+        told.append(
+            'The log is attached to the bag.'
+            if self.log_attached
+            else 'The log is NOT attached to the bag (too long, damaged or no UTF-8): keep it.'
+        )
+        return told
+
+    def table(self) -> Table:
+        """
+        Return messages by input.
+        """
+        return Table(
+            ('input', 'from', 'messages'),
+            tuple((name, self.sources[name], f'{n}') for name, n in self.written.items()),
+        )
+
+    def details(self) -> list[str]:
+        """
+        Say what was not used, and why.
+        """
+        told = not_taken_words(self.not_taken) + rejected_words(self.rejected)
+        if self.not_used:
+            others = ', '.join(f'{address} {count}' for address, count in self.not_used.items())
+            told.append(f'Sentences not used: {others}')
+        if self.unknown_talkers:
+            names = ', '.join(f'{name} {count}' for name, count in self.unknown_talkers.items())
+            told.append(f'Talkers that NMEA 0183 does not know: {names}')
+        return told
 
 
 def import_nmea(
@@ -154,7 +230,9 @@ def import_nmea(
                 bag.write_samples(record.pop())
         record.finish()
         bag.write_samples(record.pop())
-        result = _result(log, survey, record, clock, attached=text_of_log is not None)
+        result = _result(
+            log, survey, record, _understood(bag, record), attached=text_of_log is not None
+        )
         about = {'source': source.name, 'date': day, 'transducer_m': transducer_m}
         about |= {'checksum': checksum.value, **asdict(result)}
         bag.attach(ATTACHMENT, strict_yaml.dump(about))
@@ -171,7 +249,12 @@ def _part(
 
 
 def _result(
-    log: NmeaLog, survey: Survey, record: SentenceConverter, clock: Clock, *, attached: bool
+    log: NmeaLog,
+    survey: Survey,
+    record: SentenceConverter,
+    understood: tuple[Understood, ...],
+    *,
+    attached: bool,
 ) -> NmeaResult:
     """Sum up; ImportDataError if there is nothing."""
     rejected = {
@@ -192,7 +275,7 @@ def _result(
     not_used: Counter[str] = Counter()
     unknown: Counter[str] = Counter()
     for (talker, kind), count in survey.addresses.items():
-        if kind not in READERS and kind not in TIMED:
+        if kind not in READERS and kind not in TIMED and talker not in READERS:
             not_used[talker + kind] += count
         if kind and talker not in NMEA_TALKERS:
             unknown[talker] += count
@@ -210,11 +293,20 @@ def _result(
         end_ns=record.newest_ns,
         backward=record.backward,
         repeated=record.repeated,
-        dates_put_right=clock.dates_put_right,
+        dates_put_right=record.clock.dates_put_right,
         magnetic_heading=heading is not None and heading.detail == MAGNETIC,
-        shift_days=clock.shift_days,
+        shift_days=record.clock.shift_days,
         log_attached=attached,
         damage=log.damage,
+        checksums=log.checksum is Checksum.REQUIRED,
+        understood=understood,
+    )
+
+
+def _understood(bag: ImportBag, record: SentenceConverter) -> tuple[Understood, ...]:
+    return tuple(
+        Understood(channel.input, str(record.chosen[channel]), '', first)
+        for channel, first in sorted(bag.first.items())
     )
 
 

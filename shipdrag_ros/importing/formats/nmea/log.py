@@ -5,11 +5,9 @@ A log of NMEA 0183 as sentences, and a count of what is none.
 
 from __future__ import annotations
 
-import gzip
 import re
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from datetime import datetime
 from fractions import Fraction
 from io import BufferedReader, TextIOWrapper
@@ -20,10 +18,10 @@ from pynmeagps.nmeahelpers import calc_checksum
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import LIMIT_NS, Rejected
+from shipdrag_ros.importing.opened import check_unpacked, opened
 from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
 from shipdrag_ros.samples import SECOND_NS
 
-_GZIP = b'\x1f\x8b'
 _UTF_16 = (b'\xff\xfe', b'\xfe\xff')
 _UTF_8_MARK = '\xef\xbb\xbf'  # as it looks in the encoding below
 # every byte is a character, so that checksums are those of the bytes
@@ -33,7 +31,9 @@ _TAG = re.compile(r'\\([^\\]*)\*([0-9A-Fa-f]{2})\\')
 _TAGS = re.compile(f'(?:{_TAG.pattern})+')
 _TAG_TIME = re.compile(r'(?:^|,)c:(\d{9,14})(?:,|$)')
 _EPOCH = re.compile(r'\[?(\d{9,10}|\d{13})(\.\d+)?\]?[\s,;:]*')
-_ISO = re.compile(r'\[?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)\]?[\s,;:]*')
+_ISO = re.compile(
+    r'(?:\w{1,40}\s+)?\[?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)\]?[\s,;:]*'
+)
 _MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past the year 5000
 
 
@@ -52,6 +52,7 @@ class NmeaLog:
 
     Attributes
     ----------
+    checksum
     rejected
         Lines without a sentence by reason, of the last reading.
     lines
@@ -67,12 +68,12 @@ class NmeaLog:
 
     def __init__(self, path: Path, *, checksum: Checksum = Checksum.REQUIRED) -> None:
         self.path = path
-        self._checksum = checksum
+        self.checksum = checksum
         self.rejected: dict[str, Rejected] = {}
         self.lines = 0
         self.damage = ''
         try:
-            with self._opened() as (_, file):
+            with opened(self.path) as (_, file):
                 start = file.read(2)
         except (OSError, EOFError, zlib.error) as error:
             reason = getattr(error, 'strerror', None) or str(error)
@@ -88,7 +89,7 @@ class NmeaLog:
         """
         Return the whole log, or None if it is longer or no text in UTF-8.
         """
-        with self._opened() as (_, file):
+        with opened(self.path) as (_, file):
             try:
                 raw = file.read(limit_bytes + 1)
                 return None if len(raw) > limit_bytes else raw.decode()
@@ -107,22 +108,29 @@ class NmeaLog:
         self.rejected = {}
         self.damage = ''
         total = self.path.stat().st_size
-        with self._opened() as (raw, file):
-            for line in self._lines(file):
+        with opened(self.path) as (raw, file):
+            for line in self._lines(raw, file):
                 if progress is not None and self.lines % 1000 == 0:
                     progress(raw.tell(), total)
                 yield from self._of_line(self.lines, line)
 
-    def _lines(self, file: IO[bytes]) -> Iterator[str]:
+    def _lines(self, raw: IO[bytes], file: IO[bytes]) -> Iterator[str]:
         """Yield lines ended by LF, CR or both; of a long one only its beginning."""
         text = TextIOWrapper(cast(BufferedReader, file), encoding=_ENCODING)
         self.lines = 0
+        size = 0
         try:
             while line := text.readline(_LINE):
                 self.lines += 1
                 rest = line
+                size += len(line)
                 while len(rest) == _LINE and not rest.endswith('\n'):
                     rest = text.readline(_LINE)
+                    size += len(rest)
+                    if file is not raw:
+                        check_unpacked(self.path, size, raw.tell())
+                if file is not raw:
+                    check_unpacked(self.path, size, raw.tell())
                 if self.lines == 1:
                     line = line.removeprefix(_UTF_8_MARK)
                 yield line.strip()
@@ -150,22 +158,12 @@ class NmeaLog:
             receive_ns = None
         for text in texts:
             try:
-                yield parse(text.strip(), self._checksum, line=number, receive_ns=receive_ns)
+                yield parse(text.strip(), self.checksum, line=number, receive_ns=receive_ns)
             except ValueError as error:
                 self._reject(str(error), number, text)
 
     def _reject(self, reason: str, number: int, text: str) -> None:
         self.rejected.setdefault(reason, Rejected()).add(number, text)
-
-    @contextmanager
-    def _opened(self) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
-        """Open the file, and what is in it; by its content, whatever its name."""
-        with self.path.open('rb') as raw:
-            if raw.peek(2)[:2] != _GZIP:
-                yield raw, raw
-                return
-            with gzip.open(raw) as unpacked:
-                yield raw, cast(IO[bytes], unpacked)
 
 
 def _receive_ns(prefix: str) -> int | None:

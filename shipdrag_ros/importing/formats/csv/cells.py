@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What may stand in a cell: a number with a point or a comma, or a coordinate."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from enum import Enum
+from math import cos, hypot, pi, radians, remainder, sin
+
+from shipdrag_ros.display import NUMBER
+
+_COMMA = re.compile(r'[-+]?(\d+,\d*|,\d+)([eE][-+]?\d{1,4})?')
+_SIDES = {'N': 1.0, 'E': 1.0, 'S': -1.0, 'W': -1.0}
+_DECIMAL = re.compile(r'([-+]?\d{1,3}(?:\.\d*)?)\s*°?\s*([NSEW])?')
+_PARTED = re.compile(r"(\d{1,3})[°\s]\s*(\d{1,2}(?:\.\d*)?)\s*'?\s*([NSEW])")
+_JOINED = re.compile(r'([-+]?)(\d{1,3})(\d{2}(?:\.\d*)?)\s*([NSEW])?')
+
+
+class BadCell(Exception):
+    """A cell without a usable number."""
+
+    def __init__(self, reason: str, cell: str) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.cell = cell
+
+
+class Form(Enum):
+    """How the columns of an input make its value."""
+
+    PLAIN = 'plain'
+    HYPOT = 'hypot'  # a speed from two components
+    POLAR = 'polar'  # apparent wind: speed, and where it comes from, clockwise from ahead
+    COMPASS = 'compass'  # deg clockwise from north
+
+
+def number(cell: str) -> float:
+    """
+    Read a number with a decimal point.
+
+    Raises
+    ------
+    BadCell
+        If it is none.
+    """
+    if not cell:
+        raise BadCell('empty', cell)
+    if not NUMBER.fullmatch(cell):
+        raise BadCell('not a number', cell)
+    return float(cell)
+
+
+def number_with_comma(cell: str) -> float:
+    """
+    Read a number with a decimal comma; one without either is a number too.
+
+    Raises
+    ------
+    BadCell
+        If it is none.
+    """
+    if '.' in cell:
+        raise BadCell('a point where others have a decimal comma', cell)
+    return number(cell.replace(',', '.', 1))
+
+
+def has_decimal_commas(cells: Iterable[str]) -> bool:
+    """
+    Say whether the cells of a table are numbers with decimal commas.
+
+    Not where all have three digits behind the comma, which may be thousands, nor
+    where any has a point.
+    """
+    commas = points = parted = plain = 0
+    for cell in cells:
+        if _COMMA.fullmatch(cell):
+            commas += 1
+            parted += len(cell.partition(',')[2]) != 3
+        elif NUMBER.fullmatch(cell):
+            points += '.' in cell
+            plain += 1
+    # a few that are otherwise are damaged, and rejected one by one
+    return bool(commas > 1 and parted and 10 * commas >= plain and 50 * points <= commas)
+
+
+def degrees_of(side: str) -> Callable[[str], float]:
+    """
+    Return a reader of latitudes or longitudes in degrees, with or without a letter.
+
+    Parameters
+    ----------
+    side
+        'NS' or 'EW'.
+    """
+
+    def read(cell: str) -> float:
+        text = cell.strip().upper()
+        if not text:
+            raise BadCell('empty', cell)
+        if found := _PARTED.fullmatch(text):
+            return _checked(float(found[1]), float(found[2]), found[3], side, cell)
+        found = _DECIMAL.fullmatch(text)
+        if found is None or (found[2] and text[0] in '+-'):
+            raise BadCell('no latitude and longitude', cell)
+        return _checked(float(found[1]), 0.0, found[2] or side[0], side, cell)
+
+    return read
+
+
+def minutes_of(side: str) -> Callable[[str], float]:
+    """
+    Return a reader of degrees and minutes written as one number, ddmm.mmmm, and a letter.
+    """
+
+    def read(cell: str) -> float:
+        text = cell.strip().upper()
+        if not text:
+            raise BadCell('empty', cell)
+        found = _JOINED.fullmatch(text)
+        if found is None or (found[1] and found[4]):
+            raise BadCell('no latitude and longitude', cell)
+        value = _checked(float(found[2]), float(found[3]), found[4] or side[0], side, cell)
+        return -value if found[1] == '-' else value
+
+    return read
+
+
+def is_in_minutes(cells: Iterable[str], side: str) -> bool:
+    """
+    Say whether a column is written as ddmm.mmmm: its numbers are too large for degrees.
+    """
+    largest = 90.0 if side == 'NS' else 180.0
+    joined = beyond = 0
+    for cell in filter(None, (cell.strip().upper() for cell in cells)):
+        found = _JOINED.fullmatch(cell)
+        joined += found is not None
+        beyond += found is not None and float(found[2] + found[3]) > largest
+    return beyond > 0 and joined > 0
+
+
+def _checked(degrees: float, minutes: float, letter: str, side: str, cell: str) -> float:
+    value = abs(degrees) + minutes / 60.0
+    largest = 90.0 if side == 'NS' else 180.0
+    # a longitude counted from 0 to 360 is one too
+    if letter not in side or minutes >= 60.0 or value > (largest if side == 'NS' else 360.0):
+        raise BadCell('no latitude and longitude', cell)
+    value *= _SIDES[letter] * (-1.0 if degrees < 0.0 else 1.0)
+    return value - 360.0 if value > largest else value
+
+
+def combined(form: Form, values: list[float]) -> tuple[float, float]:
+    """
+    Return the two values of a sample from those of its columns, in SI units.
+    """
+    if form is Form.COMPASS:
+        return remainder(pi / 2.0 - values[0], 2.0 * pi), 0.0
+    if form is Form.HYPOT:
+        return hypot(values[0], values[1]), 0.0
+    if form is Form.POLAR:
+        speed, angle = values
+        return -speed * cos(angle), speed * sin(angle)
+    return values[0], values[1] if len(values) > 1 else 0.0
+
+
+def compass_to_yaw(compass_deg: float) -> float:
+    """
+    Return REP-103 yaw [rad] of a compass angle.
+    """
+    return remainder(pi / 2.0 - radians(compass_deg), 2.0 * pi)

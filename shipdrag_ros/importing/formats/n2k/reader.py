@@ -1,0 +1,322 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Messages of NMEA 2000 to readings.
+
+Fast packets are put together and fields are read by `nmea2000`, which has the
+table of canboat; units are SI.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import date
+from itertools import islice, pairwise
+from math import cos, pi, remainder, sin
+from typing import Any
+
+from nmea2000 import backend
+
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing.format import Job
+from shipdrag_ros.importing.formats.n2k.frames import Frame, parse
+from shipdrag_ros.importing.opened import Lines
+from shipdrag_ros.importing.stream import Origin, Reading, Tally
+from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
+
+_DAY_NS = 86_400 * SECOND_NS
+_BASE_NS = 946_684_800 * SECOND_NS  # 2000-01-01, for lines without a time
+_RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
+_SYSTEM_TIME, _GNSS = 126992, 129029
+_DATED_FRAMES = 50_000  # in which a date is looked for
+_FAST = (_GNSS,)
+_EPOCH_DAYS = date(1970, 1, 1).toordinal()
+
+
+@dataclass(frozen=True)
+class FrameClock:
+    """
+    How the times of the lines are to be read.
+
+    Attributes
+    ----------
+    rate_hz
+        Frames a second, where the lines tell no time.
+    day
+        Days since 1970 of the first line, where the lines tell times of day.
+    base_ns
+        Added to times that count from the start of the log [ns].
+    """
+
+    rate_hz: float | None = None
+    day: int = 0
+    base_ns: int = 0
+
+
+def clock_of(job: Job) -> FrameClock:
+    """
+    Find out how the times of a log are to be read.
+
+    Raises
+    ------
+    ImportDataError
+        If its lines tell no time, or no date, and it is not given either.
+    """
+    name = repr(str(job.source))
+    rate_hz = job.options.get('rate')
+    day = job.options.get('date')
+    days = None if day is None else day.toordinal() - _EPOCH_DAYS
+    frames = (frame for line in Lines(job.source) if (frame := parse(line)) is not None)
+    first = next(frames, None)
+    if first is None:
+        raise ImportDataError(f'{name} holds no frame of NMEA 2000')
+    if rate_hz is not None:
+        return FrameClock(rate_hz, days or 0)
+    if first.time_ns is None:
+        raise ImportDataError(
+            f'{name}: its lines tell no time; log with `candump -L`, or give --rate HZ, how '
+            'many frames came in a second'
+        )
+    if not first.of_day:
+        if first.time_ns >= _RELATIVE_BELOW_NS:
+            return FrameClock()
+        times = [frame.time_ns for frame in islice(frames, 1000) if frame.time_ns is not None]
+        if any(after < before for before, after in pairwise(times)):
+            raise ImportDataError(
+                f'{name}: its times are no dates and go back and forth, as those of `candump -td` '
+                'do; log with `candump -L`, or give --rate HZ'
+            )
+        return FrameClock(base_ns=_BASE_NS)
+    if days is None:
+        days = _date_in(islice(frames, _DATED_FRAMES))
+    if days is None:
+        raise ImportDataError(
+            f'{name} tells times of day, and no date (no PGN 126992 or 129029 with one); give '
+            '--date YYYY-MM-DD of its first time, in UTC'
+        )
+    return FrameClock(None, days)
+
+
+def _date_in(frames: Iterator[Frame]) -> int | None:
+    """Return the days since 1970 that a message tells, of the first that does."""
+    packets = _Packets()
+    for frame in frames:
+        if frame.pgn in (_SYSTEM_TIME, _GNSS):
+            data = packets.whole(frame)
+            place = 2 if frame.pgn == _SYSTEM_TIME else 1
+            if data is not None and len(data) >= 8:
+                days = int.from_bytes(data[place : place + 2], 'little')
+                if 0 < days < 0xFFFD:
+                    return days
+    return None
+
+
+class _Packets:
+    """Puts the frames of fast packets together."""
+
+    def __init__(self) -> None:
+        self._parts = backend.canboat.Reassembler()
+
+    def whole(self, frame: Frame) -> bytes | None:
+        if frame.whole or frame.pgn not in _FAST:
+            return frame.data
+        sender = int(frame.sender) if frame.sender.isdecimal() else hash(frame.sender) % 254
+        try:
+            data: bytes | None = self._parts.push(frame.pgn, frame.data, sender % 256)
+        except backend.canboat.ReassemblyError:
+            return None  # a frame was lost
+        return data
+
+
+Value = tuple[Channel, int, float, float]
+Fields = Mapping[str, Any]
+
+
+class Reader:
+    """
+    Takes the messages of a log.
+
+    Parameters
+    ----------
+    tally
+    clock
+        From `clock_of`.
+    options
+        `gear` and `transducer`, where they were given.
+    """
+
+    def __init__(self, tally: Tally, clock: FrameClock, options: Mapping[str, Any]) -> None:
+        self._tally = tally
+        self._clock = clock
+        self._gear: float | None = options.get('gear')
+        self._transducer_m: float | None = options.get('transducer')
+        self._packets = _Packets()
+        self._frames = 0
+        self._midnights = 0
+        self._of_day_ns = 0
+        self._readers: dict[int, Callable[[Fields], Value | str]] = {
+            128259: _water,
+            129026: _ground,
+            129025: _position,
+            _GNSS: _gnss,
+            127250: self._heading,
+            130306: _wind,
+            128267: self._depth,
+            127245: _rudder,
+            127488: self._engine,
+        }
+
+    def read(self, job: Job) -> Iterator[Reading]:
+        """
+        Yield the readings of a log.
+        """
+        lines = Lines(job.source)
+        total = job.source.stat().st_size
+        for line in lines:
+            self._tally.records += 1
+            if self._tally.records % 1000 == 0 and job.progress is not None:
+                job.progress(lines.done_bytes, total)
+            if not line:
+                continue
+            frame = parse(line)
+            if frame is None:
+                self._tally.reject('line', 'no frame', line)
+                continue
+            yield from self._frame(frame, line)
+        if lines.damage:
+            self._tally.note(f'The log could not be read to its end, {lines.damage}.')
+
+    def _frame(self, frame: Frame, line: str) -> Iterator[Reading]:
+        stamp_ns = self._stamp_ns(frame)
+        read = self._readers.get(frame.pgn)
+        if read is None:
+            self._tally.not_used[f'PGN {frame.pgn}'] += 1
+            return
+        if stamp_ns is None:
+            self._tally.reject('time', 'no time in the line', line)
+            return
+        data = self._packets.whole(frame)
+        if data is None:
+            return
+        message = backend.decode(frame.pgn, data, units='si')
+        if message is None:
+            self._tally.reject(f'PGN {frame.pgn}', 'cannot be decoded', line)
+            return
+        fields = {field.id: field for field in message.fields}
+        try:
+            found = read(fields)
+        except KeyError:  # of a message of another length
+            found = 'without the field'
+        if isinstance(found, str):
+            self._tally.reject(f'PGN {frame.pgn}', found, line)
+            return
+        channel, rank, a, b = found
+        origin = Origin(rank, f'PGN {frame.pgn} from {frame.sender}')
+        yield Reading(channel, origin, stamp_ns, a, b)
+
+    def _stamp_ns(self, frame: Frame) -> int | None:
+        self._frames += 1
+        if self._clock.rate_hz is not None:
+            start_ns = self._clock.day * _DAY_NS or _BASE_NS
+            return start_ns + round((self._frames - 1) / self._clock.rate_hz * SECOND_NS)
+        if frame.time_ns is None:
+            return None
+        if not frame.of_day:
+            return frame.time_ns + self._clock.base_ns
+        if frame.time_ns < self._of_day_ns - _DAY_NS // 2:
+            self._midnights += 1
+        elif frame.time_ns > self._of_day_ns + _DAY_NS // 2 and self._midnights:
+            self._midnights -= 1  # a damaged time had passed for the next day's
+        self._of_day_ns = frame.time_ns
+        return (self._clock.day + self._midnights) * _DAY_NS + frame.time_ns
+
+    def _heading(self, fields: Fields) -> Value | str:
+        heading, reference = fields['heading'].value, fields['reference'].value
+        if heading is None:
+            return _EMPTY
+        if reference == 'True':
+            return Channel.HEADING, 0, _yaw(heading), 0.0
+        if reference != 'Magnetic':
+            return 'neither true nor magnetic'
+        deviation, variation = fields['deviation'].value, fields['variation'].value
+        if variation is not None:
+            return Channel.HEADING, 1, _yaw(heading + (deviation or 0.0) + variation), 0.0
+        self._tally.note(
+            'A heading is MAGNETIC, as its sensor states no variation: good for finding turns, '
+            'not for directions over ground.'
+        )
+        return Channel.HEADING, 2, _yaw(heading), 0.0
+
+    def _depth(self, fields: Fields) -> Value | str:
+        depth, offset = fields['depth'].value, fields['offset'].value
+        if depth is None:
+            return _EMPTY
+        # negative: to the keel, whose depth is not told
+        if offset is None or offset <= 0.0:
+            if self._transducer_m is None:
+                return 'depth of the transducer not told'
+            offset = self._transducer_m
+        return Channel.DEPTH, 0, depth + offset, 0.0
+
+    def _engine(self, fields: Fields) -> Value | str:
+        if self._gear is None:
+            return 'revolutions of the engine, and not of the shaft: give --gear RATIO'
+        rate_hz, place = fields['speed'].value, fields['instance'].raw_value
+        if rate_hz is None:
+            return _EMPTY
+        if not isinstance(place, int) or not 0 <= place < len(SHAFTS):
+            return 'no engine from 0 to 3'
+        return SHAFTS[place], 0, rate_hz * 2.0 * pi / self._gear, 0.0
+
+
+_EMPTY = 'not available'
+
+
+def _yaw(compass: float) -> float:
+    return remainder(pi / 2.0 - compass, 2.0 * pi)
+
+
+def _water(fields: Fields) -> Value | str:
+    speed = fields['speedWaterReferenced'].value
+    return _EMPTY if speed is None else (Channel.SPEED_THROUGH_WATER, 0, speed, 0.0)
+
+
+def _ground(fields: Fields) -> Value | str:
+    speed = fields['sog'].value
+    return _EMPTY if speed is None else (Channel.SPEED_OVER_GROUND, 0, speed, 0.0)
+
+
+def _position(fields: Fields) -> Value | str:
+    return _where(fields, 0)
+
+
+def _gnss(fields: Fields) -> Value | str:
+    method = fields['method'].value
+    if method in (None, 'no GNSS', 'Estimated (DR) mode', 'Manual Input', 'Simulate mode'):
+        return f'no fix: {method}'
+    return _where(fields, 1)
+
+
+def _where(fields: Fields, rank: int) -> Value | str:
+    latitude, longitude = fields['latitude'].value, fields['longitude'].value
+    if latitude is None or longitude is None:
+        return _EMPTY
+    if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        return 'no latitude and longitude'
+    return Channel.POSITION_GEODETIC, rank, latitude, longitude
+
+
+def _wind(fields: Fields) -> Value | str:
+    speed, angle = fields['windSpeed'].value, fields['windAngle'].value
+    if fields['reference'].value != 'Apparent':
+        return f'wind that is not apparent: {fields["reference"].value}'
+    if speed is None or angle is None:
+        return _EMPTY
+    return Channel.WIND_APPARENT, 0, -speed * cos(angle), speed * sin(angle)
+
+
+def _rudder(fields: Fields) -> Value | str:
+    angle = fields['position'].value
+    if angle is None:
+        return _EMPTY
+    return Channel.RUDDER, int(fields['instance'].raw_value or 0), angle, 0.0

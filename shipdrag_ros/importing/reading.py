@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Any file as runs: a bag as it is, a log or a table through a bag that is made of it.
+
+The bag lives in a temporary folder as long as its run does, so that what is
+estimated from a log is what `shipdrag import` and `shipdrag replay` give.
+"""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags.locate import BagFiles, is_bag
+from shipdrag_ros.bags.mcap_file import McapFile
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing import formats
+from shipdrag_ros.importing.format import Format, Job, Result, best_of, head_of
+from shipdrag_ros.importing.join import import_joined
+
+
+@dataclass(frozen=True)
+class Understanding:
+    """
+    What was understood of a file that is no bag.
+
+    Attributes
+    ----------
+    path
+    kind
+        Of the file, `a CSV file` for instance.
+    result
+        What became of it.
+    """
+
+    path: Path
+    kind: str
+    result: Result
+
+    def lines(self) -> list[str]:
+        """
+        Return what is to be told: what each input was taken from, and what was left out.
+        """
+        told = [f'{self.path}: {self.kind}', *(f'  {each}' for each in self.result.understood)]
+        return [*told, *self.result.summary(self.path)[1:], *self.result.details()]
+
+
+class ImportedRun(Run):
+    """A run whose samples stood in logs or tables; `paths` are these."""
+
+    def __init__(
+        self, bag: Path, sources: Sequence[Path], remap: Mapping[str, str] | None = None
+    ) -> None:
+        name = ', '.join(map(str, sources))
+        super().__init__(BagFiles(name, (bag,)), [McapFile(bag)], remap=remap)
+        self._sources = tuple(sources)
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files that it was made of."""
+        return self._sources
+
+
+def read_any(
+    paths: Iterable[Path],
+    *,
+    remap: Mapping[str, str] | None = None,
+    joined: bool = False,
+    options: Mapping[str, Any] | None = None,
+    tell: Callable[[Understanding], None] | None = None,
+) -> list[Run]:
+    """
+    Open files of any format that is known, as `open_runs` opens bags.
+
+    Parameters
+    ----------
+    paths
+        MCAP files, rosbag2 directories, logs and tables.
+    remap
+        Recorded topic -> input.
+    joined
+        Whether all logs and tables are one run, as files of one instrument each
+        are; otherwise each is a run of its own.
+    options
+        Values by `format.Option.key`, such as `{'speed_unit': 'kn'}`; a format
+        takes those that it knows.
+    tell
+        Called with what was understood of each log.
+
+    Returns
+    -------
+    list of Run
+        First those of the bags, then those of the logs, in the order given.
+
+    Raises
+    ------
+    BagError
+        If a bag cannot be read.
+    ImportDataError
+        If nothing in a log can be used, saying what to type.
+
+    Notes
+    -----
+    Source: docs/import.md.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from shipdrag_ros.importing.reading import read_any
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = Path(folder) / 'coast.csv'
+    ...     _ = table.write_text('time_s,STW [kn]\\n0,12.0\\n1,11.9\\n')
+    ...     (run,) = read_any([table])
+    >>> [topic.topic for topic in run.topics]
+    ['/speed_through_water']
+    """
+    bags: list[Path] = []
+    logs: list[Path] = []
+    for path in map(Path, paths):
+        (bags if is_bag(path) else logs).append(path)
+    runs = open_runs(bags, remap=remap) if bags else []
+    groups = [logs] if joined and logs else [[path] for path in logs]
+    return runs + [_imported(group, remap, options or {}, tell) for group in groups]
+
+
+def _imported(
+    sources: Sequence[Path],
+    remap: Mapping[str, str] | None,
+    options: Mapping[str, Any],
+    tell: Callable[[Understanding], None] | None,
+) -> Run:
+    folder = TemporaryDirectory(prefix='shipdrag-import-')
+    bag = Path(folder.name) / 'imported.mcap'
+    declared_parts = [(_declared(source, options), source) for source in sources]
+    parts = [(each, _job(each, source, bag, options)) for each, source in declared_parts]
+    try:
+        found = import_joined(parts, bag, {})
+    except ImportDataError as error:
+        if '--' not in str(error):
+            raise
+        raise ImportDataError(
+            f'{error} (make a bag of it with `shipdrag import`, which takes these options)'
+        ) from error
+    for (declared, job), result in zip(parts, found.results, strict=True):
+        if tell is not None:
+            tell(Understanding(job.source, declared.kind, result))
+    run = ImportedRun(bag, sources, remap)
+    weakref.finalize(run, folder.cleanup)
+    return run
+
+
+def import_file(
+    source: Path,
+    bag: Path,
+    *,
+    options: Mapping[str, Any] | None = None,
+    attachments: Mapping[str, str] | None = None,
+) -> Understanding:
+    """
+    Make a bag of a log or a table.
+
+    Parameters
+    ----------
+    source
+        In any format that is known.
+    bag
+        MCAP file to make.
+    options
+        Values by `format.Option.key`; a format takes those that it knows.
+    attachments
+        Text by name, a ship file for instance.
+
+    Raises
+    ------
+    ImportDataError
+        If nothing in it can be used, saying what to type.
+    BagError
+        If the bag cannot be made.
+    """
+    declared = _declared(source, options or {})
+    job = _job(declared, source, bag, options or {}, attachments)
+    return Understanding(source, declared.kind, declared.write(job))
+
+
+def _declared(source: Path, options: Mapping[str, Any]) -> Format:
+    known = formats.found()
+    asked = next((each for each in known if each.chosen_by in options), None)
+    return asked or best_of(known, head_of(source))
+
+
+def _job(
+    declared: Format,
+    source: Path,
+    bag: Path,
+    options: Mapping[str, Any],
+    attachments: Mapping[str, str] | None = None,
+) -> Job:
+    own = {option.key for option in declared.options}
+    values = {key: value for key, value in options.items() if key in own}
+    return Job(source, bag, values, attachments or {})
