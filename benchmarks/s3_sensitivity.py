@@ -17,27 +17,29 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import argparse
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
 import _plain_mariner
+import matplotlib
 import numpy as np
 from _tables import table as markdown
 from _wrong_values import COAST_S, LEAD_IN_S, SPEED_M_S, verdicts
+from matplotlib.figure import Figure
 
 from shipdrag_ros.display import Table
-from shipdrag_ros.report.drawing import save
+from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.manoeuvring.manoeuvre import (
     Side,
-    advance_m,
     overshoots_rad,
-    tactical_diameter_m,
     turn,
     zigzag,
 )
+from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 from shipdrag_ros.studies.manoeuvring.simulate import steer
 from shipdrag_ros.studies.sensitivity import coasting_words, steering_words
@@ -149,6 +151,13 @@ def checks() -> Table:
     )
 
 
+def _turned(motion: ManoeuvreMotion, heading_rad: float, value: Float64) -> float:
+    """Return what a turning ship has done when her heading has changed by so much."""
+    turned = np.abs(motion.heading_rad)
+    i = int(np.argmax(turned >= heading_rad))
+    return float(np.interp(heading_rad, turned[i - 1 : i + 1], np.abs(value[i - 1 : i + 1])))
+
+
 def circles() -> Table:
     """
     Show turning circles.
@@ -158,7 +167,8 @@ def circles() -> Table:
         circle = turn(35.0, first=first)
         motions = [steer(SHIP, circle, approach_s=each)[0] for each in (0.0, APPROACH_S)]
         cells = [
-            f'{advance_m(motion, circle):.0f} / {tactical_diameter_m(motion, circle):.0f}'
+            f'{_turned(motion, 0.5 * np.pi, motion.position_m[:, 0]):.0f} / '
+            f'{_turned(motion, np.pi, motion.position_m[:, 1]):.0f}'
             for motion in motions
         ]
         known = '566 / 1029' if first is Side.STARBOARD else ''
@@ -461,6 +471,20 @@ def page(
     ]
 
 
+def _surge_picture(time_s: Float64, speeds: Sequence[tuple[str, Float64]]) -> Figure:
+    """Draw the surge speed of one manoeuvre after several changes of a derivative."""
+    styles = (('#444444', '-'), (BLUE, '--'), (GREEN, '-.'), (VERMILION, ':'), (ORANGE, '--'))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.2), layout='constrained')
+        axis = figure.subplots()
+        for (label, speed), (color, style) in zip(speeds, styles):
+            axis.plot(time_s, speed, color=color, linestyle=style, label=label)
+        axis.set_xlabel('time after the first order [s]')
+        axis.set_ylabel('u [m/s]')
+        axis.legend(loc='upper right', ncols=len(speeds))
+    return figure
+
+
 def main() -> None:
     """
     Print the page, and write it where that is asked for.
@@ -481,7 +505,7 @@ def main() -> None:
     (DOCS / 's3_sensitivity.md').write_text('\n'.join(lines) + '\n', encoding='utf-8')
     time_s = found.check.full.time_s
     for name, figure in (
-        ('surge', sensitivity_pictures.surge_picture(time_s, surge())),
+        ('surge', _surge_picture(time_s, surge())),
         ('ranking', sensitivity_pictures.ranking_picture(found)),
         ('check', sensitivity_pictures.check_picture(found)),
         ('design', sensitivity_pictures.design_picture(shown)),

@@ -4,8 +4,8 @@ Trend on simulated fleets: cover of growth and level, cleanings found, false ste
 
 The world here is not the trend's model: fouling saturates or grows in bursts in port,
 seasons move the resistance, errors have long tails, some runs are junk. Beside the trend
-stand a straight line through all runs and the difference of means before and after, as
-ISO 19030 compares periods.
+stand a straight line through all runs, the difference of means before and after, as
+ISO 19030 compares periods, and change points by `ruptures` where it is installed.
 
     python benchmarks/trend_score.py --ships 40 --years 2.5 --seed 1
 """
@@ -17,7 +17,8 @@ import os
 
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # small matrices; threads only wait
 
-from dataclasses import dataclass
+from collections import defaultdict
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -77,10 +78,106 @@ def first_noticed(world: World) -> float | None:
                 for each in (years, world.runs.added, world.runs.sd, world.runs.covariates)
             )
         )
-        _, steps = search(part, Steps(), Growth())
+        steps = search(part, Steps(), Growth()).steps
         if any(abs(step.year - world.cleaned) < MONTH for step in steps):
             return float(years[last] - world.cleaned) * 365.25
     return None
+
+
+def steps_by_ruptures(runs: Runs) -> list[float] | None:
+    """Return the change points of the runs less a straight line, by PELT; None without it."""
+    try:
+        import ruptures
+    except ImportError:  # of peers.in; nothing else needs it
+        return None
+    rest = runs.added - np.polyval(np.polyfit(runs.years, runs.added, 1), runs.years)
+    step = np.diff(rest)
+    variance = float(np.median(np.abs(step)) / 0.6745) ** 2 / 2.0
+    penalty = 3.0 * variance * np.log(len(rest))
+    ends = ruptures.Pelt(model='l2', min_size=2, jump=1).fit(rest).predict(pen=penalty)[:-1]
+    return [float(0.5 * (runs.years[end - 1] + runs.years[end])) for end in ends]
+
+
+def growth_by_means(runs: Runs) -> float:
+    """Return the growth by the means of the first and the last three months."""
+    first, last = runs.years < 0.25, runs.years > runs.years[-1] - 0.25
+    rise = runs.added[last].mean() - runs.added[first].mean()
+    return float(rise / (runs.years[last].mean() - runs.years[first].mean()))
+
+
+@dataclass
+class Score:
+    """What is counted over ships of one kind."""
+
+    ships: int = 0
+    years: float = 0.0
+    inside: dict[str, list[bool]] = field(default_factory=lambda: defaultdict(list))
+    off: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    level: list[float] = field(default_factory=list)
+    false: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    bursts: int = 0
+    found: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    size: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+
+    def add(self, world: World, cleaning: float) -> None:
+        """Score one ship."""
+        runs, seen = world.runs, search(world.runs, Steps(), Growth())
+        self.ships += 1
+        self.years += float(runs.years[-1])
+        slope = seen.open.growth_per_year()
+        self._growth('trend', world, float(slope.value[0]), float(slope.sd[0]))
+        fit, covariance = np.polyfit(runs.years, runs.added, 1, cov=True)
+        self._growth('line', world, float(fit[0]), float(np.sqrt(covariance[0, 0])))
+        self._growth('means', world, growth_by_means(runs), None)
+        band = seen.open.level(runs.years)
+        self.level.append(float(np.mean(np.abs(band.value - world.level) < 1.96 * band.sd)))
+        for name, steps in (
+            ('trend', [step.year for step in seen.steps]),
+            ('ruptures', steps_by_ruptures(runs)),
+        ):
+            if steps is None:
+                continue
+            near = [world.cleaned and abs(year - world.cleaned) < MONTH for year in steps]
+            self.found[name] += any(near)
+            others = [year for year, right in zip(steps, near) if not right]
+            self.false[name] += sum(not _is_jump(world, year) for year in others)
+            if name == 'trend':
+                self.bursts += sum(_is_jump(world, year) for year in others)
+        if world.cleaned is not None:
+            known = HullState(runs, Steps(np.array([world.cleaned])), Growth())
+            self.size['trend'].append(float(known.changes().value[0]) + cleaning)
+            half = np.abs(runs.years - world.cleaned) < 0.25
+            after = runs.years >= world.cleaned
+            change = runs.added[half & after].mean() - runs.added[half & ~after].mean()
+            self.size['means'].append(float(change) + cleaning)
+
+    def _growth(self, name: str, world: World, value: float, sd: float | None) -> None:
+        self.off[name].append(value - world.growth)
+        if sd is not None:
+            self.inside[name].append(abs(value - world.growth) < 1.96 * sd)
+
+    def show(self) -> None:
+        """Print what was counted."""
+        print(
+            f'  growth inside its 95 % band: {np.mean(self.inside["trend"]):.0%} (straight line '
+            f'{np.mean(self.inside["line"]):.0%}); rms error a year {_rms(self.off["trend"])} '
+            f'(straight line {_rms(self.off["line"])}, means of the first and last three months '
+            f'{_rms(self.off["means"])})'
+        )
+        print(f'  level inside its 95 % band: {np.mean(self.level):.0%} of runs')
+        false = ', '.join(f'{name} {many}' for name, many in self.false.items())
+        print(f'  false steps in {self.years:.0f} ship-years: {false}; bursts found {self.bursts}')
+        if self.size:
+            found = ', '.join(f'{name} {n / self.ships:.0%}' for name, n in self.found.items())
+            print(f'  found and dated within a month: {found}')
+            print(
+                f'  its size where its date is known, rms error: {_rms(self.size["trend"])} '
+                f'(means of three months before and after {_rms(self.size["means"])})'
+            )
+
+
+def _rms(errors: list[float]) -> str:
+    return f'{np.sqrt(np.mean(np.square(errors))):.1%}'
 
 
 def main() -> None:
@@ -93,57 +190,19 @@ def main() -> None:
     parser.add_argument('--seed', type=int, default=1)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
-    growth, level, false, jumps = [], [], 0, 0
-    line = []
-    for _ in range(options.ships):
-        world = ship(rng, options.years, 0.0)
-        state, steps = search(world.runs, Steps(), Growth())
-        false += sum(not _is_jump(world, step.year) for step in steps)
-        jumps += sum(_is_jump(world, step.year) for step in steps)
-        found = state.growth_per_year()
-        growth.append(abs(found.value[0] - world.growth) < 1.96 * found.sd[0])
-        band = state.level(world.runs.years)
-        level.append(np.mean(np.abs(band.value - world.level) < 1.96 * band.sd))
-        fit, covariance = np.polyfit(world.runs.years, world.runs.added, 1, cov=True)
-        line.append(abs(fit[0] - world.growth) < 1.96 * np.sqrt(covariance[0, 0]))
-    years = options.ships * options.years
-    print(f'{options.ships} ships, {years:.0f} ship-years without a cleaning, weekly, 2 %')
-    print(
-        f'  growth inside its 95 % band: {np.mean(growth):.0%} (straight line {np.mean(line):.0%})'
-    )
-    print(f'  level inside its 95 % band: {np.mean(level):.0%} of runs')
-    print(f'  false steps: {false} in {years:.0f} ship-years; true bursts found: {jumps}')
-    hit, size, means, noticed, growth = 0, [], [], [], []
-    for number in range(options.ships):
-        world = ship(rng, options.years, options.cleaning)
-        state, steps = search(world.runs, Steps(), Growth())
-        near = [step for step in steps if abs(step.year - world.cleaned) < MONTH]
-        hit += bool(near)
-        slope = state.growth_per_year()
-        growth.append(abs(slope.value[0] - world.growth) < 1.96 * slope.sd[0])
-        known = HullState(world.runs, Steps(np.array([world.cleaned])), Growth())
-        size.append(float(known.changes().value[0]) + options.cleaning)
-        half = np.abs(world.runs.years - world.cleaned) < 0.25
-        after = world.runs.years >= world.cleaned
-        means.append(
-            world.runs.added[half & after].mean()
-            - world.runs.added[half & ~after].mean()
-            + options.cleaning
-        )
-        if number < options.noticed:
-            noticed.append(first_noticed(world))
-    print(f'{options.ships} ships with one cleaning of {options.cleaning:.0%} that nobody noted')
-    print(f'  found and dated within a month: {hit / options.ships:.0%}')
-    print(f'  growth inside its 95 % band: {np.mean(growth):.0%}')
-    print(
-        f'  first noticed after (days, {options.noticed} ships): '
-        f'{[day and round(day) for day in noticed]}'
-    )
-    print(
-        '  its size where it is known, rms error: '
-        f'{np.sqrt(np.mean(np.square(size))):.2%}; difference of means of three months '
-        f'{np.sqrt(np.mean(np.square(means))):.2%}'
-    )
+    for cleaning in (0.0, options.cleaning):
+        score, noticed = Score(), []
+        for number in range(options.ships):
+            world = ship(rng, options.years, cleaning)
+            score.add(world, cleaning)
+            if cleaning and number < options.noticed:
+                noticed.append(first_noticed(world))
+        what = f'one cleaning of {cleaning:.0%} that nobody noted' if cleaning else 'no cleaning'
+        print(f'{options.ships} ships with {what}, weekly runs, 2 %')
+        score.show()
+        if noticed:
+            days = [day and round(day) for day in noticed]
+            print(f'  first noticed after (days, {options.noticed} ships): {days}')
 
 
 if __name__ == '__main__':

@@ -185,14 +185,14 @@ def text() -> Kind:
     return Kind(read, 'text')
 
 
-def choice(*values: str) -> Kind:
+def choice(*values: str, former: Collection[str] = ()) -> Kind:
     """
-    Expect one of some words.
+    Expect one of some words; those that they had before are accepted, and listed nowhere.
     """
     expectation = f'one of {", ".join(value for value in values if value)}'
 
     def read(value: object, path: str, problems: Problems) -> str | _Invalid:
-        if isinstance(value, str) and value in values:
+        if isinstance(value, str) and (value in values or value in former):
             return value
         problems.append(f'{path}: {show(value)}, expected {expectation}')
         return INVALID

@@ -39,7 +39,6 @@ ESTIMATORS = (
         module.name
         for module in iter_modules([str(Path(__file__).parent / 'estimation' / 'estimators')])
     ),
-    *FORMER_ESTIMATORS,
 )
 """Values of the parameter `estimator`."""
 
@@ -54,7 +53,7 @@ def _parameter(
     choices: tuple[str, ...] = (),
 ) -> Any:
     if isinstance(default, str):
-        kind = choice(*choices)
+        kind = choice(*choices, former=FORMER_ESTIMATORS if choices is ESTIMATORS else ())
     elif isinstance(default, int):
         kind = whole_number(int(low), int(high), unit)
     else:

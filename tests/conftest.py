@@ -8,19 +8,22 @@ Property tests try the same examples each time, new ones with
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
+from tempfile import gettempdir
+from typing import Any, TextIO
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
+from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.coastdown.events import Coastdown, EndedBy
 from shipdrag_ros.estimation.result import (
     Estimate,
@@ -34,6 +37,7 @@ from shipdrag_ros.fleet.store import Store, bag_schema, coastdown_schema
 from shipdrag_ros.replay import InputCounts, Recorded
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.truth import TrueCurve
+from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
 settings.register_profile('repeatable', derandomize=True)
@@ -45,6 +49,36 @@ _BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')
 _FLAGS = ['--no-sandbox', '--disable-gpu', '--disable-quic', '--disable-dev-shm-usage']
 _START_NS = 1_700_000_000_000_000_000
 _SECOND_NS = 1_000_000_000
+
+
+def _own_domain() -> tuple[int, TextIO]:
+    """Find a domain that no other test process of this machine is in, and lock it."""
+    for domain in range(10, 102):
+        path = Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock'
+        try:
+            lock = path.open('w')
+        except PermissionError:  # that of another user
+            continue
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            lock.close()
+        else:
+            return domain, lock
+    raise RuntimeError('92 test processes run already')
+
+
+# nodes of other test processes are not heard, from before the first of this one is made
+_domain, _lock = _own_domain()
+os.environ['ROS_DOMAIN_ID'] = str(_domain)
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+
+
+@pytest.fixture(scope='session')
+def own_domain() -> Callable[[], tuple[int, TextIO]]:
+    """A function that finds one more domain, until its lock is closed."""
+    return _own_domain
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -245,3 +279,21 @@ def fleet_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made.write(fleet_result(99, 0.0, error='no bag: 3 bytes of text'))
     made.keep_ship('Test <b>ship</b>', {'events.csv': 'date,kind\n2024-02-01,cleaning\n'})
     return made.path
+
+
+def _write(
+    path: Path, block: Block, ship: Ship | None = None, parameters: str = '', **options: Any
+) -> Path:
+    with BagWriter(path, **options) as bag:
+        if ship is not None:
+            bag.attach('ship.yaml', ship.to_yaml())
+        if parameters:
+            bag.attach('parameters.yaml', parameters)
+        bag.write_samples(block)
+    return path
+
+
+@pytest.fixture(scope='session')
+def write_run() -> Callable[..., Path]:
+    """Write a block, and maybe a ship and parameters, to a file."""
+    return _write

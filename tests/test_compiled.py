@@ -284,7 +284,7 @@ print(table.tobytes().hex())
 # functions that call those of other files, and what they call
 CALLERS = (
     'estimation.ode_fit.solve',
-    'estimation.log_time.projection',
+    'estimation.distance',
     'estimation.log_time.robust',
 )
 CALLEES = (

@@ -158,14 +158,9 @@ def run(command: str) -> None:
         return
     pytest.importorskip('rclpy')
     words[0] = str(Path(sys.executable).with_name(words[0]))
-    worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
-    environment = os.environ | {
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(30 + worker),
-    }
     log, before = Path('node.log'), set(Path.cwd().rglob('*.mcap'))
     with log.open('w') as file:
-        node = subprocess.Popen(words, stdout=file, stderr=file, env=environment)
+        node = subprocess.Popen(words, stdout=file, stderr=file)
     try:
         end_s = time.monotonic() + LIMIT_S
         while 'active; recording to' not in log.read_text():

@@ -76,6 +76,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='RAD',
         help='heading [rad], anticlockwise from east as in REP-103: 1.5708 is north',
     )
+    _add_day(parser)
+    _add_sensors(parser)
+    add_json(parser)
+
+
+def _add_day(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--effect',
         action='append',
@@ -99,8 +105,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='date of the first stamp, ISO 8601, UTC unless it says otherwise: 2026-03-01 or '
         '2026-03-01T06:30:00+01:00 (default: 2026-06-01T08:00:00)',
     )
-    _add_sensors(parser)
-    add_json(parser)
 
 
 def _add_sensors(parser: argparse.ArgumentParser) -> None:

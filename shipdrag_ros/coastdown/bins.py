@@ -34,6 +34,9 @@ PER_SECOND = 1000
 PER_UNIT = 1e6  # m/s, m, rad/s, cosine and sine
 PER_DEGREE = 1e11
 UNIT = np.array([PER_DEGREE if c == _GEODETIC else PER_UNIT for c in range(BINNED)])
+# A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
+TURNING_RAD_S = 0.5
+PITCH_LEAST = 1e-3  # a pitch below it is none
 
 COUNT, TIME, A, B = range(4)
 SPEED, TIME_TIME, TIME_SPEED = range(2, 5)

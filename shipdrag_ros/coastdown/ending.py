@@ -14,10 +14,11 @@ import math
 from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.bins import Bins, line
+from shipdrag_ros.coastdown.deceleration import bend
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
-from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, bend
+from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate
 from shipdrag_ros.coastdown.settling import ConstantForce, constant_force
 from shipdrag_ros.coastdown.shafts import SpeedEvidence, Thrust, all_stand, engaged_at, propulsion
 from shipdrag_ros.coastdown.tracking import heading_is_told, turned_at
@@ -41,6 +42,14 @@ _TURN_MOST = 3.0  # times the deceleration before: more than drifting in a turn 
 _EARLIER_WINDOWS = 3  # slope windows before the newest one that say how it decelerated
 
 
+_CUT_SHORT = {
+    EndedBy.DATA_STOP: 'the speed fell silent',
+    EndedBy.SILENCE: 'all sources of speed fell silent',
+    EndedBy.RESET: 'the memory was reset',
+    EndedBy.RECORD_END: 'the record ended',
+}
+
+
 @dataclass(frozen=True)
 class End:
     """
@@ -49,6 +58,14 @@ class End:
 
     ended_by: EndedBy
     last: int
+
+
+def cut_short(ended_by: EndedBy, age_s: int) -> Doubt:
+    """
+    Say that a candidate ended before it was confirmed.
+    """
+    text = f'{_CUT_SHORT[ended_by]} {age_s} s after it began, before it was confirmed'
+    return Doubt(Dismissal.GAP, text)
 
 
 def end_of(

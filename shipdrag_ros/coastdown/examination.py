@@ -23,6 +23,7 @@ from shipdrag_ros.coastdown.instruments import astern, cut_of, gaps, rudder, swi
 from shipdrag_ros.coastdown.readings import binned, readings
 from shipdrag_ros.coastdown.thrust_end import thrust_end
 from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.ode_fit.shaft_fall import IDLING
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
@@ -34,10 +35,6 @@ LEAST_FALL = 0.05  # of the speed, from the first to the last tenth of what is k
 _ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are told
 _SHORTEST = 0.5  # of confirm_s: less at the end of what was found is no coastdown by itself
 _AT_REST = 0.1  # of the highest speed of the stretch: what is slower from its start is no coast
-_IDLING = (
-    'the shaft turns on, more often a metre than when it drove the ship, and no pitch is known: '
-    'the propeller is taken to idle at zero pitch'
-)
 _LATE_S = 10.0  # of the thrust after an onset that is worth a cut
 _TURNS = 0.25  # of turn_rad, by which the heading swings where it is a turn that stops her
 _TURN_MOST = 4.0  # times the deceleration before: no turn slows her by more
@@ -114,15 +111,13 @@ def estimate_examined(
     estimate, failure = None, examined.failure
     if failure is None:
         part = window.part(examined.start_ns, examined.end_ns)
-        if not steady:
-            part = replace(part, before=None)
+        part = replace(
+            part, before=part.before if steady else None, notes=(*examined.notes, *part.notes)
+        )
         try:
             estimate = estimator(part, ship, parameters)
         except EstimationError as error:
             failure = str(error)
-        else:
-            if examined.notes:
-                estimate = replace(estimate, notes=(*examined.notes, *estimate.notes))
     return Examined(
         examined.start_ns,
         examined.end_ns,
@@ -192,7 +187,7 @@ def examine(
         cuts = [cut for cut in cuts if cut.end_ns - cut.start_ns > _WORDLESS * _length(whole)]
     notes = () if best is None else tuple(best.notes)
     if idling:
-        notes = (*notes, _IDLING)
+        notes = (*notes, IDLING)
     return Examination(start_ns, end_ns, tuple(cuts), failure, notes)
 
 

@@ -15,7 +15,15 @@ from enum import IntEnum
 import numpy as np
 from numba import typeof, types
 
-from shipdrag_ros.coastdown.bins import SOURCES, Bins, line, mean_turning, newest_bin
+from shipdrag_ros.coastdown.bins import (
+    PITCH_LEAST,
+    SOURCES,
+    TURNING_RAD_S,
+    Bins,
+    line,
+    mean_turning,
+    newest_bin,
+)
 from shipdrag_ros.coastdown.filling import add, close
 from shipdrag_ros.coastdown.memory import RECENT, Memory, Tally, Tuning, Watch
 from shipdrag_ros.coastdown.ring import append
@@ -36,13 +44,9 @@ from shipdrag_ros.coastdown.validate import (
 from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.samples import SECOND_NS, Channel, Float64, Int64, Reason, UInt8
 
-# A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
-SHAFT_TURNING_RAD_S = 0.5
-
 _SHAFT = int(Channel.SHAFT)
 _SHAFT_2 = int(Channel.SHAFT_2)  # this channel and those after it are shafts and pitches
 _PITCH = int(Channel.PITCH)  # and these are pitches
-_PITCH_MIN = 1e-3
 _SLOWED = 0.85  # of the steady shaft speed or pitch: worth a look at the speed
 _ACCEPTED = int(Reason.ACCEPTED)
 
@@ -142,7 +146,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
     # half a window ago, so that a shaft that runs down slowly is not its own measure
     width = tuning.slopes.width
     steady, count = mean_turning(bins, channel, number - (width + 1) // 2, width)
-    if count < 3 or abs(steady) < (_PITCH_MIN if channel >= _PITCH else SHAFT_TURNING_RAD_S):
+    if count < 3 or abs(steady) < (PITCH_LEAST if channel >= _PITCH else TURNING_RAD_S):
         return 0
     if mean_turning(bins, channel, number, 1)[0] / steady < _SLOWED:
         return _SHAFT_SLOWED

@@ -9,7 +9,6 @@ before the last `history_ns` of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,44 +16,31 @@ import numpy as np
 from shipdrag_ros.coastdown.bins import SOURCES, warm
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
-from shipdrag_ros.coastdown.ending import End, end_of, withdrawn
+from shipdrag_ros.coastdown.ending import End, cut_short, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
     Coastdown,
     Dismissal,
     EndedBy,
     Event,
-    NoEstimate,
     NotCoastdown,
     Onset,
     Reset,
     State,
-    Update,
 )
-from shipdrag_ros.coastdown.examination import estimate_examined
 from shipdrag_ros.coastdown.health import InputHealth, Progress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
+from shipdrag_ros.coastdown.running import Estimator, RunningCoastdown
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
-from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading, rep103_yaw
-from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns
-from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
+from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
-from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Block, Channel
+from shipdrag_ros.samples import SECOND_NS, Block
 from shipdrag_ros.ship import Ship
-
-Estimator = Callable[[Window, Ship, Parameters], Estimate]
-
-_CUT_SHORT = {
-    EndedBy.DATA_STOP: 'the speed fell silent',
-    EndedBy.SILENCE: 'all sources of speed fell silent',
-    EndedBy.RESET: 'the memory was reset',
-    EndedBy.RECORD_END: 'the record ended',
-}
 
 
 class Monitor:
@@ -121,15 +107,10 @@ class Monitor:
         warm(self._memory.bins)
         alive_ns(self._memory.guard, self._tuning.limits, 0)  # compiled now, too
         ode_fit.warm()
-        self._steady_ns = round(parameters.steady_s * SECOND_NS)
-        self._window_ns = round(parameters.window_s * SECOND_NS)
-        self._update_ns = round(parameters.update_s * SECOND_NS)
-        self._history_ns = self._window_ns + self._seconds * SECOND_NS
+        self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._candidate: OnsetCandidate | None = None
-        self._onset: Onset | None = None
-        self._heading_rad: float | None = None
-        self._estimated = False
-        self._dismissals = Dismissals(self._steady_ns)
+        self._running: RunningCoastdown | None = None
+        self._dismissals = Dismissals(round(parameters.steady_s * SECOND_NS))
 
     @property
     def steady_lead_s(self) -> float:
@@ -148,16 +129,16 @@ class Monitor:
         watch = self._memory.watch
         used_s = self._parameters.steady_s
         steady_s = 0.0
-        if int(watch.lead[0]) != NEVER and self._onset is None:
+        if int(watch.lead[0]) != NEVER and self._running is None:
             seconds = int(watch.seen[0]) - int(watch.lead[0]) + 2 * self._tuning.slopes.width // 3
             steady_s = min(float(seconds), used_s)
-        since_ns = None if self._onset is None else self._onset.start_ns
+        since_ns = None if self._running is None else self._running.onset.start_ns
         return Progress(steady_s, used_s, since_ns)
 
     @property
     def state(self) -> State:
         """Where the monitor stands."""
-        if self._onset is not None:
+        if self._running is not None:
             return State.COASTDOWN
         if self._candidate is not None:
             return State.CANDIDATE
@@ -225,10 +206,9 @@ class Monitor:
             elif stop == WalkEvent.SHAFT:
                 self._propose(int(self._memory.bins.filling[channel[at]]), noticed=False)
             else:
-                arrival = int(receive_ns[at])
-                events += self.reset(
-                    arrival, self._clock_set(stop, int(channel[at]), int(stamp_ns[at]), arrival)
-                )
+                arrival, guard = int(receive_ns[at]), self._memory.guard
+                why = clock_set(guard, stop, int(channel[at]), int(stamp_ns[at]), arrival)
+                events += self.reset(arrival, why)
 
     def reset(self, receive_ns: int, reason: str) -> list[Event]:
         """
@@ -266,7 +246,7 @@ class Monitor:
 
         What is older than `history_ns` may be missing; after a reset all is.
         """
-        before_ns = 0 if ended.cut_at_start else self._steady_ns
+        before_ns = 0 if ended.cut_at_start else round(self._parameters.steady_s * SECOND_NS)
         return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - before_ns)
 
     def _fresh(self, tally: Tally) -> Memory:
@@ -287,37 +267,25 @@ class Monitor:
         watch, bins = self._memory.watch, self._memory.bins
         source = int(watch.seen_source[0])
         watch.source[0] = source
-        seen = self._knowing_chance(OnsetCandidate(source, number, Drive(), noticed))
+        seen = OnsetCandidate(source, number, Drive(), noticed).knowing(self._memory.steadiness)
         self._candidate = propose(bins, self._tuning, seen, number)
-
-    def _knowing_chance(self, candidate: OnsetCandidate) -> OnsetCandidate:
-        """Fix what chance could do before the candidate, once it is known."""
-        if not np.isnan(candidate.slope_sd):
-            return candidate
-        steadiness, source = self._memory.steadiness, candidate.source
-        return replace(
-            candidate,
-            limits=tuple(float(limit) for limit in steadiness.limit[source]),
-            slope_sd=float(steadiness.slope_sd[source, 0]),
-        )
 
     def _judge(self) -> list[Event]:
         assert self._candidate is not None
-        bins, tuning, parameters = self._memory.bins, self._tuning, self._parameters
+        bins, steadiness = self._memory.bins, self._memory.steadiness
+        tuning, parameters = self._tuning, self._parameters
         number = int(bins.filling[self._candidate.source])
-        if self._onset is not None:
+        if self._running is not None:
             end = end_of(self._candidate, bins, tuning, parameters, number)
-            return [] if end is None else self._end_at(end)
+            return [] if end is None else self._end_at(end, (end.last + 1) * SECOND_NS)
         candidate = self._candidate
         if not candidate.noticed and self._memory.watch.falls[0]:
             # from here on as if the speed alone had made it one
             candidate = replace(
                 candidate, noticed=True, start=number, slope_sd=np.nan, trials=0, doubt=None
             )
-            candidate = propose(bins, tuning, self._knowing_chance(candidate), number)
-        found = judge(
-            self._knowing_chance(candidate), bins, self._ship, tuning, parameters, number
-        )
+            candidate = propose(bins, tuning, candidate.knowing(steadiness), number)
+        found = judge(candidate.knowing(steadiness), bins, self._ship, tuning, parameters, number)
         self._candidate = found.candidate
         if found.decision is OnsetDecision.DISMISSED:
             return self._dismiss(found.doubt, (number + 1) * SECOND_NS)
@@ -342,60 +310,31 @@ class Monitor:
         steadiness, guard, tuning = self._memory.steadiness, self._memory.guard, self._tuning
         failed = self._candidate.source
         for source in range(SOURCES):
-            limits = steadiness.limit[source]
             # by the rule that found the other silent: or both would be tried in turn for ever
             silent = now_ns > alive_ns(guard, tuning.limits, source) + tuning.data_stop_ns
-            if source == failed or silent or np.isnan(limits[0]):
+            if source == failed or silent or np.isnan(steadiness.limit[source, 0]):
                 continue
             self._memory.watch.source[0] = source
-            self._candidate = replace(
-                self._candidate,
-                source=source,
-                limits=tuple(float(limit) for limit in limits),
-                slope_sd=float(steadiness.slope_sd[source, 0]),
-            )
+            other = replace(self._candidate, source=source, slope_sd=np.nan)
+            self._candidate = other.knowing(steadiness)
             return True
         return False
 
     def _begin(self, candidate: OnsetCandidate, number: int) -> Onset:
         onset = Onset(candidate.start * SECOND_NS, (number + 1) * SECOND_NS)
-        self._estimated = False
-        self._onset = onset
-        self._memory.watch.update_ns[0] = self._grid_ns(onset.detected_ns)
         heading = mean_heading(self._memory.bins, candidate.start - 1, HEADING_BEFORE_S)
-        self._heading_rad = (
-            None if np.isnan(heading) else rep103_yaw(heading, self._parameters.heading_convention)
+        self._running = RunningCoastdown(
+            onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
+        self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
         return onset
 
-    def _grid_ns(self, stamp_ns: int) -> int:
-        """Return the first time of an update at or after a stamp."""
-        assert self._onset is not None
-        start, step = self._onset.start_ns, self._update_ns
-        return min(start + -(-(stamp_ns - start) // step) * step, ALWAYS)
-
     def _update(self, next_stamp_ns: int) -> Event:
+        assert self._running is not None
         watch = self._memory.watch
         stamp_ns = int(watch.update_ns[0])
-        watch.update_ns[0] = self._grid_ns(next_stamp_ns)
-        try:
-            window = self._window(stamp_ns, before_ns=self._steady_ns)
-            found = self._estimator(window, self._ship, self._parameters)
-        except EstimationError as error:
-            return NoEstimate(stamp_ns, str(error))
-        # an estimator that is given may return what it likes
-        if not self._estimated and isinstance(found, Estimate):
-            self._estimated = not (why := _too_vague(found, self._parameters))
-            if why:
-                return NoEstimate(stamp_ns, why)
-        return Update(stamp_ns, found)
-
-    def _window(self, end_ns: int, *, before_ns: int) -> Window:
-        """Cut the coastdown so far, with the record before it where all of it is there."""
-        assert self._onset is not None
-        start_ns = max(self._onset.start_ns, end_ns - self._window_ns)
-        first_ns = start_ns - before_ns if start_ns == self._onset.start_ns else start_ns
-        return self._cut(start_ns, end_ns, first_ns)
+        watch.update_ns[0] = self._running.due_ns(next_stamp_ns)
+        return self._running.update(stamp_ns, self._estimator)
 
     def _cut(self, start_ns: int, end_ns: int, first_ns: int) -> Window:
         """Cut a window, with the record from `first_ns` on before it."""
@@ -418,62 +357,26 @@ class Monitor:
             self._stand_down()
             return events
         end_ns = int(self._memory.guard.last_ns[self._candidate.source])
-        if self._onset is not None:
-            doubt = None
-            if ended_by is not EndedBy.RESET:
-                doubt = self._withdrawn(End(ended_by, end_ns // SECOND_NS - 1))
-            events += self._conclude(ended_by, end_ns, doubt)
+        if self._running is not None:
+            events += self._end_at(End(ended_by, end_ns // SECOND_NS - 1), end_ns)
         elif self._candidate.noticed:
             age_s = end_ns // SECOND_NS - self._candidate.start
-            text = f'{_CUT_SHORT[ended_by]} {age_s} s after it began, before it was confirmed'
-            events += self._dismiss(Doubt(Dismissal.GAP, text), end_ns)
+            events += self._dismiss(cut_short(ended_by, age_s), end_ns)
         self._stand_down()
         return events
 
-    def _end_at(self, end: End) -> list[Event]:
+    def _end_at(self, end: End, end_ns: int) -> list[Event]:
         assert self._candidate is not None
-        end_ns = (end.last + 1) * SECOND_NS
-        events = self._conclude(end.ended_by, end_ns, self._withdrawn(end))
+        assert self._running is not None
+        doubt = None
+        if end.ended_by is not EndedBy.RESET:
+            bins, number = self._memory.bins, int(self._memory.bins.closed[self._candidate.source])
+            doubt = withdrawn(
+                self._candidate, end, bins, self._ship, self._tuning, self._parameters, number
+            )
+        events = self._running.end(end.ended_by, end_ns, doubt, self._final_estimator)
         self._stand_down()
         return events
-
-    def _withdrawn(self, end: End) -> Doubt | None:
-        assert self._candidate is not None
-        bins = self._memory.bins
-        number = int(bins.closed[self._candidate.source])
-        return withdrawn(
-            self._candidate, end, bins, self._ship, self._tuning, self._parameters, number
-        )
-
-    def _conclude(self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None) -> list[Event]:
-        assert self._onset is not None
-        start_ns, final, failure = self._onset.start_ns, None, None
-        cuts: tuple[NotCoastdown, ...] = ()
-        stretch: tuple[tuple[int, float], ...] = ()
-        if doubt is None:
-            window = self._window(end_ns, before_ns=self._steady_ns)
-            found = estimate_examined(window, self._ship, self._parameters, self._final_estimator)
-            cuts, final, failure, end_ns = found.cuts, found.estimate, found.failure, found.end_ns
-            stretch = found.stretch
-            if found.start_ns != window.start_ns:  # later too where an old part has rolled out
-                start_ns = found.start_ns
-            refused = found.refused
-        else:
-            failure, refused = f'withdrawn: {doubt.text}', True
-            cuts = (NotCoastdown(start_ns, end_ns, doubt.reason, failure),)
-        ended = Coastdown(
-            start_ns,
-            end_ns,
-            self._onset.detected_ns,
-            ended_by,
-            final,
-            failure,
-            self._heading_rad,
-            refused,
-            cuts,
-            stretch,
-        )
-        return [ended, *cuts]
 
     def _stand_down(self, *, driven: bool = False) -> None:
         """Watch for an onset again, once the ship has been steady."""
@@ -482,30 +385,9 @@ class Monitor:
         watch.update_ns[0] = ALWAYS
         if self._candidate is not None:
             # what a shaft alone proposed and the speed did not bear out changes nothing for it
-            if self._candidate.noticed or self._onset is not None:
+            if self._candidate.noticed or self._running is not None:
                 watch.armed[0] = 0
                 watch.held[:] = self._candidate.limits
             if not driven:
                 watch.armed[1] = 0
-        self._candidate = self._onset = self._heading_rad = None
-
-    def _clock_set(self, stop: int, channel: int, stamp_ns: int, receive_ns: int) -> str:
-        guard = self._memory.guard
-        if stop == WalkEvent.STAMP_JUMPED_BACK:
-            back = int(guard.last_ns[channel]) - stamp_ns
-            return f'{Channel(channel).input}: the stamp went back by {back * 1e-9:.3f} s'
-        back = int(guard.arrival_ns[0]) - receive_ns
-        return f'the time of arrival went back by {back * 1e-9:.3f} s'
-
-
-def _too_vague(found: Estimate, parameters: Parameters) -> str:
-    """Say why the first estimate of a coastdown is not given yet; '' if it is."""
-    sigma, resistance = found.last_sigma_m_s2, found.last_resistance_m_s2
-    share = parameters.first_relative_sigma
-    if sigma < share * resistance:
-        return ''
-    known = f'{sigma / resistance:.0%} of it' if resistance > 0.0 else 'more than all of it'
-    return (
-        f'the resistance at {found.last_speed_m_s:.2f} m/s is uncertain by {known} so far; '
-        f'the first figure waits until that is below {share:.0%}'
-    )
+        self._candidate = self._running = None

@@ -18,11 +18,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
-from itertools import pairwise
-
-import numpy as np
 
 from shipdrag_ros.coastdown.bins import Bins, line, speeds
+from shipdrag_ros.coastdown.deceleration import begin_of_fall, fit_deceleration
 from shipdrag_ros.coastdown.events import Dismissal
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
@@ -36,10 +34,10 @@ from shipdrag_ros.coastdown.shafts import (
     propulsion,
     steady_drive,
 )
+from shipdrag_ros.coastdown.steadiness import Steadiness
 from shipdrag_ros.coastdown.tracking import turned_at
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed settles
@@ -47,7 +45,6 @@ EXCESS_MAX = 1.0  # of the exponent over the one expected: beyond it the speed s
 _BRAKED = 1.5
 _BRAKE_EXPONENT = 1.0  # ... and by a force that falls less than in proportion to the speed
 _LAW_BINS_MIN = 6
-_BEND_BINS_MIN = 6
 _GUARD = 0.1  # of confirm_s: the thrust runs down first
 _TRIALS = 3  # after confirm_s, twice and three times as long
 _PATIENCE = 4.0  # times confirm_s: a stopped shaft whose ship has not slowed by then
@@ -121,6 +118,18 @@ class OnsetCandidate:
     trials: int = 0
     doubt: Doubt | None = None
 
+    def knowing(self, steadiness: Steadiness) -> OnsetCandidate:
+        """
+        Return it with what chance could do before it, once that is known.
+        """
+        if not math.isnan(self.slope_sd):
+            return self
+        return replace(
+            self,
+            limits=tuple(float(limit) for limit in steadiness.limit[self.source]),
+            slope_sd=float(steadiness.slope_sd[self.source, 0]),
+        )
+
     def falls(self, bins: Bins, number: int, width: int) -> bool:
         """
         Say whether the speed still falls faster than chance explains.
@@ -157,7 +166,7 @@ def propose(bins: Bins, tuning: Tuning, seen: OnsetCandidate, number: int) -> On
         return replace(seen, drive=drive, judged_from=number + SHAFT_S - 1)
     # the window that shows the fall holds its start, and one as long before it the steady speed
     span = seen.falls_over(bins, number, width, 1.0) or width
-    start = change_point(bins, seen.source, number - 2 * span, number, tuning.speed_min)
+    start = begin_of_fall(bins, seen.source, number - 2 * span, number, tuning.speed_min)
     if not seen.drive.known:
         seen = replace(seen, drive=steady_drive(bins, start - (width + 1) // 2, width))
     return replace(seen, start=start)
@@ -217,7 +226,7 @@ def _tried(
     """Judge the deceleration once more."""
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
     if told.stop is None:
-        start = change_point(
+        start = begin_of_fall(
             bins, candidate.source, candidate.start - 2 * width, number, tuning.speed_min
         )
         candidate = replace(candidate, start=start)
@@ -379,83 +388,3 @@ def _unlike_a_coastdown(
         f'{found.exponent:.1f} ± {sd:.1f} of the speed where the water has '
         f'{found.exponent - excess:.1f}: power was reduced, or the ship turned',
     )
-
-
-def change_point(bins: Bins, source: int, first: int, last: int, speed_min: float) -> int:
-    """
-    Return the bin at which a constant speed turns into a coastdown.
-
-    Parameters
-    ----------
-    first, last
-        Bins to look at; the second half of the coastdown is not needed.
-    speed_min
-        A speed below half of it is taken as half of it [m/s].
-
-    Notes
-    -----
-    Quadratic drag makes 1/v rise linearly.
-    """
-    return bend(bins, source, first, last, speed_min, degree=0, sign=1)
-
-
-def bend(
-    bins: Bins, source: int, first: int, last: int, speed_min: float, *, degree: int, sign: int
-) -> int:
-    """
-    Return the bin at which 1/v bends most.
-
-    Parameters
-    ----------
-    degree
-        Of the polynomial that 1/v follows before: 0 steady, 1 coasting.
-    sign
-        1: where it begins to rise faster, -1: slower.
-
-    Notes
-    -----
-    Least squares of 1/v = polynomial + c max(0, t - s), s searched over all bins, and over
-    each second of a gap between them.
-    """
-    time, speed = speeds(bins, source, first, last)
-    if len(time) < _BEND_BINS_MIN:  # too few to bend: what is there is all of it
-        return first
-    inverse = 1.0 / np.maximum(speed, 0.5 * speed_min)
-    hinges = np.concatenate([np.arange(one, other - 0.5) for one, other in pairwise(time[2:-1])])
-    ramp = np.maximum(0.0, time - hinges[:, np.newaxis])
-    # what the polynomial explains is taken out of both
-    basis, _ = np.linalg.qr(np.vander(time, degree + 1))
-    inverse = inverse - basis @ (basis.T @ inverse)
-    ramp -= (ramp @ basis) @ basis.T
-    gain = np.maximum(0.0, sign * (ramp @ inverse)) ** 2 / np.einsum('ij,ij->i', ramp, ramp)
-    return last + math.floor(float(hinges[np.argmax(gain)]))
-
-
-@dataclass(frozen=True)
-class DecelerationFit:
-    """
-    Deceleration of a span of record, from a parabola through the speed.
-
-    Attributes
-    ----------
-    speed, slope, curvature
-        In the middle of the span [m/s, m/s^2, m/s^3].
-    """
-
-    speed: float
-    slope: float
-    curvature: float
-
-    @property
-    def exponent(self) -> float:
-        """The p of v' = -c v^p: p = v'' v / v'^2."""
-        return self.curvature * self.speed / self.slope**2
-
-
-def fit_deceleration(time: Float64, speed: Float64) -> DecelerationFit:
-    """
-    Fit v = a + b t + c t^2 / 2 about the middle of the span.
-    """
-    middle = 0.5 * (time[0] + time[-1])
-    c, b, a = np.polyfit(time - middle, speed, 2)
-    return DecelerationFit(float(a), float(b), 2.0 * float(c))

@@ -21,6 +21,8 @@ import numpy as np
 from shipdrag_ros.coastdown.bins import (
     COUNT,
     PER_UNIT,
+    PITCH_LEAST,
+    TURNING_RAD_S,
     A,
     Bins,
     mean_turning,
@@ -31,9 +33,6 @@ from shipdrag_ros.samples import PITCHES, SHAFTS, Float64
 
 SHAFT_S = 3  # averaged over this long, so that one bad reading engages no engine
 FELL = 0.9  # of its steady drive, below which a propeller has slowed down
-# A shaft that turns slower than this (5 rpm) drives no ship: whether it stops says nothing.
-TURNING_RAD_S = 0.5
-_PITCH_MIN = 1e-3
 _ASTERN = -0.1  # of the steady drive: beyond what an idle propeller creeps
 _ENGAGED = 0.12  # rise of the drive above its lowest that only an engine makes
 _SILENT_S = 60  # a reading is taken to hold for this long
@@ -144,7 +143,7 @@ def steady_drive(bins: Bins, last: int, width: int) -> Drive:
         drives = count >= 3 and abs(turns) >= TURNING_RAD_S and turns * usual > 0.0
         turning.append(turns if drives else math.nan)
         angle, count = mean_turning(bins, int(blade), last, width)
-        pitch.append(angle if count >= 3 and abs(angle) > _PITCH_MIN else math.nan)
+        pitch.append(angle if count >= 3 and abs(angle) > PITCH_LEAST else math.nan)
     return Drive(tuple(turning), tuple(pitch))
 
 

@@ -350,3 +350,23 @@ def _walk(
             reject(guard, code, c, stamp, a, b, p, q)
         guard.arrival_ns[0] = receive_ns[i]
         reasons[i] = code
+
+
+def clock_set(memory: CheckMemory, code: int, channel: int, stamp_ns: int, receive_ns: int) -> str:
+    """
+    Say which clock went back before a sample, and by how much.
+
+    Parameters
+    ----------
+    memory
+        What was before the sample.
+    code
+        `STAMP_JUMPED_BACK` or `ARRIVAL_JUMPED_BACK`.
+    channel, stamp_ns, receive_ns
+        The sample.
+    """
+    if code == STAMP_JUMPED_BACK:
+        back = int(memory.last_ns[channel]) - stamp_ns
+        return f'{Channel(channel).input}: the stamp went back by {back * 1e-9:.3f} s'
+    back = int(memory.arrival_ns[0]) - receive_ns
+    return f'the time of arrival went back by {back * 1e-9:.3f} s'

@@ -30,6 +30,7 @@ DIED = 'its worker died'
 """What the reason begins with where nothing came back."""
 
 _CONNECT_S = 30.0
+_GIVEN_UP = '1 hour'
 _LOOK_S = 60.0  # between looks at whether a worker is left
 
 
@@ -81,6 +82,8 @@ class Engine:
                 {
                     'distributed.scheduler.allowed-failures': DEATHS - 1,
                     'distributed.comm.timeouts.connect': f'{_CONNECT_S:g}s',
+                    # so long after a death a worker that is not there just then is given up
+                    'distributed.deploy.lost-worker-timeout': _GIVEN_UP,
                 }
             )
         )

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipdrag_ros.messages import types
 from shipdrag_ros.messages.gather import GatherResult, gather
-from shipdrag_ros.messages.joints import Joints, read_joints
+from shipdrag_ros.messages.joints import Joints, MessageRows, read_joints
 from shipdrag_ros.messages.layout import steps
 from shipdrag_ros.messages.topics import Source
 from shipdrag_ros.samples import Block, Channel, Float64, Int64, UInt8
@@ -151,9 +151,8 @@ def decode_batch(
     for i, reading in enumerate(readings):
         place = np.flatnonzero(number == i)
         if not reading.steps:
-            joints = read_joints(
-                data, start, end, place, reading.channel, stamp_ns, code, rows, found
-            )
+            into = MessageRows(code, stamp_ns, rows, found)
+            joints = read_joints(data, start, end, place, reading.channel, into)
             more.append(joints)
             unreadable.append(_count(found[place], joints.surplus))
             continue

@@ -70,16 +70,35 @@ class Joints(NamedTuple):
     surplus: int
 
 
+class MessageRows(NamedTuple):
+    """
+    What is read of n messages, to be filled.
+
+    Attributes
+    ----------
+    code : (n,) uint8
+        Channels; of the first joint where there are several.
+    stamp_ns : (n,) int64
+        Stamps [ns].
+    value : (n, c) float64
+        As `gather` fills them.
+    found : (n,) uint8
+        A `GatherResult` each.
+    """
+
+    code: UInt8
+    stamp_ns: Int64
+    value: Float64
+    found: UInt8
+
+
 def read_joints(
     data: UInt8,
     start: Int64,
     end: Int64,
     place: NDArray[np.intp],
     channel: Channel,
-    stamp_ns: Int64,
-    code: UInt8,
-    rows: Float64,
-    found: UInt8,
+    rows: MessageRows,
 ) -> Joints:
     """
     Read the joints of some messages.
@@ -94,15 +113,8 @@ def read_joints(
         Which of them to read.
     channel
         `SHAFT` for shafts and pitches, or `RUDDER`.
-    stamp_ns : (n,) int64
-        Filled with the stamps [ns].
-    code : (n,) uint8
-        Filled with the channel of the first joint of each.
-    rows : (n, c) float64
-        Filled with the value of the first joint of each, and what `gather` fills for
-        a single value without a variance.
-    found : (n,) uint8
-        Filled with a `GatherResult` each.
+    rows
+        Filled with the first joint of each.
 
     Returns
     -------
@@ -114,7 +126,17 @@ def read_joints(
     more = Joints(np.empty(room, np.intp), np.empty(room, np.uint8), np.empty(room), 0)
     scratch = np.empty(_SCRATCH, np.int64)
     count, surplus = _read_all(
-        data, start, end, place, rudder, stamp_ns, code, rows, found, scratch, *more[:3]
+        data,
+        start,
+        end,
+        place,
+        rudder,
+        rows.stamp_ns,
+        rows.code,
+        rows.value,
+        rows.found,
+        scratch,
+        *more[:3],
     )
     return Joints(more.message[:count], more.code[:count], more.value[:count], surplus)
 

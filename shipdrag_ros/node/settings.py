@@ -46,6 +46,7 @@ class Setting:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
+    kind: Kind | None = None  # how it is checked, where that is known elsewhere
     start_only: bool = False  # nobody on the network may say which files or lines are touched
 
     @property
@@ -55,6 +56,8 @@ class Setting:
 
     @property
     def _kind(self) -> Kind:
+        if self.kind is not None:
+            return self.kind
         if self.choices:
             return choice(*self.choices)
         if isinstance(self.default, bool):
@@ -155,6 +158,7 @@ SETTINGS: tuple[Setting, ...] = (
             low=key.kind.low,
             high=key.kind.high,
             choices=key.kind.choices,
+            kind=key.kind,
         )
         for name, key in keys_of(Parameters).items()
     ),

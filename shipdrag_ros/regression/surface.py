@@ -14,7 +14,6 @@ from functools import cached_property
 
 import numpy as np
 
-from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression.domain import Domain, Prediction
 from shipdrag_ros.regression.least_squares import LinearFit, least_squares
@@ -76,14 +75,6 @@ class Surface:
         from shipdrag_ros.regression import words  # it tells what this module holds
 
         return (words.sentence(self, target), *self.notes)
-
-    def coefficient_table(self) -> Table:
-        """
-        Show the coefficients of raw powers of the inputs.
-        """
-        from shipdrag_ros.regression import words
-
-        return words.coefficients(self)
 
     @cached_property
     def coefficients(self) -> Float64:

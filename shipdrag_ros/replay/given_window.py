@@ -4,9 +4,11 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.bags.run import Run, RunSamples
 from shipdrag_ros.coastdown import validate
@@ -29,9 +31,11 @@ class WindowSamples(NamedTuple):
     Attributes
     ----------
     inputs
-        Spent, with its counts.
+        Of the messages that came in the window; spent, with its counts.
     block, reasons
-        Samples and the `Reason` of each.
+        Samples and the `Reason` of each, of a while around the window too.
+    inside : (n,) bool
+        Which of these came in the window.
     start_ns, end_ns
         The window in stamps [ns].
     """
@@ -39,6 +43,7 @@ class WindowSamples(NamedTuple):
     inputs: RunSamples
     block: Block
     reasons: UInt8
+    inside: NDArray[np.bool_]
     start_ns: int
     end_ns: int
 
@@ -79,14 +84,17 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     start_ns = span[0] + round(start_s * SECOND_NS)
     end_ns = min(span[0] + round(end_s * SECOND_NS), span[1])  # of what is not there, nothing
     margin_ns = round((parameters.frozen_s + parameters.late_s) * SECOND_NS) + _SET_CLOCK_NS
-    inputs = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
-    block = concatenate([item for item in inputs if isinstance(item, Block)])
+    around = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
+    block = concatenate([item for item in around if isinstance(item, Block)])
+    inside = (block.receive_ns >= start_ns) & (block.receive_ns <= end_ns)
+    inputs = run.inputs(start_ns=start_ns, end_ns=end_ns)
+    deque(inputs, maxlen=0)  # counted, and the samples are there already
     reasons = validate(block, parameters)
     accepted = np.flatnonzero(reasons == Reason.ACCEPTED)
     if len(accepted):
         clock_ns = int(block.stamp_ns[accepted[0]] - block.receive_ns[accepted[0]])
         start_ns, end_ns = start_ns + clock_ns, end_ns + clock_ns
-    return WindowSamples(inputs, block, reasons, start_ns, end_ns)
+    return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns)
 
 
 def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) -> Coastdown:

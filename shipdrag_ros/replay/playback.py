@@ -38,7 +38,7 @@ class InputCounts:
     Attributes
     ----------
     messages
-        Messages that came.
+        Messages that came, in the window where one is given.
     used, rejected
         Readings that were used, and those that were not by reason. A message holds one
         reading, but of shafts and pitches one a joint; one that cannot be read counts
@@ -239,7 +239,8 @@ def _in_window(
     coastdown = estimate_window(samples, ship, parameters)
     used: Counter[str] = Counter()
     rejected: dict[str, Counter[str]] = {}
-    for channel, code in zip(samples.block.channel, samples.reasons, strict=True):
+    inside = samples.inside
+    for channel, code in zip(samples.block.channel[inside], samples.reasons[inside], strict=True):
         name, reason = Channel(channel).input, Reason(code)
         if reason is Reason.ACCEPTED:
             used[name] += 1

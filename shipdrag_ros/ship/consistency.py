@@ -89,7 +89,7 @@ def _proportions(values: Mapping[str, Any], length: float, volume: float) -> Ite
         usual = usual_wetted_surface_m2(length, volume)
         if not 0.5 <= surface / usual <= 2.0:
             yield (
-                f'wetted_surface_m2: {surface!r}, expected {usual / 2:.3g}..{2 * usual:.3g} m^2 '
+                f'wetted_surface_m2: {surface!r}, expected {usual / 2:.4g}..{2 * usual:.4g} m^2 '
                 f'for this length and volume'
             )
     if air is not None and air.frontal_area_m2 > length**2:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Steps at unknown times: found by their Bayes factors, with a probability and a date.
+Steps at unknown times: found one after the other, with a probability and a date.
 
-Between each two runs there may be a step, with a prior probability in proportion to the
-time between them. The step that the runs ask for most is taken in where all places
-together make "one more step" probable enough, and the search goes on.
+The step that the runs ask for most is taken in where "one more step" is probable enough
+(`one_more`), and the search goes on.
 """
 
 from __future__ import annotations
@@ -13,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.samples import Float64
 from shipdrag_ros.trend.hull_state import Growth, HullState, Runs, Steps
+from shipdrag_ros.trend.one_more import OneMore
 
-STEPS_PER_YEAR = 0.5  # cleanings, surprises in port, that nobody wrote down
 PROBABLE = 0.5  # of "one more step": what is reported
+_DATED = 0.3  # of it within a month of its date
+_SURE = 0.99  # of a step that is there in all that is said of the hull
 _NEAR_YEARS = 31.0 / 365.25
-_AT_LEAST_RUNS = 2  # on either side: one run alone is an outlier as well
 _MOST = 20
 
 
@@ -40,7 +39,27 @@ class FoundStep:
     probability: float
 
 
-def search(runs: Runs, known: Steps, growth: Growth) -> tuple[HullState, list[FoundStep]]:
+@dataclass(frozen=True)
+class Found:
+    """
+    What the runs of one ship show.
+
+    Attributes
+    ----------
+    state
+        With all steps, known and found.
+    steps
+        Those found, in the order of time.
+    open
+        The posterior in which the least certain step is not taken for granted.
+    """
+
+    state: HullState
+    steps: tuple[FoundStep, ...]
+    open: OneMore
+
+
+def search(runs: Runs, known: Steps, growth: Growth) -> Found:
     """
     Find the steps that the runs ask for beside those that are known.
 
@@ -52,42 +71,37 @@ def search(runs: Runs, known: Steps, growth: Growth) -> tuple[HullState, list[Fo
         Steps that a log book tells.
     growth
         Prior of the growth.
-
-    Returns
-    -------
-    state, found
-        The state with all steps, and those that were found, in the order of time.
     """
     taken: list[float] = []
     state = HullState(runs, known, growth)
-    while len(taken) < _MOST:
-        years, probability = _one_more(state)
-        if probability.sum() < PROBABLE:
+    more = OneMore(state)
+    while len(taken) < _MOST and more.probability.sum() >= PROBABLE:
+        year, probability = _most_likely(more)
+        if probability < _DATED:
             break
-        taken.append(float(years[int(probability.argmax())]))
-        steps = Steps(np.sort(np.append(known.years, taken)))
-        state = HullState(runs, steps, growth, outlier=state.outlier)
+        taken.append(year)
+        state = HullState(runs, _with(known, taken), growth, outlier=state.outlier)
+        more = OneMore(state)
     found = []
+    least = _SURE
     for year in sorted(taken):
         others = [each for each in taken if each != year]
-        steps = Steps(np.sort(np.append(known.years, others)))
-        without = HullState(runs, steps, growth, outlier=state.outlier)
-        years, probability = _one_more(without)
-        near = np.abs(years - year) <= _NEAR_YEARS
-        found.append(FoundStep(year, float(probability[near].sum())))
-    return state, found
+        without = HullState(runs, _with(known, others), growth, outlier=state.outlier)
+        one = OneMore(without)
+        near = np.abs(one.years - year) <= _NEAR_YEARS
+        found.append(FoundStep(year, float(one.probability[near].sum())))
+        if found[-1].probability < least:
+            least, more = found[-1].probability, one
+    return Found(state, tuple(found), more)
 
 
-def _one_more(state: HullState) -> tuple[Float64, Float64]:
-    """Return the places of one more step, and the probability of each."""
-    years = state.runs.years
-    places = np.arange(_AT_LEAST_RUNS, len(years) - _AT_LEAST_RUNS + 1)
-    if len(places) == 0:
-        return np.zeros(0), np.zeros(0)
-    gaps = np.maximum(years[places] - years[places - 1], 1e-6)
-    after = (np.arange(len(years))[:, None] >= places[None, :]).astype(float)
-    log_odds = state.log_bayes_factors(after) + np.log(STEPS_PER_YEAR * gaps)
-    top = max(float(log_odds.max()), 0.0)
-    odds = np.exp(log_odds - top)
-    middle = 0.5 * (years[places] + years[places - 1])
-    return middle, np.asarray(odds / (odds.sum() + np.exp(-top)))
+def _with(known: Steps, taken: list[float]) -> Steps:
+    return Steps(np.sort(np.append(known.years, taken)))
+
+
+def _most_likely(more: OneMore) -> tuple[float, float]:
+    """Return the place with most about it within a month, and how probable that is."""
+    near = np.abs(more.years[:, None] - more.years[None, :]) <= _NEAR_YEARS
+    within = near @ more.probability
+    best = int((within + more.probability).argmax())  # the step itself, of all near it
+    return float(more.years[best]), float(within[best])

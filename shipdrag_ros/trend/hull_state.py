@@ -31,12 +31,13 @@ GROWTH_PER_YEAR = (0.10, 0.12)  # merchant hulls: 5 to 20 % a year between clean
 STEP_SD = 0.10  # a cleaning, a docking, a sudden growth in port
 GROWTH_CHANGE_SD = 0.10  # per year, after a step: new paint, another trade
 COVARIATE_SD = 1.0  # relative resistance for a relative change of displacement
+SEASON_SD = 0.005  # of a yearly wave: light, water and trade
 SCATTER = np.array([0.004, 0.008, 0.014, 0.022, 0.035, 0.06, 0.11])
 _SCATTER_MEDIAN, _SCATTER_LOG_SD = 0.03, 0.8
 WANDER = np.array([0.0, 0.06, 0.18])  # growth per year, per square root of a year
 _WANDER_PRIOR = np.array([0.4, 0.35, 0.25])
-WALK = np.array([0.0, 0.02, 0.05])  # of the level, per square root of a year: growth in bursts
-_WALK_PRIOR = np.array([0.6, 0.25, 0.15])
+WALK = np.array([0.0, 0.015, 0.04])  # of the level, per square root of a year: growth in bursts
+_WALK_PRIOR = np.array([0.5, 0.25, 0.25])
 _OUTLIER_PROBABILITY, _OUTLIER_SCALE = 0.02, 6.0
 _ROUNDS = 4
 _NEGLIGIBLE = 1e-4  # weight of a setting
@@ -97,6 +98,26 @@ class Mixture:
 
     value: Float64
     sd: Float64
+
+
+@dataclass(frozen=True)
+class Functional:
+    """
+    What is asked of the posterior: linear in the state of the hull.
+
+    Attributes
+    ----------
+    columns : (m, p)
+        Weights of level, growth, and of each step the jump and the change of growth.
+    years : (m,)
+        Where the wander counts; NaN: not at all.
+    own : (m,)
+        Divides the wander.
+    """
+
+    columns: Float64
+    years: Float64
+    own: Float64
 
 
 class HullState:
@@ -216,42 +237,51 @@ class HullState:
         """Return the prior mean of the runs and their covariance without noise and wander."""
         scaled = self._columns(years) * self._sd()
         mean = self.growth.mean * years
-        return mean, scaled @ scaled.T + COVARIATE_SD**2 * covariates @ covariates.T
+        phase = 2.0 * np.pi * (years[:, None] - years[None, :])
+        others = COVARIATE_SD**2 * covariates @ covariates.T + SEASON_SD**2 * np.cos(phase)
+        return mean, scaled @ scaled.T + others
 
-    def _functional(self, columns: Float64, years: Float64, own: Float64) -> Mixture:
+    def given(self, number: int, asked: Functional) -> tuple[Float64, Float64, Float64]:
         """
-        Return the posterior of linear functionals: columns and wander at years.
+        Return the posterior of functionals under one setting of the sizes.
 
         Parameters
         ----------
-        columns : (m, p)
-            Weights of the columns.
-        years : (m,)
-            Where the wander counts; NaN: not at all.
-        own : (m,)
-            Divides the wander.
+        number
+            Of the setting.
+        asked
+            The functionals.
+
+        Returns
+        -------
+        value, variance : (m,)
+            Of each.
+        gain : (m, n)
+            What each takes from each run.
         """
-        runs, sd = self.runs, self._sd()
-        prior_mean = columns[:, 1] * self.growth.mean
+        runs, sd, sizes = self.runs, self._sd(), self._settings[number][1:]
+        columns, own = asked.columns, asked.own
+        wandering = np.isfinite(asked.years)
+        at = np.where(wandering, asked.years, 0.0)  # where it began it is 0
         cross = (columns * sd**2) @ self._columns(runs.years).T
-        own_variance = ((columns * sd) ** 2).sum(axis=1)
-        wandering = np.isfinite(years)
-        at = np.where(wandering, years, 0.0)  # where it began it is 0
-        mean = np.zeros(len(columns))
-        second = np.zeros(len(columns))
-        for weight, (_, *sizes), precision in zip(self.weights, self._settings, self._precision):
-            if weight < _NEGLIGIBLE:
-                continue
-            all_cross = cross + _wander(at, runs.years, *sizes) / own[:, None]
-            gain = all_cross @ precision
-            value = prior_mean + gain @ self._residual
-            variance = (
-                own_variance
-                + np.diag(_wander(at, at, *sizes)) / own**2
-                - np.einsum('ij,ij->i', gain, all_cross)
-            )
-            mean += weight * value
-            second += weight * (value**2 + np.maximum(variance, 0.0))
+        cross += _wander(at, runs.years, *sizes) / own[:, None]
+        gain = cross @ self._precision[number]
+        value = columns[:, 1] * self.growth.mean + gain @ self._residual
+        variance = (
+            ((columns * sd) ** 2).sum(axis=1)
+            + np.diag(_wander(at, at, *sizes)) / own**2
+            - np.einsum('ij,ij->i', gain, cross)
+        )
+        return value, np.maximum(variance, 0.0), gain
+
+    def _averaged(self, asked: Functional) -> Mixture:
+        """Return the posterior of functionals, over all settings."""
+        mean = np.zeros(len(asked.columns))
+        second = np.zeros(len(asked.columns))
+        for number in np.flatnonzero(self.weights > _NEGLIGIBLE).tolist():
+            value, variance, _ = self.given(number, asked)
+            mean += self.weights[number] * value
+            second += self.weights[number] * (value**2 + variance)
         return Mixture(mean, np.sqrt(np.maximum(second - mean**2, 0.0)))
 
     def level(self, years: Float64) -> Mixture:
@@ -263,7 +293,18 @@ class HullState:
         years : (m,)
             Since the first run, 0 or later.
         """
-        return self._functional(self._columns(years), years, np.ones(len(years)))
+        return self._averaged(self.level_of(years))
+
+    def level_of(self, years: Float64) -> Functional:
+        """
+        Return what the added resistance at some times is, as functionals.
+
+        Parameters
+        ----------
+        years : (m,)
+            Since the first run, 0 or later.
+        """
+        return Functional(self._columns(years), years, np.ones(len(years)))
 
     def growth_per_year(self) -> Mixture:
         """
@@ -271,12 +312,18 @@ class HullState:
 
         A step upwards is growth too: fouling in port, for instance.
         """
+        return self._averaged(self.growth_of())
+
+    def growth_of(self) -> Functional:
+        """
+        Return what the mean growth between cleanings is, as a functional.
+        """
         end = max(float(self.runs.years[-1]), 1e-9)
         columns = self._columns(np.array([end])) - self._columns(np.zeros(1))
         many = len(self.steps)
         if many:
             columns[:, 2 : 2 + many] *= self.changes().value > 0.0
-        return self._functional(columns / end, np.array([end]), np.array([end]))
+        return Functional(columns / end, np.array([end]), np.array([end]))
 
     def growth_since_last_step(self) -> Mixture:
         """
@@ -285,7 +332,7 @@ class HullState:
         columns = np.zeros((1, 2 + 2 * len(self.steps)))
         columns[0, 1] = 1.0
         columns[0, 2 + len(self.steps) :] = 1.0
-        return self._functional(columns, np.array([np.nan]), np.ones(1))
+        return self._averaged(Functional(columns, np.array([np.nan]), np.ones(1)))
 
     def changes(self) -> Mixture:
         """
@@ -294,31 +341,27 @@ class HullState:
         many = len(self.steps)
         columns = np.zeros((many, 2 + 2 * many))
         columns[np.arange(many), 2 + np.arange(many)] = 1.0
-        return self._functional(columns, np.full(many, np.nan), np.ones(many))
+        return self._averaged(Functional(columns, np.full(many, np.nan), np.ones(many)))
 
-    def log_bayes_factors(self, after: Float64) -> Float64:
+    def asked_for(self, number: int, after: Float64) -> tuple[Float64, Float64]:
         """
-        Return the log Bayes factor of one more step, for each of some step functions.
+        Return how the runs ask for one more step under a setting, before its prior.
 
         Parameters
         ----------
+        number
+            Of the setting.
         after : (n, m)
-            1 where a run is after the step.
+            1 where a run is after the step, for each of some places.
 
         Returns
         -------
-        (m,)
-            Under the settings' posterior weights without the step.
+        tightness, pull : (m,)
+            The likelihood of a jump x is exp(pull x - tightness x^2 / 2).
         """
-        total = np.full(after.shape[1], -np.inf)
-        for weight, precision in zip(self.weights, self._precision):
-            # no setting is too improbable: what the step explains was scatter without it
-            solved = precision @ after
-            a = STEP_SD**2 * np.einsum('ij,ij->j', after, solved)
-            b = STEP_SD * (self._residual @ solved)
-            one = -0.5 * np.log1p(a) + 0.5 * b**2 / (1.0 + a)
-            total = np.logaddexp(total, np.log(max(weight, 1e-300)) + one)
-        return total
+        solved = self._precision[number] @ after
+        tightness = np.einsum('ij,ij->j', after, solved)
+        return tightness, np.asarray(self._residual @ solved)
 
 
 def _scatter_prior() -> list[float]:

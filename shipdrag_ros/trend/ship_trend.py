@@ -196,18 +196,19 @@ def ship_trend(
     runs = _runs(used)
     inside = [event for event in known if first_ns < event.time_ns <= used[-1].time_ns]
     steps = Steps(np.array([(event.time_ns - first_ns) / YEAR_NS for event in inside]))
-    state, found = search(runs, steps, growth or Growth())
+    found = search(runs, steps, growth or Growth())
+    state, open_state = found.state, found.open
     shared = _shared_sd(used)
     end = np.array([runs.years[-1]])
-    level = state.level(end)
+    level = open_state.level(end)
     now = Parameter(float(level.value[0]), float(np.hypot(level.sd[0], shared)))
     kw = series.clean_force_n * series.reference_speed_m_s / 1000.0
     years = np.linspace(0.0, runs.years[-1], _CURVE_POINTS)
-    curve = state.level(years)
-    slope = state.growth_per_year()
+    curve = open_state.level(years)
+    slope = open_state.growth_per_year()
     result = ShipTrend(
         series,
-        _events(state, inside, found, first_ns),
+        _events(state, inside, found.steps, first_ns),
         Parameter(float(slope.value[0]), float(slope.sd[0])),
         now,
         Parameter(now.value * kw, now.sd * kw),

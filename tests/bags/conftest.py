@@ -11,11 +11,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.messages import (
-    encode,
-)
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
-from shipdrag_ros.ship import Ship
 
 START_NS = 1_700_000_000_000_000_000
 
@@ -45,36 +41,17 @@ def record(seed: int = 1, seconds: int = 60) -> Block:
     return in_arrival_order(blocks)
 
 
-def write(
-    path: Path, block: Block, ship: Ship | None = None, parameters: str = '', **options: Any
-) -> Path:
-    with BagWriter(path, **options) as bag:
-        if ship is not None:
-            bag.attach('ship.yaml', ship.to_yaml())
-        if parameters:
-            bag.attach('parameters.yaml', parameters)
-        for message in encode(block):
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
-    return path
-
-
 @pytest.fixture(scope='session')
 def block() -> Block:
     return record()
 
 
 @pytest.fixture
-def write_bag(tmp_path: Path) -> Callable[..., Path]:
+def write_bag(tmp_path: Path, write_run: Callable[..., Path]) -> Callable[..., Path]:
     """Write a block to a new file of the test's folder."""
 
     def new(name: str, block: Block, **options: Any) -> Path:
-        return write(tmp_path / name, block, **options)
+        return write_run(tmp_path / name, block, **options)
 
     return new
 
@@ -85,14 +62,7 @@ def sample_bag(tmp_path_factory: pytest.TempPathFactory, block: Block) -> bytes:
     path = tmp_path_factory.mktemp('sample') / 'sample.mcap'
     with BagWriter(path, chunk_bytes=4096) as bag:
         bag.attach('ship.yaml', 'name: x\n')
-        for message in encode(block[:200]):
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
+        bag.write_samples(block[:200])
     return path.read_bytes()
 
 

@@ -139,15 +139,8 @@ def test_a_type_that_nobody_knows_is_told(tmp_path: Path) -> None:
 def test_a_full_disk_is_told(monkeypatch: pytest.MonkeyPatch, block: Block) -> None:
     monkeypatch.setattr(writer, 'private_opener', lambda *_: os.open('/dev/full', os.O_WRONLY))
     bag = BagWriter(Path('a.mcap'), chunk_bytes=1024)
-    with pytest.raises(BagError, match=r'a\.mcap.* cannot be written: No space'):  # noqa: PT012
-        for message in encode(block):
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
+    with pytest.raises(BagError, match=r'a\.mcap.* cannot be written: No space'):
+        bag.write_samples(block)
     with pytest.raises(BagError, match='No space'):
         bag.close()
     bag.close()

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -52,11 +51,6 @@ ROOT = Path(__file__).resolve().parents[2]
 def node_log(tmp_path: Path, ship: Path, *ros_arguments: str) -> str:
     """Start the node, end it by a signal once it records, and return what it said."""
     pytest.importorskip('rclpy')
-    worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
-    environment = os.environ | {
-        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-        'ROS_DOMAIN_ID': str(10 + worker),
-    }
     log = tmp_path / 'log'
     line = [SHIPDRAG, 'node', '--ship', ship, '--out', tmp_path / 'bags', '--ros-args']
     with log.open('w') as file:
@@ -65,7 +59,6 @@ def node_log(tmp_path: Path, ship: Path, *ros_arguments: str) -> str:
             stdin=subprocess.DEVNULL,
             stdout=file,
             stderr=subprocess.STDOUT,
-            env=environment,
         )
     try:
         end_s = time.monotonic() + LIMIT_S

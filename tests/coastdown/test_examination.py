@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown.events import Dismissal
-from shipdrag_ros.coastdown.examination import Examination, examine
-from shipdrag_ros.estimation import Window
+from shipdrag_ros.coastdown.examination import Examination, estimate_examined, examine
+from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship
@@ -145,6 +145,21 @@ def test_a_shaft_that_idles_and_stops_later_leaves_it_to_the_speed(level: float)
     found = after_an_onset(turning, time_s, glide(time_s))
     assert is_whole(found)
     assert any('no pitch is known' in note for note in found.notes)
+
+
+def test_what_is_said_of_a_shaft_that_idles_does_not_contradict_itself() -> None:
+    time_s = np.arange(-600.0, LENGTH_S)
+    inputs = [
+        block(LOG, noisy(glide(time_s)), time_s),
+        block(SHAFT, np.full(len(time_s), 12.0), time_s),
+    ]
+    record = window(*inputs, before_s=600.0)
+    found = estimate_examined(record, BOAT, Parameters(), estimate_final)
+    assert found.estimate is not None
+    notes = ' '.join(found.estimate.notes)
+    assert notes.count('taken to idle at zero pitch') == 1
+    assert 'the shaft turns at 12 to 12 rad/s: with no thrust, as it is taken' in notes
+    assert 'if it drives the ship' not in notes
 
 
 def test_a_shaft_that_holds_a_lower_speed_while_the_ship_slows_to_it_drives() -> None:

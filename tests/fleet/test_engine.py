@@ -12,7 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import cloudpickle
+import dask
 import pytest
+from dask.utils import parse_timedelta
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import FleetError
@@ -108,6 +110,12 @@ def test_only_what_kills_its_worker_by_itself_is_given_up(engine: Engine) -> Non
     assert isinstance(lost, Lost)
     assert 'its worker died' in lost.reason
     assert found == {'a': 'A', 'b': 'B', 'c': 'C', 'd': 'D'}
+
+
+def test_a_worker_that_dies_again_while_it_starts_is_waited_for(engine: Engine) -> None:
+    """Dask looks 15 s after a death, and gives up the worker that is not there just then."""
+    assert engine.address
+    assert parse_timedelta(dask.config.get('distributed.deploy.lost-worker-timeout')) > 600.0
 
 
 def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import signal
@@ -14,7 +13,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import gettempdir
 from typing import Any, TextIO
 
 import pytest
@@ -24,23 +22,6 @@ from shipdrag_ros.live.serve import listen, serve
 
 START_S = 240.0  # the first start of a machine compiles the kernels
 SHIP = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
-
-
-def _own_domain() -> tuple[int, TextIO]:
-    """Find a domain that no other test process of this machine is in, and lock it."""
-    for domain in range(10, 102):
-        path = Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock'
-        try:
-            lock = path.open('w')
-        except PermissionError:  # that of another user
-            continue
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
-        else:
-            return domain, lock
-    raise RuntimeError('92 test processes run already')
 
 
 class Viewer:
@@ -132,9 +113,11 @@ class Process:
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., Process]]:
+def start(
+    tmp_path: Path, own_domain: Callable[[], tuple[int, TextIO]]
+) -> Iterator[Callable[..., Process]]:
     """A function that starts a module of the package on a domain of this test's own."""
-    domain, lock = _own_domain()
+    domain, lock = own_domain()
     started: list[Process] = []
 
     def run(*line: str | Path) -> Process:

@@ -3,9 +3,7 @@
 
 from __future__ import annotations
 
-import fcntl
 import gc
-import os
 import resource
 import signal
 import subprocess
@@ -13,37 +11,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from tempfile import gettempdir
-from typing import Any, TextIO
+from typing import Any
 
 import pytest
 import yaml
 
 START_S = 240.0  # the first start of a machine compiles the kernels
 ANSWER_S = 60.0
-
-
-def _own_domain() -> tuple[int, TextIO]:
-    """Find a domain that no other test process of this machine is in, and lock it."""
-    for domain in range(10, 102):
-        path = Path(gettempdir()) / f'shipdrag_ros_domain_{domain}.lock'
-        try:
-            lock = path.open('w')
-        except PermissionError:  # that of another user
-            continue
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            lock.close()
-        else:
-            return domain, lock
-    raise RuntimeError('92 test processes run already')
-
-
-_domain, _lock = _own_domain()
-os.environ['ROS_DOMAIN_ID'] = str(_domain)
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 
 
 class NodeProcess:

@@ -102,3 +102,14 @@ def test_the_launch_file_parses_and_sets_known_parameters() -> None:
     names = {key.value for node in dicts for key in node.keys if isinstance(key, ast.Constant)}
     assert names - {'use_sim_time'} <= {setting.name for setting in SETTINGS}
     assert {'ship_file', 'output_directory', 'autostart'} <= names
+
+
+def test_a_former_name_is_accepted_and_listed_nowhere() -> None:
+    (estimator,) = [setting for setting in SETTINGS if setting.name == 'estimator']
+    assert 'warped' not in estimator.choices
+    problems: list[str] = []
+    assert estimator.key.kind.read('warped', 'estimator', problems) == 'warped'
+    assert problems == []
+    estimator.key.kind.read('kalman', 'estimator', problems)
+    assert 'log_time' in problems[0]
+    assert 'warped' not in problems[0]

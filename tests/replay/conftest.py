@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -28,25 +27,6 @@ from shipdrag_ros.ship import Ship
 
 START_NS = 1_700_000_000_000_000_000
 PARAMETERS = Parameters(update_s=30.0)
-
-
-def write(
-    path: Path, block: Block, ship: Ship | None = None, parameters: str = '', **options: Any
-) -> Path:
-    with BagWriter(path, **options) as bag:
-        if ship is not None:
-            bag.attach('ship.yaml', ship.to_yaml())
-        if parameters:
-            bag.attach('parameters.yaml', parameters)
-        for message in encode(block):
-            bag.write(
-                message.topic,
-                message.type,
-                message.payload,
-                log_ns=message.log_ns,
-                publish_ns=message.publish_ns,
-            )
-    return path
 
 
 def sail(seed: int = 1, *, steady_s: float = 400.0, coast_s: float = 700.0) -> Block:
@@ -169,9 +149,3 @@ def recording(ship: Ship, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
         live.receive(message)
     live.stop(int(block.receive_ns[-1]))
     return path, live.events
-
-
-@pytest.fixture
-def write_run() -> Callable[..., Path]:
-    """Write a block, and maybe a ship and parameters, to a file."""
-    return write

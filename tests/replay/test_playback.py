@@ -160,6 +160,9 @@ def test_rejected_samples_are_counted_in_a_window_and_in_a_replay(
         counts = replay(run, window=window).inputs['speed_through_water']
         assert counts.rejected == {'nan': 1, 'absurd': 1}
         assert counts.used == counts.messages - 2
+    # what is read before a window, to judge what is in it by, is none of its messages
+    counts = replay(run, window=(15.0, 100.0)).inputs['speed_through_water']
+    assert (counts.messages, counts.used, counts.rejected) == (86, 85, {'absurd': 1})
 
 
 def test_unreadable_messages_and_wrong_types_are_counted_among_the_rejected(

@@ -7,6 +7,7 @@ import base64
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from shipdrag_ros.estimation import pictures
 from shipdrag_ros.estimation.result import Estimate
@@ -28,3 +29,10 @@ def test_the_same_data_give_the_same_bytes(estimate: Estimate) -> None:
     kind, data = first.split(',', 1)
     assert kind == 'data:image/svg+xml;base64'
     assert b'</svg>' in base64.b64decode(data)
+
+
+@pytest.mark.parametrize(('width', 'wide'), [(drawing.SIZE[0], False), (7.2, False), (9.0, True)])
+def test_a_picture_much_wider_than_others_takes_the_page_for_itself(
+    width: float, wide: bool
+) -> None:
+    assert drawing.picture(Figure(figsize=(width, 3.0)), 'caption').wide == wide

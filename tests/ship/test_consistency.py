@@ -32,7 +32,7 @@ def problems_of(**keys: object) -> tuple[str, ...]:
         ({'draught_m': 5.0}, 'block coefficient'),
         ({'breadth_m': 2.16}, 'breadth_m: 2.16'),
         ({'wetted_surface_m2': 48890.0}, 'wetted_surface_m2'),  # square feet
-        ({'wetted_surface_m2': 454.2}, 'wetted_surface_m2'),
+        ({'wetted_surface_m2': 454.2}, 'expected 2263..9052 m^2'),  # half and twice what is usual
         ({'wetted_surface_m2': None}, 'wetted_surface_m2: missing'),
         ({'propeller': {'diameter_m': 12.0, 'state_in_baseline': 'free'}}, 'propeller.diameter_m'),
         (
@@ -43,6 +43,12 @@ def problems_of(**keys: object) -> tuple[str, ...]:
 )
 def test_a_wrong_unit_is_seen_beside_the_other_particulars(keys, message):
     assert any(message in problem for problem in problems_of(**keys))
+
+
+@pytest.mark.parametrize('name', ['length_m', 'displaced_volume_m3'])
+def test_where_a_size_is_missing_the_rest_is_not_held_against_it(name):
+    (problem,) = problems_of(**{name: None})
+    assert problem.startswith(f'{name}: missing')
 
 
 def test_tables_must_have_equal_lengths():

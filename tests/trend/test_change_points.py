@@ -27,7 +27,7 @@ def test_a_cleaning_of_six_percent_is_found_and_dated():
     for _ in range(8):
         when = rng.uniform(0.5, 1.5)
         seen, first = ship(rng, when)
-        _, steps = search(seen, Steps(), Growth())
+        steps = search(seen, Steps(), Growth()).steps
         found += any(abs(step.year + first - when) < MONTH for step in steps)
     assert found >= 6
 
@@ -35,18 +35,18 @@ def test_a_cleaning_of_six_percent_is_found_and_dated():
 def test_few_steps_are_found_where_there_is_none():
     """N = 8 ships of two years, seed 12: at most 2 in 16 ship-years."""
     rng = np.random.default_rng(12)
-    assert sum(len(search(ship(rng)[0], Steps(), Growth())[1]) for _ in range(8)) <= 2
+    assert sum(len(search(ship(rng)[0], Steps(), Growth()).steps) for _ in range(8)) <= 2
 
 
 def test_a_known_step_is_not_found_again():
     seen, first = ship(np.random.default_rng(13), 1.0, 0.15)
-    state, steps = search(seen, Steps(np.array([1.0 - first])), Growth())
-    assert steps == []
-    assert len(state.steps) == 1
+    found = search(seen, Steps(np.array([1.0 - first])), Growth())
+    assert found.steps == ()
+    assert len(found.state.steps) == 1
 
 
 def test_too_few_runs_have_no_unknown_step():
     seen = Runs(
         np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.3, 0.3]), np.full(3, 0.01), np.zeros((3, 0))
     )
-    assert search(seen, Steps(), Growth())[1] == []
+    assert search(seen, Steps(), Growth()).steps == ()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.log_time.projection import project
+from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.log_time.robust import despike
 from shipdrag_ros.estimation.ode_fit.stated import stated_weight
 from shipdrag_ros.estimation.window import Series, Window
@@ -114,7 +114,7 @@ def gather(window: Window, parameters: Parameters) -> Inputs:
         )
     if LOG not in used:
         notes.append('no speed through water: a current is part of the speed')
-    values = [_along(one) if kind == POSITION else one.value for kind, one in used.items()]
+    values = [_values(kind, one) for kind, one in used.items()]
     scale = TimeScale.of(*(one.time_ns for one in used.values()))
     speed_sd = parameters.speed_sigma_m_s
     time_s: list[Float64] = [
@@ -137,12 +137,8 @@ def gather(window: Window, parameters: Parameters) -> Inputs:
     )
 
 
-def _along(position: Series) -> Float64:
-    time = TimeScale.of(position.time_ns).normalise(position.time_ns)
-    distance: Float64 = project(time, np.ascontiguousarray(position.value))
-    if np.isnan(distance[0]):
-        raise EstimationError(
-            f'position: {len(position)} samples without a direction of travel, all near '
-            f'{position.value[0].tolist()} m; check the input or leave it out'
-        )
-    return distance
+def _values(kind: int, series: Series) -> Float64:
+    if kind != POSITION:
+        return series.value
+    time = TimeScale.of(series.time_ns).normalise(series.time_ns)
+    return along_track(time, series.value)

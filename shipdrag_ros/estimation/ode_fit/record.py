@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.stated import stated_weight
 from shipdrag_ros.estimation.ode_fit.steady import (
@@ -17,15 +18,12 @@ from shipdrag_ros.estimation.ode_fit.steady import (
     steady_since,
     weighted_white_sd,
 )
-from shipdrag_ros.estimation.s1.track import along_track
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, Rows
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.regression.orthogonal import OrthogonalBasis
 from shipdrag_ros.samples import Float64, Int64
 
 LEAST_STAMPS = 12  # of an input: fewer do not tell its noise
-_TRACK_ORDER = 8  # of the polynomials of a track that bends
 _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
 
 
@@ -218,6 +216,4 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
 
 def _distance(time_s: Float64, position: Float64) -> Float64:
     scale = 0.5 * float(np.ptp(time_s))
-    time = (time_s - time_s[0]) / scale - 1.0
-    basis = OrthogonalBasis.on(time, min(_TRACK_ORDER, len(time) - 1))
-    return along_track(time, position, basis)
+    return along_track((time_s - time_s[0]) / scale - 1.0, position)

@@ -15,6 +15,7 @@ import numpy as np
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.assemble import AtEnd, assembled
 from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
+from shipdrag_ros.estimation.distance import along_track
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.s1.problems import (
     ScalarInput,
@@ -23,7 +24,6 @@ from shipdrag_ros.estimation.s1.problems import (
     solve_position,
     solve_speed,
 )
-from shipdrag_ros.estimation.s1.track import along_track
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
@@ -75,8 +75,8 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     ship
         For n_r and the Froude number.
     parameters
-        `estimator`, `order_max`, `froude_min` and the known standard
-        deviations are used.
+        `estimator`, one of `PROBLEMS`, `order_max`, `froude_min` and the known
+        standard deviations are used.
 
     Raises
     ------
@@ -120,20 +120,11 @@ def _inputs(window: Window, parameters: Parameters) -> _Offered:
         name, speed = 'speed_over_ground', window.speed_over_ground
     position = window.position
     estimator = parameters.estimator
-    if estimator == 'auto':
-        estimator = _offered(len(speed), len(position))
     problem = PROBLEMS[estimator]
-    for series_name, series, used in (
-        (name, speed, problem.speed),
-        ('position', position, problem.position),
-    ):
-        if used:
-            _check(series_name, series, problem.stamps, estimator)
-        elif len(series) and parameters.estimator == 'auto':
-            notes.append(
-                f'{series_name}: {len(series)} sample(s) left out, a joint fit needs '
-                f'{PROBLEMS["s1_joint"].stamps} of each input'
-            )
+    if problem.speed:
+        _check(name, speed, problem.stamps, estimator)
+    if problem.position:
+        _check('position', position, problem.stamps, estimator)
     if problem.speed and name == 'speed_over_ground':
         notes.append(
             'speed over ground was used as the speed, there is none through water: '
@@ -145,14 +136,6 @@ def _inputs(window: Window, parameters: Parameters) -> _Offered:
         _distance(position, parameters) if problem.position else None,
         tuple(notes),
     )
-
-
-def _offered(speeds: int, positions: int) -> str:
-    """Name the problem that `auto` stands for."""
-    enough = PROBLEMS['s1_joint'].stamps
-    if min(speeds, positions) >= enough:
-        return 's1_joint'
-    return 's1_speed' if speeds >= min(positions, enough) else 's1_position'
 
 
 def _check(name: str, series: Series, enough: int, estimator: str) -> None:
@@ -175,7 +158,7 @@ def _speed(name: str, series: Series, parameters: Parameters) -> ScalarInput:
 
 def _distance(series: Series, parameters: Parameters) -> ScalarInput:
     scale, basis = _polynomials(series, parameters)
-    distance = along_track(scale.normalise(series.time_ns), series.value, basis)
+    distance = along_track(scale.normalise(series.time_ns), series.value)
     sigma_m = parameters.position_sigma_m
     return ScalarInput('position', series.time_ns, distance, sigma_m, scale, basis)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf, isinf, pi, radians
+from math import inf, isinf, radians
 
 import numpy as np
 
@@ -121,32 +121,3 @@ def overshoots_rad(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> Float64:
             found.append(beyond)
             side = -side
     return np.array(found)
-
-
-def advance_m(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> float:
-    """
-    Return the way ahead from the order to a change of heading by 90 degrees.
-
-    NaN where the ship does not turn as far.
-    """
-    return _at(motion, manoeuvre, 0.5 * pi, motion.position_m[:, 0])
-
-
-def tactical_diameter_m(motion: ManoeuvreMotion, manoeuvre: Manoeuvre) -> float:
-    """
-    Return the way abeam from the order to a change of heading by 180 degrees.
-
-    NaN where the ship does not turn as far.
-    """
-    return _at(motion, manoeuvre, pi, manoeuvre.first.sign * motion.position_m[:, 1])
-
-
-def _at(
-    motion: ManoeuvreMotion, manoeuvre: Manoeuvre, heading_rad: float, value: Float64
-) -> float:
-    turned = manoeuvre.first.sign * motion.heading_rad
-    beyond = np.flatnonzero(turned >= heading_rad)
-    if not len(beyond):
-        return np.nan
-    i = int(beyond[0])
-    return float(np.interp(heading_rad, turned[i - 1 : i + 1], value[i - 1 : i + 1]))

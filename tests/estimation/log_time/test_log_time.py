@@ -92,7 +92,13 @@ def test_error_and_coverage(coast: Any, ship: Ship) -> None:
     # the runs are independent, the range of one is not: 40 trials at 95 %, less 3 sd
     assert np.mean(inside) > 0.95 - 3.0 * np.sqrt(0.95 * 0.05 / RUNS)
     s1_wrong = [
-        rmse(s1.estimate(window(coast.block(500, seed=seed)), ship, Parameters()), coast, ship)
+        rmse(
+            s1.estimate(
+                window(coast.block(500, seed=seed)), ship, Parameters(estimator='s1_joint')
+            ),
+            coast,
+            ship,
+        )
         for seed in range(RUNS)
     ]
     assert np.sqrt(np.mean(np.square(wrong))) < 0.9 * np.sqrt(np.mean(np.square(s1_wrong)))

@@ -23,6 +23,9 @@ from shipdrag_ros.ship import ConstantAddedMass, Ship
 START_NS = 1_700_000_000_123_456_789
 END_NS = START_NS + 1500 * 10**9
 CURVE = tuple(item.name for item in fields(ResistanceCurve))
+JOINT = Parameters(estimator='s1_joint')
+SPEED = Parameters(estimator='s1_speed')
+POSITION = Parameters(estimator='s1_position')
 pytestmark = pytest.mark.filterwarnings('error')
 
 
@@ -79,7 +82,7 @@ def test_quadratic_drag_comes_back(coast: Any, ship: Ship, estimator: str, bound
 
 def test_last_figures_are_those_of_the_curve(coast: Any, ship: Ship) -> None:
     end_ns = START_NS + 600 * 10**9
-    found = estimate(window(coast.block(500), end_ns), ship, Parameters())
+    found = estimate(window(coast.block(500), end_ns), ship, JOINT)
     assert found.end_ns == found.tracks['position'].time_ns[-1]
     assert found.curve.speed_m_s[0] == found.last_speed_m_s
     assert found.curve.resistance_m_s2[0] == found.last_resistance_m_s2
@@ -100,7 +103,7 @@ def test_the_published_figure_is_at_the_same_times(coast: Any, ship: Ship) -> No
 
 
 @pytest.mark.parametrize(
-    ('channels', 'expected', 'noted'),
+    ('channels', 'estimator', 'noted'),
     [
         ((Channel.SPEED_THROUGH_WATER, Channel.POSITION), 's1_joint', ''),
         ((Channel.SPEED_THROUGH_WATER,), 's1_speed', ''),
@@ -110,58 +113,28 @@ def test_the_published_figure_is_at_the_same_times(coast: Any, ship: Ship) -> No
         ((Channel.SPEED_OVER_GROUND, Channel.SPEED_THROUGH_WATER), 's1_speed', ''),
     ],
 )
-def test_auto_takes_what_is_there(
-    coast: Any, ship: Ship, channels: tuple[Channel, ...], expected: str, noted: str
+def test_speed_over_ground_stands_in_for_a_log_and_is_said(
+    coast: Any, ship: Ship, channels: tuple[Channel, ...], estimator: str, noted: str
 ) -> None:
     block = coast.block(200)
     log = only(block, Channel.SPEED_THROUGH_WATER)
     ground = replace(log, channel=np.full(len(log), Channel.SPEED_OVER_GROUND, np.uint8))
     found = estimate(
-        window(only(in_arrival_order([block, ground]), *channels)), ship, Parameters()
+        window(only(in_arrival_order([block, ground]), *channels)),
+        ship,
+        Parameters(estimator=estimator),
     )
-    assert found.estimator == expected
+    assert found.estimator == estimator
     assert ' '.join(found.notes).count(noted or 'current') == bool(noted)
     over_ground = Channel.SPEED_OVER_GROUND in channels
     through_water = Channel.SPEED_THROUGH_WATER in channels
     assert ('speed_over_ground' in found.samples) == (over_ground and not through_water)
-    explicit = estimate(
-        window(only(in_arrival_order([block, ground]), *channels)),
-        ship,
-        Parameters(estimator=expected),
-    )
-    assert same_bits(found, explicit)
-
-
-@pytest.mark.parametrize(
-    ('speeds', 'positions', 'expected'),
-    [
-        (200, 5, 's1_speed'),
-        (5, 200, 's1_position'),
-        (3, 200, 's1_position'),
-        (200, 12, 's1_joint'),
-    ],
-)
-def test_too_few_samples_of_an_input_are_left_out_and_said(
-    coast: Any, ship: Ship, speeds: int, positions: int, expected: str
-) -> None:
-    parts = [
-        only(coast.block(n), channel)
-        for n, channel in (
-            (speeds, Channel.SPEED_THROUGH_WATER),
-            (positions, Channel.POSITION),
-        )
-    ]
-    found = estimate(window(in_arrival_order(parts)), ship, Parameters())
-    assert found.estimator == expected
-    assert len(found.notes) == (expected != 's1_joint')
-    if found.notes:
-        assert f'{min(speeds, positions)} sample(s) left out' in found.notes[0]
 
 
 @pytest.mark.parametrize(
     ('estimator', 'channels', 'n', 'message'),
     [
-        ('auto', (), 9, 'speed_through_water: 0 distinct stamp'),
+        ('s1_joint', (), 9, 'speed_through_water: 0 distinct stamp'),
         ('s1_speed', (Channel.POSITION,), 100, 'speed_through_water: 0 distinct stamp'),
         ('s1_position', (Channel.SPEED_THROUGH_WATER,), 100, 'position: 0 distinct stamp'),
         ('s1_joint', (Channel.SPEED_THROUGH_WATER,), 100, 'position: 0 distinct stamp'),
@@ -190,16 +163,17 @@ def test_steady_speed_is_no_coastdown(ship: Ship, n: int) -> None:
     speed = Block.of(Channel.SPEED_THROUGH_WATER, stamps, 8.0 + 0.05 * noise)
     along = 8.0 * np.arange(n)[:, None] * [0.6, 0.8]
     position = Block.of(Channel.POSITION, stamps, along + rng.normal(size=(n, 2)))
-    for block in (speed, position, in_arrival_order([speed, position])):
+    both = in_arrival_order([speed, position])
+    for block, asked in ((speed, SPEED), (position, POSITION), (both, JOINT)):
         with pytest.raises(EstimationError, match=r'no deceleration above the noise \(sd '):
-            estimate(window(block), ship, Parameters())
+            estimate(window(block), ship, asked)
 
 
 def test_rising_speed_is_refused(ship: Ship) -> None:
     stamps = START_NS + np.arange(100) * 10**9
     speed = 5.0 + 0.01 * np.arange(100) + 0.02 * np.random.default_rng(1).normal(size=100)
     with pytest.raises(EstimationError, match='does not fall steadily'):
-        estimate(window(Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed)), ship, Parameters())
+        estimate(window(Block.of(Channel.SPEED_THROUGH_WATER, stamps, speed)), ship, SPEED)
 
 
 @pytest.mark.parametrize('value', [np.nan, np.inf])
@@ -207,7 +181,7 @@ def test_values_that_are_not_finite_are_refused(coast: Any, ship: Ship, value: f
     block = coast.block(50)
     block.value[7, 0] = value
     with pytest.raises(EstimationError, match=r'1 value\(s\) are not finite'):
-        estimate(window(block), ship, Parameters())
+        estimate(window(block), ship, JOINT)
 
 
 def test_equal_stamps_do_not_count_twice(coast: Any, ship: Ship) -> None:
@@ -215,27 +189,27 @@ def test_equal_stamps_do_not_count_twice(coast: Any, ship: Ship) -> None:
     series = good.speed_through_water
     same = Series(np.full(40, START_NS), series.value, series.variance)
     with pytest.raises(EstimationError, match='1 distinct stamp'):
-        estimate(replace(good, speed_through_water=same), ship, Parameters())
+        estimate(replace(good, speed_through_water=same), ship, SPEED)
     few = Series(START_NS + np.arange(40) // 8 * 10**11, series.value, series.variance)
-    found = estimate(replace(good, speed_through_water=few), ship, Parameters())
+    found = estimate(replace(good, speed_through_water=few), ship, SPEED)
     assert len(found.orders) == 5
 
 
 def test_every_parameter_changes_something(coast: Any, ship: Ship) -> None:
     # a steep start, so that many orders are used
     cut = window(coast.block(500))
-    base = estimate(cut, ship, Parameters())
+    base = estimate(cut, ship, JOINT)
     for changed in (
-        Parameters(estimator='s1_speed'),
-        Parameters(order_max=5),
-        Parameters(froude_min=0.1),
-        Parameters(speed_sigma_m_s=0.2),
-        Parameters(position_sigma_m=2.0),
+        SPEED,
+        replace(JOINT, order_max=5),
+        replace(JOINT, froude_min=0.1),
+        replace(JOINT, speed_sigma_m_s=0.2),
+        replace(JOINT, position_sigma_m=2.0),
     ):
         assert not same_bits(base, estimate(cut, ship, changed))
-    assert estimate(cut, ship, Parameters(order_max=5)).order <= 5
-    assert estimate(cut, ship, Parameters(froude_min=0.1)).froude_valid[0] >= 0.1
-    known = Parameters(speed_sigma_m_s=0.05, position_sigma_m=10.0)
+    assert estimate(cut, ship, replace(JOINT, order_max=5)).order <= 5
+    assert estimate(cut, ship, replace(JOINT, froude_min=0.1)).froude_valid[0] >= 0.1
+    known = replace(JOINT, speed_sigma_m_s=0.05, position_sigma_m=10.0)
     assert 0.9 < estimate(cut, ship, known).orders[-1].variance < 1.1
 
 
@@ -249,7 +223,7 @@ def test_n_r_and_its_error(coast: Any) -> None:
                 displaced_volume_m3=20200.0,
                 added_mass=ConstantAddedMass(value=value, sd=sd),
             ),
-            Parameters(),
+            JOINT,
         )
         for value, sd in ((0.05, 0.0), (0.1, 0.0), (0.1, 0.03))
     ]
@@ -267,7 +241,7 @@ def test_n_r_and_its_error(coast: Any) -> None:
 def test_a_doubtful_n_r_is_passed_on(coast: Any) -> None:
     slender = Ship(length_m=150.0, displaced_volume_m3=7500.0)
     assert slender.warnings
-    assert estimate(window(coast.block(100)), slender, Parameters()).notes == slender.warnings
+    assert estimate(window(coast.block(100)), slender, JOINT).notes == slender.warnings
 
 
 def test_speed_through_zero(ship: Ship) -> None:
@@ -302,7 +276,7 @@ def test_speed_through_zero(ship: Ship) -> None:
 
 def test_hull_with_an_inflection_and_one_without(coast: Any, ship: Ship) -> None:
     quiet = coast.block(2000, speed_sigma=0.005, position_sigma=0.5)
-    found = estimate(window(quiet), ship, Parameters())
+    found = estimate(window(quiet), ship, JOINT)
     assert found.froude_max_by is FroudeMax.BRANCH_TOP
     assert found.froude_valid[1] == found.curve.froude[-1]
     assert found.froude_max_argmax >= 0.9 * found.froude_valid[1]
@@ -366,11 +340,13 @@ def test_a_curve_or_a_reason_and_the_epoch_changes_no_bit(case: tuple[Block, int
     hull = Ship(length_m=20.0, displaced_volume_m3=60.0)
     whole = Window.from_block(block, -(2**63), 2**63 - 1)
     moved = replace(block, stamp_ns=block.stamp_ns + shift)
+    positions = int((block.channel == Channel.POSITION).sum())
+    asked = JOINT if 0 < positions < len(block) else POSITION if positions else SPEED
     try:
-        found = estimate(whole, hull, Parameters())
+        found = estimate(whole, hull, asked)
     except EstimationError as reason:
         with pytest.raises(EstimationError, match=re.escape(str(reason))):
-            estimate(Window.from_block(moved, -(2**63), 2**63 - 1), hull, Parameters())
+            estimate(Window.from_block(moved, -(2**63), 2**63 - 1), hull, asked)
         return
     for name in CURVE:
         assert np.isfinite(getattr(found.curve, name)).all()
@@ -386,6 +362,6 @@ def test_a_curve_or_a_reason_and_the_epoch_changes_no_bit(case: tuple[Block, int
     ).all()
     assert np.isfinite([found.last_speed_m_s, found.last_resistance_m_s2]).all()
     assert all(np.isfinite(value) for value in found.noise_sd.values())
-    again_found = estimate(Window.from_block(moved, -(2**63), 2**63 - 1), hull, Parameters())
+    again_found = estimate(Window.from_block(moved, -(2**63), 2**63 - 1), hull, asked)
     assert same_bits(found, again_found)
     assert again_found.start_ns == found.start_ns + shift

@@ -58,12 +58,6 @@ def test_a_map_with_a_dot_at_the_best_manoeuvre():
     assert [shown.manoeuvres[int(i)] for i in dots] == list(shown.best)
 
 
-def test_a_line_a_change():
-    time_s = np.arange(3.0)
-    axis = pictures.surge_picture(time_s, [('as it is', time_s), ('+10%', 2 * time_s)]).axes[0]
-    assert names(axis.get_legend().get_texts()) == ['as it is', '+10%']
-
-
 def test_bars_of_values_and_of_effects(coasted):
     axis = pictures.particulars_picture(coasted).axes[0]
     order = [*coasted.selection.kept, *coasted.selection.dropped]

@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION
 from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.steering import Experiment, SteeringStudy
@@ -106,28 +105,6 @@ def design_picture(shown: Experiment) -> Figure:
         axis.set_xticks(np.arange(len(shown.names)), shown.names, rotation=90)
         axis.set_yticks(np.arange(len(manoeuvres)), manoeuvres)
         figure.colorbar(image, label='loss of 10 %; dot: most')
-    return figure
-
-
-def surge_picture(time_s: Float64, speeds: Sequence[tuple[str, Float64]]) -> Figure:
-    """
-    Draw the surge speed of one manoeuvre after several changes of a derivative.
-
-    Parameters
-    ----------
-    time_s : (n,)
-    speeds
-        What was changed, and the speed (n,) [m/s].
-    """
-    styles = (('#444444', '-'), (BLUE, '--'), (GREEN, '-.'), (VERMILION, ':'), (ORANGE, '--'))
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 3.2), layout='constrained')
-        axis = figure.subplots()
-        for (label, speed), (color, style) in zip(speeds, styles):
-            axis.plot(time_s, speed, color=color, linestyle=style, label=label)
-        axis.set_xlabel('time after the first order [s]')
-        axis.set_ylabel('u [m/s]')
-        axis.legend(loc='upper right', ncols=len(speeds))
     return figure
 
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Distance along the track from noisy positions, compiled.
+Distance along the track from noisy positions.
 
-As `track`, with the polynomials of `regression.refit` and the order of the bend
-by AICc, at a cost that a live update can afford.
+A length summed from noisy positions is biased long, so nothing is summed over
+them: both coordinates are fitted with the same polynomials and the positions
+are projected on the direction of the fitted track.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import math
 import numpy as np
 
 from shipdrag_ros.compiled import compiled
+from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.regression.refit import COEFFICIENT, SSE, evaluate, refit
 from shipdrag_ros.samples import Float64
 
-_ORDER = 7  # most coefficients of a bend
+_ORDER = 8  # most coefficients of a bend
 _STRAIGHT = 2
 _STEPS = 256  # of the integral of the excess
 
@@ -35,8 +37,7 @@ def _best_order(sse: Float64, n: int) -> int:
     return best
 
 
-@compiled('f8[::1](f8[::1], f8[:, ::1])')
-def project(time: Float64, position: Float64) -> Float64:
+def along_track(time: Float64, position: Float64) -> Float64:
     """
     Return the distance along the track of each position.
 
@@ -50,15 +51,35 @@ def project(time: Float64, position: Float64) -> Float64:
     Returns
     -------
     (n,)
-        [m], ascending in the direction of travel; NaN where there is none.
+        [m], ascending in the direction of travel, 0 at the first position.
+
+    Raises
+    ------
+    EstimationError
+        If the positions have no direction of travel.
 
     Notes
     -----
-    The excess of the arc over its projection is that of the fitted track: a
-    length summed from noisy positions is biased long.
+    The direction is that of the straight lines through both coordinates. Where the
+    cross-track coordinate y bends (its order, by AICc, is above that of a line), the
+    excess of the arc over its projection, integral of sqrt(x'^2 + y'^2) - |x'| of the
+    fitted track, is added: of second order in the angle, so that the noise of y enters
+    in second order only. AICc: Hurvich and Tsai (1989).
     """
+    distance: Float64 = _project(time, np.ascontiguousarray(position))
+    if np.isnan(distance[0]):
+        raise EstimationError(
+            f'position: {len(position)} samples without a direction of travel, all near '
+            f'{position[0].tolist()} m; check the input or leave it out'
+        )
+    return distance
+
+
+@compiled('f8[::1](f8[::1], f8[:, ::1])')
+def _project(time: Float64, position: Float64) -> Float64:
+    """Return the distance along the track of each position; NaN without a direction."""
     n = len(time)
-    order = min(_ORDER, n - 2)
+    order = max(1, min(_ORDER, n - 2))
     east = position[:, 0] - position[0, 0]
     north = position[:, 1] - position[0, 1]
     to_east = refit(time, east, _STRAIGHT)[COEFFICIENT, 1]
