@@ -23,6 +23,26 @@ TRACK_LABELS = {
 }
 
 
+class Link(str):
+    """
+    The text of a cell that leads somewhere; where nothing can be followed it is the text alone.
+
+    Parameters
+    ----------
+    text
+    href
+        Where it leads.
+    """
+
+    __slots__ = ('href',)
+    href: str
+
+    def __new__(cls, text: str, href: str) -> Link:
+        made = super().__new__(cls, text)
+        made.href = href
+        return made
+
+
 @dataclass(frozen=True)
 class Table:
     """Column heads and rows, ready to be shown."""

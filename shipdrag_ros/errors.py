@@ -62,7 +62,7 @@ class BagError(ShipdragError):
 
 
 class ImportDataError(ShipdragError):
-    """A CSV or NMEA source that cannot be turned into a bag."""
+    """A log or a table that cannot be turned into a bag."""
 
 
 class EstimationError(ShipdragError):

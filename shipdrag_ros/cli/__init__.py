@@ -53,7 +53,7 @@ VERBS = (
     ),
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
     Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
-    Verb('import', '.import_', 'NMEA 0183 log, or table of measurements (CSV) -> bag'),
+    Verb('import', '.import_', 'logs and tables of other programs -> bag'),
     Verb('completion', '.completion', 'completion of the command line in a shell'),
     Verb('doctor', '.doctor', 'what of the installation works, and what to do about the rest'),
     Verb('info', '.info', 'what is in a bag'),

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from shipdrag_ros.cli import trend_json
-from shipdrag_ros.cli.arguments import add_json, add_report
+from shipdrag_ros.cli.arguments import add_json, add_report, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
@@ -36,7 +38,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='QUERY',
         help='put a question to the store instead; its tables are coastdowns and bags',
     )
+    parser.add_argument(
+        '--csv',
+        type=new_file('.csv'),
+        metavar='FILE.csv',
+        help='write a row a coastdown, for a spreadsheet',
+    )
+    parser.add_argument(
+        '--parquet',
+        type=new_file('.parquet'),
+        metavar='FILE.parquet',
+        help='the same as Parquet, for a data frame',
+    )
     add_report(parser, of='trend')
+    parser.add_argument(
+        '--pages',
+        type=Path,
+        metavar='DIR',
+        help='with --report: write a page a coastdown there, to which the rows of the report lead',
+    )
     add_json(parser)
 
 
@@ -48,15 +68,46 @@ def run(options: argparse.Namespace) -> int:
     if options.sql is not None:
         _answer(output, options.store, options.sql)
         return 0
+    if options.pages is not None and options.report is None:
+        raise FleetError('--pages DIR: give --report FILE.html too, whose rows lead there')
     trends, skipped = trends_of(output, options.store)
+    for file in filter(None, (options.csv, options.parquet)):
+        from shipdrag_ros.trend.export import write_rows
+
+        write_rows(file, trends)
+        output.log(f'rows in {file}')
     _show(output, trends, skipped)
     if options.report is not None:
         from shipdrag_ros.trend.page import write_trends  # pictures take long to import
 
-        write_trends(options.report, trends, skipped)
+        links = None if options.pages is None else _write_pages(output, options)
+        write_trends(options.report, trends, skipped, links=links)
         output.log(f'report in {options.report}')
     output.json(trend_json.document(trends, skipped))
     return 0
+
+
+def _write_pages(output: Output, options: argparse.Namespace) -> dict[tuple[str, int], str]:
+    """Write a page for each coastdown, and return where each is from the report."""
+    from shipdrag_ros.fleet.store import read_coastdowns
+    from shipdrag_ros.trend.coastdown_page import coastdown_page, links, page_name
+
+    folder, report = options.pages.absolute(), options.report.absolute()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        rows = read_coastdowns(options.store).to_pylist()
+        for row in rows:
+            text = coastdown_page(row, fleet=_way(folder, report))
+            (folder / page_name(row)).write_text(text, encoding='utf-8')
+    except OSError as error:
+        raise FleetError(f'--pages {str(options.pages)!r}: {error.strerror}') from error
+    output.log(f'{len(rows)} page(s) in {options.pages}')
+    return links(rows, f'{_way(report.parent, folder)}/')
+
+
+def _way(here: Path, there: Path) -> str:
+    """Return a relative URL."""
+    return quote(os.path.relpath(there, here).replace(os.sep, '/'))
 
 
 def _show(output: Output, trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]]) -> None:

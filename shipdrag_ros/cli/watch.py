@@ -8,7 +8,6 @@ import contextlib
 import ipaddress
 import os
 import stat
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
+from shipdrag_ros.live.fleet_pages import FLEET, FleetPages
 from shipdrag_ros.live.serve import listen, serve
 from shipdrag_ros.live.source import FASTEST, BagSource, NodeSource, PictureFeed
 from shipdrag_ros.ship import Ship
@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
     with page_socket, contextlib.ExitStack() as stack:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
         source: PictureFeed = stack.enter_context(_source(options, ship, past))
-        fleet = None if options.store is None else fleet_page(output, options.store)
+        fleet = None if options.store is None else fleet_pages(output, options.store)
         page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet)
         for note in notes:
             output.log(note)
@@ -141,16 +141,18 @@ def _source(
         yield node
 
 
-def fleet_page(output: Output, store: Path) -> str:
+def fleet_pages(output: Output, store: Path) -> FleetPages:
     """
-    Return the page of the fleet (HTML) by a store of `shipdrag fleet`.
+    Return the pages of the fleet by a store of `shipdrag fleet`.
     """
-    from shipdrag_ros.trend.page import write_trends  # pictures take long to import
+    # Parquet and pictures take long to import
+    from shipdrag_ros.fleet.store import read_coastdowns
+    from shipdrag_ros.trend.coastdown_page import links
+    from shipdrag_ros.trend.page import fleet_text
 
-    with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder) / 'fleet.html'
-        write_trends(page, *trends_of(output, store))
-        return page.read_text(encoding='utf-8')
+    rows = read_coastdowns(store).to_pylist()
+    text = fleet_text(*trends_of(output, store), links=links(rows, f'{FLEET}/'))
+    return FleetPages(text, rows)
 
 
 def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:

@@ -29,6 +29,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from shipdrag_ros import __version__
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
+from shipdrag_ros.live.fleet_pages import FleetPages
 from shipdrag_ros.live.frames import Frames
 from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
 from shipdrag_ros.live.source import PictureFeed
@@ -57,7 +58,7 @@ class LivePage:
     notes
         Lines about how the page was started, shown below it.
     fleet
-        The page of the fleet (HTML), shown under /fleet; None: none.
+        Shown under /fleet; None: none.
 
     Attributes
     ----------
@@ -72,7 +73,7 @@ class LivePage:
         *,
         token: str | None = None,
         notes: tuple[str, ...] = (),
-        fleet: str | None = None,
+        fleet: FleetPages | None = None,
     ) -> None:
         self.frames = Frames(lambda: source.bridge.trace.rows())
         self._source = source
@@ -90,6 +91,7 @@ class LivePage:
             routes=[
                 Route('/', self._page),
                 Route('/fleet', self._fleet_page),
+                Route('/fleet/{name}', self._fleet_page),
                 Route('/login', self._login, methods=['GET', 'POST']),
                 Route('/stream', _Stream(self._stream)),
                 Route('/player', self._control, methods=['POST']),
@@ -141,7 +143,13 @@ class LivePage:
         if self._fleet is None:
             return PlainTextResponse('No fleet: start the page with --store STORE.\n', 404)
         # a page on paper: its style and its pictures are in it, and it runs nothing
-        return HTMLResponse(self._fleet, headers={'Content-Security-Policy': _ON_PAPER})
+        name = request.path_params.get('name')
+        page: str | None = self._fleet.page
+        if name is not None:
+            page = await asyncio.to_thread(self._fleet.coastdown, name)
+        if page is None:
+            return PlainTextResponse('No such coastdown: go back to /fleet.\n', 404)
+        return HTMLResponse(page, headers={'Content-Security-Policy': _ON_PAPER})
 
     async def _login(self, request: Request) -> Response:
         if self._token is None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from shipdrag_ros import __version__
-from shipdrag_ros.display import Section, Table
+from shipdrag_ros.display import Link, Section, Table
 
 _TEMPLATE = 'page.html'
 _LISTED = 2  # sections with an entry, from which on a list of contents helps
@@ -25,12 +25,28 @@ def write_page(
     foot: str = '',
 ) -> None:
     """
-    Write a page of sections; what it is given is text, never markup.
+    Write a page of sections to a file; an existing one is replaced.
+
+    The other parameters are those of `page_text`.
+    """
+    text = page_text(title, sections, sentence=sentence, source=source, foot=foot)
+    path.write_text(text, encoding='utf-8')
+
+
+def page_text(
+    title: str,
+    sections: Sequence[Section],
+    *,
+    sentence: str = '',
+    source: str = '',
+    foot: str = '',
+    above: Link | None = None,
+) -> str:
+    """
+    Return a page of sections (HTML); what it is given is text, never markup.
 
     Parameters
     ----------
-    path
-        The file; an existing one is replaced.
     title
         Of the page.
     sections
@@ -40,6 +56,8 @@ def write_page(
         What was found, before all else.
     source, foot
         Where the data come from; where the formulas do.
+    above
+        Leads to the page that this one belongs to.
     """
     environment = Environment(
         loader=PackageLoader('shipdrag_ros.report', '.'),
@@ -57,8 +75,9 @@ def write_page(
         sections=tuple(enumerate(sections)),
         contents=sum(bool(section.entry) for section in sections) >= _LISTED,
         foot=foot,
+        above=above,
     )
-    path.write_text(text.lstrip(), encoding='utf-8')
+    return text.lstrip()
 
 
 def _sides(table: Table) -> tuple[str, ...]:

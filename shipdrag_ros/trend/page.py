@@ -3,15 +3,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from shipdrag_ros.display import Section, Table
-from shipdrag_ros.report.document import write_page
+import numpy as np
+
+from shipdrag_ros.display import Link, Section, Table, plus_minus, utc
+from shipdrag_ros.report.document import page_text
 from shipdrag_ros.trend import pictures, words
 from shipdrag_ros.trend.ship_trend import ShipTrend
 
 _RANKED = 'Each ship at her reference speed, the one to be cleaned first on top'
+_RUNS = 'Coastdowns, the latest first; ± is two standard deviations'
+Links = Mapping[tuple[str, int], str]
 _HOW = Section(
     'How to read it',
     lines=(
@@ -19,27 +23,45 @@ _HOW = Section(
         'hull, at the speed stated. It is what coastdowns show, without the propeller.',
         'The band holds what is known of the hull, not of a single run: weather and draught make '
         'runs scatter about it.',
-        'It is not the speed loss of ISO 19030, which compares shaft power and so counts the '
-        'propeller too. At equal effective power a hull whose resistance grew by 10 % is about '
-        '3 % slower, where power goes as the cube of the speed.',
+        'Speed lost is at equal effective power, where power goes as the cube of the speed: a '
+        'hull whose resistance grew by 10 % is about 3 % slower. It is not the speed loss of ISO '
+        '19030, which compares shaft power and so counts the propeller too.',
     ),
 )
 
 
 def write_trends(
-    path: Path, trends: Sequence[ShipTrend], skipped: Sequence[tuple[str, str]]
+    path: Path,
+    trends: Sequence[ShipTrend],
+    skipped: Sequence[tuple[str, str]],
+    *,
+    links: Links | None = None,
 ) -> None:
     """
-    Write the trends of a fleet as one HTML file.
+    Write the trends of a fleet to an HTML file; an existing one is replaced.
+
+    The other parameters are those of `fleet_text`.
+    """
+    path.write_text(fleet_text(trends, skipped, links=links), encoding='utf-8')
+
+
+def fleet_text(
+    trends: Sequence[ShipTrend],
+    skipped: Sequence[tuple[str, str]],
+    *,
+    links: Links | None = None,
+) -> str:
+    """
+    Return the trends of a fleet as one page (HTML).
 
     Parameters
     ----------
-    path
-        The file; an existing one is replaced.
     trends
         In the order of their rank.
     skipped
         Bag and reason of what the fleet could not use.
+    links
+        Where the page of each coastdown is, by bag and start; None where there are none.
     """
     sections = [Section('Which hull first', tables=((_RANKED, words.ranking(trends)),))]
     for trend in trends:
@@ -52,7 +74,7 @@ def write_trends(
                 lead=words.lines(trend)[:1],
                 lines=words.lines(trend)[1:],
                 pictures=drawn,
-                tables=steps if trend.events else (),
+                tables=(*(steps if trend.events else ()), (_RUNS, _runs(trend, links or {}))),
             )
         )
     if skipped:
@@ -64,7 +86,27 @@ def write_trends(
             )
         )
     sections.append(_HOW)
-    write_page(path, 'Trend of the fleet', sections, sentence=_sentence(trends))
+    return page_text('Trend of the fleet', sections, sentence=_sentence(trends))
+
+
+def _runs(trend: ShipTrend, links: Links) -> Table:
+    """Return a line a coastdown; its date leads to its page, where there is one."""
+    rows = []
+    for point in reversed(trend.points):
+        date, href = utc(point.time_ns), links.get((point.bag, point.time_ns))
+        loss = words.speed_lost(point.value)
+        known = bool(np.isfinite(point.value))
+        rows.append(
+            (
+                date if href is None else Link(date, href),
+                point.bag,
+                plus_minus(100.0 * point.value, 200.0 * point.sd) if known else '-',
+                '-' if loss is None or not known else f'{100.0 * loss:.1f}',
+                point.reason or 'used',
+            )
+        )
+    head = ('start', 'bag', 'added [%]', 'speed lost [%]', 'used, or why not')
+    return Table(head, tuple(rows))
 
 
 def _sentence(trends: Sequence[ShipTrend]) -> str:

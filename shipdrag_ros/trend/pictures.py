@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from shipdrag_ros.display import Picture
+from shipdrag_ros.display import M_S_PER_KNOT, Picture, force_unit
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION, picture
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.trend.ship_trend import ShipTrend
@@ -79,6 +82,50 @@ def draw_added_resistance(axes: Axes, trend: ShipTrend) -> None:
     axes.set_xlabel('date (UTC)')
     axes.xaxis_date()
     axes.legend(loc='upper left')
+
+
+def coastdown_curve(row: Mapping[str, Any], known: Int64, mass_kg: float) -> Picture:
+    """
+    Draw the resistance of one coastdown over that of the clean hull.
+
+    Parameters
+    ----------
+    row
+        Of the store's `coastdowns`.
+    known
+        Places of its grid where r is known.
+    mass_kg
+        Of the ship.
+    """
+    unit, name = force_unit(mass_kg)
+    with rc_context(STYLE):
+        figure = Figure(figsize=_SIZE, layout='constrained')
+        axes = figure.add_subplot()
+        knots = np.asarray(row['speed_m_s'], dtype=float) / M_S_PER_KNOT
+        force = mass_kg / unit * np.asarray(row['resistance_m_s2'], dtype=float)
+        spread = 2.0 * mass_kg / unit * np.asarray(row['sigma_m_s2'], dtype=float)
+        axes.fill_between(
+            knots[known],
+            (force - spread)[known],
+            (force + spread)[known],
+            color=BLUE,
+            alpha=0.2,
+            lw=0,
+            label='±2 standard deviations',
+        )
+        axes.plot(knots[known], force[known], color=BLUE, label='this run')
+        if row['clean_m_s2'] is not None:
+            clean = mass_kg / unit * np.asarray(row['clean_m_s2'], dtype=float)
+            axes.plot(knots[known], clean[known], color=VERMILION, ls='--', label='clean hull')
+        axes.set_xlabel('speed through water [knots]')
+        axes.set_ylabel(f'resistance [{name}]')
+        axes.set_ylim(bottom=0.0)
+        axes.legend(loc='upper left')
+    return picture(
+        figure,
+        'Resistance of this run over that of the clean hull. Where the band lies above the dashed '
+        'line, she needed more than clean.',
+    )
 
 
 def _days(time_ns: Int64) -> Float64:

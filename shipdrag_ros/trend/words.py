@@ -29,6 +29,7 @@ def ranking(trends: Sequence[ShipTrend]) -> Table:
                 trend.series.name,
                 f'{len(trend.series.used)} of {len(trend.series.points)}',
                 percent(trend.now),
+                _speed_lost(trend),
                 '-' if trend.power_kw is None else _plus_minus(trend.power_kw, 1.0),
                 '-' if costs is None else f'{costs.fuel_t_per_day:.2f}',
                 percent(trend.growth_per_year),
@@ -40,6 +41,7 @@ def ranking(trends: Sequence[ShipTrend]) -> Table:
         'ship',
         'runs used',
         'added now [%]',
+        'speed lost [%]',
         'effective power [kW]',
         'fuel [t/day]',
         'growth [% a year]',
@@ -91,10 +93,23 @@ def speed_loss(trend: ShipTrend) -> str:
     Power goes about as the cube of the speed; it is not the measure of ISO 19030, which needs
     shaft power.
     """
-    if trend.now is None or trend.now.value <= -0.9:
-        return ''
-    loss = 1.0 - (1.0 + trend.now.value) ** (-1.0 / 3.0)
-    return f', about {loss:.1%} of speed lost at equal effective power'
+    loss = None if trend.now is None else speed_lost(trend.now.value)
+    return '' if loss is None else f', about {loss:.1%} of speed lost at equal effective power'
+
+
+def speed_lost(added: float) -> float | None:
+    """
+    Return the share of speed lost at equal effective power; None where it cannot be said.
+
+    Power goes as the cube of the speed. It is not the measure of ISO 19030, which
+    needs shaft power.
+
+    Parameters
+    ----------
+    added
+        Resistance over that of the clean hull, a share of it.
+    """
+    return 1.0 - (1.0 + added) ** (-1.0 / 3.0) if added > -0.9 else None
 
 
 def event_table(trend: ShipTrend) -> Table:
@@ -113,6 +128,11 @@ def event_table(trend: ShipTrend) -> Table:
             for event in trend.events
         ),
     )
+
+
+def _speed_lost(trend: ShipTrend) -> str:
+    loss = None if trend.now is None else speed_lost(trend.now.value)
+    return '-' if loss is None else f'{100.0 * loss:.1f}'
 
 
 def percent(found: Parameter | None) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every block of Python in docs/python.md runs, in the order it stands there."""
+"""Every block of Python in docs/python.md and the README runs, in the order it stands there."""
 
 from __future__ import annotations
 
@@ -36,3 +36,13 @@ def test_the_blocks_run(
         'months.png',
     }
     assert (tmp_path / 'report.html').stat().st_size > 10_000
+
+
+def test_the_block_of_the_readme_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    text = PAGE.parents[1].joinpath('README.md').read_text(encoding='utf-8')
+    (block,) = re.findall(r'^```python\n([\s\S]*?)^```', text, flags=re.MULTILINE)
+    try:
+        exec(compile(block, 'README.md', 'exec'), {})
+    finally:
+        plt.close('all')
+    assert 'fouling' in capsys.readouterr().out

@@ -9,13 +9,13 @@ from typing import Any
 import httpx
 
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.watch import fleet_page
+from shipdrag_ros.cli.watch import fleet_pages
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.source import NodeSource
 
 
 def test_the_fleet_stands_under_the_page(serving: Any, browser: Any, fleet_store: Path) -> None:
-    page = LivePage(NodeSource(), fleet=fleet_page(Output(), fleet_store))
+    page = LivePage(NodeSource(), fleet=fleet_pages(Output(), fleet_store))
     with serving(page) as url:
         answer = httpx.get(f'{url}fleet')
         assert 'script-src' not in answer.headers['content-security-policy']
@@ -30,6 +30,15 @@ def test_the_fleet_stands_under_the_page(serving: Any, browser: Any, fleet_store
         wide = tab.evaluate('getComputedStyle(document.body).maxWidth')
         assert wide != 'none'  # its own style counts
         assert tab.evaluate('document.images[0].naturalWidth') > 0
+        dates = tab.locator('td a')
+        assert dates.count() == 12
+        dates.first.click()
+        tab.wait_for_url('**/fleet/*')
+        assert 'coastdown of' in tab.locator('h1').inner_text()
+        assert tab.evaluate('document.images[0].naturalWidth') > 0
+        tab.get_by_role('link', name='The fleet').click()
+        tab.wait_for_url('**/fleet')
+        assert httpx.get(f'{url}fleet/..%2fstate.json').status_code == 404
         assert said == []
         tab.close()
 

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
-from contextlib import closing, redirect_stderr, redirect_stdout
+from contextlib import closing, contextmanager, redirect_stdout
 from io import StringIO
 from math import isfinite, pi, radians, remainder
 from typing import Any
@@ -38,7 +39,7 @@ def _write(job: Job) -> StreamResult:
     def read(tally: Tally) -> Iterator[Reading]:
         found: list[Reading] = []
         try:
-            with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # it prints
+            with redirect_stdout(StringIO()), _silence():
                 log = DFReader_binary(str(job.source))
                 with closing(log):
                     found = list(_readings(log, tally))
@@ -47,6 +48,20 @@ def _write(job: Job) -> StreamResult:
         yield from found
 
     return import_stream(job, 'ardupilot', read)
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep from stderr what the compiled part of the reader writes there of each bad header."""
+    kept = os.dup(2)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def _readings(log: Any, tally: Tally) -> Iterator[Reading]:

@@ -53,7 +53,18 @@ def _write(job: Job) -> StreamResult:
         raise ImportDataError(
             f'{str(job.source)!r} is an ULog that cannot be read: {error or type(error).__name__}'
         ) from error
-    return import_stream(job, 'ulog', lambda tally: _read(log, tally))
+
+    def read(tally: Tally) -> Iterator[Reading]:
+        try:
+            found = list(_read(log, tally))
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+            # definitions that are damaged name other columns
+            raise ImportDataError(
+                f'{str(job.source)!r} is an ULog whose definitions are damaged: {error!r}'
+            ) from error
+        yield from found
+
+    return import_stream(job, 'ulog', read)
 
 
 def _read(log: Any, tally: Tally) -> Iterator[Reading]:
