@@ -70,7 +70,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for p, steps in track(RULES, console=Console(stderr=True)):
         order.SIGNIFICANCE, order.NEIGHBOURS = p, steps
         chosen = {
-            size: np.array([OrderTable(t.coefficients, t.sse, t.rows).plateau_order for t in some])
+            size: np.array(
+                [t.coefficients[OrderTable(t.coefficients, t.sse, t.rows).plateau()] for t in some]
+            )
             for size, some in known.items()
         }
         found = [

@@ -18,7 +18,7 @@ PACKAGE = ROOT / 'shipdrag_ros'
 
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
-    ('errors', 'samples', 'display', 'compiled', 'strict_yaml', 'plain_file'),
+    ('errors', 'samples', 'display', 'progress', 'compiled', 'strict_yaml', 'plain_file'),
     ('fields',),
     ('parameter',),
     ('parameters', 'ship', 'report'),
@@ -59,7 +59,13 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
         )
     },
 }
-GROUND = {'errors', 'compiled', 'strict_yaml', 'plain_file'}  # known by the modules that need them
+GROUND = {
+    'errors',
+    'progress',
+    'compiled',
+    'strict_yaml',
+    'plain_file',
+}  # known by the modules that need them
 ROS = {
     'rclpy',
     'lifecycle_msgs',

@@ -200,7 +200,8 @@ def test_without_a_home_it_is_kept_where_nobody_else_writes(toy: Path, tmp_path:
     for _ in range(2):
         assert run(toy, CALL, HOME=NOWHERE, TMPDIR=str(tmp_path)) == ('4.0', '')
     assert len(kept(place)) == 2
-    assert place.stat().st_mode & 0o777 == 0o700
+    for folder in (place, *{path.parent for path in kept(place)}):
+        assert folder.stat().st_mode & 0o777 == 0o700
 
 
 def test_a_link_that_somebody_laid_is_not_followed(toy: Path, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.progress import stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, LearntBaseline, learn_baseline
 from shipdrag_ros.display import Table
@@ -66,7 +67,8 @@ def run(options: argparse.Namespace) -> int:
         )
     runs = open_windowed(options.bags, remap=dict(options.remap))
     refuse_overlaps(runs)
-    coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship))
+    with stages(output) as progress:
+        coasts, ship, parameters = coasts_of(output, runs, Ship.load(options.ship), progress)
     found = learn_baseline(coasts, ship, parameters)
     options.out.write_text(found.ship.to_yaml(), encoding='utf-8')
     _show(output, found)

@@ -10,6 +10,7 @@ from pathlib import Path
 from shipdrag_ros.cli import diagnose_json
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.progress import stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis import Diagnosis, Verdict, with_effects
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
@@ -84,7 +85,8 @@ def run(options: argparse.Namespace) -> int:
     runs = open_windowed(options.bags, remap=dict(options.remap), window=window, output=output)
     refuse_overlaps(runs)
     facts = _facts(options.fact)
-    found, ship = diagnose_runs(output, runs, given, facts)
+    with stages(output) as progress:
+        found, ship = diagnose_runs(output, runs, given, facts, progress)
     if ship is None and options.write is not None:
         raise DiagnosisError(
             f'no ship file is attached to {runs[0].run.name!r}, and --write needs one; give it '

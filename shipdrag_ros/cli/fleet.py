@@ -5,21 +5,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros import display
 from shipdrag_ros.cli.arguments import add_json
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.progress import Lines
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
+from shipdrag_ros.progress import Progress
 
 if TYPE_CHECKING:  # help must come at once
-    from shipdrag_ros.fleet.update import Progress, Report
+    from shipdrag_ros.fleet.update import Report
 
 _SKIPPED = 1
 _EVERY_S = 15.0  # a line of progress, where there is no terminal
@@ -158,26 +158,7 @@ def _progress(output: Output) -> Iterator[Progress]:
         with output.progress('') as bar:
             yield lambda text, done, total: bar(done, total)
         return
-    yield _Lines(output.log).tell
-
-
-class _Lines:
-    """A line of progress now and then."""
-
-    def __init__(self, log: Callable[[str], None]) -> None:
-        self._log = log
-        self._text = ''
-        self._begun_s = self._told_s = 0.0
-
-    def tell(self, text: str, done: int, total: int) -> None:
-        now_s = time.monotonic()
-        if text != self._text:
-            self._text, self._begun_s, self._told_s = text, now_s, now_s
-        if now_s - self._told_s < _EVERY_S or done == 0:
-            return
-        self._told_s = now_s
-        left_s = (now_s - self._begun_s) / done * (total - done)
-        self._log(f'{text}: {done} of {total}, {display.duration(left_s)} left')
+    yield Lines(output.log, every_s=_EVERY_S, at_once=False).tell
 
 
 def _count(text: str) -> int:

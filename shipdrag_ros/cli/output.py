@@ -14,11 +14,13 @@ from typing import Any, TextIO
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as RichProgress
 from rich.table import Table as RichTable
 
 from shipdrag_ros.cli.arguments import STDOUT
 from shipdrag_ros.display import Table
+from shipdrag_ros.progress import Progress
 
 _PIPE_WIDTH = 160  # a file or a pipe has no width of its own; tables must not be cut there
 
@@ -87,18 +89,43 @@ class Output:
         callable
             To be told how much is done, and of how much.
         """
-        bar = Progress(
+        with self.bar() as bar:
+            yield lambda done, total: bar(text, done, total) if bar else None
+
+    @contextmanager
+    def bar(self) -> Iterator[Progress | None]:
+        """
+        Show a bar that goes on from one stage to the next.
+
+        Yields
+        ------
+        Progress
+            To be told of each stage, how much of it is done, and of how much; None
+            where no terminal shows it.
+        """
+        if not self._log.is_terminal:
+            yield None
+            return
+        bar = RichProgress(
             TextColumn('{task.description}', markup=False),
             BarColumn(),
             TextColumn('{task.percentage:.0f} %'),
             TimeRemainingColumn(),
             console=self._log,
             transient=True,
-            disable=not self._log.is_terminal,
         )
+        shown = ''
+
+        def tell(text: str, done: int, total: int) -> None:
+            nonlocal shown
+            if text != shown:
+                shown = text
+                bar.reset(task, description=text)
+            bar.update(task, completed=done, total=total or None)
+
         with bar:
-            task = bar.add_task(text, total=None)
-            yield lambda done, total: bar.update(task, completed=done, total=total)
+            task = bar.add_task('', total=None)
+            yield tell
 
     def json(self, document: Mapping[str, Any]) -> None:
         """

@@ -34,6 +34,7 @@ from shipdrag_ros.diagnosis.verdict import decide
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship.facts import advice as fact_advice
 from shipdrag_ros.simulation.effects import discriminating_measurements
@@ -60,6 +61,7 @@ def advice(
     model: CoastModel,
     posterior: Posterior,
     candidates: Sequence[Candidate],
+    progress: Progress = silent,
 ) -> tuple[Advice, ...]:
     """
     Return what would decide; first what is likely to cost the crew least.
@@ -72,6 +74,8 @@ def advice(
         Of what was found.
     candidates
         That the runs cannot tell apart.
+    progress
+        Told how many measurements are tried.
 
     Returns
     -------
@@ -89,7 +93,9 @@ def advice(
         Rival(names, one.log_evidence, one.hypothesis.log_odds) for names, one in fits.items()
     ]
     found: list[Advice] = []
-    for measure in (*_RUNS, *_INSTRUMENTS):
+    tried = (*_RUNS, *_INSTRUMENTS)
+    for done, measure in enumerate(tried):
+        progress('trying what would decide', done, len(tried))
         if _measured(measure, model.seen):
             continue
         settings, setting = _settings(measure, model, list(fits.values()))

@@ -38,6 +38,7 @@ from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
 DISCREPANCIES = ('force', 'log', 'radar')
+_SWINGING = 1  # place of something that swings in time
 _EVERYWHERE = (-1.8, -1.4, -1.0, -0.6, -0.2, 0.2, 0.8)  # z of what may be anywhere
 _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find from 0
 
@@ -100,7 +101,7 @@ class CoastModel(CoastSimulation):
             )
             for effect in self.ship.effects
         ]
-        log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES)))
+        log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES) + _SWINGING))
         found = Hypothesis((), (baseline, *given), places, log_prior=log_prior)
         return replace(found, log_prior=log_prior + self._log_facts(found))
 

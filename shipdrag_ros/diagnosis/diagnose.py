@@ -23,11 +23,13 @@ from shipdrag_ros.diagnosis.result import (
 )
 from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
 from shipdrag_ros.diagnosis.speeds import CoastRun
+from shipdrag_ros.diagnosis.swinging import swing_notes, swinging, with_swinging
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation.effect import Scope
 from shipdrag_ros.simulation.effects import find
@@ -43,6 +45,7 @@ def diagnose(
     *,
     facts: Sequence[Fact] = (),
     advise: bool = True,
+    progress: Progress = silent,
 ) -> Diagnosis:
     """
     Name the effect that is missing in a ship's model.
@@ -59,6 +62,8 @@ def diagnose(
         That a log book knows of all runs, whatever the ship file and the runs say.
     advise
         Whether to work out what would decide, which takes as long as all the rest.
+    progress
+        Told of each stage, how much of it is done, and of how much.
 
     Returns
     -------
@@ -101,29 +106,25 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    moved_s = {run.name: 0.0 for run in runs}
-    for _ in range(_LOOKS):
-        seen, notes = _observed(runs, ship, parameters, moved_s)
-        told = _told(runs, seen, ship, facts)
-        model = CoastModel(ship, seen, seen[0].heading_rad, told)
-        found = search(model)
-        more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
-        if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
-            break
-        moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
-    found = with_pairs(with_differing(found, model))
+    model, found, told, notes = _searched(runs, ship, parameters, facts, progress)
+    seen = model.seen
+    found = with_swinging(found, model)
+    found = with_pairs(with_differing(found, model), progress=progress)
     best = found.best
     predicted = held_out(model, best) if found.alarm else None
     # an instrument that errs before the stop has taught the noise what it should have shown
     distrusted = any(run.log_ground_discrepancy for run in seen) and not _of_the_ship(found)
-    judged = judge(found, held_out=predicted, distrusted=distrusted)
+    swings = swinging(model, best) if found.alarm else None
+    besides = () if swings is None else (swings,)
+    judged = judge(found, held_out=predicted, distrusted=distrusted, besides=besides)
     would_decide: tuple[Advice, ...] = ()
     if advise and judged.verdict is Verdict.ONE_OF:
-        would_decide = advice(model, judged.posterior, judged.candidates)
+        would_decide = advice(model, judged.posterior, judged.candidates, progress)
     as_stated = frozen(model)
     explained = best if judged.missing else found.nothing
     if judged.verdict is Verdict.UNKNOWN:
-        explained = max(found.smooth, key=lambda one: one.log_likelihood)
+        explained = max((*found.smooth, *besides), key=lambda one: one.log_likelihood)
+        notes = (*notes, *swing_notes(explained, model))
     differ = runs_differ(found) if judged.missing else ()
     place: Where | None = None
     if judged.verdict is not Verdict.NONE:
@@ -147,6 +148,27 @@ def diagnose(
     )
 
 
+def _searched(
+    runs: Sequence[CoastRun],
+    ship: Ship,
+    parameters: Parameters,
+    facts: Sequence[Fact],
+    progress: Progress,
+) -> tuple[CoastModel, SearchResult, Facts, tuple[str, ...]]:
+    """Search, and see the runs anew where that moves their stops; notes on them besides."""
+    moved_s = {run.name: 0.0 for run in runs}
+    for _ in range(_LOOKS):
+        seen, notes = _observed(runs, ship, parameters, moved_s, progress)
+        told = _told(runs, seen, ship, facts)
+        model = CoastModel(ship, seen, seen[0].heading_rad, told)
+        found = search(model, progress=progress)
+        more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
+        if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
+            break
+        moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
+    return model, found, told, notes
+
+
 def _told(
     runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
 ) -> Facts:
@@ -164,7 +186,11 @@ def _has_both(run: Observation) -> bool:
 
 
 def _observed(
-    runs: Sequence[CoastRun], ship: Ship, parameters: Parameters, moved_s: Mapping[str, float]
+    runs: Sequence[CoastRun],
+    ship: Ship,
+    parameters: Parameters,
+    moved_s: Mapping[str, float],
+    progress: Progress,
 ) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
     """
     Return the runs that can be diagnosed, and what is to be said about them.
@@ -173,10 +199,13 @@ def _observed(
     ----------
     moved_s
         By how much the stop of each run is later than it is taken for at first.
+    progress
+        Told how many runs are seen.
     """
     seen: list[Observation] = []
     refused: dict[str, DiagnosisError | EstimationError] = {}
-    for run in runs:
+    for done, run in enumerate(runs):
+        progress('learning the noise before the stop, of each run', done, len(runs))
         try:
             by_s = moved_s.get(run.name, 0.0)
             seen.append(

@@ -18,6 +18,7 @@ from scipy.special import log_ndtr
 
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Linearised
 from shipdrag_ros.parameter import Shape
+from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 
 _ANEW = (0, 3)  # iterations in which all derivatives are found anew
@@ -66,6 +67,9 @@ def fit(
     model: Linearised,
     hypotheses: Sequence[Hypothesis],
     starts: Sequence[Float64],
+    *,
+    progress: Progress = silent,
+    stage: str = 'fitting hypotheses',
 ) -> list[Fit]:
     """
     Fit hypotheses; those that cannot be have no evidence.
@@ -77,6 +81,10 @@ def fit(
     hypotheses
     starts
         (p,) each, as `Linear.z`.
+    progress
+        Told how many are fitted.
+    stage
+        What they are, for it.
 
     Returns
     -------
@@ -95,6 +103,7 @@ def fit(
     for number in range(model.iterations):
         if not active:
             break
+        progress(stage, len(states) - len(active), len(states))
         near = [None if number in _ANEW else s.best for s in active]
         points = model.linearise([s.hypothesis for s in active], [s.trial for s in active], near)
         for state, point in zip(active, points, strict=True):

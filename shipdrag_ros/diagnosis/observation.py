@@ -237,7 +237,7 @@ class _Learner:
         time = time[order]
         rows = Rows(time, kind.astype(np.int64), value)
         steady = time < self.lead_in_s - self.margin_s
-        damping, inertia = self._damping(np.array([self.speed_m_s]))
+        damping, inertia = damping_of(self.ship, np.array([self.speed_m_s]))
         seen = of_steady(
             Rows(time[steady], rows.kind[steady], value[steady]),
             variance[steady],
@@ -250,7 +250,7 @@ class _Learner:
         after = np.maximum(time - self.lead_in_s, 0.0)
         speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
         whitener = np.eye(len(time))
-        white = Noise(variance, WHITE, *self._damping(speed))
+        white = Noise(variance, WHITE, *damping_of(self.ship, speed))
         noise = noise_of(learnt, 0, rows, white, int(np.searchsorted(time, self.lead_in_s)))
         whiten(rows, whitener, noise)
         return Measured(
@@ -261,16 +261,31 @@ class _Learner:
             noise.slow.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
         )
 
-    def _damping(self, speed_m_s: Float64) -> tuple[Float64, Float64]:
-        """Return dr/dv / (1 + n_r) and 1 + n_r of the baseline."""
-        low, high = self.ship.baseline_range_m_s
-        speed = np.clip(speed_m_s, max(low, 1e-3 * high), high)
-        step = 1e-3 * speed
-        above, below = np.minimum(speed + step, high), np.maximum(speed - step, low)
-        rise = self.ship.resistance_n(above) - self.ship.resistance_n(below)
-        inertia = 1.0 + self.ship.n_r(speed)
-        damping = np.maximum(rise / (above - below), 0.0) / (self.ship.mass_kg * inertia)
-        return np.maximum(damping, 1e-6), inertia
+
+def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:
+    """
+    Return how a ship's speed answers a small force.
+
+    Parameters
+    ----------
+    ship
+        With a baseline.
+    speed_m_s : (n,)
+        Through water.
+
+    Returns
+    -------
+    damping_1_s, inertia : (n,)
+        dr/dv / (1 + n_r) and 1 + n_r of the baseline.
+    """
+    low, high = ship.baseline_range_m_s
+    speed = np.clip(speed_m_s, max(low, 1e-3 * high), high)
+    step = 1e-3 * speed
+    above, below = np.minimum(speed + step, high), np.maximum(speed - step, low)
+    rise = ship.resistance_n(above) - ship.resistance_n(below)
+    inertia = 1.0 + ship.n_r(speed)
+    damping = np.maximum(rise / (above - below), 0.0) / (ship.mass_kg * inertia)
+    return np.maximum(damping, 1e-6), inertia
 
 
 def _stopped(window: Window, run_down: RunDown, record: Record) -> RunDown:

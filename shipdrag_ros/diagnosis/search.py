@@ -21,6 +21,7 @@ from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
 from shipdrag_ros.diagnosis.posterior import QUIET, Posterior, mode_of, posterior_of
 from shipdrag_ros.diagnosis.terms import trial_z
 from shipdrag_ros.parameter import Parameter, Shape
+from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
 
@@ -77,7 +78,7 @@ class SearchResult:
         return tuple(fit(model, more, [start(model, one, best.best) for one in more]))
 
 
-def search(model: Model) -> SearchResult:
+def search(model: Model, *, progress: Progress = silent) -> SearchResult:
     """
     Fit nothing, each effect, and something unnamed.
 
@@ -85,10 +86,12 @@ def search(model: Model) -> SearchResult:
     ----------
     model
         With the record that it is held against.
+    progress
+        Told how many hypotheses are fitted.
 
     Returns
     -------
-    Found
+    SearchResult
         Without pairs.
     """
     nothing = fit(model, [model.nothing], [start(model, model.nothing)])[0]
@@ -96,11 +99,12 @@ def search(model: Model) -> SearchResult:
     likely = _likeliest_starts(model, named, nothing)
     unnamed = [model.with_discrepancy(model.nothing, channel) for channel in model.channels]
     both = [*likely, *unnamed]
-    fits = fit(model, both, [start(model, one, nothing.best) for one in both])
+    starts = [start(model, one, nothing.best) for one in both]
+    fits = fit(model, both, starts, progress=progress)
     return SearchResult(model, nothing, (nothing, *fits))
 
 
-def with_pairs(found: SearchResult) -> SearchResult:
+def with_pairs(found: SearchResult, *, progress: Progress = silent) -> SearchResult:
     """
     Fit pairs of effects besides, where something is missing.
 
@@ -111,15 +115,18 @@ def with_pairs(found: SearchResult) -> SearchResult:
     ----------
     found
         From `search`.
+    progress
+        Told how many pairs are fitted.
 
     Returns
     -------
-    Found
+    SearchResult
         The same where nothing may be missing.
     """
     if found.posterior.nothing >= QUIET:
         return found
-    return replace(found, fits=(*found.fits, *_pairs(found.model, found.posterior)))
+    pairs = _pairs(found.model, found.posterior, progress)
+    return replace(found, fits=(*found.fits, *pairs))
 
 
 def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -> Float64:
@@ -178,7 +185,7 @@ def _likeliest_starts(
     return [one for ones in kept.values() for one in ones]
 
 
-def _pairs(model: Model, posterior: Posterior) -> list[Fit]:
+def _pairs(model: Model, posterior: Posterior, progress: Progress) -> list[Fit]:
     """Fit pairs of the likeliest names with all others."""
     first = [names for names in posterior.named() if names][:_PAIRED]
     tried: list[tuple[float, Hypothesis, Fit]] = []
@@ -200,4 +207,5 @@ def _pairs(model: Model, posterior: Posterior) -> list[Fit]:
         if len(kept) < _PAIRS:
             kept.setdefault(mode_of(hypothesis), (hypothesis, base))
     starts = [start(model, hypothesis, base.best) for hypothesis, base in kept.values()]
-    return fit(model, [hypothesis for hypothesis, _ in kept.values()], starts)
+    hypotheses = [hypothesis for hypothesis, _ in kept.values()]
+    return fit(model, hypotheses, starts, progress=progress, stage='fitting pairs of effects')

@@ -22,7 +22,7 @@ from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.parameter import Parameter
 
-_SET = 0.99  # of the candidates
+SET = 0.99  # of the candidates
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _SHAPE_SD = 2.5  # prior standard deviations of a shape parameter of an effect
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
@@ -81,7 +81,11 @@ class Judgement:
 
 
 def judge(
-    found: SearchResult, *, held_out: Gap | None = None, distrusted: bool = False
+    found: SearchResult,
+    *,
+    held_out: Gap | None = None,
+    distrusted: bool = False,
+    besides: Sequence[Fit] = (),
 ) -> Judgement:
     """
     Return the verdict on what a search found.
@@ -95,6 +99,8 @@ def judge(
         without.
     distrusted
         The measurements themselves are known to be wrong.
+    besides
+        Fits of the most probable hypothesis with something more that has no name.
 
     Returns
     -------
@@ -105,7 +111,7 @@ def judge(
     doubted = distrusted or (
         found.alarm
         and (
-            has_residual_structure(best, found.with_discrepancy())
+            has_residual_structure(best, (*found.with_discrepancy(), *besides))
             or outside_prior(best)
             or (held_out is not None and exceeds_noise(held_out.chi2_per_sample, best.best.rows))
         )
@@ -264,6 +270,6 @@ def _smallest(posterior: Posterior) -> tuple[Candidate, ...]:
     for names in posterior.named():
         found.append(Candidate(names, posterior.probability[names]))
         held += posterior.probability[names]
-        if held >= _SET * total:
+        if held >= SET * total:
             break
     return tuple(found)

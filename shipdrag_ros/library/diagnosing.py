@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.diagnosis import (
@@ -22,6 +23,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
 from shipdrag_ros.library.windowed import Span, WindowedRun
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay import (
     ReplayResult,
     accepted_samples,
@@ -41,6 +43,7 @@ def diagnose_runs(
     runs: Sequence[WindowedRun],
     given: Ship | None,
     facts: Sequence[Fact],
+    progress: Progress = silent,
 ) -> tuple[Diagnosis, Ship | None]:
     """
     Diagnose by what the records hold: coastdowns, or sailing alone.
@@ -55,6 +58,8 @@ def diagnose_runs(
         The ship; None: the one attached to the first run that has one.
     facts
         Of all runs.
+    progress
+        Told of each stage, how much of it is done, and of how much.
 
     Returns
     -------
@@ -69,24 +74,27 @@ def diagnose_runs(
     windowed = any(window is not None for _, window in runs)
     if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        return _unused(_sailing(runs, f'No coastdown was found: {why}.'), facts), None
-    seen = _found(listener, runs, given)
+        return _unused(_sailing(runs, f'No coastdown was found: {why}.', progress), facts), None
+    seen = _found(listener, runs, given, progress)
     if not seen.coasts:
         why = f'No coastdown was found {"; ".join(seen.without)}.'
-        return _unused(_sailing(runs, why), (*seen.ship.facts, *facts)), seen.ship
+        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts)), seen.ship
     if seen.ship.baseline is None:
+        progress('fitting a form of the resistance', 0, 0)
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
-        found = _with_log_track(found, runs)
+        found = _with_log_track(found, runs, progress)
     else:
-        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts)
+        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
 
 
-def _with_log_track(found: Diagnosis, runs: Sequence[WindowedRun]) -> Diagnosis:
+def _with_log_track(
+    found: Diagnosis, runs: Sequence[WindowedRun], progress: Progress
+) -> Diagnosis:
     """Hold the logs against the ways over ground besides; a note says why not."""
     try:
-        return with_log_track(found, _sailing(runs, ''))
+        return with_log_track(found, _sailing(runs, '', progress))
     except DiagnosisError as error:
         why = f'the log was not held against the way over ground: {str(error).strip()}'
         return replace(found, notes=(*found.notes, why))
@@ -97,9 +105,13 @@ def _unused(found: Diagnosis, facts: Sequence[Fact]) -> Diagnosis:
     return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
 
 
-def _sailing(runs: Sequence[WindowedRun], no_coastdown: str) -> Diagnosis:
+def _sailing(runs: Sequence[WindowedRun], no_coastdown: str, progress: Progress) -> Diagnosis:
     """Hold the logs against the ways over ground."""
-    read = [(run.name, *accepted_samples(run, zeros=True)) for run, _ in runs]
+    read = []
+    for done, (run, _) in enumerate(runs):
+        progress(f'reading {run.name}', done, len(runs))
+        read.append((run.name, *accepted_samples(run, zeros=True)))
+    progress('holding the log against the way over ground', 0, 0)
     records = [SailingRecord(name, block) for name, block, _ in read]
     try:
         return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
@@ -109,7 +121,10 @@ def _sailing(runs: Sequence[WindowedRun], no_coastdown: str) -> Diagnosis:
 
 
 def coasts_of(
-    listener: Listener, runs: Sequence[WindowedRun], given: Ship | None
+    listener: Listener,
+    runs: Sequence[WindowedRun],
+    given: Ship | None,
+    progress: Progress = silent,
 ) -> tuple[list[CoastRun], Ship, Parameters]:
     """
     Find the coastdowns of all bags.
@@ -122,6 +137,8 @@ def coasts_of(
         Where to look.
     given
         The ship; None: the one attached to the first run.
+    progress
+        Told of each stage, how much of it is done, and of how much.
 
     Returns
     -------
@@ -133,7 +150,7 @@ def coasts_of(
     DiagnosisError
         If there is none.
     """
-    seen = _found(listener, runs, given)
+    seen = _found(listener, runs, given, progress)
     if not seen.coasts:
         raise DiagnosisError(
             f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
@@ -159,6 +176,7 @@ def _found(
     listener: Listener,
     runs: Sequence[WindowedRun],
     given: Ship | None,
+    progress: Progress,
 ) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
@@ -166,8 +184,9 @@ def _found(
     estimates: list[Estimate] = []
     ship, parameters = given, None
     for each, window in runs:
-        with listener.progress(f'replaying {each.name}') as progress:
-            result = replay(each, ship=ship, window=window, progress=progress)
+        stage = partial(progress, f'replaying {each.name}')
+        stage(0, 0)
+        result = replay(each, ship=ship, window=window, progress=stage)
         ship, parameters = ship or result.ship, parameters or result.parameters
         sheet, of_run = _sheet(listener, each, ship)
         for name in clocks_apart(result):

@@ -121,11 +121,6 @@ class OrderTable:
         """
         return int(np.argmax(self._settled(significance or SIGNIFICANCE)))
 
-    @property
-    def plateau_order(self) -> int:
-        """How many coefficients the smallest fit in the plateau has."""
-        return int(self.coefficients[self.plateau()])
-
     def plateau_at(self, variance: float) -> int | None:
         """
         Return the row of the smallest fit in a plateau at a known variance.

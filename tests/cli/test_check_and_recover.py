@@ -102,3 +102,10 @@ def test_no_bag_is_an_error(
     for name in ('nowhere.mcap', 'text.mcap'):
         assert main([verb[0], name, *verb[1:]]) == 1
         assert capsys.readouterr().err.startswith(f"ERROR: '{name}'")
+
+
+def test_recover_asks_where_to_write(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(['recover', 'a.mcap'])
+    assert end.value.code == 2
+    assert '-o/--out' in capsys.readouterr().err

@@ -135,7 +135,7 @@ def test_neither_a_coastdown_nor_enough_sailing_is_an_error(
 ) -> None:
     assert main(['diagnose', str(steady_bag)]) == 1
     said = capsys.readouterr().err
-    assert said.startswith('ERROR: No coastdown was found in ')
+    assert '\nERROR: No coastdown was found in ' in said
     assert 'by speed_through_water nothing slowed' in said
     assert 'give a longer record' in said
 

@@ -90,6 +90,8 @@ def test_the_run_file_of_each_bag(tmp_path: Path) -> None:
     (tmp_path / 'one' / 'run.yaml').write_text('of c')
     touch(tmp_path / 'two' / 'd_000.mcap', tmp_path / 'two' / 'd_001.mcap')
     (tmp_path / 'two' / 'run.yaml').write_text('of d')
+    (tmp_path / 'none').mkdir()
+    (tmp_path / 'none' / 'run.yaml').write_text('of no bag')
     found = find([str(tmp_path)])
     assert {each.bag: each.run for each in found.sources} == {
         'many/a.mcap': 'of a',

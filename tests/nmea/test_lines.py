@@ -16,6 +16,14 @@ def test_lines_by_any_end() -> None:
     assert splitter.feed(b'$E') == []
     assert splitter.end() == ['$E']
     assert splitter.end() == []
+    assert splitter.feed(b'$F\n') == ['$F']  # the next datagram, or connection
+
+
+def test_a_line_that_is_skipped_ends_with_its_datagram() -> None:
+    splitter = LineSplitter()
+    assert splitter.feed(b'x' * (LINE_BYTES + 1)) == []
+    assert splitter.end() == []
+    assert splitter.feed(b'$A\n') == ['$A']
 
 
 def test_what_is_no_text_is_counted() -> None:

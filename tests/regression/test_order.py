@@ -11,6 +11,11 @@ from shipdrag_ros.regression import OrderTable, OrthogonalBasis, fit_orders
 from shipdrag_ros.regression.order import SIGNIFICANCE
 
 
+def plateau_order(table: OrderTable) -> int:
+    """How many coefficients the smallest fit in the plateau has."""
+    return int(table.coefficients[table.plateau()])
+
+
 def test_published_surface_degrees() -> None:
     # m_x on 17 x 17 points at degrees 3, 4, 5: S5 keeps 4
     table = OrderTable.of([10, 15, 21], [0.002438, 6.776e-5, 6.506e-5], rows=289)
@@ -20,7 +25,7 @@ def test_published_surface_degrees() -> None:
     np.testing.assert_allclose(table.f[2], 1.85, rtol=5e-3)
     np.testing.assert_allclose(table.p[2], 0.09, rtol=2e-2)
     assert table.plateau() == 1
-    assert table.plateau_order == 15
+    assert plateau_order(table) == 15
 
 
 def test_probabilities_against_scipy_stats() -> None:
@@ -41,7 +46,7 @@ def test_one_idle_step_is_not_a_plateau() -> None:
     # an odd term after an even one that is not there
     table = OrderTable.of(range(1, 6), [100.0, 99.9, 1.0, 0.999, 0.998], rows=100)
     assert table.p[1] > SIGNIFICANCE > table.p[2]
-    assert table.plateau_order == 3
+    assert plateau_order(table) == 3
 
 
 @pytest.mark.filterwarnings('error')
@@ -49,8 +54,8 @@ def test_exact_fits_are_rounding_not_steps() -> None:
     table = OrderTable.of(range(1, 6), [10.0, 4.0, 1e-28, 1e-29, 0.0], rows=9, rounding=1e-26)
     assert table.f[2] == np.inf
     np.testing.assert_array_equal(table.p[2:], [0.0, 1.0, 1.0])
-    assert table.plateau_order == 3
-    assert OrderTable.of([1, 2], [0.0, 0.0], rows=5).plateau_order == 1
+    assert plateau_order(table) == 3
+    assert plateau_order(OrderTable.of([1, 2], [0.0, 0.0], rows=5)) == 1
 
 
 def test_polynomials_of_known_degree_without_noise() -> None:
@@ -58,7 +63,7 @@ def test_polynomials_of_known_degree_without_noise() -> None:
     basis = OrthogonalBasis.on(time, 20)
     for degree in (1, 3, 6):
         values = 1e3 + np.polynomial.Chebyshev(0.2 ** np.arange(degree + 1))(time)
-        assert fit_orders(basis, values)[1].plateau_order == degree + 1
+        assert plateau_order(fit_orders(basis, values)[1]) == degree + 1
 
 
 def test_known_variance() -> None:
@@ -78,7 +83,7 @@ def test_known_variance() -> None:
 def test_a_plateau_above_the_known_variance_is_not_the_last() -> None:
     # a term of high order behind idle ones
     table = OrderTable.of(range(1, 8), [1e4, 110.0, 109.0, 108.0, 107.0, 52.0, 51.5], rows=60)
-    assert table.plateau_order == 2
+    assert plateau_order(table) == 2
     assert table.coefficients[table.plateau_at(1.0)] == 6
 
 
@@ -102,7 +107,7 @@ def test_false_choice_rate() -> None:
     runs = 2000
     orders = np.array(
         [
-            fit_orders(basis, truth + noise)[1].plateau_order
+            plateau_order(fit_orders(basis, truth + noise)[1])
             for noise in rng.normal(size=(runs, 100))
         ]
     )

@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hulls compared are all drawn."""
+"""Hulls compared are all drawn, and cuts are named."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import pytest
+
+from shipdrag_ros.coastdown.events import Coastdown, Dismissal, NotCoastdown
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.replay import pictures
 from shipdrag_ros.replay.hulls import RankedHull
@@ -19,3 +24,17 @@ def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
     ]
     (dot,) = [line for line in axis.get_lines() if line.get_marker() == 'o'][:1]
     assert dot.get_xdata() == [0.1]
+
+
+def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: Coastdown) -> None:
+    start_ns, end_ns = coastdown.start_ns, coastdown.end_ns
+    length_ns = end_ns - start_ns
+    cuts = tuple(
+        NotCoastdown(start_ns + round(a * length_ns), start_ns + round(b * length_ns), reason, '')
+        for a, b, reason in ((0.5, 0.8, Dismissal.THRUST), (0.9, 0.91, Dismissal.TURN))
+    )
+    shown = replace(coastdown, cuts=cuts, stretch=((start_ns, 8.0), (end_ns, 1.0)))
+    axis = pictures.cut_picture(shown, None, 2e7).axes[0]
+    assert [text.get_text() for text in axis.texts] == [cuts[0].reason.value]
+    assert len(axis.patches) == len(cuts)
+    assert axis.get_xlim() == pytest.approx((0.0, length_ns * 1e-9))

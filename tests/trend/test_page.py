@@ -33,6 +33,9 @@ def test_json_is_the_contracts(fleet_store, tmp_path, capsys):
     assert 'Test &lt;b&gt;ship&lt;/b&gt;' in page
     assert '<b>ship</b>' not in page
     assert 'data:image/svg+xml' in page
+    # power goes about as the cube of the speed
+    loss = 1.0 - (1.0 + ship['now']['value']) ** (-1.0 / 3.0)
+    assert f', about {loss:.1%} of speed lost at equal effective power.' in page
 
 
 def test_questions_in_sql_read_the_store_and_no_file(fleet_store, tmp_path, capsys):

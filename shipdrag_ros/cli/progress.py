@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far something long is: a bar in a terminal, else a line now and then; always on stderr."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import duration
+from shipdrag_ros.progress import Progress
+
+_EVERY_S = 3.0  # between lines
+
+
+@contextmanager
+def stages(output: Output) -> Iterator[Progress]:
+    """
+    Tell of one stage after the other, and of compiling where that is really done.
+
+    Parameters
+    ----------
+    output
+        Whose log it goes to.
+
+    Yields
+    ------
+    Progress
+        To be told of each stage, how much of it is done, and of how much.
+    """
+    from numba.core import event  # long to import, and help must come at once
+
+    from shipdrag_ros.cli.compiling import Compiling
+
+    with output.bar() as bar:
+        tell = bar or Lines(output.log, every_s=_EVERY_S, at_once=True).tell
+        with event.install_listener('numba:compile', Compiling(output.log)):
+            yield tell
+
+
+class Lines:
+    """
+    A line of progress now and then.
+
+    Parameters
+    ----------
+    log
+        Where the lines go.
+    every_s
+        Between two of them, at least [s].
+    at_once
+        Whether the first word is told without waiting.
+    """
+
+    def __init__(self, log: Callable[[str], None], *, every_s: float, at_once: bool) -> None:
+        self._log = log
+        self._every_s = every_s
+        self._text = ''
+        self._begun_s = self._told_s = time.monotonic()
+        self._waits = not at_once
+
+    def tell(self, text: str, done: int, total: int) -> None:
+        """
+        Say how far a stage is, with the time left in it, unless a line was said just now.
+        """
+        now_s = time.monotonic()
+        if text != self._text:
+            self._text, self._begun_s = text, now_s
+        if self._waits and (not done or now_s - self._told_s < self._every_s):
+            return
+        self._waits, self._told_s = True, now_s
+        if not done:
+            self._log(text if total < 2 else f'{text}: 0 of {total}')
+            return
+        left_s = (now_s - self._begun_s) / done * (total - done)
+        self._log(f'{text}: {done} of {total}, {duration(round(left_s))} left')

@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How something long tells how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+Progress = Callable[[str, int, int], None]
+"""Called with a stage in words, how much of it is done, and of how much."""
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Tell nobody."""
