@@ -137,8 +137,8 @@ def _imported(
 ) -> Run:
     folder = TemporaryDirectory(prefix='shipdrag-import-')
     bag = Path(folder.name) / 'imported.mcap'
-    declared_parts = [(_declared(source, options), source) for source in sources]
-    parts = [(each, _job(each, source, bag, options)) for each, source in declared_parts]
+    declared_parts = [(format_of(source, options), source) for source in sources]
+    parts = [(each, job_of(each, source, bag, options)) for each, source in declared_parts]
     try:
         found = import_joined(parts, bag, {})
     except ImportDataError as error:
@@ -183,24 +183,35 @@ def import_file(
     BagError
         If the bag cannot be made.
     """
-    declared = _declared(source, options or {})
-    job = _job(declared, source, bag, options or {}, attachments)
+    declared = format_of(source, options or {})
+    job = job_of(declared, source, bag, options or {}, attachments)
     return Understanding(source, declared.kind, declared.write(job))
 
 
-def _declared(source: Path, options: Mapping[str, Any]) -> Format:
+def format_of(source: Path, options: Mapping[str, Any]) -> Format:
+    """
+    Return the format of a file: the one that an option chooses, or by its beginning.
+
+    Raises
+    ------
+    ImportDataError
+        If it is of none that is known.
+    """
     known = formats.found()
     asked = next((each for each in known if each.chosen_by in options), None)
     return asked or best_of(known, head_of(source))
 
 
-def _job(
+def job_of(
     declared: Format,
     source: Path,
     bag: Path,
     options: Mapping[str, Any],
     attachments: Mapping[str, str] | None = None,
 ) -> Job:
+    """
+    Return what a format is asked to do, with those of the options that it knows.
+    """
     own = {option.key for option in declared.options}
     values = {key: value for key, value in options.items() if key in own}
     return Job(source, bag, values, attachments or {})

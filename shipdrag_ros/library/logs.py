@@ -1,13 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of other programs made bags, which everything else reads."""
+"""Logs, tables and frames made runs; what belongs together is joined."""
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
-BAGS = ('.mcap', '.zstd')
+from shipdrag_ros.bags import Run
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing.format import Format, Job
+from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
+from shipdrag_ros.importing.join import import_joined
+from shipdrag_ros.importing.reading import ImportedRun, format_of, job_of
+from shipdrag_ros.importing.table import Table
+from shipdrag_ros.library.frames import NANOSECONDS, is_frame, write_table
+from shipdrag_ros.samples import SECOND_NS
+
+_NEAR_NS = 600 * SECOND_NS  # logs that begin so soon after another one ends continue it
+_FRAME = 'frame'
 
 
 @dataclass(frozen=True)
@@ -29,6 +43,20 @@ class Told:
     time: str | None = None
     rate_hz: float | None = None
 
+    def of_dates(self, dates: Sequence[str]) -> Told:
+        """
+        Take the first column of dates for the time, where no other is told.
+
+        Parameters
+        ----------
+        dates
+            Columns that hold ns since the epoch.
+        """
+        time = self.time
+        if time is None and self.rate_hz is None and dates:
+            time = dates[0]
+        return replace(self, time=f'{time}:{NANOSECONDS}' if time in dates else time)
+
     @property
     def maps(self) -> tuple[str, ...]:
         """The columns as `shipdrag import --map` takes them."""
@@ -37,64 +65,144 @@ class Told:
             for name, columns in (self.columns or {}).items()
         )
 
+    def options(self, source: Path, *, alone: bool) -> dict[str, Any]:
+        """
+        Return the options of `shipdrag import` for a file.
+
+        Parameters
+        ----------
+        source
+        alone
+            Whether it must have all the columns; of several files each takes those
+            that it has, and one that has none is read by what it says itself.
+        """
+        found: dict[str, Any] = {}
+        maps = [text for text in self.maps if alone or _is_in(text, source)]
+        if maps:
+            found['map'] = maps
+        if self.time is not None:
+            found['time'] = parse_time(self.time)
+        if self.rate_hz is not None:
+            found['rate'] = self.rate_hz
+        return found
+
+
+def _is_in(text: str, source: Path) -> bool:
+    """Tell whether a file is a table that has the columns of an input."""
+    try:
+        table = Table(source)
+        for name in parse_input(text).names:
+            table.column(name)
+    except ImportDataError:
+        return False
+    return True
+
 
 @dataclass(frozen=True)
-class Imported:
-    """
-    A log that has become a bag.
+class _Part:
+    """A source that can be read by itself."""
 
-    Attributes
-    ----------
-    bag
-    dated
-        Whether its times are dates; others count from the start of a test.
-    notes
-        What of it was not used, and why.
-    """
-
-    bag: Path
+    place: int
+    declared: Format
+    job: Job
+    run: Run
     dated: bool
-    notes: tuple[str, ...]
 
 
-def is_bag(path: Path) -> bool:
+def read_logs(
+    sources: Sequence[Any], told: Told, attachments: Mapping[str, str]
+) -> tuple[list[Run], list[str]]:
     """
-    Tell whether a path is read as it is: a file of MCAP, or a folder.
-    """
-    return path.is_dir() or path.suffix in BAGS or path.name == 'metadata.yaml'
-
-
-def import_log(source: Path, bag: Path, told: Told, attachments: Mapping[str, str]) -> Imported:
-    """
-    Make a bag of a log.
+    Make runs of logs, tables and frames.
 
     Parameters
     ----------
-    source
-        In any format of `importing.formats`.
-    bag
-        MCAP file to make.
+    sources
+        Paths and frames.
     told
-        How the columns of a table are to be read.
+        How tables and frames are to be read.
     attachments
         Text by name, a ship file for instance.
+
+    Returns
+    -------
+    runs, notes
+        In the order given; what of the sources was not used, and why.
 
     Raises
     ------
     ImportDataError
-        If it cannot be read.
+        If one cannot be read.
     """
-    from shipdrag_ros.importing.formats.csv.columns import parse_time
-    from shipdrag_ros.importing.reading import import_file
+    folder = TemporaryDirectory(prefix='shipdrag-')
+    parts: list[_Part] = []
+    notes: list[str] = []
+    for place, source in enumerate(sources):
+        place_of = (Path(folder.name), place, len(sources) == 1)
+        part, said = _part(source, place_of, told, attachments)
+        parts.append(part)
+        notes += said
+    _refuse_missing(told, [part.job.source for part in parts])
+    runs: list[Run] = []
+    for number, group in enumerate(_groups(parts)):
+        if len(group) == 1:
+            runs.append(group[0].run)
+            continue
+        bag = Path(folder.name) / f'joined-{number}.mcap'
+        joined = import_joined([(each.declared, each.job) for each in group], bag, attachments)
+        notes += joined.notes
+        whole = ImportedRun(bag, [each.job.source for each in group])
+        whole.name = ', '.join(each.run.name for each in group)
+        runs.append(whole)
+    for run in runs:  # the folder stays as long as any run that reads from it
+        weakref.finalize(run, _let_go, folder)
+    return runs, notes
 
-    options: dict[str, object] = {}
-    if told.maps:
-        options['map'] = told.maps
-    if told.time is not None:
-        options['time'] = parse_time(told.time)
-    if told.rate_hz is not None:
-        options['rate'] = told.rate_hz
-    found = import_file(source, bag, options=options, attachments=attachments)
-    notes = [*found.result.summary(source)[1:], *found.result.details()]
-    dated = getattr(found.result, 'base_ns', None) is None
-    return Imported(bag, dated, tuple(f'{source.name}: {note}' for note in notes))
+
+def _refuse_missing(told: Told, sources: Sequence[Path]) -> None:
+    """Refuse columns that none of the sources has."""
+    for text in told.maps:
+        if not any(_is_in(text, source) for source in sources):
+            raise ImportDataError(f'columns {text!r}: none of the sources has them; name others')
+
+
+def _part(
+    source: Any, place_of: tuple[Path, int, bool], told: Told, attachments: Mapping[str, str]
+) -> tuple[_Part, list[str]]:
+    """Read a source by itself; return it, and what of it was not used."""
+    folder, place, alone = place_of
+    name, path = str(source), source
+    if is_frame(source):
+        name, path = _FRAME, folder / f'{place}.csv'
+        told = told.of_dates(write_table(source, path))
+    options = told.options(path, alone=alone)
+    declared = format_of(path, options)
+    bag = folder / f'{place}.mcap'
+    job = job_of(declared, path, bag, options, attachments)
+    found = declared.write(job)
+    run = ImportedRun(bag, [path])
+    run.name = name
+    notes = [*found.summary(path)[1:], *found.details()]
+    dated = getattr(found, 'base_ns', None) is None
+    return _Part(place, declared, job, run, dated), [f'{name}: {note}' for note in notes]
+
+
+def _groups(parts: Sequence[_Part]) -> list[list[_Part]]:
+    """Put together the parts whose dates follow or cover each other, in the order given."""
+    groups: list[list[_Part]] = []
+    end_ns = 0
+    for part in sorted(parts, key=lambda each: each.run.span_ns or (0, 0)):
+        start_ns, last_ns = part.run.span_ns or (0, 0)
+        if part.dated and groups and groups[-1][0].dated and start_ns - end_ns <= _NEAR_NS:
+            groups[-1].append(part)
+            end_ns = max(end_ns, last_ns)
+            continue
+        groups.append([part])
+        end_ns = last_ns
+    # effects of the earth are stated along the run that was given first
+    found = [sorted(group, key=lambda part: part.place) for group in groups]
+    return sorted(found, key=lambda group: group[0].place)
+
+
+def _let_go(folder: TemporaryDirectory[str]) -> None:
+    """Forget a folder, which goes when nobody holds it any more."""

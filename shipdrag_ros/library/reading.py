@@ -6,25 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
-from shipdrag_ros.bags import BagWriter, Run, open_runs
-from shipdrag_ros.bags.locate import BagFiles
-from shipdrag_ros.bags.mcap_file import McapFile
-from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.library.frames import NANOSECONDS, is_frame, write_table
-from shipdrag_ros.library.logs import Imported, Told, import_log, is_bag
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.replay.playback import SHIP_FILE
-from shipdrag_ros.samples import SECOND_NS, Block, concatenate, in_arrival_order
 from shipdrag_ros.ship import Ship
-
-NEAR_S = 600.0
-"""Logs that begin so soon after another one ends continue it."""
-
-_FOLDER = 'shipdrag-'
-_FRAME = 'frame'
 
 
 def read(
@@ -42,17 +30,20 @@ def read(
     Parameters
     ----------
     source
-        Path of a bag (MCAP file or rosbag2 directory), of a log of NMEA 0183 or of a
-        table (CSV); a frame of pandas or polars; or a list of these, all of one ship.
+        Path of a bag (MCAP file or rosbag2 directory), of a log in any format that
+        `shipdrag import` knows, or of a table (CSV); a frame of pandas or polars; or a
+        list of these, all of one ship.
     ship
         The ship, or the path of her file; None: the one attached to the bag.
     columns
         Which column of a table or frame is which input, with its unit behind a colon:
         `{'speed_through_water': 'log:kn', 'position': ('lat:deg', 'lon:deg')}`. Without
-        a unit it is SI. None: the columns have the names of the inputs.
+        a unit it is SI. Of several tables each takes the columns that it has. None:
+        columns are known by their usual names and units.
     time
-        Column of the time, with its unit (`s ms us ns`) behind a colon; s without one.
-        Not needed of a frame with a column or an index of dates.
+        Column of the time: dates, or a count with its unit (`s ms us ns`) behind a
+        colon. Not needed where its name says it, and of a frame with a column or an
+        index of dates.
     rate_hz
         Rows a second [Hz], where there is no column of the time.
     remap
@@ -61,7 +52,7 @@ def read(
     Returns
     -------
     Record
-        Bags are a run each. Logs and frames whose times follow or cover each other
+        Bags are a run each. Logs and frames whose dates follow or cover each other
         are joined to one run, those that count from the start of a test are not.
 
     Raises
@@ -87,95 +78,18 @@ def read(
     >>> sd.read(frame, ship=ship, columns={'speed_through_water': 'log:kn'}, time='t')
     <Record: a ship without a name, 1 run, 1200 messages>
     """
+    from shipdrag_ros.library.frames import is_frame
+
     given = ship if ship is None or isinstance(ship, Ship) else Ship.load(ship)
     alone = isinstance(source, str | PathLike) or is_frame(source)
-    sources = [source] if alone else list(source)
-    told = Told(columns, time, rate_hz)
-    bags = [Path(each) for each in sources if not is_frame(each) and is_bag(Path(each))]
-    others = [each for each in sources if is_frame(each) or not is_bag(Path(each))]
+    sources = [each if is_frame(each) else Path(each) for each in ([source] if alone else source)]
+    bags = [each for each in sources if isinstance(each, Path) and is_bag(each)]
     runs = open_runs(bags, remap=remap) if bags else []
+    others = [each for each in sources if not (isinstance(each, Path) and is_bag(each))]
     if not others:
         return Record(runs, given=given)
-    folder = TemporaryDirectory(prefix=_FOLDER)
+    from shipdrag_ros.library.logs import Told, read_logs  # a bag needs no importer
+
     attachments = {} if given is None else {SHIP_FILE: given.to_yaml()}
-    made: list[tuple[Run, bool]] = []
-    notes: list[str] = []
-    for number, each in enumerate(others):
-        bag = Path(folder.name) / f'{number}.mcap'
-        name, imported = _imported(each, bag, told, attachments)
-        made.append((_run(name, imported.bag), imported.dated))
-        notes += imported.notes
-    joined = _joined(made, Path(folder.name), attachments)
-    return Record([*runs, *joined], given=given, notes=notes, folder=folder)
-
-
-def _imported(
-    source: Any, bag: Path, told: Told, attachments: Mapping[str, str]
-) -> tuple[str, Imported]:
-    """Make a bag of a log or of a frame; return how it is called, too."""
-    if not is_frame(source):
-        return str(source), import_log(Path(source), bag, told, attachments)
-    table = bag.with_suffix('.csv')
-    dates = write_table(source, table)
-    time = told.time
-    if time is None and told.rate_hz is None and dates:
-        time = dates[0]
-    if time in dates:
-        time = f'{time}:{NANOSECONDS}'
-    return _FRAME, import_log(table, bag, Told(told.columns, time, told.rate_hz), attachments)
-
-
-def _run(name: str, bag: Path) -> Run:
-    return Run(BagFiles(name, (bag,)), [McapFile(bag)])
-
-
-def _joined(
-    made: Sequence[tuple[Run, bool]], folder: Path, attachments: Mapping[str, str]
-) -> list[Run]:
-    """Join the runs that follow or cover each other."""
-    given = [run for run, _ in made]
-    groups: list[list[Run]] = []
-    for run, dated in sorted(made, key=lambda each: each[0].span_ns or (0, 0)):
-        if dated and groups and run.span_ns is not None:
-            ends = [each.span_ns[1] for each in groups[-1] if each.span_ns is not None]
-            if ends and run.span_ns[0] - max(ends) <= NEAR_S * SECOND_NS:
-                groups[-1].append(run)
-                continue
-        groups.append([run])
-    found = []
-    # effects of the earth are stated along the run that was given first
-    groups.sort(key=lambda group: min(given.index(run) for run in group))
-    for number, group in enumerate(groups):
-        if len(group) == 1:
-            found += group
-            continue
-        _refuse_rivals(group)
-        bag = folder / f'joined-{number}.mcap'
-        with BagWriter(bag) as writer:
-            for name, text in attachments.items():
-                writer.attach(name, text)
-            writer.write_samples(in_arrival_order([_block(run) for run in group]))
-        found.append(_run(f'{group[0].name} and {len(group) - 1} more', bag))
-    return found
-
-
-def _block(run: Run) -> Block:
-    return concatenate([item for item in run.inputs() if isinstance(item, Block)])
-
-
-def _refuse_rivals(group: Sequence[Run]) -> None:
-    """Refuse two sources of one input at one time: they would be mixed."""
-    for number, one in enumerate(group):
-        for other in group[:number]:
-            assert one.span_ns is not None
-            assert other.span_ns is not None
-            if one.span_ns[0] > other.span_ns[1]:
-                continue
-            shared = {topic.input for topic in one.topics} & {
-                topic.input for topic in other.topics
-            }
-            if shared:
-                raise ImportDataError(
-                    f'{other.name!r} and {one.name!r} both give {", ".join(map(str, shared))} at '
-                    'the same time; give one of them, or read each by itself'
-                )
+    imported, notes = read_logs(others, Told(columns, time, rate_hz), attachments)
+    return Record([*runs, *imported], given=given, notes=notes)

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,8 +43,6 @@ class Record(Shown):
         The ship; None: the one attached to each run.
     notes
         What of the sources was not used, and why, a line each.
-    folder
-        Of bags that were made for this record; it goes when the record does.
 
     Raises
     ------
@@ -63,7 +60,7 @@ class Record(Shown):
     >>> record
     <Record: Vitus Bering, 1 run, 5204 messages>
     >>> print(record.summary()[1])
-    simulated: 1300 s (22 min) from 2026-06-01 08:00:00 UTC
+    simulated, seed 0: 1300 s (22 min) from 2026-06-01 08:00:00 UTC
     >>> [coastdown.ended_by for coastdown in record.coastdowns()]
     ['record_end']
     """
@@ -74,14 +71,12 @@ class Record(Shown):
         *,
         given: Ship | None = None,
         notes: Sequence[str] = (),
-        folder: TemporaryDirectory[str] | None = None,
     ) -> None:
         if not runs:
             raise BagError('no run was read; give a bag, a log or a table of measurements')
         self.runs = tuple(runs)
         self.given = given
         self.notes = tuple(notes)
-        self._folder = folder
 
     @property
     def ship(self) -> Ship | None:
@@ -127,7 +122,7 @@ class Record(Shown):
             If the file exists, or the record has several runs or files.
         """
         out = Path(path)
-        files = [file for run in self.runs for file in run.paths]
+        files = [part.path for run in self.runs for part in run.parts]
         if len(files) != 1:
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -140,7 +141,11 @@ def simulate(
     folder = TemporaryDirectory(prefix='shipdrag-')
     bag = Path(folder.name) / f'{NAME}.mcap'
     write_bag(bag, block, ship, truth, Notes())
-    return Record([Run(BagFiles(NAME, (bag,)), [McapFile(bag)])], folder=folder)
+    # two runs of one day are told apart by their names
+    name = f'{NAME}, seed {seed}' + (f', heading {heading_rad:.4g} rad' if heading_rad else '')
+    run = Run(BagFiles(name, (bag,)), [McapFile(bag)])
+    weakref.finalize(run, folder.cleanup)
+    return Record([run])
 
 
 def _stated(name: str, size: Size) -> StatedEffect:

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files and frames of one ship become one record."""
+
+from __future__ import annotations
+
+import gc
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+
+import shipdrag_ros as sd
+from shipdrag_ros.samples import Channel
+
+LOG = {'speed_through_water': 'log:kn'}
+KNOT = 1852.0 / 3600.0
+SHIP = sd.Ship(name='Coaster', length_m=80.0, displaced_volume_m3=4000.0)
+
+
+def table(count: int = 60) -> dict[str, Any]:
+    seconds = np.arange(float(count))
+    return {'t': seconds, 'log': 12.0 / (1.0 + seconds / 700.0), 'revs': np.full(count, 90.0)}
+
+
+def dates(count: int = 60, *, later_s: int = 0) -> Any:
+    start = pd.Timestamp('2026-03-01T08:00:00') + pd.Timedelta(later_s, unit='s')
+    return start + pd.to_timedelta(np.arange(count), unit='s')
+
+
+def speeds(record: sd.Record) -> Any:
+    block = record.samples()
+    return block.value[block.channel == Channel.SPEED_THROUGH_WATER, 0]
+
+
+@pytest.mark.parametrize('make', [pd.DataFrame, pl.DataFrame])
+def test_a_frame_gives_the_numbers_that_are_in_it(make: Any) -> None:
+    data = table()
+    record = sd.read(make(data), ship=SHIP, columns=LOG, time='t')
+    assert speeds(record).tolist() == (data['log'] * KNOT).tolist()
+    assert record.ship == SHIP
+    assert repr(record) == '<Record: Coaster, 1 run, 60 messages>'
+
+
+@pytest.mark.parametrize('zone', [None, 'Europe/Rome'])
+def test_dates_are_read_in_utc(zone: str | None) -> None:
+    frame = pd.DataFrame(table()).drop(columns='t')
+    frame.index = dates().tz_localize(zone) if zone else dates()
+    record = sd.read(frame, columns=LOG)
+    hour = 7 if zone else 8
+    assert record.samples().stamp_ns[0] == pd.Timestamp(f'2026-03-01T{hour:02d}:00Z').value
+    polars = pl.DataFrame({**table(), 'when': dates().to_numpy()}).drop('t')
+    if zone:
+        polars = polars.with_columns(pl.col('when').dt.replace_time_zone(zone))
+    again = sd.read(polars, columns=LOG)
+    assert again.samples().stamp_ns.tolist() == record.samples().stamp_ns.tolist()
+
+
+def test_missing_values_are_counted_and_not_made_up() -> None:
+    frame = pd.DataFrame(table())
+    frame.loc[3, 'log'] = np.nan
+    frame.loc[4, 'log'] = np.inf
+    record = sd.read(frame, columns=LOG, time='t')
+    assert len(speeds(record)) == 58
+    assert any('empty' in note for note in record.notes)
+    assert any('not a number' in note for note in record.notes)
+
+
+def test_a_table_is_read_as_the_frame_of_it(tmp_path: Path) -> None:
+    frame = pd.DataFrame(table())
+    frame.to_csv(tmp_path / 'log.csv', index=False)
+    told = {'columns': LOG, 'time': 't'}
+    one, other = sd.read(tmp_path / 'log.csv', **told), sd.read(frame, **told)
+    assert speeds(one).tolist() == speeds(other).tolist()
+    assert one.runs[0].name == str(tmp_path / 'log.csv')
+
+
+def test_rows_a_second_instead_of_times() -> None:
+    record = sd.read(pd.DataFrame(table()), columns=LOG, rate_hz=2.0)
+    assert np.diff(record.samples().stamp_ns).tolist() == [500_000_000] * 59
+
+
+def test_files_that_follow_each_other_are_one_run() -> None:
+    first, second = (
+        pd.DataFrame(table(), index=dates(later_s=s)).drop(columns='t') for s in (0, 60)
+    )
+    record = sd.read([second, first], columns=LOG)
+    assert len(record.runs) == 1
+    assert np.diff(record.samples().stamp_ns).tolist() == [10**9] * 119
+
+
+def test_instruments_of_the_same_time_are_one_run() -> None:
+    whole = pd.DataFrame(table(), index=dates()).drop(columns='t')
+    told = {**LOG, 'shaft': 'revs:rpm'}
+    both = sd.read([whole[['log']], whole[['revs']]], columns=told)
+    assert len(both.runs) == 1
+    assert {topic.input for topic in both.runs[0].topics} == {'speed_through_water', 'shaft'}
+
+
+def test_days_apart_and_tests_without_dates_are_runs_of_their_own() -> None:
+    near, far = (
+        pd.DataFrame(table(), index=dates(later_s=s)).drop(columns='t') for s in (0, 86_400)
+    )
+    assert len(sd.read([near, far], columns=LOG).runs) == 2
+    tests = [pd.DataFrame(table()), pd.DataFrame(table())]
+    assert len(sd.read(tests, columns=LOG, time='t').runs) == 2
+
+
+def test_bags_are_a_run_each(bag: Path, record: sd.Record) -> None:
+    read = sd.read([bag])
+    assert read.ship == record.ship
+    assert read.to_frame().equals(record.to_frame())
+    other = sd.Ship(name='other', length_m=90.0, displaced_volume_m3=5000.0)
+    assert sd.read(str(bag), ship=other).ship == other
+
+
+def test_what_was_read_can_be_saved_with_its_ship(tmp_path: Path) -> None:
+    record = sd.read(pd.DataFrame(table()), ship=SHIP, columns=LOG, time='t')
+    saved = sd.read(record.save(tmp_path / 'saved.mcap'))
+    assert saved.ship == SHIP
+    assert speeds(saved).tolist() == speeds(record).tolist()
+    with pytest.raises(sd.ShipdragError, match='exists; choose another name'):
+        record.save(tmp_path / 'saved.mcap')
+
+
+def test_what_cannot_be_read_says_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(sd.ShipdragError, match='does not exist'):
+        sd.read('missing.mcap')
+    with pytest.raises(sd.ShipdragError, match='no row'):
+        sd.read(pd.DataFrame({'log': []}), columns=LOG)
+    with pytest.raises(sd.ShipdragError, match="no column 'log'"):
+        sd.read(pd.DataFrame({'t': [1.0], 'speed': [2.0]}), columns=LOG, time='t')
+    with pytest.raises(sd.ShipdragError, match='give a bag, a log or a table'):
+        sd.read([])
+    (tmp_path / 'ship.yaml').write_text('length_m: -1')
+    with pytest.raises(sd.ShipdragError, match='length_m'):
+        sd.read(pd.DataFrame(table()), ship=tmp_path / 'ship.yaml', columns=LOG, time='t')
+
+
+def test_no_file_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    record = sd.read(pd.DataFrame(table()), columns=LOG, time='t')
+    simulated = sd.simulate(sd.Ship.example(), duration_s=10.0, lead_in_s=10.0)
+    assert len(simulated.samples()) > 10
+    del record, simulated
+    gc.collect()
+    assert list(tmp_path.iterdir()) == []

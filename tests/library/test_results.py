@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results show themselves: in a line, in a notebook, as a frame, as a picture, as a page."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+
+import shipdrag_ros as sd
+
+
+@pytest.fixture(scope='module')
+def found(record: sd.Record) -> sd.Resistance:
+    return sd.estimate(record)
+
+
+@pytest.fixture(scope='module')
+def diagnosis(record: sd.Record) -> sd.Diagnosis:
+    return sd.diagnose(record)
+
+
+def test_each_says_in_a_line_what_it_is(
+    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
+) -> None:
+    assert repr(record) == '<Record: Vitus Bering, 1 run, 5204 messages>'
+    assert repr(found).startswith('<Resistance: Vitus Bering, 1 coastdown; ')
+    assert 'kN at' in repr(found)
+    assert repr(found.coastdowns[0]).startswith('<Coastdown: 2026-06-01 08:06:')
+    assert repr(diagnosis).startswith('<Diagnosis: Vitus Bering, named: log scale (')
+
+
+def test_a_notebook_shows_text_and_a_table_and_nothing_else(
+    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
+) -> None:
+    for each in (record, found, found.coastdowns[0], diagnosis):
+        page = each._repr_html_()
+        assert page.count('<table>') == page.count('</table>') == 1
+        assert page.count('<p>') == 1 + len(each.summary())
+    named = sd.Record(record.runs, given=sd.Ship(name='<b>', length_m=80, displaced_volume_m3=4e3))
+    assert '<b>' not in named._repr_html_()
+    assert '&lt;b&gt;' in named._repr_html_()
+
+
+def test_the_frame_is_the_curve(found: sd.Resistance) -> None:
+    frame = found.to_frame()
+    curve = found.curve
+    assert frame['resistance_m_s2'].to_numpy().tobytes() == curve.resistance_m_s2.tobytes()
+    assert np.all(np.diff(frame['speed_m_s']) > 0.0)
+    newtons = frame['resistance_m_s2'] * found.ship.mass_kg
+    assert np.allclose(frame['resistance_n'], newtons)
+    assert np.allclose(frame['over_clean_hull'], newtons / frame['clean_hull_n'] - 1.0)
+    assert len(found.coastdowns[0].to_frame()) == len(frame)
+
+
+def test_without_pandas_the_frame_says_what_is_missing(
+    found: sd.Resistance, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, 'pandas', None)
+    with pytest.raises(sd.ShipdragError, match='pip install pandas'):
+        found.to_frame()
+
+
+def test_plots_are_drawn_on_the_axes_given(
+    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
+) -> None:
+    figure, axes = plt.subplots(1, 3)
+    try:
+        for ax, each in zip(axes, (record, found, diagnosis)):
+            assert each.plot(ax) is ax
+            assert ax.lines
+            assert ax.get_xlabel()
+            assert ax.get_ylabel()
+        alone = found.coastdowns[0].plot()
+        assert isinstance(alone, Axes)
+        assert alone.figure is not figure
+    finally:
+        plt.close('all')
+
+
+def test_the_diagnosis_is_told_in_full(diagnosis: sd.Diagnosis) -> None:
+    (effect,) = diagnosis.effects
+    factor = effect.parameters['factor']
+    assert abs(factor.value + 0.15) < 4.0 * factor.sd
+    frame = diagnosis.to_frame()
+    row = frame[frame['effect'] == 'log_scale'].iloc[0]
+    assert (row['parameter'], row['value'], row['sd']) == ('factor', factor.value, factor.sd)
+    better = diagnosis.ship_with_effects()
+    assert [each.name for each in better.effects] == ['log_scale']
+    assert diagnosis.gap_after is not None
+    assert diagnosis.gap_after.chi2_per_sample < diagnosis.gap_before.chi2_per_sample
+    assert diagnosis.gaps().rows
+    with pytest.raises(sd.ShipdragError, match='run 7 is not there'):
+        diagnosis.plot(run=7)
+    with pytest.raises(sd.ShipdragError, match=r"'depth' was not compared .* but speed_through"):
+        diagnosis.plot(quantity='depth')
+
+
+def test_pages_are_written(found: sd.Resistance, diagnosis: sd.Diagnosis, tmp_path: Path) -> None:
+    for each in (found, diagnosis):
+        each.report(tmp_path / 'page.html')
+        assert (tmp_path / 'page.html').read_text(encoding='utf-8').startswith('<!')
+
+
+def test_several_coastdowns_are_one_curve(record: sd.Record) -> None:
+    other = sd.simulate(
+        sd.Ship.example(),
+        duration_s=900.0,
+        lead_in_s=400.0,
+        heading_rad=np.pi,
+        seed=4,
+        first_heading_rad=0.0,
+    )
+    both = sd.estimate([other, sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)])
+    assert both.combined is not None
+    assert both.curve is not None
+    assert both.curve.speed_m_s.tobytes() == both.combined.speed_m_s.tobytes()
+    assert '2 coastdowns together.' in ' '.join(both.summary())
+    try:
+        assert len(both.plot().lines) >= 3
+    finally:
+        plt.close('all')
+
+
+def test_where_there_is_no_coastdown_it_says_why() -> None:
+    steady = sd.simulate(sd.Ship.example(), duration_s=5.0, lead_in_s=400.0)
+    found = sd.estimate(steady)
+    assert found.coastdowns == ()
+    assert repr(found) == '<Resistance: Vitus Bering, no coastdowns>'
+    assert found.summary()[0].startswith('No coastdown found')
+    for ask in (lambda: found.curve, found.plot, found.to_frame):
+        with pytest.raises(sd.ShipdragError, match='No coastdown found'):
+            ask()
+    assert 'No coastdown found' in found._repr_html_()
+
+
+def test_what_is_no_record_is_refused() -> None:
+    with pytest.raises(sd.ShipdragError, match=r'make one with shipdrag_ros\.read'):
+        sd.estimate(['run.mcap'])  # type: ignore[list-item]
+    ship = sd.Ship.example()
+    with pytest.raises(sd.ShipdragError, match='lead_in'):
+        sd.simulate(ship, lead_in=3.0)  # type: ignore[call-arg]
+    with pytest.raises(sd.ShipdragError, match='along_track_m_s is missing'):
+        sd.simulate(ship, {'current': {'cross_track_m_s': 1.0}})
+    with pytest.raises(sd.ShipdragError, match="'weed' is not known"):
+        sd.simulate(ship, {'weed': 1.0})
+    with pytest.raises(sd.ShipdragError, match='expected a date of ISO 8601'):
+        sd.simulate(ship, start='yesterday')
+
+
+def test_a_trend_says_what_it_is_of() -> None:
+    nothing = sd.trends([])
+    assert nothing.summary() == ('No coastdown was given: no trend.',)
+    with pytest.raises(sd.ShipdragError, match='there is no ship'):
+        nothing.plot()
+    with pytest.raises(sd.ShipdragError, match="no ship is called 'North'"):
+        nothing.of('North')
+    with pytest.raises(sd.ShipdragError, match='expected one of cleaning'):
+        sd.trends([], events={'North': [('2026-03-01', 'painting')]})
+    with pytest.raises(sd.ShipdragError, match='own events'):
+        sd.trends('store', events={})
