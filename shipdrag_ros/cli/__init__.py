@@ -62,6 +62,9 @@ VERBS = (
     *(Verb(study.verb, f'{package}.face.verb', study.summary) for package, study in found()),
 )
 
+# matrices here are small: threads that wait for each other cost up to twenty times the work
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
 USER_ERROR = 1
 INTERRUPTED, BROKEN_PIPE = 130, 141  # what a shell reports of a program killed by SIGINT, SIGPIPE
 
