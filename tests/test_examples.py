@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import glob
 import gzip
+import importlib.util
 import os
 import re
 import shlex
@@ -21,7 +22,7 @@ import pytest
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import VERBS, main
 from shipdrag_ros.fleet.store import Store
-from shipdrag_ros.samples import INPUTS, Block, concatenate
+from shipdrag_ros.samples import INPUTS, Block, Channel, concatenate
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = (ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md')))
@@ -86,6 +87,30 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with gzip.open(folder / 'LOG.nmea.gz', 'wt') as log:
         log.writelines(nmea(second) for second in range(60))
     return folder
+
+
+def make_logs(folder: Path) -> None:
+    """Make a file of each format that docs/import.md names."""
+    place = ROOT / 'benchmarks' / '_log_samples.py'
+    spec = importlib.util.spec_from_file_location('_log_samples', place)
+    assert spec is not None
+    assert spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    names = {'csv': 'bridge.csv', 'candump': 'candump.log', 'yacht_devices': 'ydwg.raw'}
+    names |= {'nmea': 'log.nmea', 'ros1': 'ros1.bag'}
+    for kind, (name, content) in made.samples(folder).items():
+        (folder / names.get(kind, name)).write_bytes(content)
+    head, *rows = [line.split(',') for line in made.csv().decode().split('\n')]
+    for name, columns in (('receiver', (0, 2, 3, 4)), ('speed_log', (0, 1))):
+        lines = (','.join(row[column] for column in columns) for row in [head, *rows])
+        (folder / f'{name}.csv').write_text('\n'.join(lines))
+    run = samples_of(str(folder / 'run.mcap'))
+    log = run[run.channel == Channel.SPEED_THROUGH_WATER]
+    speeds = [
+        f'{stamp / 1e9:.3f},{value:.5f}' for stamp, value in zip(log.stamp_ns, log.value[:, 0])
+    ]
+    (folder / 'LOG').write_text('\n'.join(['time,speed_through_water', *speeds]))
 
 
 def nmea(second: int) -> str:
@@ -195,6 +220,8 @@ def test_the_examples_of_a_page_run(folder: Path, page: str) -> None:
     lines = [line for line in OF_PAGES[page] if not line.startswith(NOT_HERE)]
     if any(DATA in line for line in lines) and DATA not in os.environ:
         pytest.skip(f'needs the folder of records in {DATA}')
+    if 'import.md' in page:
+        make_logs(folder)
     if 's4_residual' in page:  # a ship whose form the regression knows
         (folder / 'ship.yaml').write_text(RIVER_SHIP)
     for name in {name for line in lines for name in re.findall(r'-o (\S+)', line)}:
@@ -231,10 +258,13 @@ def test_the_columns_that_the_help_shows_are_read_as_it_says(
     assert x_km[-1] == pytest.approx([295.0, 0.0])
 
 
-def values(bag: str) -> list[list[float]]:
+def samples_of(bag: str) -> Block:
     (opened,) = open_runs([Path(bag)])
-    block = concatenate([item for item in opened.inputs() if isinstance(item, Block)])
-    found: list[list[float]] = block.value.tolist()
+    return concatenate([item for item in opened.inputs() if isinstance(item, Block)])
+
+
+def values(bag: str) -> list[list[float]]:
+    found: list[list[float]] = samples_of(bag).value.tolist()
     return found
 
 

@@ -155,7 +155,7 @@ def _facts(row: Row) -> Table:
         'speed at the stop': row['speed_at_stop_m_s']
         and ship_speed(row['speed_at_stop_m_s'], _mass_kg(row)),
         'draught': row['draught_m'] and f'{row["draught_m"]:.2f} m',
-        'displacement': f'{row["displaced_volume_m3"]:.0f} m³',
+        'displaced volume': f'{row["displaced_volume_m3"]:.0f} m³',
         'told by the log book': ', '.join(row['facts'] or ()),
         'to be weighed': ', '.join(flags),
         'no estimate, because': row['error'],
