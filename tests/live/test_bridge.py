@@ -228,4 +228,10 @@ def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(
     assert len(found) == 2
     assert {str(each).partition(':')[0] for each in found} == {'broken.mcap', 'out.mcap'}
     with pytest.raises(ShipdragError, match='is no folder'):
-        list(recorded_runs(tmp_path / 'none'))
+        list(recorded_runs(tmp_path / 'out.mcap'))
+
+
+def test_a_folder_that_the_node_has_yet_to_make_is_told(tmp_path: Path) -> None:
+    (told,) = recorded_runs(tmp_path / 'records')
+    assert isinstance(told, str)
+    assert 'records: there is no such folder so far' in told
