@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 
 M_S_PER_KNOT = 1852.0 / 3600.0
 # what `float` takes besides, 1_000 or nan or infinity, is no measured number
-NUMBER = re.compile(r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,4})?')
+NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
 """Below it a ship is told in kg and N, above in t and kN."""
 

@@ -34,7 +34,7 @@ UNITS = (
 )
 """What stands in a line of units."""
 
-_UNIT = re.compile(r'[\[(]?\s*([^\[\]()]*?)\s*[\])]?')
+_UNIT = re.compile(r'[\[(]?([^\[\]()]*)[\])]?')
 
 
 class Row(NamedTuple):
@@ -75,6 +75,8 @@ class Table:
         Lines before the table.
     width
         Number of columns.
+    joined_lines
+        Lines that the last reading of the rows took as part of a cell in quotation marks.
 
     Raises
     ------
@@ -84,6 +86,7 @@ class Table:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.joined_lines = 0
         lines = self._first_lines()
         first = lines[0][1] if lines else ''
         if not first:
@@ -133,7 +136,8 @@ class Table:
         best: tuple[tuple[int, int], _Layout] | None = None
         for mark in DELIMITERS:
             rows = [self._cells(line, mark) for line in lines]
-            start = next((place for place, row in enumerate(rows) if len(row) > 1), None)
+            # a title of a spreadsheet is followed by empty cells
+            start = next((i for i, row in enumerate(rows) if sum(map(bool, row)) > 1), None)
             if start is None:
                 continue
             rest = rows[start:]
@@ -193,6 +197,7 @@ class Table:
         """
         total = self.path.stat().st_size
         above = (self.header is not None) + (self.units is not None)
+        self.joined_lines = 0
         with self._decoded() as (raw, file):
             lines = self._lines(file, raw)
             for _ in range(self._skip):
@@ -215,7 +220,10 @@ class Table:
             return
         reader = csv.reader(lines, delimiter=delimiter)
         try:
+            last = 0
             for cells in reader:
+                self.joined_lines += reader.line_num - last - 1
+                last = reader.line_num
                 stripped = [cell.strip() for cell in cells]
                 if any(stripped):
                     yield Row(above + reader.line_num, stripped)
@@ -257,7 +265,7 @@ class Table:
 
 def _units(cells: Sequence[str]) -> tuple[str, ...] | None:
     """Return the units of a line that holds nothing else; None of any other line."""
-    found = [match[1] if (match := _UNIT.fullmatch(cell)) else cell for cell in cells]
+    found = [match[1].strip() if (match := _UNIT.fullmatch(cell)) else cell for cell in cells]
     known = sum(each.lower() in UNITS for each in found)
     if not known or any(NUMBER.fullmatch(cell) or _DATE.fullmatch(cell) for cell in cells):
         return None

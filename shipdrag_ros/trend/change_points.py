@@ -77,7 +77,7 @@ def search(runs: Runs, known: Steps, growth: Growth) -> Found:
     more = OneMore(state)
     while len(taken) < _MOST and more.probability.sum() >= PROBABLE:
         year, probability = _most_likely(more)
-        if probability < _DATED:
+        if probability < _DATED or year in taken:  # two at one time are one
             break
         taken.append(year)
         state = HullState(runs, _with(known, taken), growth, outlier=state.outlier)

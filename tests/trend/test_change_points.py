@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from shipdrag_ros.trend import change_points
 from shipdrag_ros.trend.change_points import search
 from shipdrag_ros.trend.hull_state import Growth, Runs, Steps
 
@@ -50,3 +51,10 @@ def test_too_few_runs_have_no_unknown_step():
         np.array([0.0, 0.5, 1.0]), np.array([0.0, 0.3, 0.3]), np.full(3, 0.01), np.zeros((3, 0))
     )
     assert search(seen, Steps(), Growth()).steps == ()
+
+
+def test_two_steps_at_one_time_are_one(monkeypatch):
+    monkeypatch.setattr(change_points, 'PROBABLE', 0.0)
+    monkeypatch.setattr(change_points, '_most_likely', lambda more: (0.5, 0.9))
+    seen, _ = ship(np.random.default_rng(14))
+    assert [step.year for step in search(seen, Steps(), Growth()).steps] == [0.5]

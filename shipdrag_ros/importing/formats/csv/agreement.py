@@ -26,6 +26,8 @@ def track_speed(time_s: Float64, latitude: Float64, longitude: Float64) -> Float
     latitude, longitude : (n,)
         [deg].
     """
+    if not np.isfinite(latitude).any():
+        return np.full(len(time_s), np.nan)
     radius_m = 6.371e6
     north = np.radians(latitude) * radius_m
     east = np.radians(longitude) * radius_m * np.cos(np.radians(np.nanmean(latitude)))
@@ -55,7 +57,7 @@ def plane_speed(time_s: Float64, x: Float64, y: Float64) -> Float64:
     return speed
 
 
-def unit_of(values: Float64, track_m_s: Float64) -> str:
+def unit_of(values: Float64, track_m_s: Float64, stated: str = '') -> str:
     """
     Return the unit in which values agree with speeds over ground; '' where none clearly does.
 
@@ -65,6 +67,8 @@ def unit_of(values: Float64, track_m_s: Float64) -> str:
         In an unknown unit.
     track_m_s : (n,)
         From `track_speed`.
+    stated
+        Unit that may be another than m/s, kn and km/h, which are looked for.
     """
     use = np.isfinite(values) & np.isfinite(track_m_s) & (values > 0.0)
     use &= track_m_s > _MOVING_M_S
@@ -74,8 +78,7 @@ def unit_of(values: Float64, track_m_s: Float64) -> str:
     low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
     if high > _SPREAD * low:
         return ''
-    for unit in ('m/s', 'kn', 'km/h'):
-        agreed = middle * SPEED_UNITS[unit]
-        if 1.0 / _NEAR < agreed < _NEAR:
-            return unit
-    return ''
+    units = dict.fromkeys(('m/s', 'kn', 'km/h', stated or 'm/s'))
+    off = {unit: abs(np.log(middle * SPEED_UNITS[unit])) for unit in units}
+    nearest = min(off, key=lambda unit: off[unit])
+    return nearest if off[nearest] < np.log(_NEAR) else ''

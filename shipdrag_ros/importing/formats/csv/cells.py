@@ -15,6 +15,7 @@ _SIDES = {'N': 1.0, 'E': 1.0, 'S': -1.0, 'W': -1.0}
 _DECIMAL = re.compile(r'([-+]?\d{1,3}(?:\.\d*)?)\s*°?\s*([NSEW])?')
 _PARTED = re.compile(r"(\d{1,3})[°\s]\s*(\d{1,2}(?:\.\d*)?)\s*'?\s*([NSEW])")
 _JOINED = re.compile(r'([-+]?)(\d{1,3})(\d{2}(?:\.\d*)?)\s*([NSEW])?')
+_THOUSANDS = re.compile(r'[-+]?[1-9]\d{0,2}(\.\d{3})+')
 
 
 class BadCell(Exception):
@@ -78,7 +79,7 @@ def has_decimal_commas(cells: Iterable[str]) -> bool:
             commas += 1
             parted += len(cell.partition(',')[2]) != 3
         elif NUMBER.fullmatch(cell):
-            points += '.' in cell
+            points += '.' in cell and not _THOUSANDS.fullmatch(cell)  # 1.234 beside 12,5
             plain += 1
     # a few that are otherwise are damaged, and rejected one by one
     return bool(commas > 1 and parted and 10 * commas >= plain and 50 * points <= commas)
@@ -126,17 +127,33 @@ def minutes_of(side: str) -> Callable[[str], float]:
     return read
 
 
-def is_in_minutes(cells: Iterable[str], side: str) -> bool:
+def are_in_minutes(latitudes: Iterable[str], longitudes: Iterable[str]) -> bool:
     """
-    Say whether a column is written as ddmm.mmmm: its numbers are too large for degrees.
+    Say whether coordinates are written as ddmm.mmmm.
+
+    The latitudes tell it: four digits before the point are no degrees. Three may
+    be a longitude in the wrong column, unless the longitudes are written so too.
+    A longitude alone tells nothing: 200.5 is one from 0 to 360 degrees.
     """
-    largest = 90.0 if side == 'NS' else 180.0
-    joined = beyond = 0
-    for cell in filter(None, (cell.strip().upper() for cell in cells)):
-        found = _JOINED.fullmatch(cell)
-        joined += found is not None
-        beyond += found is not None and float(found[2] + found[3]) > largest
-    return beyond > 0 and joined > 0
+    if _share_in_minutes(latitudes, 90.0, 4) > 0.5:
+        return True
+    three = _share_in_minutes(latitudes, 90.0, 3), _share_in_minutes(longitudes, 180.0, 3)
+    return min(three) > 0.5
+
+
+def _share_in_minutes(cells: Iterable[str], largest: float, digits: int) -> float:
+    """Return which share of the cells, without empty ones and zeros, can be dddmm.mmmm."""
+    fitting = count = 0
+    for cell in cells:
+        text = cell.strip().upper()
+        if not text.strip('+-0. NSEW'):
+            continue
+        count += 1
+        if found := _JOINED.fullmatch(text):
+            degrees, minutes = float(found[2]), float(found[3])
+            long = len(found[2]) + 2 >= digits
+            fitting += long and minutes < 60.0 and degrees + minutes / 60.0 <= largest
+    return fitting / max(count, 1)
 
 
 def _checked(degrees: float, minutes: float, letter: str, side: str, cell: str) -> float:

@@ -18,9 +18,10 @@ ORDERS = ('ymd', 'dmy', 'mdy')
 """Of year, month and day in a date."""
 
 _DAY = re.compile(r'(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4})')
+_MIDNIGHT = re.compile(r'00?:00(?::00(?:[.,]0+)?)?')
 _COMPACT = re.compile(r'(\d{4})(\d\d)(\d\d)')
 _CLOCK = re.compile(
-    r'(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?\s*([aApP][mM])?\s*'
+    r'(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?(?:\s*([aApP][mM]))?\s*'
     r'(Z|UTC|GMT|[-+]\d\d:?\d\d|[-+]\d\d)?'
 )
 _IN_TITLE = re.compile(r'(?<!\d)(20\d\d)[-_./]?(\d\d)[-_./]?(\d\d)(?!\d)')
@@ -77,8 +78,11 @@ def parts(text: str) -> tuple[str, str]:
     """
     Split a cell into date and time of day; either may be empty.
     """
-    day, blank, clock = text.replace('T', ' ', 1).partition(' ')
+    day, blank, clock = re.sub(r'(?<=\d)T(?=\d)', ' ', text, count=1).partition(' ')
     if _DAY.fullmatch(day) or _COMPACT.fullmatch(day):
+        midnight, _, rest = clock.strip().partition(' ')
+        if ':' in rest and _MIDNIGHT.fullmatch(midnight):  # a date of a spreadsheet, and the time
+            return day, rest.strip()
         return day, clock.strip()
     if blank and _DAY.fullmatch(clock.strip()):  # the time first
         return clock.strip(), day
@@ -93,6 +97,13 @@ def is_date(text: str) -> bool:
     if day and not _COMPACT.fullmatch(day):
         return not clock or _CLOCK.fullmatch(clock) is not None
     return bool(clock) and _CLOCK.fullmatch(clock) is not None
+
+
+def is_midnight(clock: str) -> bool:
+    """
+    Say whether a time of day is midnight or none.
+    """
+    return not clock or _MIDNIGHT.fullmatch(clock) is not None
 
 
 def order_of(texts: Iterable[str], hints: Sequence[str]) -> tuple[str, str]:

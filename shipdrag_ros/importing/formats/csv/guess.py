@@ -23,9 +23,9 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.formats.csv.agreement import plane_speed, track_speed, unit_of
 from shipdrag_ros.importing.formats.csv.cells import (
     BadCell,
+    are_in_minutes,
     degrees_of,
     has_decimal_commas,
-    is_in_minutes,
     minutes_of,
     number,
 )
@@ -37,7 +37,7 @@ from shipdrag_ros.importing.formats.csv.columns import (
     TimeColumn,
     columns_of,
 )
-from shipdrag_ros.importing.formats.csv.dates import is_date, parts
+from shipdrag_ros.importing.formats.csv.dates import is_date, is_midnight, parts
 from shipdrag_ros.importing.formats.csv.names import role_and_unit
 from shipdrag_ros.importing.formats.csv.row_clock import RowClock
 from shipdrag_ros.importing.table import Table
@@ -58,6 +58,9 @@ PLAIN_COLUMNS = {
 
 _SAMPLE_ROWS = 20_000
 _TURN = 6.4  # no angle in rad is larger
+_NO_COORDINATES = ('rad', 'mrad', 'gon', 'm', 'km', 'ft', 'nmi', 'min')
+_DAYS = 20_000.0  # a spreadsheet's count of days, from 1954 on
+_QUICK_S = 0.002  # of rows a day apart by that, 86400 / 500 s
 _SPEED_UNIT = 'kn'  # in what is to be typed
 
 
@@ -201,7 +204,10 @@ class _Guesser:
         dated = [each for each in (*times, *days) if self._holds_date(each)]
         if dated:
             clock = next((each for each in times if each not in dated), None)
-            bare = not any(parts(text)[1] for text in self._texts(dated[0].place)[:5])
+            clocks = [parts(text)[1] for text in self._texts(dated[0].place)]
+            bare = not any(clocks[:5])
+            if clock is not None and not bare:  # a spreadsheet gives a date a midnight
+                bare = self._holds_time_of_day(clock) and all(map(is_midnight, clocks))
             if bare and clock is not None:
                 return TimeColumn((dated[0].key, clock.key), NANOSECONDS['s'])
             return TimeColumn((dated[0].key,), NANOSECONDS['s'])
@@ -220,6 +226,10 @@ class _Guesser:
         texts = [text for text in self._texts(column.place)[:200] if text]
         return bool(texts) and is_date(texts[0]) and bool(parts(texts[0])[0])
 
+    def _holds_time_of_day(self, column: _Column) -> bool:
+        texts = [text for text in self._texts(column.place)[:200] if text]
+        return bool(texts) and is_date(texts[0]) and not parts(texts[0])[0]
+
     def _counted(self, column: _Column) -> TimeColumn:
         """Return a time without a unit; whole numbers in large steps may be milliseconds."""
         texts = [text for text in self._texts(column.place) if text]
@@ -229,6 +239,18 @@ class _Guesser:
         values = values[np.isfinite(values)]
         step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
         small = len(values) > 0 and abs(values[0]) < 1e11
+        if column.unit:
+            raise ImportDataError(
+                f'{str(self._table.path)!r}: the time {column.key!r} is said to be in '
+                f'{column.unit}; counts are read in {", ".join(NANOSECONDS)}. Write it in one of '
+                'them, or give --rate HZ'
+            )
+        if small and values[0] >= _DAYS and 0.0 < step < _QUICK_S:
+            raise ImportDataError(
+                f'{str(self._table.path)!r}: the time {column.key!r} goes by {step:.3g} from '
+                f'{values[0]:.8g}, as the days of a spreadsheet do. Save it as dates; or, if they '
+                f'are seconds, give --time {shlex.quote(column.typed)}:s'
+            )
         if small and step >= 10.0:
             raise ImportDataError(
                 f'{str(self._table.path)!r}: the unit of the time {column.key!r} is not known; '
@@ -286,9 +308,11 @@ class _Guesser:
         self._wind()
         for role, name, units in (('shaft', 'shaft', 'rpm'), ('depth', 'depth', 'm')):
             column = self._one(role)
-            if column is not None and column.unit:
+            if column is None:
+                continue
+            try:
                 self._take(name, [column], [column.unit])
-            elif column is not None:
+            except ImportDataError:  # of none, or of another quantity
                 self._unit_unknown(column, name, units)
 
     def _position(self, time: TimeColumn | None) -> None:
@@ -296,15 +320,18 @@ class _Guesser:
         x, y = self._one('x'), self._one('y')
         seconds = self._seconds(time)
         if latitude is not None and longitude is not None:
-            if 'rad' in (latitude.unit, longitude.unit):
-                self._doubt(
-                    f'{latitude.key!r}, {longitude.key!r}: coordinates in rad are not read'
-                )
-                return
+            for unit in (latitude.unit, longitude.unit):
+                if unit in _NO_COORDINATES:
+                    self._doubt(
+                        f'{latitude.key!r}, {longitude.key!r}: coordinates in {unit} are not read'
+                    )
+                    return
             self._take('position', [latitude, longitude], ['deg', 'deg'])
+            texts = [self._texts(each.place) for each in (latitude, longitude)]
+            minutes = are_in_minutes(*texts)
             values = [
-                _coordinates(self._texts(each.place), side)
-                for each, side in ((latitude, 'NS'), (longitude, 'EW'))
+                _coordinates(cells, side, minutes)
+                for cells, side in zip(texts, ('NS', 'EW'), strict=True)
             ]
             if seconds is not None:
                 self._track = track_speed(seconds, *values)
@@ -345,8 +372,11 @@ class _Guesser:
         if column is None:
             return False
         values = self._values(column)
-        seen = '' if self._track is None else unit_of(values, self._track)
-        unit = column.unit if column.unit in SPEED_UNITS else self._speed_unit
+        unit = self._unit_of_speed(column)
+        seen = '' if self._track is None else unit_of(values, self._track, unit)
+        if column.unit and not unit:
+            self._unit_unknown(column, name, _SPEED_UNIT)
+            return False
         if unit and seen and seen != unit:
             self._doubt(
                 f'{column.key!r} is said to be in {unit}, and agrees with the positions in '
@@ -365,6 +395,12 @@ class _Guesser:
         if self._track is None:  # the other speed is held against this one
             self._track = values * SPEED_UNITS[unit or seen]
         return True
+
+    def _unit_of_speed(self, column: _Column) -> str:
+        """Return the unit that is stated or given; '' for none, or one of no speed."""
+        if column.unit:
+            return column.unit if column.unit in SPEED_UNITS else ''
+        return self._speed_unit
 
     def _components(self) -> None:
         east, north = self._one('east'), self._one('north')
@@ -396,9 +432,10 @@ class _Guesser:
             self._take('heading', [column], [COMPASS])
             self.found.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
         else:
+            unit = column.unit if column.unit == 'rad' else COMPASS
             self._doubt(
                 f'{column.key!r}: whether it is yaw or compass, or its unit, is not known; --map '
-                f'{shlex.quote(f"heading={column.typed}:{column.unit or COMPASS}")}, or rad deg '
+                f'{shlex.quote(f"heading={column.typed}:{unit}")}, or rad deg '
                 'compass'
             )
 
@@ -416,12 +453,13 @@ class _Guesser:
         speed, angle = self._one('aws'), self._one('awa')
         if speed is None or angle is None:
             return
-        unit = speed.unit if speed.unit in SPEED_UNITS else self._speed_unit
+        unit = self._unit_of_speed(speed)
         turn = angle.unit or ('deg' if self._largest(angle.key) > _TURN else '')
         if unit and turn in ('deg', 'rad'):
             self._take('wind_apparent', [speed, angle], [unit, turn])
         else:
-            typed = f'wind_apparent={speed.typed}:{_SPEED_UNIT},{angle.typed}:{turn or "deg"}'
+            turn = turn if turn in ('deg', 'rad') else 'deg'
+            typed = f'wind_apparent={speed.typed}:{_SPEED_UNIT},{angle.typed}:{turn}'
             self._doubt(
                 f'{speed.key!r}, {angle.key!r}: unit not known; --speed-unit {_SPEED_UNIT} or '
                 f'm/s, or --map {shlex.quote(typed)}'
@@ -455,8 +493,8 @@ def _numbers(texts: Sequence[str]) -> Float64:
     return found
 
 
-def _coordinates(texts: Sequence[str], side: str) -> Float64:
-    read = minutes_of(side) if is_in_minutes(texts, side) else degrees_of(side)
+def _coordinates(texts: Sequence[str], side: str, minutes: bool) -> Float64:
+    read = minutes_of(side) if minutes else degrees_of(side)
     found = np.full(len(texts), np.nan)
     for place, text in enumerate(texts):
         try:

@@ -26,10 +26,10 @@ from shipdrag_ros.importing.bag import (
 )
 from shipdrag_ros.importing.formats.csv.cells import (
     BadCell,
+    are_in_minutes,
     combined,
     degrees_of,
     has_decimal_commas,
-    is_in_minutes,
     minutes_of,
     number,
     number_with_comma,
@@ -338,6 +338,11 @@ class _Record:
     def _notes(self, table: Table) -> Iterator[str]:
         if table.titles:
             yield f'{len(table.titles)} line(s) above the table were left out.'
+        if table.joined_lines:
+            yield (
+                f'{table.joined_lines} line(s) were taken as part of a cell in quotation marks; a '
+                'mark that is not closed does that.'
+            )
         yield from self._clock.notes
         for channel, count in self._too_fast.items():
             yield (
@@ -387,14 +392,16 @@ def _readers(
     found: list[list[Reader]] = []
     for columns, here in zip(inputs, places, strict=True):
         if columns.channel is Channel.POSITION_GEODETIC:
-            found.append([_coordinate(cells[each], s) for each, s in zip(here, ('NS', 'EW'))])
+            minutes = are_in_minutes(*(cells[each] for each in here))
+            sides = zip(here, ('NS', 'EW'))
+            found.append([_coordinate(cells[each], s, minutes) for each, s in sides])
         else:
             found.append([plain] * len(here))
     return found
 
 
-def _coordinate(cells: Sequence[str], side: str) -> Reader:
-    if is_in_minutes(cells, side):
+def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> Reader:
+    if minutes:
         return minutes_of(side)
     if has_decimal_commas(cells):
         read = degrees_of(side)

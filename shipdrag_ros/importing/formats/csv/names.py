@@ -55,8 +55,9 @@ ROLES: Mapping[str, tuple[str, ...]] = {
     'time': (
         *('t', 'time', 'timestamp', 'datetime', 'date time', 'utc', 'date time utc', 'time utc'),
         *('unix', 'unix time', 'epoch', 'elapsed', 'elapsed time', 'seconds', 'utc time'),
+        *('zeit', 'uhrzeit', 'hora'),
     ),
-    'date': ('date', 'day', 'date utc', 'utc date'),
+    'date': ('date', 'day', 'date utc', 'utc date', 'datum', 'fecha'),
 }
 """By role, the names of its columns: in lower case, without a unit."""
 
@@ -82,6 +83,14 @@ UNITS: Mapping[str, str] = {
 }
 """How units are written in names of columns, and how `--map` takes them."""
 
+OTHER_UNITS = frozenset(
+    (
+        *('%', 'percent', 'min', 'minutes', 'h', 'hr', 'hours', 'd', 'days', 'mrad', 'mil', 'gon'),
+        *('cm/s', 'mm/s', 'm/min', 'deg/s', '°/s', 'cm', 'mm', 'fm', 'fathoms'),
+    )
+)
+"""Units in brackets or below a name that `--map` does not take: none is guessed for these."""
+
 _BRACKETS = re.compile(r'[\[(]([^\[\]()]*)[\])]')
 _ROLE_OF = {name: role for role, names in ROLES.items() for name in names}
 
@@ -98,11 +107,13 @@ def role_and_unit(name: str, below: str = '') -> tuple[str, str]:
         What a line of units says of it.
     """
     text = name.strip().lower()
-    unit = UNITS.get(below.strip().lower(), '')
+    unit = _stated(below)
     for found in _BRACKETS.findall(text):
-        unit = unit or UNITS.get(found.strip(), '')
+        unit = unit or _stated(found)
     plain = _words(_BRACKETS.sub(' ', text))
     words = plain.split()
+    if 'rpm' in words and unit not in ('', 'rpm'):
+        return ('shaft' if plain == 'rpm' else _ROLE_OF.get(plain, '')), ''
     if plain in _ROLE_OF and (unit or plain not in UNITS):
         return _ROLE_OF[plain], unit or UNITS.get(words[-1] if len(words) > 1 else '', '')
     for length in (2, 1):  # `m_s` is two words
@@ -112,6 +123,11 @@ def role_and_unit(name: str, below: str = '') -> tuple[str, str]:
     if plain == 'rpm':
         return 'shaft', 'rpm'
     return _ROLE_OF.get(plain, ''), unit
+
+
+def _stated(text: str) -> str:
+    text = text.strip().strip('[]()').strip().lower()
+    return UNITS.get(text, text if text in OTHER_UNITS else '')
 
 
 def _words(text: str) -> str:

@@ -172,6 +172,8 @@ class RowClock:
         """Add the midnights passed: a time of day that goes back by hours is of the next day."""
         if of_day_ns < self._last_of_day_ns - _DAY_NS // 2:
             self._midnights += 1
+        elif self._midnights and of_day_ns > self._last_of_day_ns + 23 * _DAY_NS // 24:
+            self._midnights -= 1  # a row from before the midnight behind one from after it
         self._last_of_day_ns = of_day_ns
         return self._start_ns + self._midnights * _DAY_NS + of_day_ns
 
