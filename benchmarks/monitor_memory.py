@@ -14,6 +14,7 @@ import resource
 import sys
 import time
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -67,13 +68,18 @@ def month(ship: Ship, days: int) -> None:
             estimates += sum(isinstance(event, Update) for event in events)
             coastdowns += sum(isinstance(event, Coastdown) for event in events)
         if day in (0, 1, 2) or day % 5 == 4:
-            kept = sum(array.nbytes for part in monitor._memory for array in part) / 2**20
+            kept = held_bytes(monitor._memory) / 2**20
             print(
                 f'day {day + 1:3d}: process {resident_mib():6.1f} MiB, monitor {kept:5.2f} MiB,'
                 f' {coastdowns} coastdowns, {estimates} estimates',
                 flush=True,
             )
     print(f'{samples} samples in {busy_s:.1f} s, estimates included: {samples / busy_s:.3g}/s')
+
+
+def held_bytes(part: Any) -> int:
+    """Bytes of the arrays of a state, however deep they lie."""
+    return part.nbytes if hasattr(part, 'nbytes') else sum(map(held_bytes, part))
 
 
 def steady(ship: Ship, rate_hz: int) -> None:

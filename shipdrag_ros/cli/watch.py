@@ -156,10 +156,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
 
 
 def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:
-    """Yield the coastdowns of a folder; what gave none is noted."""
-    if not folder.exists():  # the page may be started before the first recording
-        notes.append(f'--earlier {str(folder)!r} is not there yet: no earlier coastdowns')
-        return
+    """Yield the coastdowns of a folder; what gave none is told."""
     for found in recorded_runs(folder):
         if isinstance(found, str):
             notes.append(found)

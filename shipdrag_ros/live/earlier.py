@@ -90,11 +90,16 @@ def recorded_runs(folder: Path) -> Iterator[PastRun | str]:
     """
     Yield the coastdowns that nodes recorded in the bags of a folder, and why a bag gave none.
 
+    A folder that is not there is told: the node that makes it may start later.
+
     Raises
     ------
     ShipdragError
-        If there is no such folder.
+        If it is no folder.
     """
+    if not folder.exists():
+        yield f'{folder}: there is no such folder so far, so no earlier coastdowns are shown'
+        return
     if not folder.is_dir():
         raise ShipdragError(f'{str(folder)!r} is no folder; give one that holds bags')
     paths = sorted(folder.rglob('*.mcap'), key=lambda path: (path.stat().st_mtime, path))

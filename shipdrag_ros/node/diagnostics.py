@@ -122,6 +122,8 @@ def state_status(standing: Standing, inputs: Sequence[InputState]) -> Diagnostic
         if standing.candidates:
             values['candidates'] = standing.candidates
             text = f'{text}; {standing.candidates}'
+        else:
+            text = f'{text}; is the driver running, in this ROS domain and discovery range?'
         return _status('state', ERROR, text, values)
     if fresh and all(each.finding.level is Level.ERROR for each in fresh):
         why = '; '.join(f'{each.topic.name}: {each.finding.text}' for each in fresh)

@@ -95,7 +95,8 @@ class InputStates:
             topic.name: topic.age_s is not None and topic.age_s < SILENT_S for topic in topics
         }
         behind = behind_others(
-            {topic.name: topic.clock_offset_s for topic in topics if fresh[topic.name]}
+            {topic.name: topic.clock_offset_s for topic in topics if fresh[topic.name]},
+            simulated=simulated,
         )
         self._seen = tuple(
             self._state(

@@ -197,7 +197,10 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
         yield Finding(level, f'no publisher{nor}')
         return
     if others:
-        text = f'wrong type: also published as {others}, heard is only {facts.type}'
+        text = (
+            f'wrong type: also published as {others}, heard is only {facts.type}: stop one, or '
+            f'name the one to hear in the parameter {facts.name}.type'
+        )
         yield Finding(Level.WARN, text)
     if facts.misfit is not None:
         text = f'a publisher is not heard: its {facts.misfit} QoS does not fit'
@@ -263,7 +266,7 @@ _ADVICE = {
     'nan': 'the sensor gives no number: look at it',
     'infinite': 'the sensor gives no finite number: look at it',
     'absurd': 'no ship moves like that: look at sensor and unit',
-    'frozen': 'the sensor repeats itself: it is stuck',
+    'frozen': 'the sensor repeats itself: it is stuck, look at it',
     'outlier': 'impossible after the readings before: look at the sensor',
     'duplicate': 'stamps repeat: is it published twice, or not stamped anew?',
     'out_of_order': 'stamps go back: are there two sources on the topic?',
@@ -317,14 +320,19 @@ def convention_doubt(convention: str, *, stamped: bool, fed: bool) -> str:
     )
 
 
-def behind_others(offsets_s: Mapping[str, float | None]) -> dict[str, tuple[str, float]]:
+def behind_others(
+    offsets_s: Mapping[str, float | None], *, simulated: bool = False
+) -> dict[str, tuple[str, float]]:
     """
     Return by how much each input of the motion lags the one with the least lag [s].
 
     Parameters
     ----------
     offsets_s
-        Arrival minus stamp of the inputs that are heard, by name.
+        Arrival minus stamp of the inputs that are heard, by name. One that is ahead of this
+        computer is no measure for the others: nothing is measured after it arrives.
+    simulated
+        Whether the clock is simulated; being ahead of it then means nothing.
     """
     known = {
         name: offset
@@ -333,5 +341,12 @@ def behind_others(offsets_s: Mapping[str, float | None]) -> dict[str, tuple[str,
     }
     if len(known) < 2:
         return {}
-    first = min(known, key=lambda name: known[name])
-    return {name: (first, known[name] - known[first]) for name in known if name != first}
+    measures = [name for name in known if simulated or known[name] >= -AHEAD_S]
+    if not measures:
+        return {}
+    first = min(measures, key=lambda name: known[name])
+    return {
+        name: (first, known[name] - known[first])
+        for name in known
+        if name != first and known[name] >= known[first]
+    }

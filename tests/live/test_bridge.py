@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli import main, watch
+from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, signal_k, verdicts
 from shipdrag_ros.live.acceptance import Held
@@ -228,10 +228,10 @@ def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(
     assert len(found) == 2
     assert {str(each).partition(':')[0] for each in found} == {'broken.mcap', 'out.mcap'}
     with pytest.raises(ShipdragError, match='is no folder'):
-        list(recorded_runs(tmp_path / 'none'))
+        list(recorded_runs(tmp_path / 'out.mcap'))
 
 
-def test_the_page_may_be_started_before_the_first_recording(tmp_path: Path) -> None:
-    notes: list[str] = []
-    assert list(watch._earlier(tmp_path / 'none', notes)) == []
-    assert 'not there yet' in notes[0]
+def test_a_folder_that_the_node_has_yet_to_make_is_told(tmp_path: Path) -> None:
+    (told,) = recorded_runs(tmp_path / 'records')
+    assert isinstance(told, str)
+    assert 'records: there is no such folder so far' in told

@@ -43,7 +43,7 @@ def test_what_is_well_is_receiving() -> None:
     [
         ({'recent': counts(0, nan=300)}, Level.ERROR, 'none of 300 readings used in 30 s'),
         ({'recent': counts(0, nan=300)}, Level.ERROR, ': 300 nan; the sensor'),
-        ({'recent': counts(0, frozen=300)}, Level.ERROR, 'it is stuck'),
+        ({'recent': counts(0, frozen=300)}, Level.ERROR, 'it is stuck, look at it'),
         ({'recent': counts(100, outlier=200)}, Level.ERROR, '33% of 300'),
         ({'recent': counts(285, absurd=15)}, Level.WARN, '95% of 300'),
         ({'recent': counts(299, absurd=1)}, Level.OK, 'receiving'),
@@ -113,6 +113,13 @@ def test_the_one_with_the_least_lag_is_the_measure() -> None:
     offsets = {'speed_through_water': 6.2, 'position': 0.2, 'rudder': 99.0}
     assert behind_others(offsets) == {'speed_through_water': ('position', 6.0)}
     assert behind_others({'position': 5.0, 'speed_over_ground': None}) == {}
+
+
+def test_one_that_is_ahead_of_this_computer_puts_no_other_behind() -> None:
+    offsets = {'speed_through_water': -30.0, 'position': 0.5, 'speed_over_ground': 4.5}
+    assert behind_others(offsets) == {'speed_over_ground': ('position', 4.0)}
+    assert behind_others(offsets, simulated=True)['position'][0] == 'speed_through_water'
+    assert behind_others({'speed_through_water': -30.0, 'position': -29.0}) == {}
 
 
 def test_a_heading_that_is_turned_twice_is_said() -> None:

@@ -122,7 +122,7 @@ def test_hears_a_publisher_of_any_quality_of_service(
 
 def test_reports_why_an_input_is_silent(start_node: Any, peer: Any, diagnostics: Any) -> None:
     start_node(**{'heading.type': IMU})
-    assert diagnostics.wait_for('state', 'no data').level == b'\x02'
+    assert diagnostics.wait_for('state', 'is the driver running').level == b'\x02'
 
     peer.player.connect(speeds())
     diagnostics.wait_for('input speed_through_water', 'no data')
