@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,13 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         page = f'notebooks/{path.stem}.md'
         files.append(File.generated(config, page, content='\n\n'.join(cells(path))))
     return files
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """
+    Let links to notebooks lead to their pages; called by MkDocs.
+    """
+    return re.sub(r'\((notebooks/\w+)\.ipynb\)', r'(\1.md)', markdown)
 
 
 def commands() -> str:

@@ -45,6 +45,12 @@ def test_nothing_is_fetched_from_elsewhere(site: Path) -> None:
         assert LOADED.findall(page.read_text(encoding='utf-8')) == []
 
 
+def test_links_to_notebooks_lead_to_their_pages(site: Path) -> None:
+    found = re.findall(r'href="(notebooks/[^"]+)"', (site / 'python.html').read_text('utf-8'))
+    assert found
+    assert all((site / link).is_file() for link in found)
+
+
 def test_it_is_searched_without_a_server(site: Path, browser: Any) -> None:
     outside: list[str] = []
     page = browser.new_page()

@@ -15,7 +15,7 @@ class Help(argparse.ArgumentDefaultsHelpFormatter):
     """Name every default that says something; leave examples to stand line by line."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        if action.default in (None, False, []):
+        if action.default in (None, False, []) or '(default: ' in (action.help or ''):
             return action.help
         return super()._get_help_string(action)
 

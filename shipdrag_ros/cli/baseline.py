@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'Learn the baseline of a ship from clean runs: clean hull, calm deep water, no wind. '
         'Writes the ship file with the baseline that they show, in the form that it has, and '
         'how well it is known for a further run: what the runs leave open, and by how much they '
-        'differ from each other. Five runs tell that well; with one or two the stated '
+        'differ from each other. Five runs show that well; with one or two the stated '
         'relative_sd is kept. Without a baseline in the ship file, r(v) of the runs is written '
         'as a table.'
     )

@@ -141,7 +141,7 @@ def _show(output: Output, found: Diagnosis, ship: Ship | None) -> None:
         output.heading('How large, were it the one; sd is one standard deviation')
         output.table(diagnosis_cells.sizes(found))
     if found.facts:
-        output.heading('Facts that were told')
+        output.heading('Facts that were given')
         output.table(diagnosis_cells.facts(found))
     output.heading('Gap between model and data')
     output.table(diagnosis_cells.gaps(found))

@@ -25,17 +25,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     known = formats.found()
     parser.description = (
         'Write the measurements of logs or tables as a bag for replay. The format is known by the '
-        'content of a file; what was understood is told, and what was not used is counted. What a '
-        'sentence or a cell holds is never mended. `replay` and `diagnose` take such files too, '
-        'where no option is needed.'
+        'content of a file. What was understood is printed, and what was not used is counted. No '
+        'value is ever repaired. `replay` and `diagnose` read such files directly, where no '
+        'option is needed.'
     )
     parser.add_argument(
         'sources',
         nargs='+',
         type=Path,
         metavar='SOURCE',
-        help=f'{", ".join(each.kind for each in known)}; text also packed as .gz. Several are put '
-        'together: of an input that two tell for the same time, the first file is taken',
+        help=f'{", ".join(each.kind for each in known)}; text also packed as .gz. Several are '
+        'joined; where two hold the same input for the same time, the first file is taken',
     )
     parser.add_argument(
         '-o',

@@ -76,7 +76,7 @@ def _verdict(found: Diagnosis, ship: Ship | None) -> Iterator[Section]:
     )
     if found.facts:
         caption = 'Facts of the log book; each may be wrong'
-        yield Section('Facts that were told', tables=[(caption, tables.facts(found))])
+        yield Section('Facts that were given', tables=[(caption, tables.facts(found))])
     if found.would_decide:
         yield Section('What would decide', lines=words.advice(found))
 

@@ -68,6 +68,6 @@ RATE = Option(
 TRANSDUCER = Option(
     '--transducer',
     'M',
-    'depth of the echo sounder below the surface, where the log does not tell it [m]',
+    'depth of the echo sounder below the surface, where the log does not state it [m]',
     _depth_m,
 )

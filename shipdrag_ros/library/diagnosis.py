@@ -264,6 +264,8 @@ def diagnose(
     runs = [WindowedRun(run, window) for record in parts for run in record.runs]
     refuse_overlaps(runs)
     listener = Notes()
-    given: Sequence[Fact] = [parse_fact(text) for text in facts]
+    given: Sequence[Fact] = [
+        parse_fact(text) for text in ([facts] if isinstance(facts, str) else facts)
+    ]
     found, used = diagnose_runs(listener, runs, ship or parts[0].given, given)
     return Diagnosis(found, used, tuple(listener.lines))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.errors import ImportDataError
 
 NANOSECONDS = 'ns'
-INDEX = 'index'
+INDEX = 'time'
 """Column of a frame's own dates, where its index has no name."""
 
 
@@ -46,8 +46,10 @@ def write_table(frame: Any, path: Path) -> tuple[str, ...]:
     Raises
     ------
     ImportDataError
-        If the frame has no row.
+        If the frame has no row, or is a lazy one.
     """
+    if callable(getattr(frame, 'collect', None)):
+        raise ImportDataError('a lazy frame holds no values yet; give frame.collect()')
     named = [(str(name), frame[name]) for name in frame.columns]
     index = getattr(frame, 'index', None)
     if str(getattr(index, 'dtype', '')).startswith('datetime64'):
@@ -59,7 +61,7 @@ def write_table(frame: Any, path: Path) -> tuple[str, ...]:
             dates.append(name)
         columns.append(list(_cells(array)))
     if not columns or not columns[0]:
-        raise ImportDataError('the frame holds no row; give one with a row a sample')
+        raise ImportDataError('the frame holds no row or no column; give one with a row a sample')
     with path.open('w', encoding='utf-8', newline='') as file:
         writer = csv.writer(file)
         writer.writerow([name for name, _ in named])

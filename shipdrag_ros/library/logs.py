@@ -22,6 +22,8 @@ from shipdrag_ros.samples import SECOND_NS
 
 _NEAR_NS = 600 * SECOND_NS  # logs that begin so soon after another one ends continue it
 _FRAME = 'frame'
+_COLUMNS = "give the column of each input, {'speed_through_water': 'log:kn'} for instance"
+_IN_PYTHON = 'In Python --map is columns=, --time is time=, --rate is rate_hz='
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,14 @@ class Told:
         if time is None and self.rate_hz is None and dates:
             time = dates[0]
         return replace(self, time=f'{time}:{NANOSECONDS}' if time in dates else time)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.columns or {}, Mapping):
+            raise ImportDataError(f'columns {self.columns!r}: {_COLUMNS}')
+        for name, columns in (self.columns or {}).items():
+            several = columns if isinstance(columns, list | tuple) else [columns]
+            if not all(isinstance(each, str) for each in several):
+                raise ImportDataError(f'columns: {name!r} is {columns!r}; {_COLUMNS}')
 
     @property
     def maps(self) -> tuple[str, ...]:
@@ -176,10 +186,15 @@ def _part(
         name, path = _FRAME, folder / f'{place}.csv'
         told = told.of_dates(write_table(source, path))
     options = told.options(path, alone=alone)
-    declared = format_of(path, options)
     bag = folder / f'{place}.mcap'
-    job = job_of(declared, path, bag, options, attachments)
-    found = declared.write(job)
+    try:
+        # a frame is a table, however few columns it has
+        declared = format_of(path, {'map': (), **options} if is_frame(source) else options)
+        job = job_of(declared, path, bag, options, attachments)
+        found = declared.write(job)
+    except ImportDataError as error:
+        said = str(error).replace(repr(str(path)), repr(name))
+        raise ImportDataError(f'{said}. {_IN_PYTHON}' if '--' in said else said) from error
     run = ImportedRun(bag, [path])
     run.name = name
     notes = [*found.summary(path)[1:], *found.details()]

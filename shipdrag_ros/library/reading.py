@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.bags.locate import is_bag
+from shipdrag_ros.errors import BagError
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Ship
@@ -80,9 +81,14 @@ def read(
     """
     from shipdrag_ros.library.frames import is_frame
 
+    if not isinstance(ship, Ship | str | PathLike | None):
+        raise BagError(f'ship={ship!r}: expected a Ship, or the path of a ship file')
     given = ship if ship is None or isinstance(ship, Ship) else Ship.load(ship)
+    if isinstance(ship, Ship):
+        Ship.from_yaml(ship.to_yaml(), subject='ship=')  # made in Python, it is not checked yet
     alone = isinstance(source, str | PathLike) or is_frame(source)
-    sources = [each if is_frame(each) else Path(each) for each in ([source] if alone else source)]
+    several = source if not alone and isinstance(source, Iterable) else [source]
+    sources = [each if is_frame(each) else _path(each) for each in several]
     bags = [each for each in sources if isinstance(each, Path) and is_bag(each)]
     runs = open_runs(bags, remap=remap) if bags else []
     others = [each for each in sources if not (isinstance(each, Path) and is_bag(each))]
@@ -93,3 +99,13 @@ def read(
     attachments = {} if given is None else {SHIP_FILE: given.to_yaml()}
     imported, notes = read_logs(others, Told(columns, time, rate_hz), attachments)
     return Record([*runs, *imported], given=given, notes=notes)
+
+
+def _path(source: Any) -> Path:
+    """Return the path that a source must be where it is no frame."""
+    if not isinstance(source, str | PathLike):
+        raise BagError(
+            f'{type(source).__name__!r} is no source; give the path of a bag, a log or a table, '
+            'a frame of pandas or polars, or a list of these'
+        )
+    return Path(source)

@@ -119,7 +119,7 @@ class Record(Shown):
         Raises
         ------
         BagError
-            If the file exists, or the record has several runs or files.
+            If the file exists or cannot be written, or the record has several runs or files.
         """
         out = Path(path)
         files = [part.path for run in self.runs for part in run.parts]
@@ -127,7 +127,10 @@ class Record(Shown):
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():
             raise BagError(f'{str(out)!r} exists; choose another name or remove it')
-        shutil.copyfile(files[0], out)
+        try:
+            shutil.copyfile(files[0], out)
+        except OSError as error:
+            raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
         return out
 
     def summary(self) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -241,7 +241,7 @@ def records_of(records: Record | Sequence[Record]) -> tuple[Record, ...]:
     EstimationError
         If there is none, or one is no record.
     """
-    found = (records,) if isinstance(records, Record) else tuple(records)
+    found = tuple(records) if isinstance(records, Iterable) else (records,)
     if not found or not all(isinstance(each, Record) for each in found):
         raise EstimationError(
             'expected a record or a list of records; make one with shipdrag_ros.read(...)'

@@ -9,6 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypedDict, Unpack
 
+import numpy as np
+
 from shipdrag_ros.bags import Run
 from shipdrag_ros.bags.locate import BagFiles
 from shipdrag_ros.bags.mcap_file import McapFile
@@ -118,6 +120,10 @@ def simulate(
     >>> bool(record.truth.at(6.0) > clean.truth.at(6.0))
     True
     """
+    if not isinstance(effects or {}, Mapping):
+        raise SimulationError(f"effects {effects!r}: give names with sizes, {{'fouling': 0.3}}")
+    if not isinstance(seed, int | np.integer) or seed < 0:
+        raise SimulationError(f'seed {seed!r}: expected a whole number from 0 on')
     more = {**sensing}
     if 'inputs' in more:
         more['inputs'] = tuple(sensing['inputs'])

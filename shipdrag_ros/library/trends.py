@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -203,7 +203,12 @@ def trends(
         listener = Notes()
         found, skipped = trends_of(listener, Path(source))
         return Trends(tuple(found), tuple(skipped), tuple(listener.lines))
-    results = tuple(source)
+    results = tuple(source) if isinstance(source, Iterable) else (source,)
+    if not all(isinstance(each, Resistance) for each in results):
+        raise FleetError(
+            'expected the folder of `shipdrag fleet`, or a list of results of '
+            'shipdrag_ros.estimate(...)'
+        )
     ships = {_name(run.ship.name): run.ship for each in results for run in each.runs}
     rows = list(_rows(results))
     return Trends(tuple(fleet_trends(rows, ships, _events(events or {}))))

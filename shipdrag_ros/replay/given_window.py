@@ -74,7 +74,10 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     window is shifted by what they differ at the first sample used.
     """
     span = run.span_ns
-    start_s, end_s = window
+    try:
+        start_s, end_s = map(float, window)
+    except (TypeError, ValueError) as error:
+        raise BagError(f'window {window!r}: expected its start and end [s]') from error
     length_s = 0.0 if span is None else (span[1] - span[0]) / SECOND_NS
     if span is None or not (0.0 <= start_s < end_s < math.inf and start_s < length_s):
         raise BagError(

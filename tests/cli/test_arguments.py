@@ -56,6 +56,7 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(formatter_class=arguments.Help)
     parser.add_argument('--rate', default=1.0, help='rate [Hz]')
     parser.add_argument('--ship', help='ship file')
+    parser.add_argument('--node', default='', help='name (default: the first)')
     parser.add_argument('bags', nargs='*')
     arguments.add_json(parser)
     return parser
@@ -65,6 +66,7 @@ def test_help_names_defaults_that_say_something(parser: argparse.ArgumentParser)
     text = parser.format_help()
     assert 'rate [Hz] (default: 1.0)' in text
     assert 'None' not in text
+    assert text.count('(default: ') == 2
 
 
 def test_json_goes_to_stdout_or_to_a_file(parser: argparse.ArgumentParser, tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def test_facts_make_a_name_of_a_set(
     assert [each['name'] for each in told['facts']][:2] == ['no_towed_cable', 'deep_water']
     assert not any(each['contradicted'] for each in told['facts'])
     said = capsys.readouterr().out
-    assert 'Facts that were told' in said
+    assert 'Facts that were given' in said
     assert 'no cable, net or line was in the water' in said
 
 

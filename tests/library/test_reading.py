@@ -140,6 +140,41 @@ def test_what_cannot_be_read_says_what_to_do(tmp_path: Path) -> None:
         sd.read(pd.DataFrame(table()), ship=tmp_path / 'ship.yaml', columns=LOG, time='t')
 
 
+@pytest.mark.parametrize('source', [None, 3, np.zeros((3, 2)), pd.Series([1.0]), [None]])
+def test_what_is_no_source_is_refused(source: Any) -> None:
+    with pytest.raises(sd.ShipdragError, match='is no source; give the path'):
+        sd.read(source)
+
+
+def test_a_frame_is_named_and_its_arguments_too(tmp_path: Path) -> None:
+    speed = pd.DataFrame({'speed_through_water': table()['log']})
+    with pytest.raises(sd.ShipdragError, match=r"'frame' has no column that is .* a time.*time="):
+        sd.read(speed)
+    with pytest.raises(sd.ShipdragError, match=r'frame\.collect\(\)'):
+        sd.read(pl.LazyFrame(table()))
+    for columns in (['log'], {'speed_through_water': 1}, {'speed_through_water': None}):
+        with pytest.raises(sd.ShipdragError, match='give the column of each input'):
+            sd.read(speed, columns=columns, rate_hz=1.0)  # type: ignore[arg-type]
+    with pytest.raises(sd.ShipdragError, match='cannot be written'):
+        sd.read(speed, rate_hz=1.0, columns={'speed_through_water': '1'}).save(
+            tmp_path / 'none' / 'a.mcap'
+        )
+
+
+def test_a_frame_with_the_names_of_the_inputs_and_an_index_of_dates_is_si() -> None:
+    frame = pd.DataFrame({'speed_through_water': table()['log']}, index=dates())
+    assert speeds(sd.read(frame)).tolist() == table()['log'].tolist()
+
+
+@pytest.mark.parametrize('length_m', [-1.0, 'long', float('nan')])
+def test_a_ship_made_in_python_is_checked(length_m: Any) -> None:
+    ship = sd.Ship(name='x', length_m=length_m, displaced_volume_m3=4000.0)
+    with pytest.raises(sd.ShipdragError, match='length_m'):
+        sd.read(pd.DataFrame(table()), ship=ship, columns=LOG, time='t')
+    with pytest.raises(sd.ShipdragError, match='expected a Ship'):
+        sd.read(pd.DataFrame(table()), ship=4, columns=LOG, time='t')  # type: ignore[arg-type]
+
+
 def test_no_file_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
     record = sd.read(pd.DataFrame(table()), columns=LOG, time='t')

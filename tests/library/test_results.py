@@ -141,7 +141,17 @@ def test_where_there_is_no_coastdown_it_says_why() -> None:
 def test_what_is_no_record_is_refused() -> None:
     with pytest.raises(sd.ShipdragError, match=r'make one with shipdrag_ros\.read'):
         sd.estimate(['run.mcap'])  # type: ignore[list-item]
+    for verb in (sd.estimate, sd.diagnose):
+        with pytest.raises(sd.ShipdragError, match=r'make one with shipdrag_ros\.read'):
+            verb(None)  # type: ignore[operator]
+    for source in (None, [3]):
+        with pytest.raises(sd.ShipdragError, match='results of'):
+            sd.trends(source)  # type: ignore[arg-type]
     ship = sd.Ship.example()
+    with pytest.raises(sd.ShipdragError, match='give names with sizes'):
+        sd.simulate(ship, 'fouling=0.3')  # type: ignore[arg-type]
+    with pytest.raises(sd.ShipdragError, match='expected a whole number'):
+        sd.simulate(ship, seed=-1)
     with pytest.raises(sd.ShipdragError, match='lead_in'):
         sd.simulate(ship, lead_in=3.0)  # type: ignore[call-arg]
     with pytest.raises(sd.ShipdragError, match='along_track_m_s is missing'):
@@ -150,6 +160,16 @@ def test_what_is_no_record_is_refused() -> None:
         sd.simulate(ship, {'weed': 1.0})
     with pytest.raises(sd.ShipdragError, match='expected a date of ISO 8601'):
         sd.simulate(ship, start='yesterday')
+
+
+def test_a_window_has_a_start_and_an_end(record: sd.Record) -> None:
+    with pytest.raises(sd.ShipdragError, match='expected its start and end'):
+        sd.estimate(record, window=5)  # type: ignore[arg-type]
+
+
+def test_one_fact_may_stand_alone(record: sd.Record) -> None:
+    with pytest.raises(sd.ShipdragError, match="fact 'a_guess'"):
+        sd.diagnose(record, facts='a_guess')
 
 
 def test_a_trend_says_what_it_is_of() -> None:

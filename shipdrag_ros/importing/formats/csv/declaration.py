@@ -90,7 +90,8 @@ FORMAT = Format(
     about='Tables separated by comma, semicolon, tab, bar or blanks, with titles above, units '
     'below the header, decimal commas, dates, coordinates as 4530.20N. Columns are known by '
     'their usual names (STW SOG HDG Lat Lon RPM AWS AWA ...) where their unit is stated or can '
-    'be told; anything else is told and not used. With --map these columns alone are taken.',
+    'be worked out; other columns are listed and not used. With --map these columns alone are '
+    'taken.',
     score=_score,
     write=_write,
     options=(
@@ -124,13 +125,13 @@ FORMAT = Format(
         Option(
             '--date-order',
             'ORDER',
-            'of day and month in dates that do not tell it: dmy, mdy or ymd',
+            'order of day and month in dates that leave it open: dmy, mdy or ymd',
             _one_of(ORDERS),
         ),
         Option(
             '--zone',
             'ZONE',
-            'time zone of dates that tell none: +02:00 or Europe/Rome (default: UTC)',
+            'time zone of dates that state none: +02:00 or Europe/Rome (default: UTC)',
             zone_of,
         ),
         Option(
