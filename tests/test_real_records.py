@@ -113,7 +113,7 @@ def test_each_record_gives_the_figures_of_the_page(results: dict[str, Any], name
 def test_the_second_opinion_agrees_where_the_samples_are_many(name: str) -> None:
     points = re.findall(r'([\d.]+): ([\d.]+) ± ([\d.]+) \(([\d.]+)\)', ROWS[name][2])
     for _, value, _, other in (map(float, point) for point in points):
-        np.testing.assert_allclose(value, other, rtol=0.045)
+        np.testing.assert_allclose(value, other, rtol=0.06)  # two digits are worth 1 % of that
 
 
 @needs_data
