@@ -1,22 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of the site that are made when it is built: the help of each verb, the notebooks."""
+"""
+Pages of the site that are made when it is built: the help of each verb, the notebooks.
+
+The notebooks are run, in half a minute; SHIPDRAG_DOCS_QUICK=1 shows their code alone.
+"""
 
 from __future__ import annotations
 
-import base64
-import json
 import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import nbformat
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from nbclient import NotebookClient
 
 from shipdrag_ros.cli import VERBS, parser
 
 NOTEBOOKS = Path(__file__).parent / 'notebooks'
+LIMIT_S = 600  # of a cell, on a machine where nothing is compiled yet
 WIDTH = 92  # characters, of a line of help
 
 
@@ -57,23 +63,27 @@ def commands() -> str:
 
 def cells(path: Path) -> Iterator[str]:
     """
-    Yield the cells of a notebook, and what they printed and drew, as Markdown.
+    Yield the cells of a notebook, and what they print and draw, as Markdown.
     """
-    for cell in json.loads(path.read_text(encoding='utf-8'))['cells']:
-        source = ''.join(cell['source'])
-        if cell['cell_type'] == 'markdown':
-            yield source
+    notebook = nbformat.read(path, as_version=4)
+    if not os.environ.get('SHIPDRAG_DOCS_QUICK'):
+        with TemporaryDirectory() as folder:
+            where = {'metadata': {'path': folder}}
+            NotebookClient(notebook, timeout=LIMIT_S, resources=where).execute()
+    for cell in notebook.cells:
+        if cell.cell_type == 'markdown':
+            yield cell.source
             continue
-        yield f'```python\n{source}\n```'
-        for output in cell.get('outputs', []):
+        yield f'```python\n{cell.source}\n```'
+        for output in cell.outputs:
             yield from _output(output)
 
 
 def _output(output: dict[str, Any]) -> Iterator[str]:
     data = output.get('data', {})
     if 'image/png' in data:
-        image = ''.join(data['image/png']).replace('\n', '')
-        base64.b64decode(image, validate=True)
-        yield f'![output](data:image/png;base64,{image})'
-    elif text := ''.join(output.get('text', data.get('text/plain', ''))).rstrip():
+        yield f'![drawn](data:image/png;base64,{"".join(data["image/png"].split())})'
+    elif 'text/html' in data:
+        yield re.sub(r'\n\s*\n', '\n', data['text/html'])  # an empty line would end the HTML
+    elif text := (output.get('text') or data.get('text/plain', '')).rstrip():
         yield f'```text\n{text}\n```'

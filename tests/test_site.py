@@ -24,7 +24,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     done = subprocess.run(
         line,
         cwd=ROOT,
-        env=os.environ | {'NO_MKDOCS_2_WARNING': '1'},
+        env=os.environ | {'NO_MKDOCS_2_WARNING': '1', 'SHIPDRAG_DOCS_QUICK': '1'},
         capture_output=True,
         text=True,
         timeout=200,
