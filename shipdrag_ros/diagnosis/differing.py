@@ -38,7 +38,7 @@ def with_differing(found: SearchResult, model: CoastModel) -> SearchResult:
 
     Returns
     -------
-    Found
+    SearchResult
         The same with a single run.
     """
     if len(model.seen) < 2:

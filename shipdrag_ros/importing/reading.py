@@ -155,39 +155,6 @@ def _imported(
     return run
 
 
-def import_file(
-    source: Path,
-    bag: Path,
-    *,
-    options: Mapping[str, Any] | None = None,
-    attachments: Mapping[str, str] | None = None,
-) -> Understanding:
-    """
-    Make a bag of a log or a table.
-
-    Parameters
-    ----------
-    source
-        In any format that is known.
-    bag
-        MCAP file to make.
-    options
-        Values by `format.Option.key`; a format takes those that it knows.
-    attachments
-        Text by name, a ship file for instance.
-
-    Raises
-    ------
-    ImportDataError
-        If nothing in it can be used, saying what to type.
-    BagError
-        If the bag cannot be made.
-    """
-    declared = format_of(source, options or {})
-    job = job_of(declared, source, bag, options or {}, attachments)
-    return Understanding(source, declared.kind, declared.write(job))
-
-
 def format_of(source: Path, options: Mapping[str, Any]) -> Format:
     """
     Return the format of a file: the one that an option chooses, or by its beginning.

@@ -32,6 +32,7 @@ from shipdrag_ros.importing.words import (
     backward_and_repeated,
     not_taken_words,
     rejected_words,
+    table_of_messages,
 )
 from shipdrag_ros.samples import INPUTS, SECOND_NS, Block, Channel
 
@@ -170,10 +171,7 @@ class StreamResult:
         """
         Return messages by input.
         """
-        return Table(
-            ('input', 'from', 'messages'),
-            tuple((name, self.sources[name], f'{n}') for name, n in self.written.items()),
-        )
+        return table_of_messages(self.written, self.sources)
 
     def details(self) -> list[str]:
         """

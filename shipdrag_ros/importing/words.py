@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from shipdrag_ros.display import Table
 from shipdrag_ros.importing.bag import Rejected
 
 
@@ -24,6 +25,16 @@ def backward_and_repeated(backward: int, repeated: int) -> list[str]:
             'rejects those.'
         )
     return told
+
+
+def table_of_messages(written: Mapping[str, int], sources: Mapping[str, str]) -> Table:
+    """
+    Return messages by input, and what each was taken from.
+    """
+    return Table(
+        ('input', 'from', 'messages'),
+        tuple((name, sources[name], f'{n}') for name, n in written.items()),
+    )
 
 
 def not_taken_words(not_taken: Mapping[str, Mapping[str, int]]) -> list[str]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from enum import Enum
-from math import cos, hypot, pi, radians, remainder, sin
+from math import cos, hypot, pi, remainder, sin
 
 from shipdrag_ros.display import NUMBER
 
@@ -178,10 +178,3 @@ def combined(form: Form, values: list[float]) -> tuple[float, float]:
         speed, angle = values
         return -speed * cos(angle), speed * sin(angle)
     return values[0], values[1] if len(values) > 1 else 0.0
-
-
-def compass_to_yaw(compass_deg: float) -> float:
-    """
-    Return REP-103 yaw [rad] of a compass angle.
-    """
-    return remainder(pi / 2.0 - radians(compass_deg), 2.0 * pi)

@@ -35,6 +35,7 @@ from shipdrag_ros.importing.words import (
     backward_and_repeated,
     not_taken_words,
     rejected_words,
+    table_of_messages,
 )
 from shipdrag_ros.nmea.framing import Checksum
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
@@ -147,10 +148,7 @@ class NmeaResult:
         """
         Return messages by input.
         """
-        return Table(
-            ('input', 'from', 'messages'),
-            tuple((name, self.sources[name], f'{n}') for name, n in self.written.items()),
-        )
+        return table_of_messages(self.written, self.sources)
 
     def details(self) -> list[str]:
         """
