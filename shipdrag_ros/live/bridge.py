@@ -13,7 +13,7 @@ from typing import Any
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, verdicts
 from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.figures import at_usual_speed, curve_part, past_part, ship_part
+from shipdrag_ros.live.figures import PagePart, at_usual_speed, curve_part, past_part, ship_part
 from shipdrag_ros.live.headline import ENDED_S, GOAL, Ended, Situation, headline
 from shipdrag_ros.live.outlook import to_go_s
 from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
@@ -28,7 +28,7 @@ PAST_RUNS = 50  # that are listed
 _MESSAGES = 20
 _COURSE_S = 300
 
-Part = dict[str, Any] | list[Any] | None
+_AnyPart = PagePart | list[Any] | None
 
 
 class Bridge:
@@ -203,7 +203,7 @@ class Bridge:
     def _now_ns(self) -> int:
         return self.trace.newest_s * 1_000_000_000
 
-    def parts(self, now_s: float) -> dict[str, Part]:
+    def parts(self, now_s: float) -> dict[str, _AnyPart]:
         """
         Return every part of the page but the traces.
 
@@ -274,7 +274,7 @@ class Bridge:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
-    def _figures(self) -> Part:
+    def _figures(self) -> _AnyPart:
         figures: dict[str, Any] = {'speed_m_s': self.speed_m_s}
         if self._resistance is not None:
             figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
@@ -287,7 +287,7 @@ class Bridge:
             figures['usual']['run_s'] = ended[-1].start_ns // 1_000_000_000  # not of now
         return figures
 
-    def _inputs(self) -> Part:
+    def _inputs(self) -> _AnyPart:
         if self._health is None:
             return []
         told = [status for status in self._health.statuses if status.input]
@@ -311,7 +311,7 @@ class Bridge:
             )
         return rows
 
-    def _checks(self, now: Situation) -> Part:
+    def _checks(self, now: Situation) -> _AnyPart:
         second, coasting = self._now_s, now.coast_s is not None
         of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
         course = self._recent.direction(second)
@@ -333,7 +333,7 @@ class Bridge:
         ]
         return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]
 
-    def _verdict_part(self) -> Part:
+    def _verdict_part(self) -> _AnyPart:
         view = self._verdict
         return {
             'state': view.state,

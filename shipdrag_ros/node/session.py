@@ -13,14 +13,14 @@ from functools import partial
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     EndedBy,
+    EndedCoastdown,
     Event,
     NoEstimate,
+    OnCoastdown,
     State,
     Update,
 )
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
     Decoded,
@@ -40,8 +40,7 @@ from shipdrag_ros.node.ring import RawMessage
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]
-Ended = Callable[[Coastdown, Window], None]
-Told = Callable[[Event], None]
+OnEvent = Callable[[Event], None]
 Count = Callable[[Decoded], None]
 
 AT_ONCE = 2000  # of what waited, between two turns of everything else
@@ -83,8 +82,8 @@ class Session:
         *,
         publish: Publish,
         node: str,
-        ended: Ended | None = None,
-        told: Told | None = None,
+        ended: OnCoastdown | None = None,
+        told: OnEvent | None = None,
         ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self.monitor = monitor
@@ -264,7 +263,7 @@ class Session:
 
     def _report(self, events: list[Event]) -> None:
         for event in events:
-            if isinstance(event, Update | Coastdown) and event.estimate is not None:
+            if isinstance(event, Update | EndedCoastdown) and event.estimate is not None:
                 self.latest = event.estimate
             self.why_none = event.reason if isinstance(event, NoEstimate) else ''
             if self._told is not None:
@@ -273,7 +272,7 @@ class Session:
                 self._send(message)
             if (
                 self._ended is not None
-                and isinstance(event, Coastdown)
+                and isinstance(event, EndedCoastdown)
                 and event.ended_by is not EndedBy.RESET
                 and not event.withdrawn
             ):
