@@ -36,6 +36,7 @@ from shipdrag_ros.coastdown.running import RunningCoastdown, WindowEstimator
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
+from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.parameters import Parameters
@@ -155,11 +156,13 @@ class Monitor:
         """
         return self._history_ns
 
-    def heading_doubt(self) -> str:
+    def doubts(self) -> dict[str, str]:
         """
-        Say what is wrong with the heading, by the course over ground; '' if nothing is seen.
+        Say which inputs contradict each other: a heading its course, a speed by its unit.
         """
-        return heading_doubt(self._memory.bins, self._parameters.heading_convention)
+        bins = self._memory.bins
+        heading = heading_doubt(bins, self._parameters.heading_convention)
+        return unit_doubts(bins) | ({'heading': heading} if heading else {})
 
     def health(self) -> dict[str, InputHealth]:
         """

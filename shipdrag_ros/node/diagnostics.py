@@ -132,8 +132,17 @@ def state_status(standing: Standing, inputs: Sequence[InputState]) -> Diagnostic
         return _status('state', ERROR, f'no input can be used: {why}', values)
     if monitor is State.WAITING:
         text = f'waiting: not enough steady sailing yet to know a coastdown by, {_lead(standing)}'
-        return _status('state', OK, text, values)
-    return _status('state', OK, monitor.value, values)
+    else:
+        text = monitor.value
+    # one good input is enough to estimate, but what it is held against is missing
+    unwell = [
+        f'{each.topic.name}: {each.finding.text}'
+        for each in motion
+        if each.topic.age_s is not None and each.finding.level is not Level.OK
+    ]
+    if unwell:
+        return _status('state', WARN, f'{text}; not well, {"; ".join(unwell)}', values)
+    return _status('state', OK, text, values)
 
 
 def _lead(standing: Standing) -> str:
@@ -147,7 +156,7 @@ def input_status(state: InputState) -> DiagnosticStatus:
     topic, health = state.topic, state.health
     values: dict[str, object] = {
         'topic': topic.topic,
-        'type': topic.type or 'not yet known',
+        'type': topic.fed_by or topic.type or 'not yet known',
         'publishers': sum(topic.publishers.values()),
         'published by': ', '.join(topic.senders) or 'none',
         'reliability': 'reliable' if topic.reliable else 'best effort',

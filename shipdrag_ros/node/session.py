@@ -43,6 +43,8 @@ Publish = Callable[[OutputMessage], None]
 OnEvent = Callable[[Event], None]
 Count = Callable[[Decoded], None]
 
+WAITING_MOST = 200_000  # messages that wait for compiled code
+WAITING_BYTES = 128 * 1024 * 1024  # of them
 AT_ONCE = 2000  # of what waited, between two turns of everything else
 
 
@@ -88,6 +90,7 @@ class Session:
     ) -> None:
         self.monitor = monitor
         self.recorder = recorder
+        self._waiting_bytes = 0
         self.latest: Estimate | None = None
         self._publish = publish
         self._node = node
@@ -95,7 +98,7 @@ class Session:
         self._told = told
         self.why_none = ''
         self._ready = ready
-        self._waiting: deque[tuple[int, Callable[[], None]]] = deque()
+        self._waiting: deque[tuple[int, int, Callable[[], None]]] = deque()
         self._arrival_ns = 0
         self._cause_ns = 0  # arrival of what the messages out come of, if not the last
 
@@ -103,6 +106,11 @@ class Session:
     def waiting(self) -> int:
         """What was heard and recorded, and waits for the monitor."""
         return len(self._waiting)
+
+    @property
+    def full(self) -> bool:
+        """Whether so much waits that no more is to be given."""
+        return len(self._waiting) > WAITING_MOST or self._waiting_bytes > WAITING_BYTES
 
     def receive(
         self, source: Source, payload: bytes, now_ns: int, count: Count | None = None
@@ -133,7 +141,7 @@ class Session:
             if count is not None:
                 count(decoded)
 
-        self._in_turn(use)
+        self._in_turn(use, len(payload))
 
     def go_on(self) -> None:
         """
@@ -143,14 +151,16 @@ class Session:
             for _ in range(min(len(self._waiting), AT_ONCE)):
                 if not self._ready():
                     return
-                self._cause_ns, use = self._waiting.popleft()
+                self._cause_ns, size, use = self._waiting.popleft()
+                self._waiting_bytes -= size
                 use()
         finally:
             self._cause_ns = 0
 
-    def _in_turn(self, use: Callable[[], None]) -> None:
+    def _in_turn(self, use: Callable[[], None], size: int = 0) -> None:
         """Do it behind what waits."""
-        self._waiting.append((self._arrival_ns, use))
+        self._waiting.append((self._arrival_ns, size, use))
+        self._waiting_bytes += size
         self.go_on()
 
     def keep(self, source: Source, payload: bytes, now_ns: int) -> None:
