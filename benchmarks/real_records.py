@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from _second_opinion import second_opinion
 from _tables import put, table
@@ -367,7 +368,8 @@ def draw(out: Path, data: Path) -> None:
             result.ship,
             truth=None if true is None else (true.speed_m_s, true.resistance_m_s2),
         )
-        drawing.save(figure, out / f'{name}.png')
+        with mpl.rc_context(drawing.STYLE):
+            figure.savefig(out / f'{name}.png', dpi=200)
         print(f'picture: {out / name}.png, {coastdown.estimate.summary(result.ship)[0]}')
 
 
