@@ -143,4 +143,5 @@ FORMAT = Format(
         ),
     ),
     chosen_by='map',
+    by_head=False,
 )
