@@ -8,14 +8,14 @@ Also one window of it, given by hand, through the same estimator.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     Dismissal,
+    EndedCoastdown,
     Event,
     NoEstimate,
     NotCoastdown,
@@ -25,6 +25,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import estimate
 from shipdrag_ros.messages import DEFAULT_NODE, TOPICS, outputs
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
 from shipdrag_ros.samples import Block, Channel, Reason
@@ -35,7 +36,6 @@ PARAMETERS_FILE = 'parameters.yaml'
 WRONG_TYPE = 'type'
 
 # done, of how many messages
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class ReplayResult:
     run: Run
     ship: Ship
     parameters: Parameters
-    coastdowns: tuple[Coastdown, ...]
+    coastdowns: tuple[EndedCoastdown, ...]
     events: tuple[Event, ...]
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
@@ -120,7 +120,7 @@ def replay(
     parameters: Parameters | None = None,
     window: tuple[float, float] | None = None,
     compare: bool = True,
-    progress: Progress | None = None,
+    progress: PartDone | None = None,
 ) -> ReplayResult:
     """
     Estimate from a run as the node would have.
@@ -195,19 +195,19 @@ def _no_input(run: Run) -> str:
 
 
 def _as_on_board(
-    run: Run, ship: Ship, parameters: Parameters, own: bool, progress: Progress | None
+    run: Run, ship: Ship, parameters: Parameters, own: bool, progress: PartDone | None
 ) -> ReplayResult:
     # what nothing is compared with is left out: an estimate depends on its window alone
     monitor = Monitor(ship, parameters, estimate=estimate if own else None)
     comparison = Comparison(run.outputs() if own else iter(()))
-    coastdowns: list[Coastdown] = []
+    coastdowns: list[EndedCoastdown] = []
     kept: list[Event] = []
 
     def take(events: list[Event]) -> None:
         for event in events:
             if not isinstance(event, Update | NoEstimate):
                 kept.append(event)
-            if isinstance(event, Coastdown) and not event.withdrawn:
+            if isinstance(event, EndedCoastdown) and not event.withdrawn:
                 coastdowns.append(event)
             if own:
                 for message in outputs(event, node=run.node or DEFAULT_NODE):
