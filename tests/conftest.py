@@ -143,17 +143,17 @@ class Page(HTMLParser):
             self.words.append(data)
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def read_page() -> type[Page]:
     return Page
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def ship() -> Ship:
     return Ship(name='Vitus Bering', length_m=150.0, displaced_volume_m3=20200.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def estimate(ship: Ship) -> Estimate:
     """r = v^2 / 3000 and a joint fit of it, 1500 s long."""
     speed = np.linspace(0.5, 8.2, 155)
@@ -200,7 +200,7 @@ def estimate(ship: Ship) -> Estimate:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def coastdown(estimate: Estimate) -> Coastdown:
     return Coastdown(
         start_ns=estimate.start_ns,
@@ -211,7 +211,7 @@ def coastdown(estimate: Estimate) -> Coastdown:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def run(ship: Ship, coastdown: Coastdown) -> RunResult:
     return RunResult(
         bag='sea trial.mcap',
@@ -226,13 +226,13 @@ def run(ship: Ship, coastdown: Coastdown) -> RunResult:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def truth() -> TrueCurve:
     speed = np.linspace(0.0, 8.2, 83)
     return TrueCurve(speed, speed**2 / 3100.0, {'speed_m_s': 8.2, 'seed': 1})
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def simulated(run: RunResult, truth: TrueCurve) -> RunResult:
     return replace(run, truth=truth)
 
