@@ -9,6 +9,7 @@ Property tests try the same examples each time, new ones with
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import re
 import shutil
@@ -79,6 +80,12 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 def own_domain() -> Callable[[], tuple[int, TextIO]]:
     """A function that finds one more domain, until its lock is closed."""
     return _own_domain
+
+
+def pytest_collection_finish() -> None:
+    """Let the collector of garbage look no more at half a million things that stay."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
