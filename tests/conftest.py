@@ -25,7 +25,7 @@ import pytest
 from hypothesis import settings
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.estimation.result import (
     Estimate,
     FroudeMax,
@@ -208,8 +208,8 @@ def estimate(ship: Ship) -> Estimate:
 
 
 @pytest.fixture(scope='module')
-def coastdown(estimate: Estimate) -> Coastdown:
-    return Coastdown(
+def coastdown(estimate: Estimate) -> EndedCoastdown:
+    return EndedCoastdown(
         start_ns=estimate.start_ns,
         end_ns=estimate.end_ns,
         onset_detected_ns=estimate.start_ns + 40 * _SECOND_NS,
@@ -219,7 +219,7 @@ def coastdown(estimate: Estimate) -> Coastdown:
 
 
 @pytest.fixture(scope='module')
-def run(ship: Ship, coastdown: Coastdown) -> RunResult:
+def run(ship: Ship, coastdown: EndedCoastdown) -> RunResult:
     return RunResult(
         bag='sea trial.mcap',
         ship=ship,

@@ -18,8 +18,8 @@ from typing import NamedTuple
 from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import Help
 from shipdrag_ros.cli.examples import epilog
-from shipdrag_ros.cli.imports import uncollected
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.imports import uncollected
 from shipdrag_ros.studies import found
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.cli.arguments import number
-from shipdrag_ros.cli.imports import uncollected
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.nmea.address import parse_addresses
@@ -81,8 +80,7 @@ def run(options: argparse.Namespace) -> int:
     for line in overruled(options.ros_args, ship=options.ship, out=options.out):
         output.log(line)
     try:
-        with uncollected():
-            from shipdrag_ros.node import main
+        from shipdrag_ros.node import main
     except ModuleNotFoundError as error:
         raise no_ros(error) from error
     output.log(discovery(os.environ, network=options.network))
