@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from _second_opinion import second_opinion
 from _tables import put, table
@@ -368,8 +367,7 @@ def draw(out: Path, data: Path) -> None:
             result.ship,
             truth=None if true is None else (true.speed_m_s, true.resistance_m_s2),
         )
-        with mpl.rc_context(drawing.STYLE):
-            figure.savefig(out / f'{name}.png', dpi=200)
+        drawing.save(figure, out / f'{name}.png')
         print(f'picture: {out / name}.png, {coastdown.estimate.summary(result.ship)[0]}')
 
 

@@ -18,7 +18,8 @@ PACKAGE = ROOT / 'shipdrag_ros'
 
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
-    ('errors', 'samples', 'display', 'progress', 'compiled', 'strict_yaml', 'plain_file'),
+    ('errors', 'samples', 'display', 'progress', 'compiled'),
+    ('imports', 'strict_yaml', 'plain_file'),
     ('fields',),
     ('parameter',),
     ('parameters', 'ship', 'report'),
@@ -65,6 +66,7 @@ GROUND = {
     'compiled',
     'strict_yaml',
     'plain_file',
+    'imports',
 }  # known by the modules that need them
 ROS = {
     'rclpy',

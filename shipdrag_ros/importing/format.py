@@ -157,6 +157,8 @@ class Format(NamedTuple):
         Those that it knows.
     chosen_by
         Key of an option that chooses it; '' for none.
+    by_head
+        Whether the score comes from the first bytes alone, and not from the file.
     """
 
     name: str
@@ -166,6 +168,7 @@ class Format(NamedTuple):
     write: Callable[[Job], ImportResult]
     options: tuple[Option, ...] = ()
     chosen_by: str = ''
+    by_head: bool = True
 
 
 def best_of(formats: Sequence[Format], head: Head) -> Format:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import base64
 import io
+from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -57,3 +58,11 @@ def data_uri(figure: Figure) -> str:
         # without a date the same data give the same bytes
         figure.savefig(buffer, format='svg', dpi=_PIXELS_PER_INCH, metadata={'Date': None})
     return 'data:image/svg+xml;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')
+
+
+def save(figure: Figure, path: Path, *, pixels_per_inch: int = _PIXELS_PER_INCH) -> None:
+    """
+    Write a figure to a file; its ending gives the format.
+    """
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(path, dpi=pixels_per_inch)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A figure becomes part of a page, the same from the same data."""
+"""A figure becomes part of a page or a file, the same from the same data."""
 
 from __future__ import annotations
 
 import base64
+from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
@@ -11,6 +12,15 @@ from matplotlib.figure import Figure
 from shipdrag_ros.estimation import pictures
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.report import drawing
+
+
+@pytest.mark.parametrize('name', ['picture.svg', 'picture.png'])
+def test_a_picture_is_saved_as_its_name_says(
+    estimate: Estimate, tmp_path: Path, name: str
+) -> None:
+    drawing.save(pictures.order_picture(estimate), tmp_path / name)
+    head = (tmp_path / name).read_bytes()[:100]
+    assert head.startswith(b'\x89PNG') if name.endswith('png') else b'<?xml' in head
 
 
 def test_the_same_data_give_the_same_bytes(estimate: Estimate) -> None:

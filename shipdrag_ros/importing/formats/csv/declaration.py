@@ -137,4 +137,5 @@ FORMAT = Format(
         ),
     ),
     chosen_by='map',
+    by_head=False,
 )
