@@ -72,7 +72,7 @@ def open_windowed(
     window
         Of the bags without a window of their own.
     output
-        Told what was understood of a log that is no bag; stderr by default.
+        Called with what was understood of a log that is no bag; stderr by default.
 
     Raises
     ------

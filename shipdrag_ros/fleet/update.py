@@ -24,7 +24,7 @@ from shipdrag_ros.fleet.rows import BagResult
 from shipdrag_ros.fleet.store import Done, Store
 
 Progress = Callable[[str, int, int], None]
-"""Told what is being done, how much of it is done, and of how much."""
+"""Called with what is being done, how much of it is done, and of how much."""
 
 
 class Twin(NamedTuple):
@@ -76,7 +76,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     engine
         Running.
     progress
-        Told how far it is.
+        Called with how far it is.
 
     Raises
     ------

@@ -289,7 +289,7 @@ class CoastdownNode(LifecycleNode):
     def _hear(self) -> None:
         """Take what has come on all topics, in its order."""
         if self._session is not None and self._session.waiting > WAITING_MOST:
-            return  # the middleware keeps some more, and tells what it loses
+            return  # the middleware keeps some more, and says what it loses
         for topic, data, received_ns in self._mailbox.take():
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock

@@ -127,7 +127,7 @@ def replay(
         Begin and end [s from the start of the bag], instead of finding
         coastdowns; outputs are then not compared.
     progress
-        Told now and then how many messages are done, and of how many.
+        Called now and then with how many messages are done, and of how many.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def _as_on_board(
 
 def feed(monitor: Monitor, item: Block | Mark) -> list[Event]:
     """
-    Give a monitor what the node's had: samples, or what was told it by other means.
+    Give a monitor what the node's had: samples, or what it learnt by other means.
     """
     if isinstance(item, Block):
         return monitor.update(item)
