@@ -17,7 +17,7 @@ from shipdrag_ros.importing.format import Format, Job, Option
 from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.importing.join import import_joined
 from shipdrag_ros.importing.reading import ImportedRun, format_of, job_of
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.library.frames import NANOSECONDS, is_frame, write_table
 from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.samples import SECOND_NS
@@ -30,7 +30,7 @@ _OWN = {'map': 'columns', 'time': 'time', 'rate': 'rate_hz'}  # options that are
 
 
 @dataclass(frozen=True)
-class HowToRead:
+class ReadOptions:
     """
     How a log is to be read, where it does not say so itself.
 
@@ -51,7 +51,7 @@ class HowToRead:
     rate_hz: float | None = None
     others: Mapping[str, Any] | None = None
 
-    def of_dates(self, dates: Sequence[str]) -> HowToRead:
+    def of_dates(self, dates: Sequence[str]) -> ReadOptions:
         """
         Take the first column of dates for the time, where no other is given.
 
@@ -155,7 +155,7 @@ def _value(option: Option, value: Any) -> Any:
 def _is_in(text: str, source: Path) -> bool:
     """Say whether a file is a table that has the columns of an input."""
     try:
-        table = Table(source)
+        table = LogTable(source)
         for name in parse_input(text).names:
             table.column(name)
     except ImportDataError:
@@ -175,7 +175,7 @@ class _Part:
 
 
 def read_logs(
-    sources: Sequence[Any], how: HowToRead, attachments: Mapping[str, str]
+    sources: Sequence[Any], how: ReadOptions, attachments: Mapping[str, str]
 ) -> tuple[list[Run], list[str]]:
     """
     Make runs of logs, tables and frames.
@@ -225,14 +225,14 @@ def read_logs(
     return runs, notes
 
 
-def _refuse_missing(how: HowToRead, sources: Sequence[Path]) -> None:
+def _refuse_missing(how: ReadOptions, sources: Sequence[Path]) -> None:
     """Refuse columns that none of the sources has."""
     for text in how.maps:
         if not any(_is_in(text, source) for source in sources):
             raise ImportDataError(f'columns {text!r}: none of the sources has them; name others')
 
 
-def _refuse_foreign(how: HowToRead, chosen: Sequence[Format]) -> None:
+def _refuse_foreign(how: ReadOptions, chosen: Sequence[Format]) -> None:
     """Refuse options that none of the formats knows."""
     for key in how.others or {}:
         if key != _FORMAT and not any(
@@ -243,7 +243,7 @@ def _refuse_foreign(how: HowToRead, chosen: Sequence[Format]) -> None:
 
 
 def _part(
-    source: Any, place_of: tuple[Path, int, bool], how: HowToRead, attachments: Mapping[str, str]
+    source: Any, place_of: tuple[Path, int, bool], how: ReadOptions, attachments: Mapping[str, str]
 ) -> tuple[_Part, list[str]]:
     """Read a source by itself; return it, and what of it was not used."""
     folder, place, alone = place_of

@@ -105,9 +105,9 @@ def read(
         idle = [f'{name}=' for name, value in given_for_logs.items() if value is not None]
         notes = [f'{", ".join(idle)} not used: they are for logs and tables'] if idle else []
         return Record(runs, given=given, notes=notes)
-    from shipdrag_ros.library.logs import HowToRead, read_logs  # a bag needs no importer
+    from shipdrag_ros.library.logs import ReadOptions, read_logs  # a bag needs no importer
 
-    how = HowToRead(columns, time, rate_hz, options)
+    how = ReadOptions(columns, time, rate_hz, options)
     attachments = {} if given is None else {SHIP_FILE: given.to_yaml()}
     imported, notes = read_logs(others, how, attachments)
     return Record([*runs, *imported], given=given, notes=notes)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import Diagnosis, SailingRecord, Verdict, diagnose_sailing
+from shipdrag_ros.diagnosis import DiagnosisResult, SailingRecord, Verdict, diagnose_sailing
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
@@ -103,7 +103,7 @@ def degrees(place: Float64) -> Float64:
     return place[:, ::-1] / METRES_A_DEGREE
 
 
-def found_in(sailing: Sailing, seed: int = 1) -> Diagnosis:
+def found_in(sailing: Sailing, seed: int = 1) -> DiagnosisResult:
     """Diagnose one record."""
     return diagnose_sailing([SailingRecord('sailing', sailing.block(seed))], PARAMETERS)
 
