@@ -14,7 +14,7 @@ from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.importing.bag import ATTACHMENT, new_bag
 from shipdrag_ros.importing.format import Format, ImportResult, Job
-from shipdrag_ros.importing.one_ship import Way, refuse_two_ships
+from shipdrag_ros.importing.one_ship import LogTrack, refuse_two_ships
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
@@ -79,7 +79,9 @@ def import_joined(
         ]
         runs = [open_runs([path])[0] for path in made]
         names = [job.source.name for _, job in parts]
-        refuse_two_ships([Way(name, _blocks(run)) for name, run in zip(names, runs, strict=True)])
+        refuse_two_ships(
+            [LogTrack(name, _blocks(run)) for name, run in zip(names, runs, strict=True)]
+        )
         taken, notes = _taken(runs, names)
         with new_bag(out, attachments) as bag:
             about = {name: run.attachments.get(ATTACHMENT, '') for name, run in zip(names, runs)}

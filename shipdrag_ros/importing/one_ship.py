@@ -17,7 +17,7 @@ _APART_M = (
 _METRES_PER_DEGREE = 1852.0 * 60.0
 
 
-class Way:
+class LogTrack:
     """
     Where the ship of a log was, at most once a second.
 
@@ -41,7 +41,7 @@ class Way:
         self.time_ns: Int64 = np.concatenate(times)[order]
         self.degrees: Float64 = np.concatenate(places)[order]
 
-    def away_m(self, other: Way) -> tuple[Float64, Int64]:
+    def away_m(self, other: LogTrack) -> tuple[Float64, Int64]:
         """
         Return how far the other is from here when she is there, less the way between.
 
@@ -67,7 +67,7 @@ class Way:
         return apart_m - ABSURD_SPEED_M_S * between_s, other.time_ns
 
 
-def refuse_two_ships(ways: Sequence[Way]) -> None:
+def refuse_two_ships(ways: Sequence[LogTrack]) -> None:
     """
     Refuse logs that hold a ship at two places at one time.
 
