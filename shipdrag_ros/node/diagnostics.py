@@ -39,7 +39,7 @@ def label(
     statuses: Sequence[DiagnosticStatus], *, node: str, hardware_id: str
 ) -> list[DiagnosticStatus]:
     """
-    Say whose statuses these are, so that two nodes are told apart.
+    Say whose statuses these are, so that two nodes are not mixed up.
 
     Parameters
     ----------

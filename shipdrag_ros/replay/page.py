@@ -72,7 +72,7 @@ def write_report(path: Path, runs: Sequence[RunResult], *, ranking: Ranking | No
 
 
 def _run(run: RunResult, speed_m_s: float) -> Iterator[Section]:
-    """Tell of one bag, its coastdowns in their order."""
+    """Show one bag, its coastdowns in their order."""
     yield Section(
         run.bag,
         quiet=run.ship.summary(),
@@ -179,7 +179,7 @@ def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:
 
 
 def _all(runs: Sequence[RunResult]) -> Section:
-    """Tell of all coastdowns: a line each, their curves, and the one curve where there is one."""
+    """Show all coastdowns: a line each, their curves, and the one curve where there is one."""
     found = together(runs)
     lines, lead = [], []
     shown = [('All coastdowns, a line each', tables.coastdowns_table(runs))]

@@ -39,7 +39,7 @@ def write_coasting(path: Path, found: CoastStudy) -> None:
             picture(
                 pictures.mimic_picture(found),
                 'What is left of each effect when the value that looks most like it is blamed: 0, '
-                'no record tells the two apart.',
+                'no record separates the two.',
             ),
             words.MIMICS,
             words.mimic_table(found),
