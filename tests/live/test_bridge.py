@@ -159,13 +159,18 @@ def test_trouble_of_the_node_is_the_headline_and_rejections_are_listed() -> None
     bridge = Bridge()
     values = {'lifecycle': 'active', 'monitor': 'waiting'}
     state = Status('n', 'state', ERROR, 'no data: nothing on any of a, b', values)
-    rejected = {'rejected nan': '3', 'rejected late': '0'}
-    heading = Status('n', 'input heading', 1, 'frozen', rejected)
+    values_of = {'rejected nan': '3', 'rejected late': '0', 'rate [Hz]': '2', 'age [s]': '0.5'}
+    heading = Status('n', 'input heading', 1, 'frozen', values_of)
     bridge.hear(Health((state, heading)), 10.0)
     parts = bridge.parts(11.0)
     assert parts['headline']['text'] == 'NO SPEED HEARD'
     assert parts['inputs'][0]['rejected'] == {'nan': 3}
-    assert bridge.parts(20.0)['headline']['text'].startswith('NODE SILENT')
+    assert [parts['inputs'][0][name] for name in ('level', 'rate_hz', 'age_s')] == [1, 2.0, 0.5]
+
+    later = bridge.parts(20.0)
+    assert later['headline']['text'].startswith('NODE SILENT')
+    assert [later['inputs'][0][name] for name in ('level', 'rate_hz', 'age_s')] == [3, None, 10.5]
+    assert later['inputs'][0]['text'] == 'not known, the node is silent; its last word: frozen'
 
 
 def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
