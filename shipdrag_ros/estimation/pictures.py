@@ -15,6 +15,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from shipdrag_ros.display import TRACK_LABELS, force_unit, power_unit, speed_unit
@@ -284,7 +285,7 @@ def draw_curves(
     for number, (label, curve) in enumerate(dated):
         color, style = _DATED[number % len(_DATED)]
         if is_shaded(len(dated)):
-            color, style = _SHADES(_LIGHTEST * number / (len(dated) - 1)), '-'
+            color, style = to_hex(_SHADES(_LIGHTEST * number / (len(dated) - 1))), '-'
         force = Force.of(curve, ship)
         if len(dated) == 1:
             _draw_force(axis, force, scale, label=label)

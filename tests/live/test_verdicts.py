@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.diagnosis import Candidate, Diagnosis, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.result import Advice
 from shipdrag_ros.live.verdicts import of_diagnosis, of_status
 from shipdrag_ros.messages.heard import Status
@@ -13,7 +13,7 @@ from shipdrag_ros.parameter import Parameter
 
 FOULING = EffectEstimate('fouling', 0.6, {'friction_factor': Parameter(0.4, 0.02)})
 CABLE = EffectEstimate('towed_cable', 0.4, {'drag_area_m2': Parameter(2.5, 0.4)})
-FOUND = Diagnosis(
+FOUND = DiagnosisResult(
     verdict=Verdict.ONE_OF,
     effects=(),
     candidates=(
