@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Bring the store up to date and tell what became of the bags.
+    Bring the store up to date and say what became of the bags.
     """
     from shipdrag_ros.fleet.engine import Engine
     from shipdrag_ros.fleet.find import find

@@ -167,7 +167,7 @@ class Monitor:
 
     def health(self) -> dict[str, InputHealth]:
         """
-        Tell how every input is doing, by its name.
+        Say how every input is doing, by its name.
         """
         return input_health(self._memory.tally)
 
@@ -298,7 +298,7 @@ class Monitor:
         """Give a candidate up and say why."""
         assert self._candidate is not None
         start_ns = self._candidate.start * SECOND_NS
-        # the stop may be still to come, and the shafts then tell it
+        # the stop may be still to come, and the shafts then show it
         driven = doubt is None or doubt.reason in (Dismissal.THRUST, Dismissal.OTHER)
         self._stand_down(driven=driven)
         if doubt is None:

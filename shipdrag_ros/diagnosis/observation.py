@@ -3,7 +3,7 @@
 A run as a diagnosis sees it: condensed rows of measurements, and what is known of it.
 
 Rows are means over times in which the motion is as good as even, so that a few
-hundred hold all that a run can tell.
+hundred hold all that a run can show.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from shipdrag_ros.ship import Ship
 _STEADY_BIN_S = 30.0
 _FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
 _LEAST_LONGEST_S, _BINS = 12.0, 80.0  # the longest bin is at least this, or this part of all
-_NEIGHBOURS = 9  # an outlier is told from the median of so many
+_NEIGHBOURS = 9  # an outlier is found by the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8
@@ -138,7 +138,7 @@ class Observation:
         if record.steady_s < LEAST_S or window.before is None:
             raise DiagnosisError(
                 f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
-                f'{LEAST_S:.0f} s are needed to tell an effect from the noise: give a record '
+                f'{LEAST_S:.0f} s are needed to separate an effect from the noise: give a record '
                 'that begins earlier'
             )
         if run_down.stop_sd_s > _KNOWN_S:
@@ -215,7 +215,7 @@ def _edges(lead_in_s: float, end_s: float) -> Float64:
 
 
 def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
-    """Tell what does not stand out from its neighbours."""
+    """Say what does not stand out from its neighbours."""
     away = np.abs(value - median_filter(value, _NEIGHBOURS, mode='nearest'))
     keep: NDArray[np.bool_] = away <= _OUTLIER * max(sd, float(np.median(away)))
     return keep

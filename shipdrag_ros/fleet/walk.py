@@ -3,7 +3,7 @@
 Folders on a disk and in an object store, walked alike.
 
 A folder is entered once however many links lead to it, and what is no regular
-file is told apart before anything reads it.
+file is known before anything reads it.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a format of log files declares: how it is recognised, read and told."""
+"""What a format of log files declares: how it is recognised, read and shown."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Job:
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how much is read, and of how much.
+        Called with how much is read, and of how much.
     """
 
     source: Path
@@ -117,7 +117,7 @@ class Job:
 
 
 class ImportResult(Protocol):
-    """What became of a file: a dataclass that tells itself."""
+    """What became of a file: a dataclass that shows itself."""
 
     @property
     def written(self) -> Mapping[str, int]:

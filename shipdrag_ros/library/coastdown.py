@@ -13,6 +13,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.library.shown import ShownResistance
+from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.ship import Ship
@@ -101,7 +102,7 @@ class Coastdown(ShownResistance):
         """
         Say what it gave, in the engineer's units, then in SI; or why nothing.
         """
-        return words.summary(self.event, self.ship)
+        return tuple(map(in_python, words.summary(self.event, self.ship)))
 
     def table(self) -> Table:
         """

@@ -20,6 +20,7 @@ from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.library.shown import ShownResistance
 from shipdrag_ros.library.windowed import WindowSpan
+from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
@@ -38,7 +39,7 @@ class Resistance(ShownResistance):
     Attributes
     ----------
     runs
-        What each run gave, as `shipdrag replay` tells it.
+        What each run gave, as `shipdrag replay` shows it.
 
     Raises
     ------
@@ -110,7 +111,7 @@ class Resistance(ShownResistance):
             place = force.near(tables.common_speed_m_s(self.runs))
             told.append(f'{whole.combined.runs} coastdowns together. {force.at(place)}')
             told += words.combined_notes(whole.combined)
-        return tuple(told)
+        return tuple(map(in_python, told))
 
     def table(self) -> Table:
         """
@@ -162,6 +163,7 @@ class Resistance(ShownResistance):
         return force_columns(self.curve, self.ship)
 
 
+@says_it_in_python
 def estimate(
     records: Record | Sequence[Record],
     *,

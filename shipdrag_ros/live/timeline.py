@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A bag as a node would have told it: through the same monitor, second by second.
+A bag as a node would have shown it: through the same monitor, second by second.
 
 Read once, ahead of whoever plays it; playing, pausing and seeking only walk
 what is there.

@@ -54,7 +54,7 @@ class Session:
     Parameters
     ----------
     recorder
-        Told of every message in and out.
+        Called with every message in and out.
     publish
         Called with every message out.
     node
@@ -211,7 +211,7 @@ class Session:
         Parameters
         ----------
         ends
-            Whether readings that matter to a coastdown are told by that clock.
+            Whether readings that matter to a coastdown are timed by that clock.
         """
         self.watch_clock(now_ns)
         if ends and self.monitor.state in (State.CANDIDATE, State.COASTDOWN):

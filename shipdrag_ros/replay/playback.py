@@ -139,7 +139,7 @@ def replay(
         Whether outputs in the bag are compared; the estimates while a coastdown runs are
         made for that alone.
     progress
-        Told now and then how many messages are done, and of how many.
+        Called now and then with how many messages are done, and of how many.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def _as_on_board(
 
 def feed(monitor: Monitor, item: Block | Mark) -> list[Event]:
     """
-    Give a monitor what the node's had: samples, or what was told it by other means.
+    Give a monitor what the node's had: samples, or what it learnt by other means.
     """
     if isinstance(item, Block):
         return monitor.update(item)

@@ -24,7 +24,7 @@ from shipdrag_ros.inference.rows import CODES, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 
-LEAST_STAMPS = 12  # of an input: fewer do not tell its noise
+LEAST_STAMPS = 12  # of an input: fewer do not show its noise
 _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
 _WeightedRows = tuple[Float64, int, Float64, Float64]
 
@@ -201,7 +201,7 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
             series: Series = getattr(window.before, name)
             time_s = _seconds(series.time_ns, zero_ns)
             return float(steady_since(time_s, series.value, heading_s, heading.value))
-    # positions alone do not tell from sample to sample: by their means
+    # positions alone do not show it from sample to sample: by their means
     series = window.before.position
     if len(series) < LEAST_STAMPS:
         return np.inf

@@ -66,7 +66,7 @@ def _readings(log: Any, tally: Tally) -> Iterator[Reading]:
         stamp_ns = round(float(message._timestamp) * 1e6) * 1000
         if stamp_ns < _DATE_S * 1e9:
             stamp_ns += _BASE_NS
-            tally.note('The log has no fix that tells the date; its times count from 2000-01-01.')
+            tally.note('The log has no fix that gives the date; its times count from 2000-01-01.')
         told = message.to_dict()
         for channel, rank, name, a, b in _values(told):
             if isfinite(a) and isfinite(b):

@@ -68,7 +68,7 @@ def _read(log: Any, tally: Tally) -> Iterator[Reading]:
     """Yield the readings of all topics by time."""
     epoch_us = _epoch_us(log)
     if epoch_us is None:
-        tally.note('The log has no fix that tells the date; its times count from 2000-01-01.')
+        tally.note('The log has no fix that gives the date; its times count from 2000-01-01.')
     found: list[Reading] = []
     for data in log.data_list:
         name = data.name if data.multi_id == 0 else f'{data.name} {data.multi_id}'
@@ -90,7 +90,7 @@ def _read(log: Any, tally: Tally) -> Iterator[Reading]:
 
 
 def _epoch_us(log: Any) -> int | None:
-    """Return the date of time 0 [us], of the first fix that tells one."""
+    """Return the date of time 0 [us], of the first fix that gives one."""
     for data in log.data_list:
         utc = data.data.get('time_utc_usec')
         if data.name in _GPS and utc is not None:

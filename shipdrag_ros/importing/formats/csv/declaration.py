@@ -31,7 +31,7 @@ def _write(job: Job) -> TableResult:
     options = job.options
     time, rate = options.get('time'), options.get('rate')
     if time is not None and rate is not None:
-        raise ImportDataError('--time and --rate: both tell the times of the rows; keep one')
+        raise ImportDataError('--time and --rate: both give the times of the rows; keep one')
     time = with_dates(time, options.get('date_order', ''), options.get('zone'))
     table = LogTable(job.source)
     found = _inputs(table, time, options)

@@ -3,8 +3,8 @@
 Which columns of a table are which inputs, where nobody says so.
 
 A column is taken where its name says what it is and its unit is sure: stated in
-the name or below it, told by its values (degrees beyond 2 pi), or by the
-positions of the same table. What is not sure is told with what to type, and
+the name or below it, shown by its values (degrees beyond 2 pi), or by the
+positions of the same table. What is not sure is named with what to type, and
 not used.
 """
 
@@ -337,7 +337,7 @@ class _Guesser:
             'usual name of a speed or a position; say which it is, for instance --map '
             'speed_over_ground=COLUMN:kn --map position=LAT,LON:deg'
         )
-        return f'{path!r} tells no speed and no position in a unit that is known: {why}'
+        return f'{path!r} gives no speed and no position in a unit that is known: {why}'
 
 
 def is_table(path: Path) -> bool:

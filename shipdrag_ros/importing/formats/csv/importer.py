@@ -42,7 +42,7 @@ from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel
 
 _FEW = 10
-_SAMPLE_ROWS = 2000  # by which the way of writing is told
+_SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
 CellReader = Callable[[str], float]
 
@@ -113,7 +113,7 @@ def import_csv(
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how many bytes are read, and of how many.
+        Called with how many bytes are read, and of how many.
 
     Raises
     ------
