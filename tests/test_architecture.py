@@ -161,6 +161,15 @@ def test_a_name_stands_for_one_thing() -> None:
     assert not twice, 'give each class and type of the package a name of its own'
 
 
+@pytest.mark.parametrize('page', ['CONTRIBUTING.md', 'docs/architecture.md'])
+def test_modules_that_a_walk_names_are_there(page: str) -> None:
+    named = set(re.findall(r'`([\w/]+\.py)`', (ROOT / page).read_text(encoding='utf-8')))
+    rooms = (ROOT / name for name in ('shipdrag_ros', 'tests', 'docs', 'benchmarks'))
+    known = [path.as_posix() for room in rooms for path in room.rglob('*.py')]
+    assert len(named) > 10
+    assert not {name for name in named if not any(path.endswith(f'/{name}') for path in known)}
+
+
 def doors() -> list[tuple[str, str]]:
     """Return room and door of each row of the table in the map of the code."""
     text = (ROOT / 'docs' / 'architecture.md').read_text(encoding='utf-8')
