@@ -265,6 +265,11 @@ def curves_picture(
 def is_shaded(count: int) -> bool:
     """
     Tell whether so many curves are told apart by shades, in their order.
+
+    Parameters
+    ----------
+    count
+        Of the curves.
     """
     return count > len(_DATED)
 

@@ -122,6 +122,7 @@ def test_coastdowns_are_drawn_by_their_dates(estimate: Estimate, ship: Ship) -> 
     axis = pictures.curves_picture(dated, ship).axes[0]
     labels = [text.get_text() for text in axis.get_legend().get_texts()]
     assert labels == [label for label, _ in dated]
+    assert len({line.get_color() for line in axis.get_lines()}) == len(dated)  # told apart
     (alone,) = pictures.curves_picture(dated[:1], ship).axes[0].collections
     assert '±2' in str(alone.get_label())
 

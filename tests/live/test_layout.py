@@ -93,6 +93,7 @@ def test_before_there_is_anything_to_show(
             source.hear(health(level, text))
         viewer = view(url)
         viewer.wait_for('#headline', 'NO ')  # no node, or no speed
+        assert not viewer.page.is_visible('#player')  # nothing is played
         for width in SCREENS:
             if level is not None:
                 source.hear(health(level, text))  # still there

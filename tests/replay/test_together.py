@@ -36,6 +36,13 @@ def test_months_later_more_resistance_is_another_state(run: RunResult) -> None:
     assert 'one state of the hull does not fit all' in found.why_not
 
 
+def test_of_many_dates_the_least_and_the_most_are_named(run: RunResult) -> None:
+    found = together([later(run, days=90.0 * i, factor=1.0 + 0.1 * i) for i in range(5)])
+    assert 'of 5 dates the least and the most: 2023-11-14: ' in found.why_not
+    assert '; 2024-11-08: ' in found.why_not
+    assert '2024-02-12' not in found.why_not
+
+
 def test_months_later_the_same_resistance_is_the_same_state(run: RunResult) -> None:
     # the bands are 1.6 % each; with 2 % from run to run, 5 % more is 1.4 standard deviations
     found = together([run, later(run, days=90.0, factor=1.05)])

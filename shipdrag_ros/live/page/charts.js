@@ -146,7 +146,7 @@ export function drawCurve(chart, { curve, clean, past, units, mass }) {
 }
 
 function timeAxis(offset) {
-  return { ...axis('', 32), labelSize: 0, values: (u, ticks) => ticks.map(t => new Date((t + offset * 3600) * 1000).toISOString().slice(11, 16)) };
+  return { ...axis('', 32), labelSize: 0, values: (u, ticks, _a, _s, step) => ticks.map(t => new Date((t + offset * 3600) * 1000).toISOString().slice(11, step < 60 ? 19 : 16)) };
 }
 
 /** Speeds over time; rows are [second, log, ground, estimate, shaft]. */

@@ -221,7 +221,7 @@ function showPast(part) {
 }
 
 function showNotes(part) {
-  el('notes').replaceChildren(...[...part].reverse().map(([second, said]) => make('li', [make('time', timeOfDay(second, zone)), said])));
+  el('notes').replaceChildren(...[...part].reverse().map(([second, said]) => make('li', [make('time', timeOfDay(second, zone)), said.replaceAll('_', ' ')])));
 }
 
 function showStarted(part) {

@@ -43,6 +43,11 @@ def technical(found: ResidualFit) -> str:
 def what_it_is(target: str) -> str:
     """
     Say what is fitted, and what the terms are made of.
+
+    Parameters
+    ----------
+    target
+        Name of what was measured.
     """
     return (
         f'{target} is residual resistance, in the measure of the data: what is left when friction '
