@@ -9,9 +9,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.sources import open_sources
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan
 
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
@@ -77,15 +78,17 @@ def open_windowed(
     Raises
     ------
     BagError
-        If one cannot be read.
+        If a bag cannot be read.
+    ImportDataError
+        If nothing in a log can be used.
     """
     output = output or Output()
     whole = [each.path for each in bags if each.window is None]
-    left = open_sources(whole, output, remap=remap) if whole else []
+    left = _open(whole, output, remap=remap) if whole else []
     found = []
     for each in bags:
         if each.window is not None:
-            runs = open_sources([each.path], output, remap=remap)
+            runs = _open([each.path], output, remap=remap)
             found += [WindowedRun(run, each.window) for run in runs]
             continue
         files = each.path.parent if each.path.name == 'metadata.yaml' else each.path
@@ -93,3 +96,16 @@ def open_windowed(
         found += [WindowedRun(run, window) for run in here]
         left = [run for run in left if run not in here]
     return found + [WindowedRun(run, window) for run in left]
+
+
+def _open(paths: Sequence[Path], output: Output, *, remap: Mapping[str, str]) -> list[Run]:
+    """Open bags and logs; what was understood of a log is told on stderr."""
+    if all(is_bag(path) for path in paths):
+        return open_runs(paths, remap=remap)
+    from shipdrag_ros.importing.reading import Understanding, read_any  # a bag needs no importer
+
+    def tell(found: Understanding) -> None:
+        for line in found.lines():
+            output.log(line)
+
+    return read_any(paths, remap=remap, tell=tell)

@@ -194,3 +194,20 @@ def best_of(formats: Sequence[Format], head: Head) -> Format:
             'as a table (CSV)'
         )
     return best
+
+
+def missing_library(job: Job, kind: str, library: str) -> ImportDataError:
+    """
+    Return the error of a file whose format needs a library that is not installed.
+
+    Parameters
+    ----------
+    job
+    kind
+        What the file is, with its article.
+    library
+        One of the extra `flight`.
+    """
+    return ImportDataError(
+        f"{str(job.source)!r} is {kind}, which needs {library}: pip install 'shipdrag_ros[flight]'"
+    )
