@@ -5,7 +5,8 @@ Trend on simulated fleets: cover of growth and level, cleanings found, false ste
 The world here is not the trend's model: fouling saturates or grows in bursts in port,
 seasons move the resistance, errors have long tails, some runs are junk. Beside the trend
 stand a straight line through all runs, the difference of means before and after, as
-ISO 19030 compares periods, and change points by `ruptures` where it is installed.
+ISO 19030 compares periods, and change points by `ruptures` where it is installed; all in
+one table.
 
     python benchmarks/trend_score.py --ships 40 --years 2.5 --seed 1
 """
@@ -156,24 +157,42 @@ class Score:
         if sd is not None:
             self.inside[name].append(abs(value - world.growth) < 1.96 * sd)
 
-    def show(self) -> None:
-        """Print what was counted."""
-        print(
-            f'  growth inside its 95 % band: {np.mean(self.inside["trend"]):.0%} (straight line '
-            f'{np.mean(self.inside["line"]):.0%}); rms error a year {_rms(self.off["trend"])} '
-            f'(straight line {_rms(self.off["line"])}, means of the first and last three months '
-            f'{_rms(self.off["means"])})'
-        )
-        print(f'  level inside its 95 % band: {np.mean(self.level):.0%} of runs')
-        false = ', '.join(f'{name} {many}' for name, many in self.false.items())
-        print(f'  false steps in {self.years:.0f} ship-years: {false}; bursts found {self.bursts}')
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return what was counted: what, then of the trend and of each peer; '-': says nothing."""
+        inside = {name: f'{np.mean(each):.0%}' for name, each in self.inside.items()}
+        off = {name: _rms(each) for name, each in self.off.items()}
+        false = {name: str(many) for name, many in self.false.items()}
+        rows = [
+            _row('growth inside its 95 % band', inside),
+            _row('growth, rms error a year', off),
+            _row('level inside its 95 % band', {'trend': f'{np.mean(self.level):.0%}'}),
+            _row(f'false steps in {self.years:.0f} ship-years', false),
+            _row('sudden growth found beside them', {'trend': str(self.bursts)}),
+        ]
         if self.size:
-            found = ', '.join(f'{name} {n / self.ships:.0%}' for name, n in self.found.items())
-            print(f'  found and dated within a month: {found}')
-            print(
-                f'  its size where its date is known, rms error: {_rms(self.size["trend"])} '
-                f'(means of three months before and after {_rms(self.size["means"])})'
-            )
+            found = {name: f'{many / self.ships:.0%}' for name, many in self.found.items()}
+            rows.append(_row('found and dated within a month', found))
+            size = {name: _rms(each) for name, each in self.size.items()}
+            rows.append(_row('size where its date is known, rms error', size))
+        return rows
+
+
+METHODS = {
+    'trend': 'trend',
+    'line': 'straight line',
+    'means': 'difference of means',
+    'ruptures': 'ruptures (PELT)',
+}
+
+
+def _row(what: str, values: dict[str, str]) -> tuple[str, ...]:
+    return (what, *(values.get(name, '-') for name in METHODS))
+
+
+def show(rows: list[tuple[str, ...]]) -> None:
+    """Print a table; a method that says nothing of something has a dash."""
+    for what, *values in rows:
+        print(f'{what:<50}' + ''.join(f'{value:>21}' for value in values))
 
 
 def _rms(errors: list[float]) -> str:
@@ -190,19 +209,20 @@ def main() -> None:
     parser.add_argument('--seed', type=int, default=1)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
+    noted: list[object] = []
+    show([(f'{options.ships} ships each, weekly runs, scatter 2 %', *METHODS.values())])
     for cleaning in (0.0, options.cleaning):
-        score, noticed = Score(), []
+        score = Score()
         for number in range(options.ships):
             world = ship(rng, options.years, cleaning)
             score.add(world, cleaning)
             if cleaning and number < options.noticed:
-                noticed.append(first_noticed(world))
-        what = f'one cleaning of {cleaning:.0%} that nobody noted' if cleaning else 'no cleaning'
-        print(f'{options.ships} ships with {what}, weekly runs, 2 %')
-        score.show()
-        if noticed:
-            days = [day and round(day) for day in noticed]
-            print(f'  first noticed after (days, {options.noticed} ships): {days}')
+                noted.append(first_noticed(world))
+        what = f'one cleaning of {cleaning:.0%} that nobody noted:' if cleaning else 'no cleaning:'
+        show([(what,), *score.rows()])
+    if noted:
+        days = [day and round(day) for day in noted]
+        print(f'first noticed after (days, {options.noticed} ships): {days}')
 
 
 if __name__ == '__main__':

@@ -16,7 +16,6 @@ from shipdrag_ros.coastdown.events import (
     EndedBy,
     EndedCoastdown,
     Event,
-    NoEstimate,
     Onset,
     Reset,
     Update,
@@ -55,10 +54,26 @@ def test_replay_gives_the_live_figures_bit_for_bit(
     np.testing.assert_allclose(
         curve.resistance_m_s2[5:-5], curve.speed_m_s[5:-5] ** 2 / 3000.0, rtol=0.2
     )
-    known = [event for event in result.events if not isinstance(event, NoEstimate)]
-    assert [type(event) for event in known] == [Onset, EndedCoastdown]
+    assert [type(event) for event in result.events] == [Onset, EndedCoastdown]
     assert result.inputs['shaft'].messages == result.inputs['shaft'].used == 1100
     assert list(result.inputs) == ['speed_through_water', 'position', 'heading', 'shaft']
+
+
+def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(
+    recording: tuple[Path, list[Event]],
+) -> None:
+    path, events = recording
+    (run,) = open_runs([path])
+    result = replay(run, compare=False)
+    assert result.recorded == Recorded(0, 0, None)
+    (found,) = result.coastdowns
+    (live,) = (event for event in events if isinstance(event, EndedCoastdown))
+    assert (found.start_ns, found.end_ns) == (live.start_ns, live.end_ns)
+    assert found.estimate is not None
+    assert live.estimate is not None
+    assert found.estimate.curve.resistance_m_s2.tobytes() == (
+        live.estimate.curve.resistance_m_s2.tobytes()
+    )
 
 
 def test_also_when_recording_starts_in_mid_run(
