@@ -19,9 +19,9 @@ import socket
 import threading
 import time
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
+import psutil
 
 from shipdrag_ros.live import guard
 from shipdrag_ros.live.app import PAGE, LivePage
@@ -103,12 +103,6 @@ def connect(address: tuple[str, int], count: int) -> tuple[int, float]:
     return refused, slowest
 
 
-def memory_mb() -> float:
-    """Return what this process holds now."""
-    pages = int(Path('/proc/self/statm').read_text().split()[1])
-    return pages * resource.getpagesize() / 1e6
-
-
 def soak(hours: int) -> list[float]:
     """Return the memory after each hour of simulated time at 10 Hz, the history being full."""
     source = NodeSource()
@@ -128,7 +122,7 @@ def soak(hours: int) -> list[float]:
         if second % 5 == 4:
             page.tick()
         if second % 3600 == 3599:
-            found.append(memory_mb())
+            found.append(psutil.Process().memory_info().rss / 1e6)
     return found
 
 

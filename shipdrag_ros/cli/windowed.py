@@ -77,7 +77,9 @@ def open_windowed(
     Raises
     ------
     BagError
-        If one cannot be read.
+        If a bag cannot be read.
+    ImportDataError
+        If nothing in a log can be used.
     """
     output = output or Output()
     whole = [each.path for each in bags if each.window is None]

@@ -55,9 +55,10 @@ class Monitor:
     parameters
         All of them matter.
     estimate
-        The estimator; raises `EstimationError` where none is possible.
+        The estimator; raises `EstimationError` where none is possible. None: there are no
+        estimates while a coastdown runs.
     final
-        The same for a coastdown that has ended, with the record before it.
+        An estimator of a coastdown that has ended, with the record before it.
 
     Notes
     -----
@@ -87,7 +88,7 @@ class Monitor:
         ship: Ship,
         parameters: Parameters,
         *,
-        estimate: WindowEstimator = estimate,
+        estimate: WindowEstimator | None = estimate,
         final: WindowEstimator = estimate_final,
     ) -> None:
         self._ship = ship
@@ -326,11 +327,13 @@ class Monitor:
         self._running = RunningCoastdown(
             onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
-        self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
+        if self._estimator is not None:
+            self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
         return onset
 
     def _update(self, next_stamp_ns: int) -> Event:
         assert self._running is not None
+        assert self._estimator is not None
         watch = self._memory.watch
         stamp_ns = int(watch.update_ns[0])
         watch.update_ns[0] = self._running.due_ns(next_stamp_ns)

@@ -11,8 +11,8 @@ import numpy as np
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, start
-from shipdrag_ros.diagnosis.observation import Measured
 from shipdrag_ros.diagnosis.result import Compared, Gap, RunTrace, Where
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION

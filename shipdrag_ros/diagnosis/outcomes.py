@@ -19,8 +19,9 @@ import numpy as np
 from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, RunNuisance, SpeedErrorTerm, Term
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.model import Hypothesis
-from shipdrag_ros.diagnosis.observation import Measured, Observation
+from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.posterior import Posterior, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.simulated import CoastSimulation

@@ -21,8 +21,9 @@ from scipy.special import logsumexp
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import Predicted
 from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.measured import damping_of
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, start
-from shipdrag_ros.diagnosis.observation import Observation, damping_of
+from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.inference.noise import apply
 from shipdrag_ros.inference.rows import POSITION

@@ -157,6 +157,17 @@ class Tree:
             raise FleetError(f'{path!r} is not UTF-8: {error}') from error
         return text
 
+    def beginning(self, path: str, size: int) -> bytes:
+        """
+        Return the first bytes of a file; none where it cannot be read.
+        """
+        try:
+            with self._fs.open(path, 'rb') as file:
+                first: bytes = file.read(size)
+        except Exception:  # each file system has errors of its own
+            return b''
+        return first
+
     def url(self, path: str) -> str:
         """
         Return what a worker opens: a path, or a URL.

@@ -157,6 +157,8 @@ class Format(NamedTuple):
         Those that it knows.
     chosen_by
         Key of an option that chooses it; '' for none.
+    by_head
+        Whether the score comes from the first bytes alone, and not from the file.
     """
 
     name: str
@@ -166,6 +168,7 @@ class Format(NamedTuple):
     write: Callable[[Job], ImportResult]
     options: tuple[Option, ...] = ()
     chosen_by: str = ''
+    by_head: bool = True
 
 
 def best_of(formats: Sequence[Format], head: Head) -> Format:
@@ -191,3 +194,20 @@ def best_of(formats: Sequence[Format], head: Head) -> Format:
             'as a table (CSV)'
         )
     return best
+
+
+def missing_library(job: Job, kind: str, library: str) -> ImportDataError:
+    """
+    Return the error of a file whose format needs a library that is not installed.
+
+    Parameters
+    ----------
+    job
+    kind
+        What the file is, with its article.
+    library
+        One of the extra `flight`.
+    """
+    return ImportDataError(
+        f"{str(job.source)!r} is {kind}, which needs {library}: pip install 'shipdrag_ros[flight]'"
+    )

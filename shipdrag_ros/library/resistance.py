@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -18,7 +18,7 @@ from shipdrag_ros.library.coastdown import Coastdown, force_columns
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import replay_run
-from shipdrag_ros.library.shown import Shown, drawing
+from shipdrag_ros.library.shown import ShownResistance
 from shipdrag_ros.library.windowed import WindowSpan
 from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.parameters import Parameters
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Resistance(Shown):
+class Resistance(ShownResistance):
     """
     r(v) of a ship, from all coastdowns of a record.
 
@@ -122,31 +122,16 @@ class Resistance(Shown):
         except EstimationError:
             return tables.coastdowns_table(self.runs)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """
-        Draw resistance against speed with its band, over the clean hull.
-
-        Parameters
-        ----------
-        ax
-            To draw on; None: new axes.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            Knots and kN, of a model ship m/s and N.
-        """
+    def _drawing(self) -> Callable[[Axes], None]:
         from shipdrag_ros.estimation.pictures import draw_curves
 
         usable = [each for each in self.coastdowns if each.estimate is not None]
         if not usable:
             raise EstimationError(' '.join(self.summary()))
         if len(usable) == 1:
-            return usable[0].plot(ax)
+            return usable[0]._drawing()
         dated = [(utc(each.start_ns), each.curve) for each in usable]
-        with drawing(ax) as axis:
-            draw_curves(axis, dated, self.ship, combined=self.combined)
-        return axis
+        return lambda axis: draw_curves(axis, dated, self.ship, combined=self.combined)
 
     def report(self, path: str | PathLike[str]) -> None:
         """

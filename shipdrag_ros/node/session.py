@@ -13,7 +13,6 @@ from functools import partial
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    EndedBy,
     EndedCoastdown,
     Event,
     NoEstimate,
@@ -280,12 +279,7 @@ class Session:
                 self._told(event)
             for message in outputs(event, node=self._node):
                 self._send(message)
-            if (
-                self._ended is not None
-                and isinstance(event, EndedCoastdown)
-                and event.ended_by is not EndedBy.RESET
-                and not event.withdrawn
-            ):
+            if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, self.monitor.ended_window(event))
 
     def _send(self, message: OutputMessage) -> None:

@@ -34,7 +34,8 @@ from shipdrag_ros.estimation.log_time.robust import robust_fit
 from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.gaussian import average, condense, deviations, root
+from shipdrag_ros.inference.averaging import average
+from shipdrag_ros.inference.gaussian import condense, deviations, root
 from shipdrag_ros.inference.robust import GROSS
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Input
 from shipdrag_ros.parameters import Parameters

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.format import CERTAIN, NO, Format, Head, Job
+from shipdrag_ros.importing.format import CERTAIN, NO, Format, Head, Job, missing_library
 from shipdrag_ros.importing.stream import Origin, Reading, StreamResult, Tally, import_stream
 from shipdrag_ros.samples import SHAFTS, Channel, Float64
 
@@ -38,10 +38,7 @@ def _write(job: Job) -> StreamResult:
     try:
         from pyulog import ULog
     except ModuleNotFoundError:
-        raise ImportDataError(
-            f'{str(job.source)!r} is an ULog, which needs pyulog: pip install '
-            "'shipdrag_ros[flight]'"
-        ) from None
+        raise missing_library(job, 'an ULog', 'pyulog') from None
     if job.source.stat().st_size > _LIMIT_BYTES:
         raise ImportDataError(
             f'{str(job.source)!r} has more than {_LIMIT_BYTES >> 30} GiB; cut it into parts'
