@@ -14,7 +14,7 @@ def uncollected() -> Iterator[None]:
     Keep the collector of garbage away from a block of imports.
 
     What is imported stays. The collector would walk all of it a dozen times meanwhile, which is a
-    seventh of the start.
+    tenth of the start.
     """
     was_on = gc.isenabled()
     gc.disable()
