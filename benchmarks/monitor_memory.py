@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Update
+from shipdrag_ros.coastdown.events import EndedCoastdown, Update
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -66,7 +66,7 @@ def month(ship: Ship, days: int) -> None:
             busy_s += time.perf_counter() - began
             samples += len(block)
             estimates += sum(isinstance(event, Update) for event in events)
-            coastdowns += sum(isinstance(event, Coastdown) for event in events)
+            coastdowns += sum(isinstance(event, EndedCoastdown) for event in events)
         if day in (0, 1, 2) or day % 5 == 4:
             kept = held_bytes(monitor._memory) / 2**20
             print(

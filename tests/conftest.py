@@ -24,7 +24,7 @@ import pytest
 from hypothesis import settings
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.estimation.result import (
     Estimate,
     FroudeMax,
@@ -201,8 +201,8 @@ def estimate(ship: Ship) -> Estimate:
 
 
 @pytest.fixture
-def coastdown(estimate: Estimate) -> Coastdown:
-    return Coastdown(
+def coastdown(estimate: Estimate) -> EndedCoastdown:
+    return EndedCoastdown(
         start_ns=estimate.start_ns,
         end_ns=estimate.end_ns,
         onset_detected_ns=estimate.start_ns + 40 * _SECOND_NS,
@@ -212,7 +212,7 @@ def coastdown(estimate: Estimate) -> Coastdown:
 
 
 @pytest.fixture
-def run(ship: Ship, coastdown: Coastdown) -> RunResult:
+def run(ship: Ship, coastdown: EndedCoastdown) -> RunResult:
     return RunResult(
         bag='sea trial.mcap',
         ship=ship,

@@ -136,6 +136,29 @@ def test_every_room_has_a_floor() -> None:
     assert rooms <= set(FLOORS), f'give {rooms - set(FLOORS)} a floor'
 
 
+def named(path: Path) -> Iterator[str]:
+    """Yield the names of the classes and types that a source file makes."""
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Assign) and not ast.unparse(node.value).startswith('TypeVar('):
+            yield from (
+                target.id
+                for target in node.targets
+                if isinstance(target, ast.Name) and re.match('_?[A-Z][a-z]', target.id)
+            )
+
+
+def test_a_name_stands_for_one_thing() -> None:
+    places: dict[str, list[str]] = {}
+    for path in SOURCES:
+        for name in named(path):
+            places.setdefault(name, []).append(str(path.relative_to(PACKAGE)))
+    assert len(places) > 500
+    twice = {name: where for name, where in places.items() if len(where) > 1}
+    assert not twice, 'give each class and type of the package a name of its own'
+
+
 def doors() -> list[tuple[str, str]]:
     """Return room and door of each row of the table in the map of the code."""
     text = (ROOT / 'docs' / 'architecture.md').read_text(encoding='utf-8')

@@ -12,7 +12,7 @@ from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, 
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.progress import stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
-from shipdrag_ros.diagnosis import Diagnosis, Verdict, with_effects
+from shipdrag_ros.diagnosis import DiagnosisResult, Verdict, with_effects
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.score import Score
@@ -118,7 +118,7 @@ def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
     return tuple(facts)
 
 
-def _show(output: Output, found: Diagnosis, ship: Ship | None) -> None:
+def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     if found.no_coastdown:
         output.say(found.no_coastdown)
     output.say(diagnosis_words.sentence(found))

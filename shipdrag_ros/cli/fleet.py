@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.arguments import add_json
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.progress import Lines
+from shipdrag_ros.cli.progress import ProgressLines
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.progress import Progress
@@ -158,7 +158,7 @@ def _progress(output: Output) -> Iterator[Progress]:
         with output.progress('') as bar:
             yield lambda text, done, total: bar(done, total)
         return
-    yield Lines(output.log, every_s=_EVERY_S, at_once=False).tell
+    yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).tell
 
 
 def _count(text: str) -> int:

@@ -31,15 +31,15 @@ def stages(output: Output) -> Iterator[Progress]:
     """
     from numba.core import event  # long to import, and help must come at once
 
-    from shipdrag_ros.cli.compiling import Compiling
+    from shipdrag_ros.cli.compiling import CompilingNotice
 
     with output.bar() as bar:
-        tell = bar or Lines(output.log, every_s=_EVERY_S, at_once=True).tell
-        with event.install_listener('numba:compile', Compiling(output.log)):
+        tell = bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).tell
+        with event.install_listener('numba:compile', CompilingNotice(output.log)):
             yield tell
 
 
-class Lines:
+class ProgressLines:
     """
     A line of progress now and then.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.sources import open_sources
-from shipdrag_ros.library.windowed import Span, WindowedRun
+from shipdrag_ros.library.windowed import WindowedRun, WindowSpan
 
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
 
@@ -21,7 +21,7 @@ class WindowedBag(NamedTuple):
     """A bag, and the window of it that was given, [s] from its start."""
 
     path: Path
-    window: Span | None
+    window: WindowSpan | None
 
 
 def windowed_bag(text: str) -> WindowedBag:
@@ -56,7 +56,7 @@ def open_windowed(
     bags: Sequence[WindowedBag],
     *,
     remap: Mapping[str, str],
-    window: Span | None = None,
+    window: WindowSpan | None = None,
     output: Output | None = None,
 ) -> list[WindowedRun]:
     """

@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 
 
@@ -89,7 +91,7 @@ class NoEstimate:
 
 
 @dataclass(frozen=True)
-class Coastdown:
+class EndedCoastdown:
     """
     A coastdown that has ended.
 
@@ -127,4 +129,6 @@ class Reset:
     reason: str
 
 
-Event = Onset | Update | NoEstimate | NotCoastdown | Coastdown | Reset
+Event = Onset | Update | NoEstimate | NotCoastdown | EndedCoastdown | Reset
+OnCoastdown = Callable[[EndedCoastdown, Window], None]
+"""Called with a coastdown that has ended and its window."""

@@ -18,21 +18,21 @@ from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.ending import End, cut_short, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     Dismissal,
     EndedBy,
+    EndedCoastdown,
     Event,
     NotCoastdown,
     Onset,
     Reset,
     State,
 )
-from shipdrag_ros.coastdown.health import InputHealth, Progress, input_health
+from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
-from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
+from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
-from shipdrag_ros.coastdown.running import Estimator, RunningCoastdown
+from shipdrag_ros.coastdown.running import RunningCoastdown, WindowEstimator
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
@@ -79,7 +79,7 @@ class Monitor:
     >>> monitor = Monitor(ship, Parameters())
     >>> events = [*monitor.update(block), *monitor.finish()]
     >>> type(events[0]).__name__, type(events[-1]).__name__
-    ('Onset', 'Coastdown')
+    ('Onset', 'EndedCoastdown')
     """
 
     def __init__(
@@ -87,8 +87,8 @@ class Monitor:
         ship: Ship,
         parameters: Parameters,
         *,
-        estimate: Estimator = estimate,
-        final: Estimator = estimate_final,
+        estimate: WindowEstimator = estimate,
+        final: WindowEstimator = estimate_final,
     ) -> None:
         self._ship = ship
         self._parameters = parameters
@@ -104,7 +104,7 @@ class Monitor:
         self._seconds = (
             round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
         )
-        self._memory = self._fresh(Tally.fresh())
+        self._memory = self._fresh(InputTally.fresh())
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._candidate: OnsetCandidate | None = None
         self._running: RunningCoastdown | None = None
@@ -122,7 +122,7 @@ class Monitor:
         return float(lead + 2 * self._tuning.slopes.width // 3) if lead else 0.0
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> MonitorProgress:
         """How long the ship has been steady by now, and since when she coasts."""
         watch = self._memory.watch
         used_s = self._parameters.steady_s
@@ -131,7 +131,7 @@ class Monitor:
             seconds = int(watch.seen[0]) - int(watch.lead[0]) + 2 * self._tuning.slopes.width // 3
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
-        return Progress(steady_s, used_s, since_ns)
+        return MonitorProgress(steady_s, used_s, since_ns)
 
     @property
     def state(self) -> State:
@@ -240,7 +240,7 @@ class Monitor:
         """
         return self._stop_at_last_sample(EndedBy.RECORD_END) + self._dismissals.flush()
 
-    def ended_window(self, ended: Coastdown) -> Window:
+    def ended_window(self, ended: EndedCoastdown) -> Window:
         """
         Cut the whole of a coastdown that has just ended, and the record before it.
 
@@ -249,7 +249,7 @@ class Monitor:
         before_ns = 0 if ended.cut_at_start else round(self._parameters.steady_s * SECOND_NS)
         return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - before_ns)
 
-    def _fresh(self, tally: Tally) -> Memory:
+    def _fresh(self, tally: InputTally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
 
     # what the walk stopped for

@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
     Advice,
-    Diagnosis,
+    DiagnosisResult,
     EffectEstimate,
     Verdict,
     Where,
@@ -46,7 +46,7 @@ def diagnose(
     facts: Sequence[Fact] = (),
     advise: bool = True,
     progress: Progress = silent,
-) -> Diagnosis:
+) -> DiagnosisResult:
     """
     Name the effect that is missing in a ship's model.
 

@@ -30,7 +30,7 @@ _SHAFT: Mapping[str, Mapping[str, float]] = {
 
 
 @dataclass(frozen=True)
-class Told:
+class StatedFact:
     """
     A fact, and the run that it is told of.
 
@@ -61,7 +61,7 @@ class Facts:
     """
 
     ship: Ship
-    told: tuple[Told, ...] = ()
+    told: tuple[StatedFact, ...] = ()
 
     def log_likelihood(self, hypothesis: Hypothesis) -> float:
         """
@@ -139,7 +139,7 @@ class Facts:
                 continue
             so = [
                 {
-                    names: self._so(Told(Fact(name, value), None, 0), one.hypothesis)[0]
+                    names: self._so(StatedFact(Fact(name, value), None, 0), one.hypothesis)[0]
                     for names, one in posterior.best.items()
                     if names in posterior.probability
                 }
@@ -150,7 +150,7 @@ class Facts:
             found[name] = math.fsum(_decided(posterior, each, decides) for each in so)
         return found
 
-    def _so(self, told: Told, hypothesis: Hypothesis) -> tuple[float, Fact]:
+    def _so(self, told: StatedFact, hypothesis: Hypothesis) -> tuple[float, Fact]:
         """Return how probable it is that a fact is so under a hypothesis, and the fact."""
         name = told.fact.name
         effects = [
@@ -198,20 +198,20 @@ def told_of(
     """
     first_ns = runs[0][1] if runs else 0
     above = {fact.name for fact in everywhere}
-    told = [Told(fact, None, first_ns) for fact in everywhere]
+    told = [StatedFact(fact, None, first_ns) for fact in everywhere]
     own = {fact.name for facts, _ in runs for fact in facts}
     for fact in ship.facts:
         if fact.name not in above | own:
-            told.append(Told(fact, None, first_ns))
+            told.append(StatedFact(fact, None, first_ns))
     for j, (facts, time_ns) in enumerate(runs):
         of_ship = [fact for fact in ship.facts if fact.name in own]
         for fact in overriding(of_ship, facts):
             if fact.name not in above:
-                told.append(Told(fact, j, time_ns))
+                told.append(StatedFact(fact, j, time_ns))
     return Facts(ship, tuple(told))
 
 
-def _goes_with(effect: Effect, told: Told) -> float:
+def _goes_with(effect: Effect, told: StatedFact) -> float:
     """Return how probable a fact is where an effect is there that it speaks about."""
     said, since_ns = effect.facts[told.fact.name], told.fact.time_ns
     if since_ns is None:

@@ -24,7 +24,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.diagnosis.direct import DirectModel, diagnosis_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
-from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Where
+from shipdrag_ros.diagnosis.result import FORCE, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.search import search
 from shipdrag_ros.diagnosis.speeds import CoastRun, MeanSpeeds
 from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
@@ -256,7 +256,7 @@ class FormModel(DirectModel):
         return Frame(self.ship, Scenario(speed_m_s=self._top_m_s), self.seen[0].heading_rad)
 
 
-def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
+def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> DiagnosisResult:
     """
     Tell what is missing in a resistance that is fitted to the runs.
 

@@ -21,7 +21,7 @@ from scipy.ndimage import median_filter
 from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.window import Series, Window
@@ -165,7 +165,7 @@ class Observation:
             If no input has enough samples.
         """
         run_down = RunDown.of(window, ship)
-        record = Record.of(window, run_down, parameters)
+        record = RunRows.of(window, run_down, parameters)
         if record.steady_s < LEAST_S or window.before is None:
             raise DiagnosisError(
                 f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
@@ -288,7 +288,7 @@ def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:
     return np.maximum(damping, 1e-6), inertia
 
 
-def _stopped(window: Window, run_down: RunDown, record: Record) -> RunDown:
+def _stopped(window: Window, run_down: RunDown, record: RunRows) -> RunDown:
     """Move the stop to where the speed begins to fall, if there is a speed."""
     assert window.before is not None
     for input_ in ('speed_through_water', 'speed_over_ground'):

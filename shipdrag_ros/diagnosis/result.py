@@ -228,7 +228,7 @@ class RunTrace:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DiagnosisResult:
     """
     The result.
 

@@ -17,7 +17,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.direct import diagnosis_of_speeds
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
-from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Where
+from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
 from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
 from shipdrag_ros.diagnosis.units import asked
@@ -38,7 +38,7 @@ def diagnose_sailing(
     parameters: Parameters,
     *,
     no_coastdown: str = 'No coastdown is used.',
-) -> Diagnosis:
+) -> DiagnosisResult:
     """
     Name what is wrong between log and way over ground.
 
@@ -73,7 +73,7 @@ def diagnose_sailing(
     return with_zeros(replace(found, notes=(units, *found.notes)) if units else found, still)
 
 
-def _diagnosed(legs: Legs, no_coastdown: str) -> Diagnosis:
+def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
     """Diagnose legs on which the log turns."""
     model = SailingModel.learnt(legs)
     # legs that no effect and no noise explains

@@ -17,7 +17,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
-from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.parameter import Parameter
@@ -60,16 +60,16 @@ class Judgement:
         fit = self.found.best
         return sized(fit, self.posterior.probability[fit.hypothesis.names])
 
-    def diagnosis(self, **rest: Any) -> Diagnosis:
+    def diagnosis(self, **rest: Any) -> DiagnosisResult:
         """
         Return the result.
 
         Parameters
         ----------
         **rest
-            What the verdict does not tell, as in `Diagnosis`.
+            What the verdict does not tell, as in `DiagnosisResult`.
         """
-        return Diagnosis(
+        return DiagnosisResult(
             verdict=self.verdict,
             effects=self.best if self.verdict is Verdict.NAMED else (),
             candidates=self.candidates,

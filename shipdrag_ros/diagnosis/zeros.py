@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.posterior import CERTAIN
 from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
     Candidate,
-    Diagnosis,
+    DiagnosisResult,
     EffectEstimate,
     Gap,
     Verdict,
@@ -153,7 +153,7 @@ def _log_likelihood(
     return total
 
 
-def with_zeros(found: Diagnosis, still: StandsStill | None) -> Diagnosis:
+def with_zeros(found: DiagnosisResult, still: StandsStill | None) -> DiagnosisResult:
     """
     Add a log that stands still to what log and track show besides.
 
@@ -201,7 +201,7 @@ def with_zeros(found: Diagnosis, still: StandsStill | None) -> Diagnosis:
     )
 
 
-def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> Diagnosis:
+def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> DiagnosisResult:
     """
     Return the result where too little is left beside the zeros.
 
@@ -216,7 +216,7 @@ def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> Diagnosis
     sure = still.effect.probability
     named = sure >= CERTAIN
     candidate = Candidate((still.effect.name,), sure, (still.effect,))
-    return Diagnosis(
+    return DiagnosisResult(
         verdict=Verdict.NAMED if named else Verdict.ONE_OF,
         effects=(still.effect,) if named else (),
         candidates=(candidate, Candidate((), 1.0 - sure)),

@@ -14,8 +14,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import Understood
 from shipdrag_ros.importing.opened import beginning
-
-Progress = Callable[[int, int], None]
+from shipdrag_ros.progress import PartDone
 
 CERTAIN, LIKELY, POSSIBLE, NO = 1.0, 0.7, 0.3, 0.0
 """Scores of `Format.score`; the highest of all formats is taken."""
@@ -114,10 +113,10 @@ class Job:
     out: Path
     options: Mapping[str, Any] = field(default_factory=dict)
     attachments: Mapping[str, str] = field(default_factory=dict)
-    progress: Progress | None = None
+    progress: PartDone | None = None
 
 
-class Result(Protocol):
+class ImportResult(Protocol):
     """What became of a file: a dataclass that tells itself."""
 
     @property
@@ -164,7 +163,7 @@ class Format(NamedTuple):
     kind: str
     about: str
     score: Callable[[Head], float]
-    write: Callable[[Job], Result]
+    write: Callable[[Job], ImportResult]
     options: tuple[Option, ...] = ()
     chosen_by: str = ''
 

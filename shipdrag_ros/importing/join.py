@@ -13,7 +13,8 @@ import numpy as np
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.importing.bag import ATTACHMENT, new_bag
-from shipdrag_ros.importing.format import Format, Job, Progress, Result
+from shipdrag_ros.importing.format import Format, ImportResult, Job
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 
@@ -30,7 +31,7 @@ class Joined:
         What was left out when they were put together, a sentence each.
     """
 
-    results: list[Result]
+    results: list[ImportResult]
     notes: list[str]
 
 
@@ -38,7 +39,7 @@ def import_joined(
     parts: Sequence[tuple[Format, Job]],
     out: Path,
     attachments: Mapping[str, str],
-    progress: Progress | None = None,
+    progress: PartDone | None = None,
 ) -> Joined:
     """
     Write the measurements of files as one bag.

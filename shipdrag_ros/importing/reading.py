@@ -20,7 +20,7 @@ from shipdrag_ros.bags.locate import BagFiles, is_bag
 from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing import formats
-from shipdrag_ros.importing.format import Format, Job, Result, best_of, head_of
+from shipdrag_ros.importing.format import Format, ImportResult, Job, best_of, head_of
 from shipdrag_ros.importing.join import import_joined
 
 
@@ -40,7 +40,7 @@ class Understanding:
 
     path: Path
     kind: str
-    result: Result
+    result: ImportResult
 
     def lines(self) -> list[str]:
         """

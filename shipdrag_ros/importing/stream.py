@@ -107,7 +107,7 @@ class Tally:
             self.notes.append(text)
 
 
-Reader = Callable[[Tally], Iterator[Reading]]
+FileReader = Callable[[Tally], Iterator[Reading]]
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ class StreamResult:
 
 
 def import_stream(
-    job: Job, name: str, read: Reader, *, about: Mapping[str, object] | None = None
+    job: Job, name: str, read: FileReader, *, about: Mapping[str, object] | None = None
 ) -> StreamResult:
     """
     Write what a reader yields as a bag.
@@ -222,7 +222,7 @@ def import_stream(
         raise ImportDataError(_nothing(job.source, name, survey))
     chosen = {channel: _best(found) for channel, found in counts.items()}
     tally = Tally()
-    record = _Record()
+    record = _ArrivedSamples()
     with new_bag(job.out, job.attachments) as bag:
         for reading in _checked(read(tally), tally):
             if reading.origin == chosen[reading.channel]:
@@ -304,7 +304,7 @@ def _possible(reading: Reading) -> bool:
     return abs(reading.a) <= largest and abs(reading.b) <= largest  # false of NaN too
 
 
-class _Record:
+class _ArrivedSamples:
     """Samples with a time of arrival that never goes back."""
 
     def __init__(self) -> None:
@@ -344,7 +344,7 @@ def _understood(bag: ImportBag, chosen: Mapping[Channel, Origin]) -> tuple[Under
 def _result(
     name: str,
     tally: Tally,
-    record: _Record,
+    record: _ArrivedSamples,
     understood: Sequence[Understood],
     counts: Mapping[Channel, Counter[Origin]],
     chosen: Mapping[Channel, Origin],

@@ -57,7 +57,7 @@ class Coastdown(Shown):
     True
     """
 
-    event: events.Coastdown
+    event: events.EndedCoastdown
     ship: Ship
     bag: str
     run: RunResult

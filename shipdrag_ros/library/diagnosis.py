@@ -9,8 +9,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.diagnosis import Candidate, Compared, EffectEstimate, Gap, tables, with_effects
-from shipdrag_ros.diagnosis import Diagnosis as Found
+from shipdrag_ros.diagnosis import (
+    Candidate,
+    Compared,
+    DiagnosisResult,
+    EffectEstimate,
+    Gap,
+    tables,
+    with_effects,
+)
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
@@ -19,7 +26,7 @@ from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.shown import Shown, drawing
-from shipdrag_ros.library.windowed import Span, WindowedRun, refuse_overlaps
+from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_overlaps
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -62,7 +69,7 @@ class Diagnosis(Shown):
     True
     """
 
-    found: Found
+    found: DiagnosisResult
     ship: Ship | None
     notes: tuple[str, ...] = ()
 
@@ -204,7 +211,7 @@ class Diagnosis(Shown):
         return {head: [row[place] for row in rows] for place, head in enumerate(heads)}
 
 
-def _first(found: Found) -> str:
+def _first(found: DiagnosisResult) -> str:
     """Name the most probable answer."""
     answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
@@ -215,7 +222,7 @@ def diagnose(
     *,
     ship: Ship | None = None,
     facts: Sequence[str] = (),
-    window: Span | None = None,
+    window: WindowSpan | None = None,
 ) -> Diagnosis:
     """
     Name the effect that is missing in the model of a ship, as `shipdrag diagnose` does.

@@ -16,7 +16,7 @@ from shipdrag_ros.importing.format import Format, Job
 from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.importing.join import import_joined
 from shipdrag_ros.importing.reading import ImportedRun, format_of, job_of
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.library.frames import NANOSECONDS, is_frame, write_table
 from shipdrag_ros.samples import SECOND_NS
 
@@ -27,7 +27,7 @@ _IN_PYTHON = 'In Python --map is columns=, --time is time=, --rate is rate_hz='
 
 
 @dataclass(frozen=True)
-class Told:
+class ReadOptions:
     """
     How a log is to be read, where it does not say so itself.
 
@@ -45,7 +45,7 @@ class Told:
     time: str | None = None
     rate_hz: float | None = None
 
-    def of_dates(self, dates: Sequence[str]) -> Told:
+    def of_dates(self, dates: Sequence[str]) -> ReadOptions:
         """
         Take the first column of dates for the time, where no other is told.
 
@@ -100,7 +100,7 @@ class Told:
 def _is_in(text: str, source: Path) -> bool:
     """Tell whether a file is a table that has the columns of an input."""
     try:
-        table = Table(source)
+        table = LogTable(source)
         for name in parse_input(text).names:
             table.column(name)
     except ImportDataError:
@@ -120,7 +120,7 @@ class _Part:
 
 
 def read_logs(
-    sources: Sequence[Any], told: Told, attachments: Mapping[str, str]
+    sources: Sequence[Any], told: ReadOptions, attachments: Mapping[str, str]
 ) -> tuple[list[Run], list[str]]:
     """
     Make runs of logs, tables and frames.
@@ -169,7 +169,7 @@ def read_logs(
     return runs, notes
 
 
-def _refuse_missing(told: Told, sources: Sequence[Path]) -> None:
+def _refuse_missing(told: ReadOptions, sources: Sequence[Path]) -> None:
     """Refuse columns that none of the sources has."""
     for text in told.maps:
         if not any(_is_in(text, source) for source in sources):
@@ -177,7 +177,10 @@ def _refuse_missing(told: Told, sources: Sequence[Path]) -> None:
 
 
 def _part(
-    source: Any, place_of: tuple[Path, int, bool], told: Told, attachments: Mapping[str, str]
+    source: Any,
+    place_of: tuple[Path, int, bool],
+    told: ReadOptions,
+    attachments: Mapping[str, str],
 ) -> tuple[_Part, list[str]]:
     """Read a source by itself; return it, and what of it was not used."""
     folder, place, alone = place_of

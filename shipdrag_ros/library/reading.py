@@ -94,10 +94,10 @@ def read(
     others = [each for each in sources if not (isinstance(each, Path) and is_bag(each))]
     if not others:
         return Record(runs, given=given)
-    from shipdrag_ros.library.logs import Told, read_logs  # a bag needs no importer
+    from shipdrag_ros.library.logs import ReadOptions, read_logs  # a bag needs no importer
 
     attachments = {} if given is None else {SHIP_FILE: given.to_yaml()}
-    imported, notes = read_logs(others, Told(columns, time, rate_hz), attachments)
+    imported, notes = read_logs(others, ReadOptions(columns, time, rate_hz), attachments)
     return Record([*runs, *imported], given=given, notes=notes)
 
 

@@ -19,7 +19,7 @@ from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.library.shown import Shown, drawing
-from shipdrag_ros.library.windowed import Span
+from shipdrag_ros.library.windowed import WindowSpan
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
@@ -180,7 +180,7 @@ class Resistance(Shown):
 def estimate(
     records: Record | Sequence[Record],
     *,
-    window: Span | None = None,
+    window: WindowSpan | None = None,
     parameters: Parameters | None = None,
 ) -> Resistance:
     """

@@ -13,7 +13,7 @@ from typing import Any
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, verdicts
 from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.figures import at_usual_speed, curve_part, past_part, ship_part
+from shipdrag_ros.live.figures import PagePart, at_usual_speed, curve_part, past_part, ship_part
 from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
 from shipdrag_ros.live.outlook import to_go_s
 from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
@@ -36,7 +36,7 @@ PAST_RUNS = 50  # that are listed
 _MESSAGES = 20
 _COURSE_S = 300
 
-Part = dict[str, Any] | list[Any] | None
+_AnyPart = PagePart | list[Any] | None
 
 
 class Bridge:
@@ -211,7 +211,7 @@ class Bridge:
     def _now_ns(self) -> int:
         return self.trace.newest_s * 1_000_000_000
 
-    def parts(self, now_s: float) -> dict[str, Part]:
+    def parts(self, now_s: float) -> dict[str, _AnyPart]:
         """
         Return every part of the page but the traces.
 
@@ -282,7 +282,7 @@ class Bridge:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
-    def _figures(self) -> Part:
+    def _figures(self) -> _AnyPart:
         figures: dict[str, Any] = {'speed_m_s': self.speed_m_s}
         if self._resistance is not None:
             figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
@@ -295,7 +295,7 @@ class Bridge:
             figures['usual']['run_s'] = ended[-1].start_ns // 1_000_000_000  # not of now
         return figures
 
-    def _inputs(self, silent_s: float) -> Part:
+    def _inputs(self, silent_s: float) -> _AnyPart:
         if self._health is None:
             return []
         silent = silent_s > SILENT_S  # what the node said last is no health of now
@@ -324,7 +324,7 @@ class Bridge:
             )
         return rows
 
-    def _checks(self, now: Situation) -> Part:
+    def _checks(self, now: Situation) -> _AnyPart:
         second, coasting = self._now_s, now.coast_s is not None
         of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
         course = self._recent.direction(second)
@@ -346,7 +346,7 @@ class Bridge:
         ]
         return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]
 
-    def _verdict_part(self) -> Part:
+    def _verdict_part(self) -> _AnyPart:
         view = self._verdict
         return {
             'state': view.state,

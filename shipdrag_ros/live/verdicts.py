@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from shipdrag_ros.messages.heard import Status
 
 if TYPE_CHECKING:  # slow to import, and needed only once there is one
-    from shipdrag_ros.diagnosis import Diagnosis
+    from shipdrag_ros.diagnosis import DiagnosisResult
 
 _NO_SIZE = re.compile(r'probability|mean square|standard deviation|coastdown')
 
@@ -71,7 +71,7 @@ def of_status(status: Status) -> VerdictView:
     )
 
 
-def of_diagnosis(found: Diagnosis) -> VerdictView:
+def of_diagnosis(found: DiagnosisResult) -> VerdictView:
     """
     Take a diagnosis.
     """

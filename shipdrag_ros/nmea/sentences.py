@@ -119,7 +119,7 @@ class Mounting:
 
 
 # None: the sentence need not hold it, and does not
-Reader = Callable[[Fields, Mounting], MeasuredValue | None]
+FieldsReader = Callable[[Fields, Mounting], MeasuredValue | None]
 
 
 def _water_vhw(fields: Fields, mounting: Mounting) -> MeasuredValue:
@@ -324,7 +324,7 @@ def _water_uhaw(fields: Fields, mounting: Mounting) -> MeasuredValue:
     return MeasuredValue((east * sin(heading) + north * cos(heading)) * M_S_PER_KNOT)
 
 
-READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
+READERS: Mapping[str, tuple[tuple[Channel, FieldsReader], ...]] = {
     'RMC': (
         (Channel.POSITION_GEODETIC, _position),
         (Channel.SPEED_OVER_GROUND, _ground_rmc),

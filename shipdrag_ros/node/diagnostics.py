@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from shipdrag_ros.coastdown.events import State
-from shipdrag_ros.coastdown.health import Progress
+from shipdrag_ros.coastdown.health import MonitorProgress
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
@@ -25,7 +25,9 @@ from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
 from shipdrag_ros.samples import MOTION_INPUTS
 
 if TYPE_CHECKING:
-    from shipdrag_ros.diagnosis import Diagnosis  # slow to import, and known once there is one
+    from shipdrag_ros.diagnosis import (
+        DiagnosisResult,  # slow to import, and known once there is one
+    )
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -84,7 +86,7 @@ class Standing:
     candidates: str = ''
     steady_lead_s: float = 0.0
     steady_needed_s: float = 0.0
-    progress: Progress | None = None
+    progress: MonitorProgress | None = None
     compiling_s: float | None = None
     waiting: int = 0
 
@@ -272,7 +274,7 @@ def diagnosis_status(status: DiagnosisStatus) -> DiagnosticStatus:
     return _status('diagnosis', level, words.sentence(found), values | _figures(found))
 
 
-def _figures(found: Diagnosis) -> dict[str, object]:
+def _figures(found: DiagnosisResult) -> dict[str, object]:
     """Return the figures of a diagnosis."""
     from shipdrag_ros.diagnosis.words import advice
     from shipdrag_ros.simulation.effects import LIBRARY

@@ -72,7 +72,7 @@ def is_installed(type_name: str) -> bool:
     return importlib.util.find_spec(type_name.partition('/')[0]) is not None
 
 
-class Heard(NamedTuple):
+class HeardMessage(NamedTuple):
     """A message, and when the middleware of this computer got it [ns, 0 if it does not say]."""
 
     topic: InputTopic
@@ -131,7 +131,7 @@ class InputTopic:
         self._arrived = arrived
         self._subscription: Subscription | None = None
         self._last_s: float | None = None
-        self._taken: list[Heard] = []
+        self._taken: list[HeardMessage] = []
         self._found: list[Any] = []
         self._sequences = Sequences(self._identities)
         self._offsets_s: deque[float] = deque(maxlen=_OFFSETS)
@@ -211,7 +211,7 @@ class InputTopic:
         least, self._least_lag_s = self._least_lag_s, None
         return least
 
-    def take(self, most: int, *, ahead: bool = True) -> list[Heard]:
+    def take(self, most: int, *, ahead: bool = True) -> list[HeardMessage]:
         """
         Return the messages that have arrived, at most so many.
 
@@ -320,7 +320,7 @@ class InputTopic:
         if len(data) > LONGEST_BYTES:
             self.unreadable['too_long'] += 1
         else:
-            self._taken.append(Heard(self, data, info.get('received_timestamp') or 0))
+            self._taken.append(HeardMessage(self, data, info.get('received_timestamp') or 0))
 
     def _on_message_lost(self, event: QoSMessageLostInfo) -> None:
         self.reported_lost += event.total_count_change

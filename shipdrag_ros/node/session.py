@@ -14,14 +14,14 @@ from time import monotonic
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     EndedBy,
+    EndedCoastdown,
     Event,
     NoEstimate,
+    OnCoastdown,
     State,
     Update,
 )
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
     Decoded,
@@ -41,8 +41,7 @@ from shipdrag_ros.node.ring import RawMessage
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]
-Ended = Callable[[Coastdown, Window], None]
-Told = Callable[[Event], None]
+OnEvent = Callable[[Event], None]
 Count = Callable[[Decoded], None]
 
 WAITING_MOST = 200_000  # messages that wait for compiled code
@@ -87,8 +86,8 @@ class Session:
         *,
         publish: Publish,
         node: str,
-        ended: Ended | None = None,
-        told: Told | None = None,
+        ended: OnCoastdown | None = None,
+        told: OnEvent | None = None,
         ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self.monitor = monitor
@@ -278,7 +277,7 @@ class Session:
 
     def _report(self, events: list[Event]) -> None:
         for event in events:
-            if isinstance(event, Update | Coastdown) and event.estimate is not None:
+            if isinstance(event, Update | EndedCoastdown) and event.estimate is not None:
                 self.latest = event.estimate
             self.why_none = event.reason if isinstance(event, NoEstimate) else ''
             if self._told is not None:
@@ -287,7 +286,7 @@ class Session:
                 self._send(message)
             if (
                 self._ended is not None
-                and isinstance(event, Coastdown)
+                and isinstance(event, EndedCoastdown)
                 and event.ended_by is not EndedBy.RESET
                 and not event.withdrawn
             ):

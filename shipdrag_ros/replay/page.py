@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.display import Picture, Section, Table
 from shipdrag_ros.estimation import pictures as estimate_pictures
 from shipdrag_ros.estimation import tables as estimate_tables
@@ -97,7 +97,9 @@ def _run(run: RunResult, speed_m_s: float) -> Iterator[Section]:
     )
 
 
-def _coastdown(number: int, coastdown: Coastdown, run: RunResult, speed_m_s: float) -> Section:
+def _coastdown(
+    number: int, coastdown: EndedCoastdown, run: RunResult, speed_m_s: float
+) -> Section:
     estimate = coastdown.estimate
     found: list[tuple[str, Table]] = []
     if estimate is not None:
@@ -123,7 +125,7 @@ def _coastdown(number: int, coastdown: Coastdown, run: RunResult, speed_m_s: flo
     )
 
 
-def _line(coastdown: Coastdown, run: RunResult, speed_m_s: float) -> str:
+def _line(coastdown: EndedCoastdown, run: RunResult, speed_m_s: float) -> str:
     """Say what a coastdown gave in one line."""
     estimate = coastdown.estimate
     if estimate is None or not len(estimate.valid_curve):
@@ -132,7 +134,7 @@ def _line(coastdown: Coastdown, run: RunResult, speed_m_s: float) -> str:
     return force.at(force.near(speed_m_s))
 
 
-def _pictures(coastdown: Coastdown, run: RunResult) -> Iterator[Picture]:
+def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:
     """Draw what there are data for."""
     if coastdown.stretch:
         yield picture(

@@ -8,15 +8,16 @@ Also one window of it, given by hand, through the same estimator.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Dismissal, Event, NotCoastdown, Update
+from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, Event, NotCoastdown, Update
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import DEFAULT_NODE, TOPICS, outputs
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
 from shipdrag_ros.samples import Block, Channel, Reason
@@ -27,7 +28,6 @@ PARAMETERS_FILE = 'parameters.yaml'
 WRONG_TYPE = 'type'
 
 # done, of how many messages
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class ReplayResult:
     run: Run
     ship: Ship
     parameters: Parameters
-    coastdowns: tuple[Coastdown, ...]
+    coastdowns: tuple[EndedCoastdown, ...]
     events: tuple[Event, ...]
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
@@ -111,7 +111,7 @@ def replay(
     ship: Ship | None = None,
     parameters: Parameters | None = None,
     window: tuple[float, float] | None = None,
-    progress: Progress | None = None,
+    progress: PartDone | None = None,
 ) -> ReplayResult:
     """
     Estimate from a run as the node would have.
@@ -182,19 +182,19 @@ def _no_input(run: Run) -> str:
 
 
 def _as_on_board(
-    run: Run, ship: Ship, parameters: Parameters, progress: Progress | None
+    run: Run, ship: Ship, parameters: Parameters, progress: PartDone | None
 ) -> ReplayResult:
     monitor = Monitor(ship, parameters)
     own = _is_own(run, ship, parameters)
     comparison = Comparison(run.outputs() if own else iter(()))
-    coastdowns: list[Coastdown] = []
+    coastdowns: list[EndedCoastdown] = []
     kept: list[Event] = []
 
     def take(events: list[Event]) -> None:
         for event in events:
             if not isinstance(event, Update):
                 kept.append(event)
-            if isinstance(event, Coastdown) and not event.withdrawn:
+            if isinstance(event, EndedCoastdown) and not event.withdrawn:
                 coastdowns.append(event)
             if own:
                 for message in outputs(event, node=run.node or DEFAULT_NODE):

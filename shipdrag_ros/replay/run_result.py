@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 from shipdrag_ros.display import Table
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.replay.no_coastdown import why_no_coastdown
@@ -51,7 +51,7 @@ class RunResult:
 
     bag: str
     ship: Ship
-    coastdowns: tuple[Coastdown, ...]
+    coastdowns: tuple[EndedCoastdown, ...]
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
     warnings: tuple[str, ...] = ()

@@ -23,7 +23,7 @@ _MOST_SHARED = 0.5  # a reference speed must lie inside the range of at least th
 _NOMINAL_TEMPERATURE_C = 15.0
 _TEMPERATURE_SCALE = 0.02  # friction per 10 K, about: the unit in which its covariate counts
 
-Row = Mapping[str, Any]
+CoastdownRow = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class ShipSeries:
 
 
 def series_of(
-    name: str, rows: Sequence[Row], *, service_speed_m_s: float | None = None
+    name: str, rows: Sequence[CoastdownRow], *, service_speed_m_s: float | None = None
 ) -> ShipSeries:
     """
     Return the runs of one ship at its reference speed.
@@ -132,7 +132,9 @@ def series_of(
     )
 
 
-def _reference_speed(rows: Sequence[Row], service: float | None) -> tuple[float, tuple[str, ...]]:
+def _reference_speed(
+    rows: Sequence[CoastdownRow], service: float | None
+) -> tuple[float, tuple[str, ...]]:
     """Return the speed at which runs are compared, and what is to be said of it."""
     ranges = [found for row in rows if (found := _range(row)) is not None]
     if not ranges:
@@ -158,7 +160,7 @@ def _reference_speed(rows: Sequence[Row], service: float | None) -> tuple[float,
     )
 
 
-def _range(row: Row) -> tuple[float, float] | None:
+def _range(row: CoastdownRow) -> tuple[float, float] | None:
     """Return the lowest and highest speed at which a row has r."""
     if row['resistance_m_s2'] is None or row['speed_m_s'] is None:
         return None
@@ -167,7 +169,7 @@ def _range(row: Row) -> tuple[float, float] | None:
     return (float(speed[known].min()), float(speed[known].max())) if known.any() else None
 
 
-def _point(row: Row, speed: float, clean: float, baseline: bool) -> Point:
+def _point(row: CoastdownRow, speed: float, clean: float, baseline: bool) -> Point:
     """Return the point of a row; without a baseline its value is r itself."""
     plain = Point(int(row['time_ns']), row['bag'])
     if row['error']:
@@ -257,7 +259,7 @@ def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
     return scaled, clean, note
 
 
-def _with_covariates(points: Sequence[Point], rows: Sequence[Row]) -> list[Point]:
+def _with_covariates(points: Sequence[Point], rows: Sequence[CoastdownRow]) -> list[Point]:
     """Set displacement and water temperature, each against its mean over the used runs."""
     volume = np.array([np.log(row['displaced_volume_m3']) for row in rows])
     temperature = np.array(
@@ -282,7 +284,7 @@ def _centred(values: Float64) -> Float64:
     return np.where(known, values - values[known].mean(), 0.0)
 
 
-def _at(values: Sequence[float] | None, row: Row, speed: float) -> float:
+def _at(values: Sequence[float] | None, row: CoastdownRow, speed: float) -> float:
     """Return what a curve of a row is at a speed; NaN outside of what is known."""
     if values is None or row['speed_m_s'] is None or not np.isfinite(speed):
         return np.nan

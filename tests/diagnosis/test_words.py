@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.diagnosis import Candidate, Diagnosis, EffectEstimate, Gap, Verdict, Where
+from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict, Where
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.words import answers, probability, sentence
 from shipdrag_ros.parameter import Parameter
@@ -22,8 +22,8 @@ def diagnosis(
     nothing: float = 0.0,
     unnamed: float = 0.0,
     effects: tuple[EffectEstimate, ...] = (),
-) -> Diagnosis:
-    return Diagnosis(
+) -> DiagnosisResult:
+    return DiagnosisResult(
         verdict=verdict,
         effects=effects,
         candidates=tuple(Candidate(*each) for each in candidates),
@@ -90,7 +90,7 @@ def diagnosis(
         ),
     ],
 )
-def test_a_verdict_in_a_sentence(found: Diagnosis, said: str) -> None:
+def test_a_verdict_in_a_sentence(found: DiagnosisResult, said: str) -> None:
     assert sentence(found) == said
 
 

@@ -18,13 +18,13 @@ from hypothesis import strategies as st
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
-from shipdrag_ros.importing.formats.csv.importer import BASE_NS, ImportResult, import_csv
+from shipdrag_ros.importing.formats.csv.importer import BASE_NS, TableResult, import_csv
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 
-Imported = tuple[ImportResult, Block]
+Imported = tuple[TableResult, Block]
 Import = Callable[..., Imported]
 
 

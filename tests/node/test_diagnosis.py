@@ -13,7 +13,7 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.estimation import Window
@@ -53,9 +53,9 @@ def values_of(status: Any) -> dict[str, str]:
     return {item.key: item.value for item in status.values}
 
 
-def coastdown_of(block: Block) -> tuple[Coastdown, Window]:
+def coastdown_of(block: Block) -> tuple[EndedCoastdown, Window]:
     monitor = Monitor(SHIP, PARAMETERS)
-    (ended,) = (event for event in monitor.update(block) if isinstance(event, Coastdown))
+    (ended,) = (event for event in monitor.update(block) if isinstance(event, EndedCoastdown))
     return ended, monitor.ended_window(ended)
 
 

@@ -28,7 +28,7 @@ _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
 
 
 @dataclass(frozen=True)
-class Record:
+class RunRows:
     """
     Rows of the coastdown and of the steady record before it.
 
@@ -55,7 +55,7 @@ class Record:
     display_sd: dict[str, float]
 
     @classmethod
-    def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> Record:
+    def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> RunRows:
         """
         Take what a window offers.
 
@@ -133,7 +133,7 @@ class Record:
         """Length of the steady record [s]."""
         return float(np.ptp(self.steady.time_s)) if len(self.steady.time_s) else 0.0
 
-    def without_steady(self) -> Record:
+    def without_steady(self) -> RunRows:
         """
         Return the coastdown alone.
         """

@@ -17,26 +17,26 @@ from shipdrag_ros.importing.formats.csv.guess import (
     is_table,
     with_dates,
 )
-from shipdrag_ros.importing.formats.csv.importer import ImportResult, import_csv
+from shipdrag_ros.importing.formats.csv.importer import TableResult, import_csv
 from shipdrag_ros.importing.formats.csv.names import role_and_unit
 from shipdrag_ros.importing.options import RATE
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 
 
 def _score(head: Head) -> float:
     if not head.lines or head.lines[0][0] in '{<[' or not is_table(head.path):
         return NO
-    names = Table(head.path).header or ()
+    names = LogTable(head.path).header or ()
     return LIKELY if any(role_and_unit(name)[0] for name in names) else POSSIBLE
 
 
-def _write(job: Job) -> ImportResult:
+def _write(job: Job) -> TableResult:
     options = job.options
     time, rate = options.get('time'), options.get('rate')
     if time is not None and rate is not None:
         raise ImportDataError('--time and --rate: both tell the times of the rows; keep one')
     time = with_dates(time, options.get('date_order', ''), options.get('zone'))
-    table = Table(job.source)
+    table = LogTable(job.source)
     found = _inputs(table, time, options)
     time = with_dates(found.time, options.get('date_order', ''), options.get('zone'))
     result = import_csv(
@@ -53,7 +53,7 @@ def _write(job: Job) -> ImportResult:
     return replace(result, notes=(*found.notes, *result.notes, *doubts))
 
 
-def _inputs(table: Table, time: Any, options: Any) -> Guess:
+def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
     """Return the columns that were given, or else those that are guessed."""
     counted = options.get('rate') is not None
     mapped = options.get('map', ())

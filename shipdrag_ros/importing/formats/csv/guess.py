@@ -40,7 +40,7 @@ from shipdrag_ros.importing.formats.csv.columns import (
 from shipdrag_ros.importing.formats.csv.dates import is_date, is_midnight, parts
 from shipdrag_ros.importing.formats.csv.names import role_and_unit
 from shipdrag_ros.importing.formats.csv.row_clock import RowClock
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.samples import MOTION_INPUTS, Float64
 
 PLAIN_TIMES = ('time', 'time_s', 't', 't_s')
@@ -102,7 +102,7 @@ class _Column:
 
 
 def guess(
-    table: Table, *, time: TimeColumn | None = None, counted: bool = False, speed_unit: str = ''
+    table: LogTable, *, time: TimeColumn | None = None, counted: bool = False, speed_unit: str = ''
 ) -> Guess:
     """
     Find the inputs in a table.
@@ -140,7 +140,7 @@ def guess(
     return made.found
 
 
-def guess_time(table: Table, found: Guess) -> TimeColumn:
+def guess_time(table: LogTable, found: Guess) -> TimeColumn:
     """
     Find the column of the time alone; how it is known goes to the notes.
 
@@ -157,7 +157,7 @@ def guess_time(table: Table, found: Guess) -> TimeColumn:
 class _Guesser:
     """Reads the first rows of a table and guesses."""
 
-    def __init__(self, table: Table, speed_unit: str) -> None:
+    def __init__(self, table: LogTable, speed_unit: str) -> None:
         assert table.header is not None
         self._table = table
         self._speed_unit = speed_unit
@@ -518,7 +518,7 @@ def is_table(path: Path) -> bool:
     Say whether a file can be read as a table with several columns or numbers alone.
     """
     try:
-        table = Table(path)
+        table = LogTable(path)
     except ImportDataError:
         return False
     return table.width > 1 or table.header is None

@@ -36,17 +36,18 @@ from shipdrag_ros.importing.formats.csv.cells import (
 )
 from shipdrag_ros.importing.formats.csv.columns import InputColumns, TimeColumn
 from shipdrag_ros.importing.formats.csv.row_clock import BASE_NS, RowClock
-from shipdrag_ros.importing.table import Row, Table
+from shipdrag_ros.importing.table import LogRow, LogTable
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel
 
 _FEW = 10
 _SAMPLE_ROWS = 2000  # by which the way of writing is told
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
-Reader = Callable[[str], float]
+CellReader = Callable[[str], float]
 
 
 @dataclass(frozen=True)
-class ImportResult:
+class TableResult:
     """
     What became of a table.
 
@@ -157,15 +158,15 @@ def import_csv(
     where: Sequence[tuple[str, str]] = (),
     start_ns: int = BASE_NS,
     attachments: Mapping[str, str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> ImportResult:
+    progress: PartDone | None = None,
+) -> TableResult:
     """
     Write the measurements of a table as a bag.
 
     Parameters
     ----------
     source
-        Table, see `Table`.
+        Table, see `LogTable`.
     out
         MCAP file to make.
     inputs
@@ -193,14 +194,14 @@ def import_csv(
     if (time is None) == (rate_hz is None):
         raise ImportDataError('the times of the rows: give either --time COLUMN[:unit] or --rate')
     _check_inputs(inputs)
-    table = Table(source)
+    table = LogTable(source)
     places = [] if time is None else [table.column(name) for name in time.names]
     channels = [each for mapped in inputs for each in mapped.by_channel()]
     mapped_places = [[table.column(name) for name in each.names] for each in channels]
     chosen = [(table.column(name), text) for name, text in where]
     sample = list(islice(table.rows(), _SAMPLE_ROWS))
     clock = RowClock.of(time, rate_hz, start_ns, [row_text(row, places) for row in sample], table)
-    record = _Record(
+    record = _RowSamples(
         list(zip(channels, mapped_places, _readers(channels, mapped_places, sample), strict=True)),
         chosen,
         clock,
@@ -217,19 +218,19 @@ def import_csv(
         return record.result(table, bag)
 
 
-def row_text(row: Row, places: Sequence[int]) -> str:
+def row_text(row: LogRow, places: Sequence[int]) -> str:
     """
     Return the text of one or two cells of a row, as a date and its time of day stand in them.
     """
     return ' '.join(_cell(row, place) for place in places)
 
 
-class _Record:
+class _RowSamples:
     """Turns rows into samples and counts what becomes of them."""
 
     def __init__(
         self,
-        inputs: Sequence[tuple[InputColumns, Sequence[int], Sequence[Reader]]],
+        inputs: Sequence[tuple[InputColumns, Sequence[int], Sequence[CellReader]]],
         where: Sequence[tuple[int, str]],
         clock: RowClock,
         time_places: Sequence[int],
@@ -256,7 +257,7 @@ class _Record:
     def __len__(self) -> int:
         return len(self._samples)
 
-    def take(self, row: Row) -> None:
+    def take(self, row: LogRow) -> None:
         """Take the samples of one row."""
         self._rows += 1
         for place, text in self._where:
@@ -298,13 +299,13 @@ class _Record:
         samples, self._samples = self._samples, []
         return Block.of_samples(samples)
 
-    def result(self, table: Table, bag: ImportBag) -> ImportResult:
+    def result(self, table: LogTable, bag: ImportBag) -> TableResult:
         """Sum up; ImportDataError if there is nothing."""
         if self._first_ns is None or not self._written:
             raise ImportDataError(
                 f'{str(table.path)!r} gave no sample from {self._rows} row(s); {self._why_not()}'
             )
-        return ImportResult(
+        return TableResult(
             rows=self._rows,
             left_out=self._left_out,
             written=dict(self._written),
@@ -335,7 +336,7 @@ class _Record:
             if columns.channel in bag.first
         )
 
-    def _notes(self, table: Table) -> Iterator[str]:
+    def _notes(self, table: LogTable) -> Iterator[str]:
         if table.titles:
             yield f'{len(table.titles)} line(s) above the table were left out.'
         if table.joined_lines:
@@ -365,16 +366,16 @@ class _Record:
             'times in seconds or in the unit given'
         )
 
-    def _reject(self, name: str, row: Row, bad: BadCell) -> None:
+    def _reject(self, name: str, row: LogRow, bad: BadCell) -> None:
         by_reason = self._rejected.setdefault(name, {})
         by_reason.setdefault(bad.reason, Rejected()).add(row.line, bad.cell)
 
 
-def _cell(row: Row, place: int) -> str:
+def _cell(row: LogRow, place: int) -> str:
     return row.cells[place] if place < len(row.cells) else ''
 
 
-def _check_width(row: Row, width: int) -> None:
+def _check_width(row: LogRow, width: int) -> None:
     """Refuse a row that does not fit the columns, as decimal commas make it."""
     beyond = [cell for cell in row.cells[width:] if cell]
     if beyond:
@@ -382,14 +383,14 @@ def _check_width(row: Row, width: int) -> None:
 
 
 def _readers(
-    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: Sequence[Row]
-) -> list[list[Reader]]:
+    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: Sequence[LogRow]
+) -> list[list[CellReader]]:
     """Return what reads the cells of each column, as they are written in the first rows."""
     cells = {place: [_cell(row, place) for row in sample] for each in places for place in each}
     plain = number
     if has_decimal_commas(cell for row in sample for cell in row.cells):
         plain = number_with_comma
-    found: list[list[Reader]] = []
+    found: list[list[CellReader]] = []
     for columns, here in zip(inputs, places, strict=True):
         if columns.channel is Channel.POSITION_GEODETIC:
             minutes = are_in_minutes(*(cells[each] for each in here))
@@ -400,7 +401,7 @@ def _readers(
     return found
 
 
-def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> Reader:
+def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> CellReader:
     if minutes:
         return minutes_of(side)
     if has_decimal_commas(cells):

@@ -14,7 +14,7 @@ from shipdrag_ros.importing.bag import LIMIT_NS
 from shipdrag_ros.importing.formats.csv.cells import BadCell, has_decimal_commas, number
 from shipdrag_ros.importing.formats.csv.columns import NANOSECONDS, TimeColumn
 from shipdrag_ros.importing.formats.csv.dates import DateForm, is_date, order_of, parts
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.samples import SECOND_NS
 
 BASE_NS = 946_684_800 * SECOND_NS
@@ -57,7 +57,7 @@ class RowClock:
         rate_hz: float | None,
         start_ns: int,
         cells: Sequence[str],
-        table: Table,
+        table: LogTable,
     ) -> RowClock:
         """
         Make the clock of a table.
@@ -95,7 +95,7 @@ class RowClock:
             clock._read_counts(time, texts)
         return clock
 
-    def _read_dates(self, time: TimeColumn, texts: Sequence[str], table: Table) -> None:
+    def _read_dates(self, time: TimeColumn, texts: Sequence[str], table: LogTable) -> None:
         order, known_by = time.order, ''
         if not order:
             order, known_by = order_of(texts, (*table.titles, table.path.name))

@@ -114,7 +114,7 @@ def rollover_days(day: int, true: date) -> int | None:
     return difference if difference % _ROLLOVER_DAYS == 0 else None
 
 
-class Clock:
+class SentenceClock:
     """
     Follows the time through a log.
 

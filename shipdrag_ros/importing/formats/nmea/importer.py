@@ -10,7 +10,7 @@ is attached, if it is not too long, so that nothing is lost.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -39,6 +39,7 @@ from shipdrag_ros.importing.words import (
 )
 from shipdrag_ros.nmea.framing import Checksum
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import INPUTS, Channel
 
 LOG_ATTACHMENT = 'log.nmea'
@@ -172,7 +173,7 @@ def import_nmea(
     transducer_m: float | None = None,
     checksum: Checksum = Checksum.REQUIRED,
     attachments: Mapping[str, str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: PartDone | None = None,
 ) -> NmeaResult:
     """
     Write the measurements of a log as a bag.
@@ -237,9 +238,7 @@ def import_nmea(
     return result
 
 
-def _part(
-    progress: Callable[[int, int], None] | None, part: int
-) -> Callable[[int, int], None] | None:
+def _part(progress: PartDone | None, part: int) -> PartDone | None:
     """Return the progress of one of two readings."""
     if progress is None:
         return None

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from shipdrag_ros.importing.bag import Rejected
-from shipdrag_ros.importing.formats.nmea.clock import GAP_NS, Clock, SentenceTime
+from shipdrag_ros.importing.formats.nmea.clock import GAP_NS, SentenceClock, SentenceTime
 from shipdrag_ros.nmea.framing import Sentence
 from shipdrag_ros.nmea.sentences import (
     TIMED,
@@ -65,7 +65,7 @@ class SentenceConverter:
     """
 
     chosen: Mapping[Channel, SentenceSource]
-    clock: Clock
+    clock: SentenceClock
     mounting: Mounting
     written: Counter[str] = field(default_factory=Counter)
     rejected: dict[str, dict[str, Rejected]] = field(default_factory=dict)

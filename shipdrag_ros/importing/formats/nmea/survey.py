@@ -13,7 +13,7 @@ from datetime import date
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.formats.nmea.clock import (
     DAY_NS,
-    Clock,
+    SentenceClock,
     SentenceTime,
     days_of,
     rollover_days,
@@ -74,7 +74,7 @@ class Survey:
         """
         return {channel: best(counts) for channel, counts in self.values.items()}
 
-    def clock(self, log: NmeaLog, day: date | None) -> Clock:
+    def clock(self, log: NmeaLog, day: date | None) -> SentenceClock:
         """
         Return the clock at the start of the log.
 
@@ -113,11 +113,11 @@ class Survey:
                     )
                 shift_days = shifted
             near_ns = (self._first.day + shift_days) * DAY_NS + self._first.of_day_ns
-            return Clock(near_ns, shift_days=shift_days)
+            return SentenceClock(near_ns, shift_days=shift_days)
         if day is not None:
-            return Clock(days_of(day) * DAY_NS + DAY_NS // 2 - 1)  # noon: of the whole day
+            return SentenceClock(days_of(day) * DAY_NS + DAY_NS // 2 - 1)  # noon: of the whole day
         if self._received:
-            return Clock(None)
+            return SentenceClock(None)
         if self._timed:
             raise ImportDataError(
                 f'{name} tells times of day, but no date (no RMC or ZDA with a fix and a date); '
