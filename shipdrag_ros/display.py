@@ -22,7 +22,7 @@ UNIT_RATIOS = {
 # what `float` takes besides, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
-"""Below it a ship is told in kg and N, above in t and kN."""
+"""Below it a ship is stated in kg and N, above in t and kN."""
 
 TRACK_LABELS = {
     'speed_through_water': ('Speed through water', 'm/s'),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How something long tells how far it is."""
+"""How something long shows how far it is."""
 
 from __future__ import annotations
 
@@ -12,4 +12,4 @@ PartDone = Callable[[int, int], None]
 
 
 def silent(stage: str, done: int, total: int) -> None:
-    """Tell nobody."""
+    """Inform nobody."""

@@ -87,7 +87,7 @@ class Output:
         Yields
         ------
         callable
-            To be told how much is done, and of how much.
+            Called with how much is done, and of how much.
         """
         with self.bar() as bar:
             yield lambda done, total: bar(text, done, total) if bar else None
@@ -100,7 +100,7 @@ class Output:
         Yields
         ------
         Progress
-            To be told of each stage, how much of it is done, and of how much; None
+            Called with each stage, how much of it is done, and of how much; None
             where no terminal shows it.
         """
         if not self._log.is_terminal:

@@ -72,12 +72,14 @@ def open_windowed(
     window
         Of the bags without a window of their own.
     output
-        Told what was understood of a log that is no bag; stderr by default.
+        Called with what was understood of a log that is no bag; stderr by default.
 
     Raises
     ------
     BagError
-        If one cannot be read.
+        If a bag cannot be read.
+    ImportDataError
+        If nothing in a log can be used.
     """
     output = output or Output()
     whole = [each.path for each in bags if each.window is None]

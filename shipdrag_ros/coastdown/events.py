@@ -116,6 +116,11 @@ class EndedCoastdown:
     stretch: tuple[tuple[int, float], ...] = ()
 
     @property
+    def stands(self) -> bool:
+        """Whether it ended as a coastdown: neither withdrawn nor cut short by a reset."""
+        return not self.withdrawn and self.ended_by is not EndedBy.RESET
+
+    @property
     def cut_at_start(self) -> bool:
         """Whether what comes before it is no steady sailing, but was cut off."""
         return any(cut.start_ns < self.start_ns for cut in self.cuts)

@@ -74,7 +74,7 @@ class MonitorProgress:
 
 def input_health(tally: InputTally) -> dict[str, InputHealth]:
     """
-    Tell the health of every input, by its name.
+    Show the health of every input, by its name.
     """
     return {name: _health(tally, name) for name in INPUTS}
 

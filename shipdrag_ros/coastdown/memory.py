@@ -79,7 +79,7 @@ class Watch(NamedTuple):
 
 class InputTally(NamedTuple):
     """
-    What the health of the inputs is told from; a reset of the clock spares it.
+    What the health of the inputs is known from; a reset of the clock spares it.
 
     Attributes
     ----------

@@ -55,9 +55,10 @@ class Monitor:
     parameters
         All of them matter.
     estimate
-        The estimator; raises `EstimationError` where none is possible.
+        The estimator; raises `EstimationError` where none is possible. None: there are no
+        estimates while a coastdown runs.
     final
-        The same for a coastdown that has ended, with the record before it.
+        An estimator of a coastdown that has ended, with the record before it.
 
     Notes
     -----
@@ -87,7 +88,7 @@ class Monitor:
         ship: Ship,
         parameters: Parameters,
         *,
-        estimate: WindowEstimator = estimate,
+        estimate: WindowEstimator | None = estimate,
         final: WindowEstimator = estimate_final,
     ) -> None:
         self._ship = ship
@@ -166,7 +167,7 @@ class Monitor:
 
     def health(self) -> dict[str, InputHealth]:
         """
-        Tell how every input is doing, by its name.
+        Say how every input is doing, by its name.
         """
         return input_health(self._memory.tally)
 
@@ -297,7 +298,7 @@ class Monitor:
         """Give a candidate up and say why."""
         assert self._candidate is not None
         start_ns = self._candidate.start * SECOND_NS
-        # the stop may be still to come, and the shafts then tell it
+        # the stop may be still to come, and the shafts then show it
         driven = doubt is None or doubt.reason in (Dismissal.THRUST, Dismissal.OTHER)
         self._stand_down(driven=driven)
         if doubt is None:
@@ -326,11 +327,13 @@ class Monitor:
         self._running = RunningCoastdown(
             onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
-        self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
+        if self._estimator is not None:
+            self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
         return onset
 
     def _update(self, next_stamp_ns: int) -> Event:
         assert self._running is not None
+        assert self._estimator is not None
         watch = self._memory.watch
         stamp_ns = int(watch.update_ns[0])
         watch.update_ns[0] = self._running.due_ns(next_stamp_ns)

@@ -37,7 +37,7 @@ def unit_doubts(bins: Bins) -> dict[str, str]:
     Returns
     -------
     dict[str, str]
-        What to say, by input; without those that agree, or of which nothing can be told:
+        What to say, by input; without those that agree, or of which nothing can be stated:
         no second speed, no way, a change of speed.
     """
     newest = max(newest_bin(bins, source) for source in range(SOURCES))

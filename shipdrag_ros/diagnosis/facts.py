@@ -3,7 +3,7 @@
 What facts of the log book say of hypotheses.
 
 A fact is evidence with an error rate: a hypothesis under which it is not so is
-as much less probable as such a fact is seldom told wrongly. Which facts speak
+as much less probable as such a fact is seldom stated wrongly. Which facts speak
 about an effect, the effect declares.
 """
 
@@ -32,7 +32,7 @@ _SHAFT: Mapping[str, Mapping[str, float]] = {
 @dataclass(frozen=True)
 class StatedFact:
     """
-    A fact, and the run that it is told of.
+    A fact, and the run that it is stated of.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class StatedFact:
 @dataclass(frozen=True)
 class Facts:
     """
-    All facts that are told.
+    All facts that are stated.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Facts:
 
     def log_likelihood(self, hypothesis: Hypothesis) -> float:
         """
-        Return the logarithm of the probability that these facts are told.
+        Return the logarithm of the probability that these facts are stated.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class Facts:
         Returns
         -------
         tuple of ToldFact
-            In the order in which they were told.
+            In the order in which they were stated.
         """
         found = []
         for each in self.told:
@@ -122,14 +122,14 @@ class Facts:
         Parameters
         ----------
         posterior
-            Of hypotheses, with the facts that are told.
+            Of hypotheses, with the facts that are stated.
         decides
             Whether a posterior names something.
 
         Returns
         -------
         dict
-            By the name of each fact that is not told yet and has no date; a fact that is
+            By the name of each fact that is not stated yet and has no date; a fact that is
             not so counts as what the effects say that it denies.
         """
         known = {each.fact.name for each in self.told}
@@ -222,12 +222,12 @@ def _goes_with(effect: Effect, told: StatedFact) -> float:
 
 
 def _told_wrongly(fact: Fact) -> float:
-    """Return how probable it is that it is told although it is not so."""
+    """Return how probable it is that it is stated although it is not so."""
     return fact.rate / max(len(KNOWN[fact.name].values) - 1, 1)
 
 
 def _likelihood(so: float, fact: Fact) -> float:
-    """Return how probable it is that a fact is told."""
+    """Return how probable it is that a fact is stated."""
     return so * (1.0 - fact.rate) + (1.0 - so) * _told_wrongly(fact)
 
 

@@ -60,7 +60,7 @@ def write_diagnosis(
 
 
 def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
-    """Tell the verdict, what the ship needs, and what would decide."""
+    """Show the verdict, what the ship needs, and what would decide."""
     sentence, *rest = found.summary()
     needs = () if ship is None else in_service(found.estimates, ship)
     yield Section(
@@ -70,7 +70,7 @@ def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
             picture(
                 pictures.probability_picture(words.answers(found)),
                 'How probable each answer is. One long bar is a name; several of like length are '
-                'what these runs cannot tell apart.',
+                'what these runs cannot separate.',
             )
         ],
     )
@@ -82,7 +82,7 @@ def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
 
 
 def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section]:
-    """Tell the resistance that was measured, over that of the clean hull."""
+    """Show the resistance that was measured, over that of the clean hull."""
     usable = [each for each in estimates if len(each.valid_curve)]
     if ship is None or not usable:
         return
@@ -116,7 +116,7 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
 
 
 def _sizes(found: DiagnosisResult) -> Iterator[Section]:
-    """Tell how large the effects are, in the units of the ship file."""
+    """Show how large the effects are, in the units of the ship file."""
     shown = found.effects or tuple(each for one in found.candidates for each in one.effects)
     if not shown:
         return

@@ -3,7 +3,7 @@
 Sensor effects and current from any sailing, without a coastdown.
 
 The log is held against the way made good over ground, on many courses and at
-many speeds. No baseline is needed, and no force can be told.
+many speeds. No baseline is needed, and no force can be seen.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _where(model: SailingModel, best: Fit) -> Where:
 
 
 def _about(model: SailingModel, outliers: int) -> list[str]:
-    """Tell what was used."""
+    """Say what was used."""
     legs = model.legs
     found = [
         f'log and way over ground are compared on {len(legs)} legs of {legs.length_s:.0f} s, '
@@ -131,7 +131,7 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
 
 
 def _why(model: SailingModel, found: SearchResult) -> list[str]:
-    """Tell why it is this and none of the others."""
+    """Say why it is this and none of the others."""
     legs, best, names = model.legs, found.best, found.best.hypothesis.names
     told = [f'log over ground: {_by_speed(legs)}']
     action = model.action(best.hypothesis, best.best.z)

@@ -63,7 +63,7 @@ def _parameter(quantity: Parameter, effect: EffectEstimate) -> tuple[str, ...]:
 
 def facts(found: DiagnosisResult) -> Table:
     """
-    Show the facts that were told, and how probable it is that each is wrong.
+    Show the facts that were stated, and how probable it is that each is wrong.
     """
     rows = [
         (

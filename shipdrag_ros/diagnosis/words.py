@@ -22,14 +22,14 @@ from shipdrag_ros.simulation.effects import LIBRARY
 _CHANNELS = {
     'log': 'in the speed log',
     'radar': 'in radar or GNSS',
-    'log_radar': 'between log and radar, which of them cannot be told',
+    'log_radar': 'between log and radar, which of the two is not known',
     'force': 'in the force on the ship',
 }
 NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
-_LEAST = 0.001  # probability that is told
+_LEAST = 0.001  # probability that is stated
 _WORTH_A_WORD = 0.01
-_LARGE_N = 1e4  # from here on a force is told in kN
+_LARGE_N = 1e4  # from here on a force is stated in kN
 
 
 def sentence(found: DiagnosisResult) -> str:
@@ -77,8 +77,8 @@ def sentence(found: DiagnosisResult) -> str:
             unnamed = f', or {UNNAMED} ({probability(found.unnamed)})'
             return (
                 f'Missing is one of these: {_listed(found.candidates)}'
-                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot tell '
-                'them apart.'
+                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot separate '
+                'them.'
             )
         case Verdict.UNKNOWN:
             first = found.candidates[0]
@@ -187,7 +187,7 @@ def model(found: DiagnosisResult) -> str:
 
 def of_log_track(found: DiagnosisResult) -> bool:
     """
-    Tell whether the answer rests on the log against the way over ground alone.
+    Say whether the answer rests on the log against the way over ground alone.
     """
     if found.baseline == 'fitted_here':
         return found.where is not None and found.where.channel != FORCE

@@ -32,7 +32,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effect import Effect, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
-_MOVES_M_S = 0.1  # slower is at rest, as positions tell it
+_MOVES_M_S = 0.1  # slower is at rest, as positions show it
 _SCATTER_M_S = 0.08  # of the way over ground while the log reads 0, that no drift explains
 _SURE = 0.99  # probability from which it is part of an answer that holds something else
 _LEAST = 3  # stretches at 0 while the ship moves, and as many that are not
@@ -133,7 +133,7 @@ def _effect() -> Effect:
 
 
 def _drifts(way: np.ndarray[tuple[int], np.dtype[np.complex128]], by_place: bool) -> bool:
-    """Tell whether one velocity of the water may be all that moves the ship."""
+    """Say whether one velocity of the water may be all that moves the ship."""
     if not by_place:
         way = np.abs(way).astype(np.complex128)
     return float(np.sqrt(np.mean(np.abs(way - way.mean()) ** 2))) < _SCATTER_M_S
@@ -209,7 +209,7 @@ def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> Diagnosis
     ----------
     still
     why
-        Nothing more can be told.
+        Nothing more can be said.
     no_coastdown
         For the reader.
     """

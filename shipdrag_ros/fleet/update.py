@@ -74,7 +74,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     engine
         Running.
     progress
-        Told how far it is.
+        Called with how far it is.
 
     Raises
     ------

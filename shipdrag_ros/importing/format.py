@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a format of log files declares: how it is recognised, read and told."""
+"""What a format of log files declares: how it is recognised, read and shown."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ class Job:
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how much is read, and of how much.
+        Called with how much is read, and of how much.
     """
 
     source: Path
@@ -117,7 +117,7 @@ class Job:
 
 
 class ImportResult(Protocol):
-    """What became of a file: a dataclass that tells itself."""
+    """What became of a file: a dataclass that shows itself."""
 
     @property
     def written(self) -> Mapping[str, int]:
@@ -157,6 +157,8 @@ class Format(NamedTuple):
         Those that it knows.
     chosen_by
         Key of an option that chooses it; '' for none.
+    by_head
+        Whether the score comes from the first bytes alone, and not from the file.
     """
 
     name: str
@@ -166,6 +168,7 @@ class Format(NamedTuple):
     write: Callable[[Job], ImportResult]
     options: tuple[Option, ...] = ()
     chosen_by: str = ''
+    by_head: bool = True
 
 
 def best_of(formats: Sequence[Format], head: Head) -> Format:
@@ -191,3 +194,20 @@ def best_of(formats: Sequence[Format], head: Head) -> Format:
             'as a table (CSV)'
         )
     return best
+
+
+def missing_library(job: Job, kind: str, library: str) -> ImportDataError:
+    """
+    Return the error of a file whose format needs a library that is not installed.
+
+    Parameters
+    ----------
+    job
+    kind
+        What the file is, with its article.
+    library
+        One of the extra `flight`.
+    """
+    return ImportDataError(
+        f"{str(job.source)!r} is {kind}, which needs {library}: pip install 'shipdrag_ros[flight]'"
+    )

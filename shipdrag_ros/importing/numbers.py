@@ -14,7 +14,7 @@ from shipdrag_ros.errors import DataError, ImportDataError
 from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.samples import Float64
 
-_SHOWN = 20  # cells that are told one by one
+_SHOWN = 20  # cells that are shown one by one
 _MOST = 1e30  # its tenth power is a number still
 
 

@@ -44,7 +44,7 @@ class Understanding:
 
     def lines(self) -> list[str]:
         """
-        Return what is to be told: what each input was taken from, and what was left out.
+        Return what is to be said: what each input was taken from, and what was left out.
         """
         told = [f'{self.path}: {self.kind}', *(f'  {each}' for each in self.result.understood)]
         return [*told, *self.result.summary(self.path)[1:], *self.result.details()]

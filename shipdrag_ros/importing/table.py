@@ -194,7 +194,7 @@ class LogTable:
         Parameters
         ----------
         progress
-            Told how many bytes are read, and of how many.
+            Called with how many bytes are read, and of how many.
         """
         total = self.path.stat().st_size
         above = (self.header is not None) + (self.units is not None)

@@ -51,7 +51,7 @@ def diagnose_runs(
     Parameters
     ----------
     listener
-        Told what is found on the way.
+        Called with what is found on the way.
     runs
         Together; effects of the earth are stated along the first.
     given
@@ -59,7 +59,7 @@ def diagnose_runs(
     facts
         Of all runs.
     progress
-        Told of each stage, how much of it is done, and of how much.
+        Called with each stage, how much of it is done, and of how much.
 
     Returns
     -------
@@ -101,7 +101,7 @@ def _with_log_track(
 
 
 def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
-    """Say of facts that they were told and not used."""
+    """Say of facts that they were stated and not used."""
     return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
 
 
@@ -134,13 +134,13 @@ def coasts_of(
     Parameters
     ----------
     listener
-        Told what is found on the way.
+        Called with what is found on the way.
     runs
         Where to look.
     given
         The ship; None: the one attached to the first run.
     progress
-        Told of each stage, how much of it is done, and of how much.
+        Called with each stage, how much of it is done, and of how much.
 
     Returns
     -------

@@ -27,6 +27,7 @@ from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.shown import Shown, drawing
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_overlaps
+from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -118,7 +119,8 @@ class Diagnosis(Shown):
         """
         Say the verdict, what was examined and where, and what would decide.
         """
-        return (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
+        said = (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
+        return tuple(map(in_python, said))
 
     def table(self) -> Table:
         """
@@ -217,6 +219,7 @@ def _first(found: DiagnosisResult) -> str:
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 
 
+@says_it_in_python
 def diagnose(
     records: Record | Sequence[Record],
     *,
@@ -243,7 +246,7 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        A name only where the data can tell; a set and what would decide otherwise.
+        A name only where the data decide; a set and what would decide otherwise.
 
     Raises
     ------

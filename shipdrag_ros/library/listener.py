@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who is told what happens while something long is done: a terminal, or nobody."""
+"""Who hears what happens while something long is done: a terminal, or nobody."""
 
 from __future__ import annotations
 

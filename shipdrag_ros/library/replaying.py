@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run, or a window of it, replayed and told."""
+"""A run, or a window of it, replayed and put into words."""
 
 from __future__ import annotations
 

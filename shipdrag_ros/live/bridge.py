@@ -98,14 +98,14 @@ class Bridge:
 
     def keep_alive(self, now_s: float) -> None:
         """
-        Note that whoever tells is still there; a bag that is paused says nothing.
+        Note that whoever sends is still there; a bag that is paused says nothing.
         """
         if self._heard_s is not None:
             self._heard_s = now_s
 
     def tell(self, view: VerdictView) -> None:
         """
-        Take a verdict that no node told.
+        Take a verdict that no node gave.
         """
         self._verdict = view
 

@@ -257,7 +257,7 @@ class BagSource:
         self.bridge.keep_alive(now_s)
 
     def _tell_verdict(self) -> None:
-        """Tell what the diagnosis says of a coastdown that has ended by now."""
+        """Say what the diagnosis says of a coastdown that has ended by now."""
         assert self._diagnosing is not None
         status = self._diagnosing.status
         of, found = status.coastdown, status.found

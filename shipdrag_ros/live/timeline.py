@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A bag as a node would have told it: through the same monitor, second by second.
+A bag as a node would have shown it: through the same monitor, second by second.
 
 Read once, ahead of whoever plays it; playing, pausing and seeking only walk
 what is there.
@@ -18,7 +18,7 @@ import numpy as np
 
 from shipdrag_ros.bags.run import Mark, Run
 from shipdrag_ros.coastdown import InputHealth, Monitor
-from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event, OnCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, Event, OnCoastdown
 from shipdrag_ros.messages import outputs
 from shipdrag_ros.messages.heard import (
     OK,
@@ -148,12 +148,7 @@ class Timeline:
         for event in events:
             for message in outputs(event):
                 heard.append(NodeMessage(message.topic.rpartition('/')[2], message.payload))
-            if (
-                self._ended is not None
-                and isinstance(event, EndedCoastdown)
-                and event.ended_by is not EndedBy.RESET
-                and not event.withdrawn
-            ):
+            if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, monitor.ended_window(event))
         return heard
 

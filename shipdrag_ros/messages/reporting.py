@@ -59,7 +59,7 @@ class EventKind(Enum):
     DISMISSED = 'dismissed'  # nearly a coastdown, or a part of one that was cut
     RESET = 'reset'  # done, whatever the cause
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
-    SILENCE = 'silence'  # by the clock, which no sample tells: an input of replay
+    SILENCE = 'silence'  # by the clock, which no sample shows: an input of replay
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
     FILES = 'files'  # recordings removed

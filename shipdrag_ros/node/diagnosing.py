@@ -83,7 +83,7 @@ class Diagnosing:
     ship
         Without a baseline none is possible, and the status says so.
     enabled
-        False: only tells that it is off.
+        False: only says that it is off.
     """
 
     def __init__(self, ship: Ship, parameters: Parameters, *, enabled: bool) -> None:

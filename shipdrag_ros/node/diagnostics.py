@@ -33,13 +33,14 @@ OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
 STALE = DiagnosticStatus.STALE
+_SETS_SIZED = 3  # candidates of a set whose sizes are told
 
 
 def label(
     statuses: Sequence[DiagnosticStatus], *, node: str, hardware_id: str
 ) -> list[DiagnosticStatus]:
     """
-    Say whose statuses these are, so that two nodes are told apart.
+    Say whose statuses these are, so that two nodes are not mixed up.
 
     Parameters
     ----------
@@ -287,11 +288,21 @@ def _figures(found: DiagnosisResult) -> dict[str, object]:
     for candidate in found.candidates:
         if candidate.names:
             values[f'probability of {" + ".join(candidate.names)} [1]'] = candidate.probability
-    for effect in found.effects:
+    told = [(effect.name, effect) for effect in found.effects]
+    if not told:  # a set: what each would have
+        told = [
+            (
+                f'if {" + ".join(each.names)}' + (f', {effect.name}' if each.names[1:] else ''),
+                effect,
+            )
+            for each in found.candidates[:_SETS_SIZED]
+            for effect in each.effects
+        ]
+    for before, effect in told:
         for quantity in LIBRARY[effect.name].parameters:
             size, unit = effect.parameters[quantity.name], quantity.unit or '1'
-            values[f'{effect.name}, {quantity.name} [{unit}]'] = size.value
-            values[f'standard deviation of {effect.name}, {quantity.name} [{unit}]'] = size.sd
+            name = f'{before}, {quantity.name} [{unit}]'
+            values |= {name: size.value, f'standard deviation of {name}': size.sd}
     values['mean square of whitened residuals, before [1]'] = found.before.chi2_per_sample
     if found.after is not None:
         values['mean square of whitened residuals, after [1]'] = found.after.chi2_per_sample

@@ -37,7 +37,7 @@ from shipdrag_ros.messages import Decoded
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.losses import Sequences
 
-# As deep as Fast DDS goes unless told otherwise, some seconds of a flood: one estimate may take
+# As deep as Fast DDS goes unless set otherwise, some seconds of a flood: one estimate may take
 # as long as many messages.
 DEPTH = 5000
 LONGEST_BYTES = 65536  # no instrument sends a message as long; thousands may have to wait
@@ -242,7 +242,7 @@ class InputTopic:
         for reason, times in decoded.unreadable.items():
             self.unreadable[reason.value] += times
         if self.type is not None and not is_stamped(self.type):
-            return  # arrivals tell nothing of a clock
+            return  # arrivals show nothing of a clock
         for stamp_ns, receive_ns in zip(
             decoded.block.stamp_ns.tolist(), decoded.block.receive_ns.tolist(), strict=True
         ):
@@ -284,7 +284,7 @@ class InputTopic:
         )
         try:
             self._subscription = self._create(type_name, qos, message_lost=self._on_message_lost)
-        except UnsupportedEventTypeError:  # not every middleware tells
+        except UnsupportedEventTypeError:  # not every middleware says so
             self._subscription = self._create(type_name, qos)
         self.type, self.reliable = type_name, reliable
         self.incompatible_qos = None

@@ -126,7 +126,7 @@ class InputFacts:
     Attributes
     ----------
     needed
-        Whether nothing else tells the motion.
+        Whether nothing else shows the motion.
     type
         Heard; None while there is none.
     stamped

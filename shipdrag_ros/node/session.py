@@ -14,7 +14,6 @@ from time import monotonic
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    EndedBy,
     EndedCoastdown,
     Event,
     NoEstimate,
@@ -57,7 +56,7 @@ class Session:
     Parameters
     ----------
     recorder
-        Told of every message in and out.
+        Called with every message in and out.
     publish
         Called with every message out.
     node
@@ -214,7 +213,7 @@ class Session:
         Parameters
         ----------
         ends
-            Whether readings that matter to a coastdown are told by that clock.
+            Whether readings that matter to a coastdown are timed by that clock.
         """
         self.watch_clock(now_ns)
         if ends and self.monitor.state in (State.CANDIDATE, State.COASTDOWN):
@@ -284,12 +283,7 @@ class Session:
                 self._told(event)
             for message in outputs(event, node=self._node):
                 self._send(message)
-            if (
-                self._ended is not None
-                and isinstance(event, EndedCoastdown)
-                and event.ended_by is not EndedBy.RESET
-                and not event.withdrawn
-            ):
+            if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, self.monitor.ended_window(event))
 
     def _send(self, message: OutputMessage) -> None:

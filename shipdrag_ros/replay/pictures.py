@@ -19,7 +19,7 @@ from shipdrag_ros.replay.cuts import StretchSpan, inside, stretch
 from shipdrag_ros.replay.hulls import RankedHull
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE
 
-_HATCHES = ('///', '\\\\\\', 'xxx', '...')  # told apart in print too
+_HATCHES = ('///', '\\\\\\', 'xxx', '...')  # distinct in print too
 _NARROW = 0.02  # of the time axis: no room for a label
 
 

@@ -89,7 +89,7 @@ def combined_notes(combined: Combined) -> tuple[str, ...]:
     """
     if combined.current_m_s is None or combined.current_sigma_m_s is None:
         current = (
-            'These runs do not tell a current: none is taken out. Runs on opposite headings would.'
+            'These runs do not show a current: none is taken out. Runs on opposite headings would.'
         )
     else:
         value = plus_minus(combined.current_m_s, 2.0 * combined.current_sigma_m_s)

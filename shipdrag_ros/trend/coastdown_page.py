@@ -154,7 +154,7 @@ def _facts(row: CoastdownRow) -> Table:
         and ship_speed(row['speed_at_stop_m_s'], _mass_kg(row)),
         'draught': row['draught_m'] and f'{row["draught_m"]:.2f} m',
         'displaced volume': f'{row["displaced_volume_m3"]:.0f} m³',
-        'told by the log book': ', '.join(row['facts'] or ()),
+        'noted in the log book': ', '.join(row['facts'] or ()),
         'to be weighed': ', '.join(flags),
         'no estimate, because': row['error'],
         'software': f'shipdrag_ros {row["software_version"]}',
@@ -187,7 +187,7 @@ def _verdict(row: CoastdownRow) -> str:
     if row['verdict'] == 'named':
         names = ' and '.join(each['name'].replace('_', ' ') for each in json.loads(row['effects']))
         return f'Missing in the model of the clean hull: {names}.'
-    return 'Missing is one of those below; this run alone cannot tell them apart.'
+    return 'Missing is one of those below; this run alone cannot separate them.'
 
 
 def _candidates(row: CoastdownRow) -> tuple[tuple[str, Table], ...]:

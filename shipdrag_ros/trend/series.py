@@ -18,6 +18,8 @@ YEAR_NS = 365.25 * 86_400e9
 _ALONE_NS = YEAR_NS
 _LENGTH_TOLERANCE = 0.02  # between ship files of one ship
 _MANY_RUNS = 5  # of fewer each may stand alone
+_FEW_SHARE = 0.1  # of all runs: so many may one wrong clock have dated, if ...
+_FAR_NS = 3.0 * YEAR_NS  # ... they are so far off; a second season is nearer
 _EARLIEST_NS = 631_152_000_000_000_000  # 1990: before it a clock was not set
 _MOST_SHARED = 0.5  # a reference speed must lie inside the range of at least this many runs
 _NOMINAL_TEMPERATURE_C = 15.0
@@ -215,20 +217,30 @@ def _of_one_hull(points: list[Point], lengths: Sequence[float]) -> list[Point]:
 
 
 def _dated(points: list[Point]) -> list[Point]:
-    """Leave out a run that stands alone, years from all others: its clock was wrong."""
-    times = np.array([point.time_ns for point in points if point.used])
+    """Leave out the few runs that are years from most of the others: their clock was wrong."""
+    used = [number for number, point in enumerate(points) if point.used]
+    times = np.array([points[number].time_ns for number in used])
     if len(times) < _MANY_RUNS:
         return points
-    found = []
-    for point in points:
-        apart_ns = np.sort(np.abs(times - point.time_ns))[1]  # the first is its own
-        if point.used and apart_ns > _ALONE_NS:
+    groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > _ALONE_NS) + 1)
+    most = max(groups, key=len)
+    if len(most) < _MOST_SHARED * len(times):  # a ship that coasts once in a year or two
+        return points
+    found = list(points)
+    for group in groups:
+        if group is most or len(group) > max(_FEW_SHARE * len(times), 1.0):
+            continue
+        ends = np.abs(times[group][:, None] - times[most[[0, -1]]])
+        if len(group) > 1 and ends.min() < _FAR_NS:
+            continue
+        for number in group.tolist():
+            time_ns, apart_ns = times[number], np.abs(times[number] - times[most[[0, -1]]]).min()
+            others = 'every other run' if len(group) == 1 else f'all but {len(group)} runs'
             reason = (
-                f'its date, {day(point.time_ns)}, is {apart_ns / YEAR_NS:.1f} years from every '
-                'other run: a wrong clock'
+                f'its date, {day(int(time_ns))}, is {apart_ns / YEAR_NS:.1f} years from {others}: '
+                'a wrong clock'
             )
-            point = replace(point, reason=reason)
-        found.append(point)
+            found[used[number]] = replace(points[used[number]], reason=reason)
     return found
 
 

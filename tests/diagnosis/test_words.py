@@ -70,12 +70,12 @@ def diagnosis(
         (
             diagnosis(Verdict.ONE_OF, (('log_scale',), 0.6), (('radar_scale',), 0.4)),
             'Missing is one of these: log scale (60.0 %), radar scale (40.0 %). These runs cannot '
-            'tell them apart.',
+            'separate them.',
         ),
         (
             diagnosis(Verdict.ONE_OF, (('waves',), 0.3), (('wind',), 0.2), unnamed=0.5),
             'Missing is one of these: waves (30.0 %), wind (20.0 %), or something without a name '
-            '(50.0 %). These runs cannot tell them apart.',
+            '(50.0 %). These runs cannot separate them.',
         ),
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),

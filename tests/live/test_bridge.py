@@ -189,12 +189,16 @@ def test_a_verdict_is_read_from_the_status_of_the_node() -> None:
         'fouling, friction_factor [1]': '0.31',
         'standard deviation of fouling, friction_factor [1]': '0.02',
         'mean square of whitened residuals, before [1]': '9',
-        'advice 1': 'a run after the hull is cleaned',
+        'if towed_cable, drag_area [m^2]': '4.5',
+        'advice 1': 'look at the hull (--fact hull_cleaned=DATE); costs a look',
     }
     view = verdicts.of_status(Status('n', 'diagnosis', 1, 'Missing: fouling.', values))
-    assert view.sizes == (('fouling, friction factor', '0.31 ± 0.04'),)
+    assert view.sizes == (
+        ('fouling, friction factor', '0.31 ± 0.04'),
+        ('if towed cable, drag area', '4.5 m^2'),
+    )
     assert view.probabilities == (('fouling', 0.98), ('nothing is missing', 0.01))
-    assert view.decide == ('a run after the hull is cleaned',)
+    assert view.decide == ('look at the hull; costs a look',)  # no options of a command line
 
 
 @pytest.mark.parametrize(

@@ -183,6 +183,6 @@ def test_end_of_the_node_does_not_wait_for_a_diagnosis() -> None:
     for _ in range(3):
         diagnosing.begin(ended, window)
     time.sleep(0.5)
-    start = time.monotonic()
     diagnosing.close()
-    assert time.monotonic() - start < 2.0  # a diagnosis takes longer
+    # killed, or not begun; the others are dropped
+    assert diagnosing.status.reason.startswith(('exit -9', 'the node has ended'))

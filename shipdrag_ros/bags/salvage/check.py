@@ -83,7 +83,7 @@ def check(
     paths
         MCAP files and rosbag2 directories.
     progress
-        Told bytes done, and in all, of each file.
+        Called with bytes done, and in all, of each file.
 
     Raises
     ------
@@ -213,7 +213,7 @@ class _FilePass:
             self._reference(offset, 'channel', f'schema {record.schema_id}')
 
     def _reference(self, offset: int, record: str, target: str) -> None:
-        """Tell once what is not there; a thousand messages may refer to it."""
+        """Say once what is not there; a thousand messages may refer to it."""
         if target not in self._told:
             self._told.add(target)
             self._damages.add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')

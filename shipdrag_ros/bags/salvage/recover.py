@@ -87,7 +87,7 @@ def recover(
         File to make; one that exists is never overwritten. What is doubtful
         goes beside it, into `NAME.quarantine.mcap`.
     progress
-        Told bytes done, and in all, of each file.
+        Called with bytes done, and in all, of each file.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 """
 Slow disturbances of a coastdown, as the steady record before it shows them.
 
-The coastdown itself cannot tell them from its own motion.
+The coastdown itself cannot separate them from its own motion.
 """
 
 from __future__ import annotations

@@ -247,7 +247,7 @@ class Problem:
         Fit the first family, None where that fails; return whitened residuals too.
 
         How the thrust ended is held as it is most likely: without the priors of the whole law
-        it cannot be told from the highest powers.
+        it cannot be separated from the highest powers.
         """
         converged, _, unknowns, covariance, white = fit(
             self.first,

@@ -26,7 +26,7 @@ AUTO = 'auto'
 OPEN = 1e-6  # which part of a row the data may leave open: the digits of printed ratios
 FIRM = 2.0  # standard deviations by which a trend must be wrong
 _STEP = 1e-4  # of a ratio, for derivatives
-_ENOUGH = 3  # hulls left out that tell how far a new hull scatters
+_ENOUGH = 3  # hulls left out that say how far a new hull scatters
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class ResidualFit:
         target
             Name of what was measured.
         """
-        from shipdrag_ros.studies.residual import words  # it tells what this module holds
+        from shipdrag_ros.studies.residual import words  # it shows what this module holds
 
         return (words.sentence(self, target, ()), words.technical(self), *self.notes)
 

@@ -26,7 +26,7 @@ class RegressionForm:
     terms
         What each column is; psi is the slenderness L / V^(1/3).
     variables
-        Ratios of `Hulls` that tell its hulls apart, Fr included.
+        Ratios of `Hulls` that separate its hulls, Fr included.
     froude_max
         What its author made it for.
     """

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from shipdrag_ros import display, strict_yaml
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import (
     ATTACHMENT,
@@ -35,128 +35,67 @@ from shipdrag_ros.importing.formats.csv.cells import (
     number_with_comma,
 )
 from shipdrag_ros.importing.formats.csv.columns import InputColumns, TimeColumn
+from shipdrag_ros.importing.formats.csv.result import TableResult
 from shipdrag_ros.importing.formats.csv.row_clock import BASE_NS, RowClock
 from shipdrag_ros.importing.table import LogRow, LogTable
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel
 
 _FEW = 10
-_SAMPLE_ROWS = 2000  # by which the way of writing is told
+_SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
 CellReader = Callable[[str], float]
 
 
 @dataclass(frozen=True)
-class TableResult:
+class TableColumns:
     """
-    What became of a table.
+    What is to be taken from a table.
 
     Attributes
     ----------
-    rows
-        Below the header.
-    left_out
-        Rows that `where` does not choose.
-    written
-        Samples by input; pitches are of `shaft`.
-    rejected
-        By input, or 'time' for a whole row, and reason.
-    start_ns, end_ns
-        First and last time written [ns].
-    base_ns
-        What was added to the times of the table [ns]; None if they are dates.
-    backward
-        Rows whose time is before that of an earlier row; a replay rejects
-        them and says so.
-    repeated
-        Rows whose time is that of the newest row before; a replay rejects them
-        too.
-    delimiter
-        That of the table.
-    header
-        Whether the table has one.
-    understood
-        What each input was taken from.
-    notes
-        What is to be known of it, a sentence each.
-    not_used
-        Columns that nothing is taken from.
+    inputs
+        Columns of the inputs, from `parse_input`.
+    time
+        Column of the time, from `parse_time`; or else
+    rate_hz
+        Rows a second.
+    where
+        (column, text): only rows with this text there are taken.
+    start_ns
+        Date of time 0, for times that count from the start of a test [ns].
     """
 
-    rows: int
-    left_out: int
-    written: dict[str, int]
-    rejected: dict[str, dict[str, Rejected]]
-    start_ns: int
-    end_ns: int
-    base_ns: int | None
-    backward: int
-    repeated: int
-    delimiter: str
-    header: bool
-    understood: tuple[Understood, ...]
-    notes: tuple[str, ...]
-    not_used: tuple[str, ...]
+    inputs: Sequence[InputColumns]
+    time: TimeColumn | None = None
+    rate_hz: float | None = None
+    where: Sequence[tuple[str, str]] = ()
+    start_ns: int = BASE_NS
 
-    def summary(self, bag: Path) -> list[str]:
+    def check(self) -> None:
         """
-        Say how much was read, and what is to be known of it.
-        """
-        length_s = (self.end_ns - self.start_ns) * 1e-9
-        told = [
-            f'{bag}: {sum(self.written.values())} messages of {self.rows - self.left_out} rows, '
-            f'{display.duration(length_s)}, from {display.utc(self.start_ns)}'
-        ]
-        if self.base_ns is not None:
-            told.append(
-                f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
-            )
-        told += self.notes
-        if self.left_out:
-            told.append(f'{self.left_out} rows were not chosen by --where.')
-        if self.backward:
-            told.append(
-                f'In {self.backward} rows the time is before that of an earlier row; a replay '
-                'rejects those.'
-            )
-        if self.repeated:
-            told.append(
-                f'In {self.repeated} rows the time is that of an earlier row; a replay rejects '
-                'those.'
-            )
-        return told
+        Refuse what is missing, or given twice.
 
-    def table(self) -> display.Table:
+        Raises
+        ------
+        ImportDataError
         """
-        Return messages by input.
-        """
-        return display.Table(
-            ('input', 'messages'), tuple((name, f'{n}') for name, n in self.written.items())
-        )
-
-    def details(self) -> list[str]:
-        """
-        Say what was not used, and why.
-        """
-        told = [
-            f'{name}: {rejected.count} cell(s) rejected, {reason}: {", ".join(rejected.first)}'
-            for name, reasons in self.rejected.items()
-            for reason, rejected in reasons.items()
-        ]
-        if self.not_used:
-            told.append(f'Columns not used: {", ".join(map(repr, self.not_used))}')
-        return told
+        if (self.time is None) == (self.rate_hz is None):
+            raise ImportDataError(
+                'the times of the rows: give either --time COLUMN[:unit] or --rate'
+            )
+        if not self.inputs:
+            raise ImportDataError('no column is mapped; give --map INPUT=COLUMN[:unit]')
+        for name, count in Counter(each.name for each in self.inputs).items():
+            if count > 1:
+                raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
 
 
 def import_csv(
     source: Path,
     out: Path,
+    columns: TableColumns,
     *,
-    inputs: Sequence[InputColumns],
-    time: TimeColumn | None = None,
-    rate_hz: float | None = None,
-    where: Sequence[tuple[str, str]] = (),
-    start_ns: int = BASE_NS,
     attachments: Mapping[str, str] | None = None,
     progress: PartDone | None = None,
 ) -> TableResult:
@@ -169,20 +108,12 @@ def import_csv(
         Table, see `LogTable`.
     out
         MCAP file to make.
-    inputs
-        Columns to take, from `parse_input`.
-    time
-        Column of the time, from `parse_time`; or else
-    rate_hz
-        Rows a second.
-    where
-        (column, text): only rows with this text there are taken.
-    start_ns
-        Date of time 0, for times that count from the start of a test [ns].
+    columns
+        Which of it to take.
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how many bytes are read, and of how many.
+        Called with how many bytes are read, and of how many.
 
     Raises
     ------
@@ -191,16 +122,16 @@ def import_csv(
     BagError
         If the bag cannot be made.
     """
-    if (time is None) == (rate_hz is None):
-        raise ImportDataError('the times of the rows: give either --time COLUMN[:unit] or --rate')
-    _check_inputs(inputs)
+    columns.check()
     table = LogTable(source)
+    time = columns.time
     places = [] if time is None else [table.column(name) for name in time.names]
-    channels = [each for mapped in inputs for each in mapped.by_channel()]
+    channels = [each for mapped in columns.inputs for each in mapped.by_channel()]
     mapped_places = [[table.column(name) for name in each.names] for each in channels]
-    chosen = [(table.column(name), text) for name, text in where]
+    chosen = [(table.column(name), text) for name, text in columns.where]
     sample = list(islice(table.rows(), _SAMPLE_ROWS))
-    clock = RowClock.of(time, rate_hz, start_ns, [row_text(row, places) for row in sample], table)
+    texts = [row_text(row, places) for row in sample]
+    clock = RowClock.of(time, columns.rate_hz, columns.start_ns, texts, table)
     record = _RowSamples(
         list(zip(channels, mapped_places, _readers(channels, mapped_places, sample), strict=True)),
         chosen,
@@ -209,7 +140,7 @@ def import_csv(
         table.width,
     )
     with new_bag(out, attachments) as bag:
-        bag.attach(ATTACHMENT, _provenance(source, inputs, time, rate_hz, where))
+        bag.attach(ATTACHMENT, _provenance(source, columns))
         for row in table.rows(progress):
             record.take(row)
             if len(record) >= BATCH_SAMPLES:
@@ -410,27 +341,13 @@ def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> CellReader:
     return degrees_of(side)
 
 
-def _check_inputs(inputs: Sequence[InputColumns]) -> None:
-    if not inputs:
-        raise ImportDataError('no column is mapped; give --map INPUT=COLUMN[:unit]')
-    for name, count in Counter(each.name for each in inputs).items():
-        if count > 1:
-            raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
-
-
-def _provenance(
-    source: Path,
-    inputs: Sequence[InputColumns],
-    time: TimeColumn | None,
-    rate_hz: float | None,
-    where: Sequence[tuple[str, str]],
-) -> str:
+def _provenance(source: Path, columns: TableColumns) -> str:
     """Say where the samples come from; the name alone, whatever the machine."""
     about = {
         'source': source.name,
-        'inputs': {each.name: list(each.names) for each in inputs},
-        'time': None if time is None else ', '.join(time.names),
-        'rate_hz': rate_hz,
-        'where': dict(where),
+        'inputs': {each.name: list(each.names) for each in columns.inputs},
+        'time': None if columns.time is None else ', '.join(columns.time.names),
+        'rate_hz': columns.rate_hz,
+        'where': dict(columns.where),
     }
     return strict_yaml.dump(about)

@@ -48,7 +48,7 @@ class N2kFrame(NamedTuple):
     Attributes
     ----------
     time_ns
-        Since 1970; since midnight where `of_day`; None where the line tells none.
+        Since 1970; since midnight where `of_day`; None where the line states none.
     of_day
     pgn, sender, data
     whole

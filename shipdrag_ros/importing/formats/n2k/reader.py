@@ -41,9 +41,9 @@ class FrameClock:
     Attributes
     ----------
     rate_hz
-        Frames a second, where the lines tell no time.
+        Frames a second, where the lines state no time.
     day
-        Days since 1970 of the first line, where the lines tell times of day.
+        Days since 1970 of the first line, where the lines have times of day.
     base_ns
         Added to times that count from the start of the log [ns].
     """
@@ -60,7 +60,7 @@ def clock_of(job: Job) -> FrameClock:
     Raises
     ------
     ImportDataError
-        If its lines tell no time, or no date, and it is not given either.
+        If its lines state no time, or no date, and it is not given either.
     """
     name = repr(str(job.source))
     rate_hz = job.options.get('rate')
@@ -74,7 +74,7 @@ def clock_of(job: Job) -> FrameClock:
         return FrameClock(rate_hz, days or 0)
     if first.time_ns is None:
         raise ImportDataError(
-            f'{name}: its lines tell no time; log with `candump -L`, or give --rate HZ, how '
+            f'{name}: its lines state no time; log with `candump -L`, or give --rate HZ, how '
             'many frames came in a second'
         )
     if not first.of_day:
@@ -91,14 +91,14 @@ def clock_of(job: Job) -> FrameClock:
         days = _date_in(islice(frames, _DATED_FRAMES))
     if days is None:
         raise ImportDataError(
-            f'{name} tells times of day, and no date (no PGN 126992 or 129029 with one); give '
+            f'{name} has times of day, and no date (no PGN 126992 or 129029 with one); give '
             '--date YYYY-MM-DD of its first time, in UTC'
         )
     return FrameClock(None, days)
 
 
 def _date_in(frames: Iterator[N2kFrame]) -> int | None:
-    """Return the days since 1970 that a message tells, of the first that does."""
+    """Return the days since 1970 that a message shows, of the first that does."""
     packets = _Packets()
     for frame in frames:
         if frame.pgn in (_SYSTEM_TIME, _GNSS):
@@ -251,10 +251,10 @@ class N2kReader:
         depth, offset = fields['depth'].value, fields['offset'].value
         if depth is None:
             return _EMPTY
-        # negative: to the keel, whose depth is not told
+        # negative: to the keel, whose depth is not stated
         if offset is None or offset <= 0.0:
             if self._transducer_m is None:
-                return 'depth of the transducer not told'
+                return 'depth of the transducer not stated'
             offset = self._transducer_m
         return Channel.DEPTH, 0, depth + offset, 0.0
 

@@ -63,7 +63,7 @@ class NmeaResult:
     not_taken
         By input, values of the sentences that it is not taken from.
     not_used
-        Sentences that tell no input and no time, by address.
+        Sentences that state no input and no time, by address.
     unknown_talkers
         Sentences by talker, where NMEA 0183 knows none of the name.
     rejected
@@ -190,13 +190,13 @@ def import_nmea(
         away from it, the dates are shifted.
     transducer_m
         Depth of the echo sounder below the surface [m], for sentences that
-        do not tell it.
+        do not state it.
     checksum
         Whether sentences without one are taken.
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how much is read, and of how much.
+        Called with how much is read, and of how much.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def import_nmea(
 
     Notes
     -----
-    The log is read twice: first to see who tells what. Each input is taken
+    The log is read twice: first to see who sends what. Each input is taken
     from one talker and sentence, the first in `READERS` of those that have at
     least half as many values as the most frequent; two instruments of
     different place or scale are never mixed.

@@ -104,7 +104,7 @@ class NmeaLog:
         Parameters
         ----------
         progress
-            Told how many bytes are read, and of how many.
+            Called with how many bytes are read, and of how many.
         """
         self.rejected = {}
         self.damage = ''
@@ -168,7 +168,7 @@ class NmeaLog:
 
 
 def _receive_ns(prefix: str) -> int | None:
-    """Return the time before a sentence [ns]; ValueError tells why there is none."""
+    """Return the time before a sentence [ns]; ValueError says why there is none."""
     if _TAGS.fullmatch(prefix):
         tags = _TAG.findall(prefix)
         if any(calc_checksum(content) != checksum.upper() for content, checksum in tags):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Who tells what in a log of NMEA 0183, before anything is taken from it.
+Who sends what in a log of NMEA 0183, before anything is taken from it.
 
-Several instruments, and several sentences of one, may tell the same input.
+Several instruments, and several sentences of one, may hold the same input.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from shipdrag_ros.samples import Channel
 
 class Survey:
     """
-    Sees who tells what, and on which day.
+    Sees who sends what, and on which day.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Survey:
         Raises
         ------
         ImportDataError
-            If there is no sentence, or nothing tells time and date.
+            If there is no sentence, or nothing states time and date.
         """
         name = repr(str(log.path))
         if not self.addresses:
@@ -120,11 +120,11 @@ class Survey:
             return SentenceClock(None)
         if self._timed:
             raise ImportDataError(
-                f'{name} tells times of day, but no date (no RMC or ZDA with a fix and a date); '
+                f'{name} has times of day, but no date (no RMC or ZDA with a fix and a date); '
                 'give --date YYYY-MM-DD of its first time, in UTC'
             )
         raise ImportDataError(
-            f'{name} tells no time: it has none of {", ".join(TIMED)} with a time, and no time '
+            f'{name} states no time: it has none of {", ".join(TIMED)} with a time, and no time '
             'of receipt before its lines'
         )
 
