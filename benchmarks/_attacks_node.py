@@ -270,16 +270,16 @@ def lying_length() -> list[bytes]:
 
 
 def huge(node: Node, folder: Path) -> str:
-    """Send names of frames of 8 MB, and a million shafts in one message."""
+    """Send names of frames of 200 kB, and a million shafts in one message."""
     from shipdrag_ros.node.inputs import message_class
 
     process = psutil.Process(node.process.pid)
     before_mb = process.memory_info().rss / 2**20
     speed = message_class(SPEED_TYPE)()
-    speed.header.frame_id = 'x' * 8_000_000
+    speed.header.frame_id = 'x' * 200_000
     shafts = message_class(JOINTS_TYPE)()
     shafts.name, shafts.velocity = ['shaft'] * 10**6, [10.0] * 10**6
-    node.publish([speed] * 20)
+    node.publish([speed] * 200)
     node.publish([shafts] * 3, 'shaft', JOINTS_TYPE)
     counts = [
         node.number(name, 'unreadable too_long') for name in ('speed_through_water', 'shaft')
@@ -356,6 +356,6 @@ ATTACKS = [
         'ten thousand readings at once',
         on_node(payloads(lambda: readings([5.0], count=10_000), 'heard, lost ones counted')),
     ),
-    Attack('node', 'messages of 8 MB, a million joints', on_node(huge)),
+    Attack('node', 'messages of 200 kB, a million joints', on_node(huge)),
     Attack('node', 'stamps and variances that are none', on_node(odd_stamps)),
 ]

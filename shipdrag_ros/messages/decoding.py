@@ -270,6 +270,21 @@ def _magnitude(extra: Float64) -> Float64:
     return _table(speed, 0.0, known, np.nan)
 
 
+def _dvl_water(extra: Float64) -> Float64:
+    """Return the speed ahead; NaN where it was measured against the bottom."""
+    x, variance, mode = extra.T
+    table = _table(x, 0.0, variance, np.nan)
+    table[mode != _DVL.DVL_MODE_WATER, ::2] = np.nan
+    return table
+
+
+def _dvl_ground(extra: Float64) -> Float64:
+    """Return the speed; NaN where it was measured against the water."""
+    table = _magnitude(extra[:, :5])
+    table[extra[:, 5] != _DVL.DVL_MODE_BOTTOM, ::2] = np.nan
+    return table
+
+
 def _yaw(extra: Float64) -> Float64:
     """Return yaw [rad] of x, y, z, w; NaN where that is no rotation."""
     x, y, z, w, variance = extra[:, :5].T
@@ -294,6 +309,7 @@ def _compass(extra: Float64) -> Float64:
     return _table(np.radians(yaw_deg), 0.0, np.nan, np.nan)
 
 
+_DVL = types.class_of(types.DVL)
 _FIX = types.class_of(types.NAV_SAT_FIX)
 _FIX_STATUS = types.class_of('sensor_msgs/msg/NavSatStatus')
 
@@ -345,6 +361,11 @@ def _readings() -> Iterator[tuple[Source, _Reading]]:
     yield _computed(ground, types.ODOMETRY, _magnitude, *both)
     yield _computed(ground, types.TWIST, _magnitude, x, y, '', '', '')
     yield _computed(ground, types.VELOCITY, _magnitude, *velocity, '', '', '')
+    velocity, covariance = ('velocity.x', 'velocity.y'), 'velocity_covar[{}]'.format
+    mode = 'velocity_mode'
+    yield _computed(speed, types.DVL, _dvl_water, velocity[0], covariance(0), mode)
+    covariances = map(covariance, (0, 4, 1))
+    yield _computed(ground, types.DVL, _dvl_ground, *velocity, *covariances, mode)
 
     position = Channel.POSITION
     pose = ['pose.pose.position.x', 'pose.pose.position.y']

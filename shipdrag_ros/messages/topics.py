@@ -19,12 +19,14 @@ TOPICS: Mapping[str, tuple[str, ...]] = {
         types.TWIST,
         types.VELOCITY,
         types.ODOMETRY,
+        types.DVL,
     ),
     'speed_over_ground': (
         types.TWIST_WITH_COVARIANCE,
         types.TWIST,
         types.VELOCITY,
         types.ODOMETRY,
+        types.DVL,
     ),
     'position': (
         types.POSE_WITH_COVARIANCE,

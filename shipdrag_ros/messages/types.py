@@ -21,6 +21,7 @@ from shipdrag_ros.samples import SECOND_NS
 
 ACCEL_WITH_COVARIANCE = 'geometry_msgs/msg/AccelWithCovarianceStamped'
 DIAGNOSTIC_ARRAY = 'diagnostic_msgs/msg/DiagnosticArray'
+DVL = 'marine_acoustic_msgs/msg/Dvl'
 FLOAT64 = 'std_msgs/msg/Float64'
 IMU = 'sensor_msgs/msg/Imu'
 JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -54,6 +55,20 @@ _store.register(
         'std_msgs/Header header\nuint8 radiation_type\nfloat32 field_of_view\n'
         'float32 min_range\nfloat32 max_range\nfloat32 range\n',
         RANGE_BEFORE_IRON,
+    )
+)
+# not of ROS itself; what a bag holds is read without its package
+_store.register(
+    get_types_from_msg(
+        'uint8 DVL_MODE_BOTTOM=1\nuint8 DVL_MODE_WATER=2\n'
+        'uint8 DVL_TYPE_PISTON=0\nuint8 DVL_TYPE_PHASED_ARRAY=1\n'
+        'std_msgs/Header header\nuint8 velocity_mode\nuint8 dvl_type\n'
+        'geometry_msgs/Vector3 velocity\nfloat64[9] velocity_covar\n'
+        'float64 altitude\nfloat64 course_gnd\nfloat64 speed_gnd\nuint8 num_good_beams\n'
+        'float32 sound_speed\nbool beam_ranges_valid\nbool beam_velocities_valid\n'
+        'geometry_msgs/Vector3[4] beam_unit_vec\nfloat64[4] range\nfloat32[4] range_covar\n'
+        'float32[4] beam_quality\nfloat32[4] beam_velocity\nfloat32[4] beam_velocity_covar\n',
+        DVL,
     )
 )
 
@@ -155,7 +170,11 @@ def leaves(type_name: str, path: str = '') -> Iterator[Leaf]:
                 yield from leaves(about, f'{path}{name}.')
             case Nodetype.BASE:
                 yield Leaf(path + name, about[0], 1)
-            case _:  # the element, a number or text in all types here, and how many
+            case Nodetype.ARRAY if about[0][0] is Nodetype.NAME:
+                (_, kind), length = about
+                for i in range(length):
+                    yield from leaves(kind, f'{path}{name}[{i}].')
+            case _:  # the element, a number or text, and how many
                 (_, (kind, _)), length = about
                 yield Leaf(path + name, kind, length if node is Nodetype.ARRAY else None)
 

@@ -108,9 +108,9 @@ class Diagnosing:
 
     def begin(self, coastdown: EndedCoastdown, window: Window) -> None:
         """
-        Diagnose a coastdown after those that wait; returns at once.
+        Diagnose a coastdown after those that wait; returns at once. None any more once closed.
         """
-        if not self._possible:
+        if not self._possible or self._closed:
             return
         if coastdown.estimate is None:
             reason = f'the coastdown gave no estimate: {coastdown.failure}'

@@ -134,6 +134,7 @@ class InputStates:
             stamped=topic.type is None or is_stamped(topic.type),
             other_types=topic.other_types,
             accepted=topic.accepted,
+            absent=topic.absent,
             senders=topic.senders,
             misfit=topic.incompatible_qos,
             active=health is not None,

@@ -9,6 +9,7 @@ sends reliably, and nobody is left wondering why a topic is silent.
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -31,6 +32,7 @@ from rclpy.qos import (
 )
 from rclpy.subscription import Subscription
 
+from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.losses import Sequences
@@ -48,9 +50,26 @@ Arrived = Callable[[], None]
 def message_class(type_name: str) -> Any:
     """
     Return the class of a type such as `geometry_msgs/msg/TwistStamped`.
+
+    Raises
+    ------
+    ShipdragError
+        If its package is not installed.
     """
     package, kind, name = type_name.split('/')
-    return getattr(importlib.import_module(f'{package}.{kind}'), name)
+    try:
+        return getattr(importlib.import_module(f'{package}.{kind}'), name)
+    except ModuleNotFoundError as error:
+        raise ShipdragError(
+            f'{type_name} cannot be heard: the package {package} is not installed here'
+        ) from error
+
+
+def is_installed(type_name: str) -> bool:
+    """
+    Say whether the package of a type is there.
+    """
+    return importlib.util.find_spec(type_name.partition('/')[0]) is not None
 
 
 class HeardMessage(NamedTuple):
@@ -78,6 +97,8 @@ class InputTopic:
 
     Attributes
     ----------
+    accepted, absent
+        Types that can be heard; that could be, were their packages installed.
     type
         Type subscribed to, None until known.
     reliable
@@ -117,7 +138,8 @@ class InputTopic:
         self._least_lag_s: float | None = None
         self.name = name
         self.topic = node.resolve_topic_name(name)
-        self.accepted = accepted
+        self.accepted = tuple(filter(is_installed, accepted))
+        self.absent = tuple(name for name in accepted if name not in self.accepted)
         self.type: str | None = None
         self.reliable = True
         self.publishers: Counter[str] = Counter()

@@ -133,8 +133,8 @@ class InputFacts:
         Whether that type carries a time.
     fed, may_be_fed
         Whether NMEA feeds it, or could.
-    other_types, accepted
-        Types published and not heard; types that could be.
+    other_types, accepted, absent
+        Types published and not heard; types that could be; could be with their package.
     senders
         Nodes that publish the type heard.
     misfit
@@ -162,6 +162,7 @@ class InputFacts:
     may_be_fed: bool = False
     other_types: tuple[str, ...] = ()
     accepted: tuple[str, ...] = ()
+    absent: tuple[str, ...] = ()
     senders: tuple[str, ...] = ()
     misfit: str | None = None
     active: bool = True
@@ -189,6 +190,9 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
     if facts.type is None and others:
         accepted = ', '.join(facts.accepted)
         text = f'wrong type: {others} is published, accepted are {accepted}'
+        for name in set(facts.other_types).intersection(facts.absent):
+            package = name.partition('/')[0]
+            text = f'{name} is published, and its package is not here: install {package}'
         yield Finding(Level.ERROR, text)
         return
     if facts.type is None or (facts.age_s is None and not facts.senders and not others):

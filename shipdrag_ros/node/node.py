@@ -123,6 +123,8 @@ class CoastdownNode(LifecycleNode):
         """
         End what is running and destroy the node; ROS may be gone already.
         """
+        if self._diagnosing is not None:
+            self._diagnosing.close()  # the coastdown that ends now will not be diagnosed
         self._deactivate('the process ends')
         self._end_what_runs_beside()
         self.destroy_node()
@@ -242,7 +244,8 @@ class CoastdownNode(LifecycleNode):
             session, self._session = self._session, None
             session.note_lifecycle(why, self._now_ns())
             session.finish()
-            self.get_logger().info(f'{why}; {session.recorder.status().text}')
+            left = f'; {session.waiting} messages are for a replay' if session.waiting else ''
+            self.get_logger().info(f'{why}; {session.recorder.status().text}{left}')
 
     def _end_what_runs_beside(self) -> None:
         if self._diagnosing is not None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from functools import partial
+from time import monotonic
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
@@ -44,6 +45,7 @@ Count = Callable[[Decoded], None]
 
 WAITING_MOST = 200_000  # messages that wait for compiled code
 WAITING_BYTES = 128 * 1024 * 1024  # of them
+FINISH_S = 0.5  # for what waits at the end
 AT_ONCE = 2000  # of what waited, between two turns of everything else
 
 
@@ -245,10 +247,12 @@ class Session:
         """
         Give the last figures and close the recording; needs no ROS.
 
-        What still waits for compiled code stays in the recording, for a replay.
+        What still waits after that stays in the recording, for a replay: who asked for the end
+        is not to wait for it.
         """
+        until_s = monotonic() + FINISH_S
         try:
-            while self._waiting and self._ready():
+            while self._waiting and self._ready() and monotonic() < until_s:
                 self.go_on()
             if not self._waiting:
                 self._report(self.monitor.finish())

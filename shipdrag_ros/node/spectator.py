@@ -23,7 +23,7 @@ from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, MalformedMessage, Sourc
 from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, Heard, NodeMessage, Samples, ShipFile
 from shipdrag_ros.messages.heard import read_health as decode_health
 from shipdrag_ros.messages.topics import RESISTANCE_CURVE
-from shipdrag_ros.node.inputs import message_class
+from shipdrag_ros.node.inputs import is_installed, message_class
 
 LOOK_S = 1.0
 CLOSEST_S = 0.04  # a reading of an input that comes sooner after the last one is not decoded
@@ -159,7 +159,8 @@ class Spectator:
         """Hear the topics that the node hears, in the types that it hears."""
         for status in health.inputs:
             topic, kind = status.values.get('topic', ''), status.values.get('type', '')
-            if kind not in TOPICS.get(status.input, ()) or not topic:
+            accepted = TOPICS.get(status.input, ())
+            if not topic or kind not in accepted or not is_installed(kind):
                 continue
             known = self._of_inputs.get(status.input)
             if known is not None:

@@ -7,9 +7,32 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
+DVL = 'marine_acoustic_msgs/msg/Dvl'
+# by its page, https://docs.ros.org/en/api/marine_acoustic_msgs/html/msg/Dvl.html
+_DVL_FIELDS = """
+std_msgs/Header header
+uint8 velocity_mode
+uint8 dvl_type
+geometry_msgs/Vector3 velocity
+float64[9] velocity_covar
+float64 altitude
+float64 course_gnd
+float64 speed_gnd
+uint8 num_good_beams
+float32 sound_speed
+bool beam_ranges_valid
+bool beam_velocities_valid
+geometry_msgs/Vector3[4] beam_unit_vec
+float64[4] range
+float32[4] range_covar
+float32[4] beam_quality
+float32[4] beam_velocity
+float32[4] beam_velocity_covar
+"""
+STORE.register(get_types_from_msg(_DVL_FIELDS, DVL))
 
 
 class Reference:
@@ -85,6 +108,30 @@ class Reference:
                 'position': np.array([0.0, a, b]),
                 'velocity': np.array([0.0, c, d]),
                 'effort': np.empty(0),
+            },
+            DVL: {
+                'velocity_mode': 2 if h > 0.0 else 1,
+                'dvl_type': 0,
+                'velocity': self.vector(a, b),
+                'velocity_covar': np.array([c, d, 0, d, e, 0, 0, 0, f]),
+                'altitude': f,
+                'course_gnd': 0.0,
+                'speed_gnd': 0.0,
+                'num_good_beams': 4,
+                'sound_speed': 1500.0,
+                'beam_ranges_valid': True,
+                'beam_velocities_valid': True,
+                'beam_unit_vec': [self.vector(a, g)] * 4,
+                'range': np.arange(4.0),
+                **{
+                    name: np.arange(4, dtype=np.float32)
+                    for name in (
+                        'range_covar',
+                        'beam_quality',
+                        'beam_velocity',
+                        'beam_velocity_covar',
+                    )
+                },
             },
             'sensor_msgs/msg/Range': {
                 'radiation_type': 0,

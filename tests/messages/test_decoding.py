@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from typing import Any
 
@@ -17,6 +16,7 @@ from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.samples import Block, Channel, concatenate
 
 SOURCES = [Source(name, type_name) for name, accepted in TOPICS.items() for type_name in accepted]
+OF_ROS = [source for source in SOURCES if source.type != types.DVL]
 STAMP_NS = 1_700_000_000_123_456_789
 
 finite = st.floats(allow_nan=False, allow_infinity=False, width=32)
@@ -40,10 +40,12 @@ def expected(source: Source, numbers: list[float]) -> tuple[Channel, list[float]
     """Say what each source gives, by scalar arithmetic."""
     a, b, c, d, e, f, g, _ = numbers
     nan = math.nan
-    with_covariance = 'WithCovariance' in source.type or 'Odometry' in source.type
+    with_covariance = any(name in source.type for name in ('WithCovariance', 'Odometry', 'Dvl'))
     match source.input:
         case 'speed_through_water':
             return Channel.SPEED_THROUGH_WATER, [a, 0], [c if with_covariance else nan, nan]
+        case 'speed_over_ground' if 'Dvl' in source.type:  # the one here is against the water
+            return Channel.SPEED_OVER_GROUND, [nan, 0], [nan, nan]
         case 'speed_over_ground':
             return Channel.SPEED_OVER_GROUND, [math.hypot(a, b), 0], [nan, nan]
         case 'position' if 'NavSatFix' in source.type:
@@ -117,7 +119,7 @@ def test_a_batch_gives_the_bits_of_single_messages(
 
 
 @settings(max_examples=60, deadline=None)
-@given(source=st.sampled_from(SOURCES), stamp_ns=stamps, frame=frames, numbers=eight)
+@given(source=st.sampled_from(OF_ROS), stamp_ns=stamps, frame=frames, numbers=eight)
 def test_what_rclpy_sends_is_decoded_the_same(
     reference: Any, source: Source, stamp_ns: int, frame: str, numbers: list[float]
 ) -> None:
@@ -126,7 +128,7 @@ def test_what_rclpy_sends_is_decoded_the_same(
     large = [x for x in numbers if np.isfinite(x) and abs(x) > 3.4e38]
     assume(not (large and source.type == 'sensor_msgs/msg/Range'))
     package, _, name = source.type.split('/')
-    kind = getattr(importlib.import_module(f'{package}.msg'), name)
+    kind = getattr(pytest.importorskip(f'{package}.msg'), name)
     ours = reference.serialize(
         source.type, reference.message(source.type, stamp_ns, frame, numbers)
     )

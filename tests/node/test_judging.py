@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.node.judging import (
     Counts,
     InputFacts,
@@ -76,6 +77,24 @@ def test_what_is_wrong_is_said(changed: dict[str, Any], level: Level, said: str)
     found = judge(replace(WELL, **changed))
     assert found.level is level
     assert said in found.text
+
+
+def test_a_type_whose_package_is_not_here_says_what_to_install() -> None:
+    dvl = 'marine_acoustic_msgs/msg/Dvl'
+    facts = InputFacts('speed_over_ground', needed=True, other_types=(dvl,), absent=(dvl,))
+    finding = judge(facts)
+    assert finding.level is Level.ERROR
+    assert finding.text.endswith('its package is not here: install marine_acoustic_msgs')
+
+
+def test_a_class_of_a_package_that_is_not_here_is_told() -> None:
+    pytest.importorskip('rclpy')
+    from shipdrag_ros.node.inputs import is_installed, message_class
+
+    assert is_installed('geometry_msgs/msg/Twist')
+    assert not is_installed('nowhere_msgs/msg/Log')
+    with pytest.raises(ShipdragError, match='the package nowhere_msgs is not installed here'):
+        message_class('nowhere_msgs/msg/Log')
 
 
 def test_context_may_be_worse_than_motion() -> None:
