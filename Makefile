@@ -46,7 +46,7 @@ types: env
 	$(BIN)/mypy
 
 tests: env
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2  # both cores are busy as it is
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist worksteal  # of three on two cores, one waits for a node
 
 docs: env
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir site

@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 import yaml
 
 from benchmarks._attack import Attack, check
 from shipdrag_ros.messages import encode
+from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, health_of
 from shipdrag_ros.samples import Block, Channel
 
 NAME = '/coastdown_node'
@@ -29,6 +31,8 @@ START_S = 240.0
 ANSWER_S = 30.0
 SECRET = 'hunter2'
 SPEED_TYPE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+
+JOINTS_TYPE = 'sensor_msgs/msg/JointState'
 
 
 class Node:
@@ -44,6 +48,8 @@ class Node:
         os.environ['ROS_DOMAIN_ID'] = '101'
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
+
+        from shipdrag_ros.node.inputs import message_class
 
         self._folder = tempfile.TemporaryDirectory()
         self.folder = Path(self._folder.name).resolve()
@@ -66,6 +72,8 @@ class Node:
         self.peer = rclpy.create_node('attacker', context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.peer)
+        self._health: Health | None = None
+        self.peer.create_subscription(message_class(DIAGNOSTICS), '/diagnostics', self._hear, 10)
         self.until(lambda: 'ready to estimate' in self.log, START_S)
 
     @property
@@ -128,13 +136,23 @@ class Node:
         answer = self.ask('get_state', GetState.Request(), GetState)[0]
         return str(answer.current_state.label)
 
-    def publish(self, payloads: list[bytes]) -> None:
-        """Publish bytes as a speed log."""
+    def _hear(self, message: Any) -> None:
+        self._health = next(iter(health_of(message.status)), self._health)
+
+    def number(self, input_name: str, key: str) -> int:
+        """Return what the node says next of one of its inputs."""
+        self._health = None
+        self.until(lambda: self._health is not None)
+        status = self._health and self._health.of(f'input {input_name}')
+        return int(status.number(key) or 0) if status else 0
+
+    def publish(
+        self, payloads: list[Any], topic: str = 'speed_through_water', kind: str = SPEED_TYPE
+    ) -> None:
+        """Publish bytes or messages, as a speed log if nothing else is said."""
         from shipdrag_ros.node.inputs import message_class
 
-        publisher = self.peer.create_publisher(
-            message_class(SPEED_TYPE), 'speed_through_water', 1000
-        )
+        publisher = self.peer.create_publisher(message_class(kind), topic, 1000)
         self.until(publisher.get_subscription_count)
         self.spin_for(0.3)
         for payload in payloads:
@@ -251,6 +269,46 @@ def lying_length() -> list[bytes]:
     return [head + struct.pack('<I', size) + b'x' * 300 for size in (2**32 - 1, 2**31, 400)]
 
 
+def huge(node: Node, folder: Path) -> str:
+    """Send names of frames of 8 MB, and a million shafts in one message."""
+    from shipdrag_ros.node.inputs import message_class
+
+    process = psutil.Process(node.process.pid)
+    before_mb = process.memory_info().rss / 2**20
+    speed = message_class(SPEED_TYPE)()
+    speed.header.frame_id = 'x' * 8_000_000
+    shafts = message_class(JOINTS_TYPE)()
+    shafts.name, shafts.velocity = ['shaft'] * 10**6, [10.0] * 10**6
+    node.publish([speed] * 20)
+    node.publish([shafts] * 3, 'shaft', JOINTS_TYPE)
+    counts = [
+        node.number(name, 'unreadable too_long') for name in ('speed_through_water', 'shaft')
+    ]
+    check(all(counts), f'{counts} were counted')
+    more_mb = process.memory_info().rss / 2**20 - before_mb
+    check(more_mb < 256.0, f'the node took {more_mb:.0f} MB more')
+    bag_mb = sum(bag.stat().st_size for bag in node.bags.glob('*.mcap')) / 2**20
+    check(bag_mb < 8.0, f'{bag_mb:.0f} MB were recorded')
+    return f'{counts[0]} and {counts[1]} counted too_long, not recorded; {more_mb:+.0f} MB memory'
+
+
+def odd_stamps(node: Node, folder: Path) -> str:
+    """Send stamps before 1970, nanoseconds beyond a second and variances that are none."""
+    from shipdrag_ros.node.inputs import message_class
+
+    made = []
+    for sec, nanosec in ((-(2**31), 0), (-5, 2**32 - 1), (2**31 - 1, 2**32 - 1), (0, 0)):
+        message = message_class(SPEED_TYPE)()
+        message.header.stamp.sec, message.header.stamp.nanosec = sec, nanosec
+        message.twist.covariance = [math.nan] * 18 + [-math.inf] * 18
+        made.append(message)
+    before = node.number('speed_through_water', 'used')
+    node.publish(made)
+    used = node.number('speed_through_water', 'used') - before
+    check(used <= 1, f'{used} of {len(made)} were used')
+    return f'{len(made) - used} of {len(made)} rejected and counted'
+
+
 def readings(values: list[float], *, ahead_s: float = 0.0, count: int = 1) -> list[bytes]:
     """Encode readings of a speed log, stamped now or ahead."""
     stamps = time.time_ns() + round(ahead_s * 1e9) + np.arange(len(values) * count) * 10**3
@@ -298,4 +356,6 @@ ATTACKS = [
         'ten thousand readings at once',
         on_node(payloads(lambda: readings([5.0], count=10_000), 'heard, lost ones counted')),
     ),
+    Attack('node', 'messages of 8 MB, a million joints', on_node(huge)),
+    Attack('node', 'stamps and variances that are none', on_node(odd_stamps)),
 ]

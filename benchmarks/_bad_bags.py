@@ -235,7 +235,7 @@ CASES = (
         _flip(_in_a_chunk),
         0,
         'Warning: bag.mcap: the chunk at byte',
-        'messages are there where the index tells of 1208',
+        'messages are there where the index lists 1208',
     ),
     _case(
         'a bit flipped in the index',

@@ -239,10 +239,10 @@ TABLES = (
         'empty cells', _TABLE.replace(',7.9\n', ',\n'), 0, "1 cell(s) rejected, empty: line 12: ''"
     ),
     _csv(
-        'dates whose day and month cannot be told apart',
+        'dates whose day and month are ambiguous',
         _HEADER + '03/04/2026 08:00:00,8.0\n03/04/2026 08:00:01,7.9\n',
         1,
-        'day and month cannot be told apart',
+        'day and month are ambiguous',
         'give --date-order dmy or --date-order mdy',
     ),
     _csv(

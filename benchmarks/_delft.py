@@ -70,7 +70,7 @@ def delft(path: Path) -> tuple[list[str], Figure]:
         "slenderness and B/T; it has no guard and is shown by Sirotina's.",
         '',
         '- Over all Froude numbers the forms, parabolas in Fr, miss the steep rise by 4 whatever',
-        '  hull is asked for. No guard over shape can tell that; the sd does.',
+        '  hull is asked for. No guard over shape can show that; the sd does.',
         '- Up to Fr 0.3 what the guard passes is better than what it refuses, and the worst',
         '  errors are among the refused.',
         '- The cubic has 35 terms of shape for 21 hulls. All of it is refused, rightly: more',

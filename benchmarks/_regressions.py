@@ -12,13 +12,13 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from shipdrag_ros.regression.polynomial import monomials, terms_up_to
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.forms import Form
+from shipdrag_ros.studies.residual.forms import RegressionForm
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 WRONG = 0.15  # a prediction this far off, relative, is a bad one
 SHAPES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
 CUBE = terms_up_to(3, [3] * len(SHAPES))
-CUBIC = Form(
+CUBIC = RegressionForm(
     'cubic',
     lambda hulls: monomials(np.column_stack([getattr(hulls, name) for name in SHAPES]), CUBE),
     SHAPES,

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
 from shipdrag_ros.display import Table
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -44,7 +44,7 @@ def _run(truth: Ship, heading_rad: float, seed: int) -> CoastRun:
     return CoastRun(f'run {seed}', Window.from_block(block, stop, last, before_ns=first))
 
 
-def _answer(found: Diagnosis) -> str:
+def _answer(found: DiagnosisResult) -> str:
     shown = [
         f'{" + ".join(each.names) or "nothing"} {each.probability:.0%}'
         for each in found.candidates

@@ -48,9 +48,9 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import estimate, estimate_final
 from shipdrag_ros.estimation.ode_fit.families import POWERS
 from shipdrag_ros.estimation.ode_fit.first_fits import fit_robustly
-from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.problem import Problem
-from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -144,8 +144,8 @@ def known_family(_: Coast) -> Callable[[Coast], Found]:
     def call(coast: Coast) -> Found:
         ship, window = coast.truth.ship, coast.window
         run_down = RunDown.of(window, ship)
-        record = Record.of(window, run_down, Parameters())
-        guess = Guess.of(record.coast, float(ship.n_r(1.0)))
+        record = RunRows.of(window, run_down, Parameters())
+        guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
         first, _ = fit_robustly(Problem.of(record, run_down, ship, guess))
         return Found(*first.resistance(coast.speeds), np.ones(len(coast.speeds), np.bool_))
 

@@ -23,7 +23,7 @@ os.environ.setdefault('OMP_NUM_THREADS', '1')
 
 import numpy as np
 
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, Verdict, diagnose
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameter import Parameter
@@ -116,7 +116,7 @@ def first_run(case: Case, *more: str) -> CoastRun:
     return run(case, 0, heading=HEADING_RAD, speed=SPEED_M_S, inputs=(*MOTION, *more))
 
 
-def after(case: Case, measure: Measure) -> Diagnosis:
+def after(case: Case, measure: Measure) -> DiagnosisResult:
     """Diagnose again, with what a measurement adds."""
     if measure in INSTRUMENTS:
         return diagnose([first_run(case, INSTRUMENTS[measure])], SHIP, Parameters())

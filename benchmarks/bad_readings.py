@@ -23,7 +23,7 @@ import numpy as np
 from _coasts import CARGO, TANKER, YACHT, Hull, errors
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.result import Estimate
@@ -216,7 +216,7 @@ def watch(ship: Ship, block: Block, truth: Truth) -> Found:
     """Replay a record."""
     monitor = Monitor(ship, Parameters(), estimate=no_estimate, final=estimate_final)
     events = monitor.update(block) + monitor.finish()
-    ended = [event for event in events if isinstance(event, Coastdown) and event.estimate]
+    ended = [event for event in events if isinstance(event, EndedCoastdown) and event.estimate]
     start_ns = int(block.stamp_ns[0])
     spans = tuple(
         ((one.start_ns - start_ns) * 1e-9 - LEAD_IN_S, (one.end_ns - start_ns) * 1e-9 - LEAD_IN_S)

@@ -246,7 +246,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--first', type=int, default=0)
     parser.add_argument('--count', type=int, default=40, help='how many cases')
     parser.add_argument('--seed', type=int, default=cases.SEED)
-    parser.add_argument('--given', action='store_true', help='the time of the stop is told')
+    parser.add_argument('--given', action='store_true', help='the time of the stop is given')
     parser.add_argument('--each', action='store_true', help='print each run')
     parser.add_argument('--out', type=Path, help='one line of JSON a run')
     options = parser.parse_args(arguments)

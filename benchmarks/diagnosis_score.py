@@ -250,7 +250,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--count', type=int, help='how many cases; all of them by default')
     parser.add_argument('--world', choices=tuple(WORLDS), default='a')
     parser.add_argument('--half', choices=tuple(HALVES), default='all', help='by number')
-    parser.add_argument('--facts', action='store_true', help='tell what a crew knows (world b)')
+    parser.add_argument('--facts', action='store_true', help='say what a crew knows (world b)')
     parser.add_argument('--processes', type=int, default=2)
     parser.add_argument('--out', type=Path, help='answers, one line of JSON a case')
     options = parser.parse_args(arguments)

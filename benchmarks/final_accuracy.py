@@ -23,9 +23,9 @@ from rich.table import Table
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate, ode_fit
-from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.problem import Problem
-from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.inference.noise import GaussMarkovNoise
@@ -166,13 +166,13 @@ def bound(case: Case, ship: Ship) -> tuple[float, float]:
     """Return the Cramer-Rao bound of r, rms and at the top, in parts of the largest r."""
     _, window = coast(case, ship, 0, noise=0.0)
     run_down = RunDown.of(window, ship)
-    record = Record.of(window, run_down, Parameters())
+    record = RunRows.of(window, run_down, Parameters())
     sds = {'speed_through_water': case.hull.speed_sd, 'position': case.hull.position_sd}
     record = replace(record, white_sd=sds)
     slow = GaussMarkovNoise(
         gust_m_s2=gust_m_s2(case, ship), gust_s=SLOW_S, log_m_s=case.log_m_s, log_s=SLOW_S
     )
-    guess = Guess.of(record.coast, float(ship.n_r(1.0)))
+    guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
     problem = Problem.of(record, run_down, ship, guess)
     plain, _ = problem.fit_first(problem.start())
     assert plain is not None

@@ -19,9 +19,9 @@ import socket
 import threading
 import time
 from contextlib import suppress
-from pathlib import Path
 
 import numpy as np
+import psutil
 
 from shipdrag_ros.live import guard
 from shipdrag_ros.live.app import PAGE, LivePage
@@ -103,12 +103,6 @@ def connect(address: tuple[str, int], count: int) -> tuple[int, float]:
     return refused, slowest
 
 
-def memory_mb() -> float:
-    """Return what this process holds now."""
-    pages = int(Path('/proc/self/statm').read_text().split()[1])
-    return pages * resource.getpagesize() / 1e6
-
-
 def soak(hours: int) -> list[float]:
     """Return the memory after each hour of simulated time at 10 Hz, the history being full."""
     source = NodeSource()
@@ -128,7 +122,7 @@ def soak(hours: int) -> list[float]:
         if second % 5 == 4:
             page.tick()
         if second % 3600 == 3599:
-            found.append(memory_mb())
+            found.append(psutil.Process().memory_info().rss / 1e6)
     return found
 
 
@@ -142,10 +136,23 @@ def in_the_browser() -> None:
         f'a reading heard to its figure in the page: median {half:.0f} ms, p99 {most:.0f} ms '
         f'({np.isfinite(late).sum()} of {len(late)} readings at 10 Hz)'
     )
-    drawn = draw_ms(20)
+    fresh, again, thread_ms = draw_ms(20)
+    for name, drawn in (('in a page just opened', fresh), ('anew in an open page', again)):
+        print(
+            f'six hours, curve, band and verdict drawn {name}: least {drawn.min():.0f} ms, median '
+            f'{np.median(drawn):.0f} ms, at most {drawn.max():.0f} ms (20 times)'
+        )
+    print(f"  of which the browser's main thread computes {thread_ms:.0f} ms")
+
+
+def long_in_the_browser() -> None:
+    """Print what the page in the browser holds over eight hours."""
+    from _live_browser import heap_mb
+
+    held = heap_mb(8, speed=600.0)
     print(
-        f'six hours, curve, band and verdict drawn: least {drawn.min():.0f} ms, median '
-        f'{np.median(drawn):.0f} ms, at most {drawn.max():.0f} ms (20 times)'
+        '8 h at 600 times in the browser, two days of history: JavaScript heap after each hour '
+        f'{", ".join(f"{each:.1f}" for each in held)} MB'
     )
 
 
@@ -163,6 +170,7 @@ def main() -> None:
     print(f'page: {size / 1000:.0f} kB')
     print(f'load of the machine: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores')
     in_the_browser()
+    long_in_the_browser()
     held = soak(8)
     print(f'8 h at 10 Hz in simulated time: {held[0]:.1f} MB after 1 h, {held[-1]:.1f} MB after 8')
     source, ended = NodeSource(), threading.Event()

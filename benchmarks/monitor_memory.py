@@ -10,16 +10,16 @@ in blocks of an hour; seed 0. Then the same sequence rate at 10 and 100 Hz for s
 
 from __future__ import annotations
 
-import resource
 import sys
 import time
 from importlib.resources import files
 from typing import Any
 
 import numpy as np
+import psutil
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Update
+from shipdrag_ros.coastdown.events import EndedCoastdown, Update
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -43,12 +43,6 @@ def hour(speed: Float64, first_s: float, way_m: float, rng: np.random.Generator)
     )
 
 
-def resident_mib() -> float:
-    """Return the memory that the process holds now [MiB]."""
-    with open('/proc/self/statm') as file:
-        return int(file.read().split()[1]) * resource.getpagesize() / 2**20
-
-
 def month(ship: Ship, days: int) -> None:
     rng = np.random.default_rng(0)
     monitor = Monitor(ship, Parameters())
@@ -66,11 +60,12 @@ def month(ship: Ship, days: int) -> None:
             busy_s += time.perf_counter() - began
             samples += len(block)
             estimates += sum(isinstance(event, Update) for event in events)
-            coastdowns += sum(isinstance(event, Coastdown) for event in events)
+            coastdowns += sum(isinstance(event, EndedCoastdown) for event in events)
         if day in (0, 1, 2) or day % 5 == 4:
             kept = held_bytes(monitor._memory) / 2**20
+            resident = psutil.Process().memory_info().rss / 2**20
             print(
-                f'day {day + 1:3d}: process {resident_mib():6.1f} MiB, monitor {kept:5.2f} MiB,'
+                f'day {day + 1:3d}: process {resident:6.1f} MiB, monitor {kept:5.2f} MiB,'
                 f' {coastdowns} coastdowns, {estimates} estimates',
                 flush=True,
             )

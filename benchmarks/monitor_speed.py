@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Update
+from shipdrag_ros.coastdown.events import EndedCoastdown, Update
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -123,7 +123,7 @@ def year(ship: Ship) -> dict[str, float]:
         )
         began = time.process_time()
         for event in monitor.update(shifted):
-            coastdowns += isinstance(event, Coastdown)
+            coastdowns += isinstance(event, EndedCoastdown)
             estimates += isinstance(event, Update)
         seconds += time.process_time() - began
         samples += len(block)

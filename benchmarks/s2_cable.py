@@ -263,7 +263,7 @@ C0 = 0.25 pi zeta0 d/l.
 
 ## Its figures, drawn anew
 
-The measured points of figure 2 are lost in the copy at hand. C0 of figures 3 to 5 is not told;
+The measured points of figure 2 are lost in the copy at hand. C0 of figures 3 to 5 is not stated;
 0.02 is taken.
 
 {pictures}

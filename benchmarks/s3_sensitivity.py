@@ -415,8 +415,8 @@ def page(
         '',
         'Most derivatives are seen best where rudder and drift are largest; the side force of the '
         'propeller (Y0, N0) and the linear ones of sway in the gentlest.',
-        "To be seen is not to be told: the own share is what of a derivative's trace no mixture "
-        f'of the other 39 makes. Where it is seen best it is {np.median(single):.1%}',
+        "To be seen is not to be identified: the own share is what of a derivative's trace no "
+        f'mixture of the other 39 makes. Where it is seen best it is {np.median(single):.1%}',
         f'(median; {np.median(shown.partial_contribution[:, circle]):.1g} in a 35 degree circle, '
         'which ends as three constants), in all nine together '
         f'{np.median(shown.partial_contribution_together):.1%}. '
@@ -424,7 +424,7 @@ def page(
         'trial identifies, as the paper hopes (after Rhee and Kim); the multiples are, for good '
         'reason, stated and not fitted.',
         '',
-        'A gentle and a hard zigzag with the multiples tied tell more than all nine without; own '
+        'A gentle and a hard zigzag with the multiples tied show more than all nine without; own '
         'shares:',
         '',
         *lines_of(sets_of_manoeuvres()),

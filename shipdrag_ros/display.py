@@ -10,10 +10,19 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 M_S_PER_KNOT = 1852.0 / 3600.0
+UNIT_RATIOS = {
+    3600.0 / 1852.0: 'knots over m/s',
+    1852.0 / 3600.0: 'm/s over knots',
+    3.6: 'km/h over m/s',
+    1.0 / 3.6: 'm/s over km/h',
+    1.852: 'km/h over knots',
+    1.0 / 1.852: 'knots over km/h',
+}
+"""What a speed is off by whose unit was mistaken."""
 # what `float` takes besides, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
-"""Below it a ship is told in kg and N, above in t and kN."""
+"""Below it a ship is stated in kg and N, above in t and kN."""
 
 TRACK_LABELS = {
     'speed_through_water': ('Speed through water', 'm/s'),

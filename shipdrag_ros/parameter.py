@@ -354,7 +354,7 @@ class Parameter:
 
     def accepts(self, value: float) -> bool:
         """
-        Tell whether a value is one of the words, or inside the bounds.
+        Say whether a value is one of the words, or inside the bounds.
         """
         if self.words:
             return value in self.words.values()

@@ -9,6 +9,7 @@ Property tests try the same examples each time, new ones with
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import re
 import shutil
@@ -24,7 +25,7 @@ import pytest
 from hypothesis import settings
 
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.estimation.result import (
     Estimate,
     FroudeMax,
@@ -79,6 +80,12 @@ os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
 def own_domain() -> Callable[[], tuple[int, TextIO]]:
     """A function that finds one more domain, until its lock is closed."""
     return _own_domain
+
+
+def pytest_collection_finish() -> None:
+    """Let the collector of garbage look no more at half a million things that stay."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -143,17 +150,17 @@ class Page(HTMLParser):
             self.words.append(data)
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def read_page() -> type[Page]:
     return Page
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def ship() -> Ship:
     return Ship(name='Vitus Bering', length_m=150.0, displaced_volume_m3=20200.0)
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def estimate(ship: Ship) -> Estimate:
     """r = v^2 / 3000 and a joint fit of it, 1500 s long."""
     speed = np.linspace(0.5, 8.2, 155)
@@ -200,9 +207,9 @@ def estimate(ship: Ship) -> Estimate:
     )
 
 
-@pytest.fixture
-def coastdown(estimate: Estimate) -> Coastdown:
-    return Coastdown(
+@pytest.fixture(scope='module')
+def coastdown(estimate: Estimate) -> EndedCoastdown:
+    return EndedCoastdown(
         start_ns=estimate.start_ns,
         end_ns=estimate.end_ns,
         onset_detected_ns=estimate.start_ns + 40 * _SECOND_NS,
@@ -211,8 +218,8 @@ def coastdown(estimate: Estimate) -> Coastdown:
     )
 
 
-@pytest.fixture
-def run(ship: Ship, coastdown: Coastdown) -> RunResult:
+@pytest.fixture(scope='module')
+def run(ship: Ship, coastdown: EndedCoastdown) -> RunResult:
     return RunResult(
         bag='sea trial.mcap',
         ship=ship,
@@ -226,13 +233,13 @@ def run(ship: Ship, coastdown: Coastdown) -> RunResult:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def truth() -> TrueCurve:
     speed = np.linspace(0.0, 8.2, 83)
     return TrueCurve(speed, speed**2 / 3100.0, {'speed_m_s': 8.2, 'seed': 1})
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def simulated(run: RunResult, truth: TrueCurve) -> RunResult:
     return replace(run, truth=truth)
 

@@ -18,7 +18,8 @@ PACKAGE = ROOT / 'shipdrag_ros'
 
 # docs/architecture.md from below: a room may import what stands lower, and itself
 PICTURE = (
-    ('errors', 'samples', 'display', 'progress', 'compiled', 'strict_yaml', 'plain_file'),
+    ('errors', 'samples', 'display', 'progress', 'compiled'),
+    ('imports', 'strict_yaml', 'plain_file'),
     ('fields',),
     ('parameter',),
     ('parameters', 'ship', 'report'),
@@ -65,6 +66,7 @@ GROUND = {
     'compiled',
     'strict_yaml',
     'plain_file',
+    'imports',
 }  # known by the modules that need them
 ROS = {
     'rclpy',
@@ -134,6 +136,38 @@ def test_imports_run_downward_and_stay_at_the_edges(path: Path) -> None:
 def test_every_room_has_a_floor() -> None:
     rooms = {room(dotted(path)) for path in SOURCES} - {''}
     assert rooms <= set(FLOORS), f'give {rooms - set(FLOORS)} a floor'
+
+
+def named(path: Path) -> Iterator[str]:
+    """Yield the names of the classes and types that a source file makes."""
+    for node in ast.parse(path.read_text()).body:
+        if isinstance(node, ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Assign) and not ast.unparse(node.value).startswith('TypeVar('):
+            yield from (
+                target.id
+                for target in node.targets
+                if isinstance(target, ast.Name) and re.match('_?[A-Z][a-z]', target.id)
+            )
+
+
+def test_a_name_stands_for_one_thing() -> None:
+    places: dict[str, list[str]] = {}
+    for path in SOURCES:
+        for name in named(path):
+            places.setdefault(name, []).append(str(path.relative_to(PACKAGE)))
+    assert len(places) > 500
+    twice = {name: where for name, where in places.items() if len(where) > 1}
+    assert not twice, 'give each class and type of the package a name of its own'
+
+
+@pytest.mark.parametrize('page', ['CONTRIBUTING.md', 'docs/architecture.md'])
+def test_modules_that_a_walk_names_are_there(page: str) -> None:
+    named = set(re.findall(r'`([\w/]+\.py)`', (ROOT / page).read_text(encoding='utf-8')))
+    rooms = (ROOT / name for name in ('shipdrag_ros', 'tests', 'docs', 'benchmarks'))
+    known = [path.as_posix() for room in rooms for path in room.rglob('*.py')]
+    assert len(named) > 10
+    assert not {name for name in named if not any(path.endswith(f'/{name}') for path in known)}
 
 
 def doors() -> list[tuple[str, str]]:

@@ -114,5 +114,5 @@ def test_shows_an_example_that_runs(room: str, door: str) -> None:
     )
     assert examples.examples
     said: list[str] = []
-    doctest.DocTestRunner().run(examples, out=said.append)
+    doctest.DocTestRunner(verbose=False).run(examples, out=said.append)
     assert not said, ''.join(said)

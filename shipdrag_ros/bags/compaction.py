@@ -84,6 +84,6 @@ def _rewrite(source: Path, target: Path) -> int:
 
 
 def _whole_records(stream: IO[bytes]) -> Iterator[Any]:
-    # a file that the disk let down has no end; whether all is there, the count tells
+    # a file that the disk let down has no end; whether all is there, the count shows
     with suppress(EndOfFile, struct.error):
         yield from StreamReader(stream, validate_crcs=True).records

@@ -116,7 +116,7 @@ def read_index(data: Buffer) -> Contents | None:
     """
     Return the contents by the summary of a file.
 
-    None where the summary does not tell all, as the format allows.
+    None where the summary does not say all, as the format allows.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def scan(data: Buffer) -> Contents:
     """
     Return the contents by a walk from the beginning of a file.
 
-    What is damaged is left out and told in `warnings`.
+    What is damaged is left out and stated in `warnings`.
     """
     contents = Contents()
     loose = _LooseMessages(contents)

@@ -2,7 +2,7 @@
 """
 A recording while it grows: nothing in it depends on how it ends.
 
-What tells the messages apart comes first and comes again; each write is a chunk
+What distinguishes the messages comes first and comes again; each write is a chunk
 of its own with a checksum; no index is kept, so that it takes no memory.
 """
 

@@ -128,13 +128,25 @@ def _without_metadata(path: Path) -> list[BagFiles]:
     if not files:
         if any(path.glob('*.db3')):
             raise BagError(f'{str(path)!r} is a bag in sqlite3 storage; {CONVERT}')
-        raise BagError(f'{str(path)!r} holds no .mcap file; give a bag')
+        raise BagError(f'{str(path)!r} holds no .mcap file; {_instead(path)}')
     stem = re.escape(path.name)
     if len(files) > 1 and all(re.fullmatch(rf'{stem}_\d+\.mcap.*', f.name) for f in files):
         # as rosbag2 names the files that it splits a recording into
         note = 'metadata.yaml is missing; the files are joined in the order of their numbers'
         return [BagFiles(str(path), tuple(files), warnings=(note,))]
     return [BagFiles(str(file), (file,)) for file in files]
+
+
+def _instead(folder: Path) -> str:
+    """Say what to give for a folder without a bag."""
+    other = sorted(each.name for each in folder.iterdir() if each.is_file())
+    if not other:
+        return 'give a bag'
+    more = f' and {len(other) - 3} more' if len(other) > 3 else ''
+    return (
+        f'it holds {", ".join(other[:3])}{more}. Logs are given by their own names: '
+        f'{str(folder / other[0])!r}'
+    )
 
 
 def _natural_order(path: Path) -> list[tuple[int, str]]:

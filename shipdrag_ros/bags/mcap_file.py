@@ -3,7 +3,7 @@
 One MCAP file: what is in it, and its messages in order of arrival.
 
 Without a sound index the file is walked once from its beginning, and what is
-whole in it is read; the damage is told, not mended.
+whole in it is read; the damage is stated, not mended.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class McapFile:
                     yield loaded[:ready]
         expected = sum(self.contents.counts[channel] for channel in wanted)
         if len(in_time) == len(self.contents.segments) and found != expected:
-            self._warn(f'{found} messages are there where the index tells of {expected}')
+            self._warn(f'{found} messages are there where the index lists {expected}')
 
     def _load(
         self, data: mmap, segments: deque[FileSegment], wanted: UInt8, least_bytes: int

@@ -79,13 +79,15 @@ class BagInfo:
 
 def info(run: Run) -> BagInfo:
     """
-    Tell what is in a run; nothing but its index is read where it has one.
+    Say what is in a run; nothing but its index is read where it has one.
     """
     start_ns, end_ns = run.span_ns or (None, None)
     duration_s = 0.0 if start_ns is None or end_ns is None else (end_ns - start_ns) * 1e-9
     found = {topic.input for topic in run.topics}
     about = run.parts[0].contents.metadata.get(METADATA, {})
     compressions = {kind for part in run.parts for kind in part.contents.compressions}
+    if run.paths != tuple(part.path for part in run.parts):
+        about, compressions = {}, set()  # those of a bag made for the moment, of a log
     return BagInfo(
         name=run.name,
         paths=run.paths,

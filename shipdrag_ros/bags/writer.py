@@ -33,7 +33,7 @@ from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block
 
 METADATA = 'shipdrag_ros'
-"""Name of the metadata record that tells which recording a file is part of."""
+"""Name of the metadata record that says which recording a file is part of."""
 
 
 def private_opener(path: str, flags: int) -> int:

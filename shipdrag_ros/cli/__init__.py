@@ -19,6 +19,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import Help
 from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.imports import uncollected
 from shipdrag_ros.studies import found
 
 
@@ -146,7 +147,8 @@ def parser(*of: str) -> argparse.ArgumentParser:
         )
         if known.name in of:
             added.epilog = epilog(known.name)
-            module = import_module(known.module, __name__)
+            with uncollected():
+                module = import_module(known.module, __name__)
             module.add_arguments(added)
             added.set_defaults(run=module.run)
     return top

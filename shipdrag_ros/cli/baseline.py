@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Learn, write and tell.
+    Learn, write and show it.
     """
     output = Output(options.json)
     if options.out.resolve() == options.ship.resolve():

@@ -10,7 +10,7 @@ from numba.core import event
 _COMPILES = 'compiling, once after an installation or an update; this takes about a minute'
 
 
-class Compiling(event.Listener):  # type: ignore[misc]
+class CompilingNotice(event.Listener):  # type: ignore[misc]
     """
     Says that something is compiled, when the first function is.
 

@@ -12,7 +12,7 @@ from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, 
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.progress import stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
-from shipdrag_ros.diagnosis import Diagnosis, Verdict, with_effects
+from shipdrag_ros.diagnosis import DiagnosisResult, Verdict, with_effects
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.score import Score
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.description = (
         'Hold coastdowns against the baseline of the ship file and name the effect that is '
-        'missing: a name only where the data can tell, the smallest set and what would decide '
+        'missing: a name only where the data decide, the smallest set and what would decide '
         'where they cannot, "unknown" with a place where it is none of them. Coastdowns of all '
         'bags are taken together; effects of the earth are stated along the first one. Without '
         'a baseline a form of the resistance is fitted to the runs. In a record without a '
@@ -77,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Diagnose and tell.
+    Diagnose and show it.
     """
     output = Output(options.json)
     given = None if options.ship is None else Ship.load(options.ship)
@@ -109,7 +109,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
-    """Read facts; each may be told once."""
+    """Read facts; each may be stated once."""
     facts = [parse_fact(text) for text in given]
     names = [fact.name for fact in facts]
     twice = next((name for name in names if names.count(name) > 1), None)
@@ -118,7 +118,7 @@ def _facts(given: Sequence[str]) -> tuple[Fact, ...]:
     return tuple(facts)
 
 
-def _show(output: Output, found: Diagnosis, ship: Ship | None) -> None:
+def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     if found.no_coastdown:
         output.say(found.no_coastdown)
     output.say(diagnosis_words.sentence(found))

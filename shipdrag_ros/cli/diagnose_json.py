@@ -6,10 +6,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import Diagnosis, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, Verdict
 
 
-def document(found: Diagnosis) -> dict[str, Any]:
+def document(found: DiagnosisResult) -> dict[str, Any]:
     """
     Return the document of a diagnosis.
 

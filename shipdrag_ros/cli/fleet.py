@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.arguments import add_json
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.progress import Lines
+from shipdrag_ros.cli.progress import ProgressLines
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.progress import Progress
@@ -41,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs='+',
         metavar='DIR_OR_URL',
         help='folder, or URL as s3://bucket/folder (the usual AWS variables say where and who): '
-        'bags (MCAP, rosbag2), logs of NMEA 0183 (.nmea), and tables (.csv) whose columns have '
-        'the names of the inputs',
+        'bags (MCAP, rosbag2, ROS 1), tables (.csv, .tsv) whose columns `shipdrag import` knows '
+        'without options, and logs of NMEA 0183, NMEA 2000, Signal K or GPX whatever their names',
     )
     parser.add_argument(
         '-o', '--out', required=True, type=Path, metavar='STORE', help='folder; made if missing'
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Bring the store up to date and tell what became of the bags.
+    Bring the store up to date and say what became of the bags.
     """
     from shipdrag_ros.fleet.engine import Engine
     from shipdrag_ros.fleet.find import find
@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
     if not (found.sources or found.skipped):
         raise FleetError(
             f'no bag lies below {", ".join(map(repr, options.folders))}: no .mcap file, directory '
-            'of rosbag2, .nmea log or .csv table'
+            'of rosbag2, .csv table or log of a format that `shipdrag import` knows'
         )
     output.log(
         f'{len(found.sources)} bag(s) found; {found.left_alone} other file(s) left alone; '
@@ -158,7 +158,7 @@ def _progress(output: Output) -> Iterator[Progress]:
         with output.progress('') as bar:
             yield lambda text, done, total: bar(done, total)
         return
-    yield Lines(output.log, every_s=_EVERY_S, at_once=False).tell
+    yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).tell
 
 
 def _count(text: str) -> int:

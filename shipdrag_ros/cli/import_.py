@@ -94,7 +94,7 @@ def _reader(option: Option) -> Callable[[str], Any]:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Write the bag and tell what became of the sources.
+    Write the bag and say what became of the sources.
     """
     output = Output(options.json)
     given = {

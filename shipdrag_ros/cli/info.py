@@ -7,9 +7,10 @@ import argparse
 from typing import Any
 
 from shipdrag_ros import display
-from shipdrag_ros.bags import BagInfo, info, open_runs
+from shipdrag_ros.bags import BagInfo, info
 from shipdrag_ros.cli.arguments import add_json, add_remap, bag
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.sources import open_sources
 from shipdrag_ros.display import Table
 
 
@@ -19,10 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """
     parser.description = (
         'Show what is in bags: length, topics with their rates, which of them are inputs, what '
-        'is attached, and what is wrong. Estimates nothing.'
+        'is attached, and what is wrong. Of a log that is no bag: what a bag of it holds. '
+        'Estimates nothing.'
     )
     parser.add_argument(
-        'bags', nargs='+', type=bag, metavar='BAG', help='MCAP file or rosbag2 directory'
+        'bags', nargs='+', type=bag, metavar='BAG', help='MCAP file, rosbag2 directory, or log'
     )
     add_remap(parser)
     add_json(parser)
@@ -33,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
     Show what is in the bags.
     """
     output = Output(options.json)
-    found = [info(each) for each in open_runs(options.bags, remap=dict(options.remap))]
+    found = [info(each) for each in open_sources(options.bags, output, remap=dict(options.remap))]
     for about in found:
         _show(output, about)
     output.json({'bags': [_document(about) for about in found]})

@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     """
     Run the node until SIGINT or SIGTERM.
     """
-    Ship.load(options.ship)  # here its problems are told before ROS starts
+    Ship.load(options.ship)  # here its problems are said before ROS starts
     output = Output()
     for line in overruled(options.ros_args, ship=options.ship, out=options.out):
         output.log(line)
@@ -160,7 +160,7 @@ def overruled(ros_arguments: Sequence[str], *, ship: Path, out: Path) -> list[st
 
 
 def _stated(ros_arguments: Sequence[str]) -> Iterator[tuple[str, str, object]]:
-    """Yield where a parameter stands, its name and its value; what is wrong is told by ROS."""
+    """Yield where a parameter stands, its name and its value; what is wrong is said by ROS."""
     for flag, word in pairwise(ros_arguments):
         if flag in ('-p', '--param') and ':=' in word:
             name, _, text = word.partition(':=')

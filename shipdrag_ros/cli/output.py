@@ -7,7 +7,7 @@ import io
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
@@ -20,7 +20,7 @@ from rich.table import Table as RichTable
 
 from shipdrag_ros.cli.arguments import STDOUT
 from shipdrag_ros.display import Table
-from shipdrag_ros.progress import Progress
+from shipdrag_ros.progress import PartDone, Progress
 
 _PIPE_WIDTH = 160  # a file or a pipe has no width of its own; tables must not be cut there
 
@@ -80,14 +80,14 @@ class Output:
         self._log.print(text, soft_wrap=True, style='dim')
 
     @contextmanager
-    def progress(self, text: str) -> Iterator[Callable[[int, int], None]]:
+    def progress(self, text: str) -> Iterator[PartDone]:
         """
         Show a bar while something long is done; only to a terminal.
 
         Yields
         ------
         callable
-            To be told how much is done, and of how much.
+            Called with how much is done, and of how much.
         """
         with self.bar() as bar:
             yield lambda done, total: bar(text, done, total) if bar else None
@@ -100,7 +100,7 @@ class Output:
         Yields
         ------
         Progress
-            To be told of each stage, how much of it is done, and of how much; None
+            Called with each stage, how much of it is done, and of how much; None
             where no terminal shows it.
         """
         if not self._log.is_terminal:

@@ -17,7 +17,7 @@ _EVERY_S = 3.0  # between lines
 @contextmanager
 def stages(output: Output) -> Iterator[Progress]:
     """
-    Tell of one stage after the other, and of compiling where that is really done.
+    Show one stage after the other, and compiling where that is really done.
 
     Parameters
     ----------
@@ -27,19 +27,19 @@ def stages(output: Output) -> Iterator[Progress]:
     Yields
     ------
     Progress
-        To be told of each stage, how much of it is done, and of how much.
+        Called with each stage, how much of it is done, and of how much.
     """
     from numba.core import event  # long to import, and help must come at once
 
-    from shipdrag_ros.cli.compiling import Compiling
+    from shipdrag_ros.cli.compiling import CompilingNotice
 
     with output.bar() as bar:
-        tell = bar or Lines(output.log, every_s=_EVERY_S, at_once=True).tell
-        with event.install_listener('numba:compile', Compiling(output.log)):
+        tell = bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).tell
+        with event.install_listener('numba:compile', CompilingNotice(output.log)):
             yield tell
 
 
-class Lines:
+class ProgressLines:
     """
     A line of progress now and then.
 
@@ -50,7 +50,7 @@ class Lines:
     every_s
         Between two of them, at least [s].
     at_once
-        Whether the first word is told without waiting.
+        Whether the first word is printed without waiting.
     """
 
     def __init__(self, log: Callable[[str], None], *, every_s: float, at_once: bool) -> None:

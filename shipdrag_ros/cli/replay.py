@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Replay the bags and tell what they gave.
+    Replay the bags and say what they gave.
     """
     output = Output(options.json)
     ship = None if options.ship is None else Ship.load(options.ship)

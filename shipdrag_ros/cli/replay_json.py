@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.replay import InputCounts, Recorded
 from shipdrag_ros.replay.hulls import Ranking
@@ -73,7 +73,7 @@ def _combined(combined: Combined | None) -> dict[str, Any] | None:
     }
 
 
-def _coastdown(bag: str, coastdown: Coastdown) -> dict[str, Any]:
+def _coastdown(bag: str, coastdown: EndedCoastdown) -> dict[str, Any]:
     estimate = coastdown.estimate
     found: dict[str, Any] = {
         'bag': bag,

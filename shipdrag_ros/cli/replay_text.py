@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.force import Force
@@ -39,7 +39,7 @@ def show_run(output: Output, run: RunResult) -> None:
     output.say(words.recorded_sentence(run.recorded))
 
 
-def _show_coastdown(output: Output, coastdown: Coastdown, run: RunResult) -> None:
+def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -> None:
     """Print one coastdown: knots and kN first, m/s and m/s² below."""
     for line in cut_lines(coastdown, run.span_ns):
         output.say(line)

@@ -13,7 +13,7 @@ from shipdrag_ros.cli.output import Output
 
 def open_sources(paths: Sequence[Path], output: Output, *, remap: Mapping[str, str]) -> list[Run]:
     """
-    Open bags and logs; what was understood of a log is told on stderr.
+    Open bags and logs; what was understood of a log is printed on stderr.
 
     Parameters
     ----------

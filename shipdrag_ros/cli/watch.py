@@ -11,10 +11,10 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import add_remap, bag, number
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.sources import open_sources
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.live.app import LivePage
@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         'Serve one page for the bridge: the state and what to do now, speed, r(v) against the '
         'clean hull, inputs, checklist and verdict. Without a bag it shows the node that runs on '
-        'this network, which may come and go; with bags it plays them. It only reads.'
+        'this network, which may come and go; with bags or logs it plays them. It only reads.'
     )
-    parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='MCAP or rosbag2 to play')
+    parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='bag or log to play')
     parser.add_argument('--port', type=_port, default=8088, help='of the page, 0: any free one')
     parser.add_argument(
         '--listen',
@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
     deltas = None if options.signal_k is None else listen(LOOPBACK, options.signal_k)
     with page_socket, contextlib.ExitStack() as stack:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
-        source: PictureFeed = stack.enter_context(_source(options, ship, past))
+        source: PictureFeed = stack.enter_context(_source(options, ship, past, output))
         fleet = None if options.store is None else fleet_pages(output, options.store)
         page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet)
         for note in notes:
@@ -119,11 +119,11 @@ def run(options: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def _source(
-    options: argparse.Namespace, ship: Ship | None, past: list[PastRun]
+    options: argparse.Namespace, ship: Ship | None, past: list[PastRun], output: Output
 ) -> Iterator[PictureFeed]:
     """Yield what feeds the page, and end it."""
     if options.bags:
-        runs = open_runs(options.bags, remap=dict(options.remap))
+        runs = open_sources(options.bags, output, remap=dict(options.remap))
         bags = BagSource(runs, ship=ship, speed=options.speed, past=past)
         try:
             yield bags
@@ -156,7 +156,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
 
 
 def _earlier(folder: Path, notes: list[str]) -> Iterator[PastRun]:
-    """Yield the coastdowns of a folder; what gave none is told."""
+    """Yield the coastdowns of a folder; what gave none is said."""
     for found in recorded_runs(folder):
         if isinstance(found, str):
             notes.append(found)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.sources import open_sources
-from shipdrag_ros.library.windowed import Span, WindowedRun
+from shipdrag_ros.library.windowed import WindowedRun, WindowSpan
 
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
 
@@ -21,7 +21,7 @@ class WindowedBag(NamedTuple):
     """A bag, and the window of it that was given, [s] from its start."""
 
     path: Path
-    window: Span | None
+    window: WindowSpan | None
 
 
 def windowed_bag(text: str) -> WindowedBag:
@@ -56,7 +56,7 @@ def open_windowed(
     bags: Sequence[WindowedBag],
     *,
     remap: Mapping[str, str],
-    window: Span | None = None,
+    window: WindowSpan | None = None,
     output: Output | None = None,
 ) -> list[WindowedRun]:
     """
@@ -72,12 +72,14 @@ def open_windowed(
     window
         Of the bags without a window of their own.
     output
-        Told what was understood of a log that is no bag; stderr by default.
+        Called with what was understood of a log that is no bag; stderr by default.
 
     Raises
     ------
     BagError
-        If one cannot be read.
+        If a bag cannot be read.
+    ImportDataError
+        If nothing in a log can be used.
     """
     output = output or Output()
     whole = [each.path for each in bags if each.window is None]

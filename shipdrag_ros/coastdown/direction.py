@@ -44,7 +44,7 @@ def heading_doubt(bins: Bins, convention: str) -> str:
     Returns
     -------
     str
-        '' where they agree, or where nothing can be told: no track, no way, a turn.
+        '' where they agree, or where nothing can be said: no track, no way, a turn.
     """
     newest = newest_bin(bins, _HEADING)
     tracks = [

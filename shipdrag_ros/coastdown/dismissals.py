@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What was nearly a coastdown, told without flooding the log.
+What was nearly a coastdown, said without flooding the log.
 
 A rough sea, or a ship that manoeuvres, may give many dismissals. Of each reason one is
-told in each span of absolute time; the rest of the span is counted and told as one.
+said in each span of absolute time; the rest of the span is counted and stated as one.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from shipdrag_ros.coastdown.events import Dismissal, Event, NotCoastdown
 
 @dataclass(frozen=True)
 class _More:
-    """Dismissals of one reason that were not told yet: how many, and all as one."""
+    """Dismissals of one reason that were not said yet: how many, and all as one."""
 
     count: int
     as_one: NotCoastdown
@@ -23,7 +23,7 @@ class _More:
 
 class Dismissals:
     """
-    Tells the first dismissal of each reason in a span, and the rest together.
+    Says the first dismissal of each reason in a span, and the rest together.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Dismissals:
 
     def take(self, dismissed: NotCoastdown) -> list[Event]:
         """
-        Take a dismissal and return what is to be told now.
+        Take a dismissal and return what is to be said now.
         """
         span = dismissed.end_ns // self._span_ns
         if self._told.get(dismissed.reason) != span:
@@ -54,7 +54,7 @@ class Dismissals:
 
     def flush(self) -> list[Event]:
         """
-        Return what was counted and not told, and forget everything.
+        Return what was counted and not said, and forget everything.
         """
         events = [event for reason in list(self._more) for event in self._flush(reason)]
         self._told.clear()

@@ -97,7 +97,7 @@ def idles(window: Window) -> bool:
     -----
     A propeller that drives with less power turns less often a metre than in steady
     sailing, until the ship has slowed to where it drives her as before. If she slows on
-    beyond that it is at zero pitch, which nothing tells where no pitch is known. What
+    beyond that it is at zero pitch, which nothing shows where no pitch is known. What
     it does after it has stopped says nothing.
     """
     speed_s, speed = _speed_of_record(window)

@@ -4,7 +4,7 @@ When a coastdown is over, and where its record ends.
 
 Judged each second on the bins, in this order: the shaft turns again, the ship
 turns, the minimum speed is reached, the speed settles or rises; or falls faster
-than before, which is how a turn shows where nothing tells the heading. The
+than before, which is how a turn shows where nothing gives the heading. The
 record ends where the cause began, not where it was noticed.
 """
 
@@ -132,7 +132,7 @@ def _departed(
     if excess > coasting.limits[0]:
         return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
     if -excess > coasting.limits[0]:
-        # where nothing tells the heading, this is how a turn shows, unless it is too much for one
+        # where nothing gives the heading, this is how a turn shows, unless it is too much for one
         braked = told or slope < _TURN_MOST * min(before, 0.0)
         cause = EndedBy.BRAKE if braked else EndedBy.TURN
         return End(cause, _bend(bins, coasting, tuning, first, number, sign=1))

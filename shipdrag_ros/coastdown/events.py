@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 
 
@@ -89,7 +91,7 @@ class NoEstimate:
 
 
 @dataclass(frozen=True)
-class Coastdown:
+class EndedCoastdown:
     """
     A coastdown that has ended.
 
@@ -114,6 +116,11 @@ class Coastdown:
     stretch: tuple[tuple[int, float], ...] = ()
 
     @property
+    def stands(self) -> bool:
+        """Whether it ended as a coastdown: neither withdrawn nor cut short by a reset."""
+        return not self.withdrawn and self.ended_by is not EndedBy.RESET
+
+    @property
     def cut_at_start(self) -> bool:
         """Whether what comes before it is no steady sailing, but was cut off."""
         return any(cut.start_ns < self.start_ns for cut in self.cuts)
@@ -127,4 +134,6 @@ class Reset:
     reason: str
 
 
-Event = Onset | Update | NoEstimate | NotCoastdown | Coastdown | Reset
+Event = Onset | Update | NoEstimate | NotCoastdown | EndedCoastdown | Reset
+OnCoastdown = Callable[[EndedCoastdown, Window], None]
+"""Called with a coastdown that has ended and its window."""

@@ -32,13 +32,13 @@ from shipdrag_ros.ship import Ship
 
 LEAST_READINGS = 8  # of the speed, or positions, in what is kept
 LEAST_FALL = 0.05  # of the speed, from the first to the last tenth of what is kept
-_ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are told
+_ENOUGH = 0.5  # of a stretch must be left where turns and rudder are cut; else they are noted
 _SHORTEST = 0.5  # of confirm_s: less at the end of what was found is no coastdown by itself
 _AT_REST = 0.1  # of the highest speed of the stretch: what is slower from its start is no coast
 _LATE_S = 10.0  # of the thrust after an onset that is worth a cut
 _TURNS = 0.25  # of turn_rad, by which the heading swings where it is a turn that stops her
 _TURN_MOST = 4.0  # times the deceleration before: no turn slows her by more
-_MANY = 20  # readings that must be left by them, since fewer tell less than the turn spoils
+_MANY = 20  # readings that must be left by them, since fewer show less than the turn spoils
 _SHOWN = 300  # means of the speed
 _WORDLESS = 1e-3  # of a stretch
 _SLIVER = 0.01  # of a stretch
@@ -192,7 +192,7 @@ def examine(
 
 
 def _slow_stop(window: Window, ship: Ship) -> list[NotCoastdown]:
-    """Let the speed tell how long the thrust ran down, where no shaft does."""
+    """Let the speed show how long the thrust ran down, where no shaft does."""
     if any(len(shaft) for shaft in window.shafts):
         return []
     end = thrust_end(window, 0.0 if ship.propulsion is None else ship.propulsion.run_down_s)
@@ -210,7 +210,7 @@ class _KeptPart(NamedTuple):
     A part that no instrument speaks against, and what of it is kept.
 
     `worth` is the time kept [s], times the fraction of the speed that is lost in it;
-    `set_aside` is what is told of it where another part is kept.
+    `set_aside` is what is said of it where another part is kept.
     """
 
     kept: _SPAN
@@ -264,7 +264,7 @@ def _ends(window: Window) -> tuple[float, float, int]:
 def _steered(
     window: Window, ship: Ship, parameters: Parameters
 ) -> tuple[_SPAN, list[NotCoastdown], list[str]]:
-    """Cut turns and rudder where that leaves enough; else tell them."""
+    """Cut turns and rudder where that leaves enough; else note them."""
     span = (window.start_ns, window.end_ns)
     cuts: list[NotCoastdown] = []
     notes = []
@@ -285,7 +285,7 @@ def _steered(
 def _by_speed(
     window: Window, kept: _SPAN, ship: Ship, parameters: Parameters, *, steady: bool
 ) -> list[NotCoastdown]:
-    """Let the speed tell where it is not that of a ship that coasts."""
+    """Let the speed show where it is not that of a ship that coasts."""
     part = window.part(*kept)
     time_s, speed = readings(part)
     from_onset = steady and kept[0] == window.start_ns

@@ -2,7 +2,7 @@
 """
 How fast this ship should slow down when its engine stops.
 
-Only to tell a coastdown from a ship that has merely reduced power: an onset is
+Only to separate a coastdown from a ship that has merely reduced power: an onset is
 confirmed where the loss of speed is of this size. Nothing estimated depends on
 it.
 """

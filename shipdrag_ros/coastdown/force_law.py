@@ -21,7 +21,7 @@ from shipdrag_ros.coastdown.readings import binned
 from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.samples import Float64
 
-_LEAST = 8  # bins in which a law can be told from another
+_LEAST = 8  # bins in which a law can be separated from another
 _EDGE = 3  # bins at least on each side of a change
 _POWERS = (0, 1, 2, 4)
 _STEEPEST_POWER = 5.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.coastdown.memory import RECENT, Tally
+from shipdrag_ros.coastdown.memory import RECENT, InputTally
 from shipdrag_ros.coastdown.validate import NEVER
 from shipdrag_ros.samples import INPUTS, Channel, Reason
 
@@ -42,7 +42,7 @@ class InputHealth:
 
 
 @dataclass(frozen=True)
-class Progress:
+class MonitorProgress:
     """
     How far the monitor is.
 
@@ -72,14 +72,14 @@ class Progress:
         return told
 
 
-def input_health(tally: Tally) -> dict[str, InputHealth]:
+def input_health(tally: InputTally) -> dict[str, InputHealth]:
     """
-    Tell the health of every input, by its name.
+    Show the health of every input, by its name.
     """
     return {name: _health(tally, name) for name in INPUTS}
 
 
-def _health(tally: Tally, name: str) -> InputHealth:
+def _health(tally: InputTally, name: str) -> InputHealth:
     channels = [channel for channel in Channel if channel.input == name]
     reasons = tally.reasons[channels].sum(axis=0)
     # an input has one channel, but for the two encodings of a position: take the later

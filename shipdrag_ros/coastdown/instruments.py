@@ -82,7 +82,7 @@ def swing(window: Window, start_s: float) -> float:
     """
     Return how far beyond the headings before a time it swings after it [rad].
 
-    0 where nothing tells the heading.
+    0 where nothing shows the heading.
     """
     if not len(window.heading):
         return 0.0
@@ -170,7 +170,7 @@ def _where(
 
 def gaps(window: Window, parameters: Parameters) -> list[NotCoastdown]:
     """
-    Find when nothing tells the motion for longer than `data_stop_s`, or a third of the window.
+    Find when nothing shows the motion for longer than `data_stop_s`, or a third of the window.
     """
     heard = [
         series.time_ns

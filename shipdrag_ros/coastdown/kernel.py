@@ -25,7 +25,7 @@ from shipdrag_ros.coastdown.bins import (
     newest_bin,
 )
 from shipdrag_ros.coastdown.filling import add, close
-from shipdrag_ros.coastdown.memory import RECENT, Memory, Tally, Tuning, Watch
+from shipdrag_ros.coastdown.memory import RECENT, InputTally, Memory, Tuning, Watch
 from shipdrag_ros.coastdown.ring import append
 from shipdrag_ros.coastdown.steadiness import SCALES, Slopes, Steadiness, update_limits
 from shipdrag_ros.coastdown.validate import (
@@ -155,7 +155,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
 
 _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all that counts
 _SIGNATURE: Signature = types.UniTuple(types.int64, 2)(
-    typeof(Memory.fresh(_SLOPES, seconds=1, tally=Tally.fresh())),
+    typeof(Memory.fresh(_SLOPES, seconds=1, tally=InputTally.fresh())),
     typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0)),
     CHANNEL_CODES,
     STAMPS,

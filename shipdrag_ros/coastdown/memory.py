@@ -77,9 +77,9 @@ class Watch(NamedTuple):
         )
 
 
-class Tally(NamedTuple):
+class InputTally(NamedTuple):
     """
-    What the health of the inputs is told from; a reset of the clock spares it.
+    What the health of the inputs is known from; a reset of the clock spares it.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Tally(NamedTuple):
     arrival_ns: Int64
 
     @classmethod
-    def fresh(cls) -> Tally:
+    def fresh(cls) -> InputTally:
         """
         Return the counts before the first sample.
         """
@@ -112,11 +112,11 @@ class Memory(NamedTuple):
     bins: Bins
     steadiness: Steadiness
     watch: Watch
-    tally: Tally
+    tally: InputTally
     store: RingBuffer
 
     @classmethod
-    def fresh(cls, slopes: Slopes, *, seconds: int, tally: Tally) -> Memory:
+    def fresh(cls, slopes: Slopes, *, seconds: int, tally: InputTally) -> Memory:
         """
         Return the memory before the first sample, with bins for the last `seconds`.
         """

@@ -18,24 +18,25 @@ from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
 from shipdrag_ros.coastdown.ending import End, cut_short, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     Dismissal,
     EndedBy,
+    EndedCoastdown,
     Event,
     NotCoastdown,
     Onset,
     Reset,
     State,
 )
-from shipdrag_ros.coastdown.health import InputHealth, Progress, input_health
+from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
-from shipdrag_ros.coastdown.memory import ALWAYS, Memory, Tally, Tuning
+from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
-from shipdrag_ros.coastdown.running import Estimator, RunningCoastdown
+from shipdrag_ros.coastdown.running import RunningCoastdown, WindowEstimator
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
+from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.parameters import Parameters
@@ -54,9 +55,10 @@ class Monitor:
     parameters
         All of them matter.
     estimate
-        The estimator; raises `EstimationError` where none is possible.
+        The estimator; raises `EstimationError` where none is possible. None: there are no
+        estimates while a coastdown runs.
     final
-        The same for a coastdown that has ended, with the record before it.
+        An estimator of a coastdown that has ended, with the record before it.
 
     Notes
     -----
@@ -78,7 +80,7 @@ class Monitor:
     >>> monitor = Monitor(ship, Parameters())
     >>> events = [*monitor.update(block), *monitor.finish()]
     >>> type(events[0]).__name__, type(events[-1]).__name__
-    ('Onset', 'Coastdown')
+    ('Onset', 'EndedCoastdown')
     """
 
     def __init__(
@@ -86,8 +88,8 @@ class Monitor:
         ship: Ship,
         parameters: Parameters,
         *,
-        estimate: Estimator = estimate,
-        final: Estimator = estimate_final,
+        estimate: WindowEstimator | None = estimate,
+        final: WindowEstimator = estimate_final,
     ) -> None:
         self._ship = ship
         self._parameters = parameters
@@ -103,7 +105,7 @@ class Monitor:
         self._seconds = (
             round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
         )
-        self._memory = self._fresh(Tally.fresh())
+        self._memory = self._fresh(InputTally.fresh())
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._candidate: OnsetCandidate | None = None
         self._running: RunningCoastdown | None = None
@@ -121,7 +123,7 @@ class Monitor:
         return float(lead + 2 * self._tuning.slopes.width // 3) if lead else 0.0
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> MonitorProgress:
         """How long the ship has been steady by now, and since when she coasts."""
         watch = self._memory.watch
         used_s = self._parameters.steady_s
@@ -130,7 +132,7 @@ class Monitor:
             seconds = int(watch.seen[0]) - int(watch.lead[0]) + 2 * self._tuning.slopes.width // 3
             steady_s = min(float(seconds), used_s)
         since_ns = None if self._running is None else self._running.onset.start_ns
-        return Progress(steady_s, used_s, since_ns)
+        return MonitorProgress(steady_s, used_s, since_ns)
 
     @property
     def state(self) -> State:
@@ -155,15 +157,17 @@ class Monitor:
         """
         return self._history_ns
 
-    def heading_doubt(self) -> str:
+    def doubts(self) -> dict[str, str]:
         """
-        Say what is wrong with the heading, by the course over ground; '' if nothing is seen.
+        Say which inputs contradict each other: a heading its course, a speed by its unit.
         """
-        return heading_doubt(self._memory.bins, self._parameters.heading_convention)
+        bins = self._memory.bins
+        heading = heading_doubt(bins, self._parameters.heading_convention)
+        return unit_doubts(bins) | ({'heading': heading} if heading else {})
 
     def health(self) -> dict[str, InputHealth]:
         """
-        Tell how every input is doing, by its name.
+        Say how every input is doing, by its name.
         """
         return input_health(self._memory.tally)
 
@@ -237,7 +241,7 @@ class Monitor:
         """
         return self._stop_at_last_sample(EndedBy.RECORD_END) + self._dismissals.flush()
 
-    def ended_window(self, ended: Coastdown) -> Window:
+    def ended_window(self, ended: EndedCoastdown) -> Window:
         """
         Cut the whole of a coastdown that has just ended, and the record before it.
 
@@ -246,7 +250,7 @@ class Monitor:
         before_ns = 0 if ended.cut_at_start else round(self._parameters.steady_s * SECOND_NS)
         return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - before_ns)
 
-    def _fresh(self, tally: Tally) -> Memory:
+    def _fresh(self, tally: InputTally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)
 
     # what the walk stopped for
@@ -294,7 +298,7 @@ class Monitor:
         """Give a candidate up and say why."""
         assert self._candidate is not None
         start_ns = self._candidate.start * SECOND_NS
-        # the stop may be still to come, and the shafts then tell it
+        # the stop may be still to come, and the shafts then show it
         driven = doubt is None or doubt.reason in (Dismissal.THRUST, Dismissal.OTHER)
         self._stand_down(driven=driven)
         if doubt is None:
@@ -323,11 +327,13 @@ class Monitor:
         self._running = RunningCoastdown(
             onset, heading, cut=self._cut, ship=self._ship, parameters=self._parameters
         )
-        self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
+        if self._estimator is not None:
+            self._memory.watch.update_ns[0] = self._running.due_ns(onset.detected_ns)
         return onset
 
     def _update(self, next_stamp_ns: int) -> Event:
         assert self._running is not None
+        assert self._estimator is not None
         watch = self._memory.watch
         stamp_ns = int(watch.update_ns[0])
         watch.update_ns[0] = self._running.due_ns(next_stamp_ns)

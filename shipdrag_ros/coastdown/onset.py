@@ -3,7 +3,7 @@
 Has a coastdown begun, and when?
 
 A fall of the speed that chance does not explain, or of a shaft or its pitch,
-makes a candidate. Turns and slow-downs make candidates too: what tells them
+makes a candidate. Turns and slow-downs make candidates too: what sets them
 apart is the law of the deceleration. A ship that coasts follows v' = -c v^p
 with p about 2 (friction) to 3 (waves); one that nears a new steady speed stops
 decelerating while it is still fast, as if p were large.
@@ -264,7 +264,7 @@ def _propulsion(
     )
     if told.stop is None or not candidate.noticed:
         return told
-    # a shaft that stopped long before the ship slowed down, or after, tells of something else;
+    # a shaft that stopped long before the ship slowed down, or after, is a sign of something else;
     # of several, others have stopped before
     late = told.stop - candidate.start
     if late < -_APART * width or (late > _APART * width and candidate.drive.known == 1):

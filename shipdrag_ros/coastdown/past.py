@@ -32,7 +32,7 @@ REPEATS = 2  # among the readings kept: a sensor that repeats more often does so
 
 _NEVER = -(2**62)
 _LEARN_NS = 128_000_000_000
-_WITNESSES = 16  # readings before a run of repeats that tell whether it is natural
+_WITNESSES = 16  # readings before a run of repeats that say whether it is natural
 _OF_QUARTILE = 1.1503  # its upper quartile
 _OF_PLANE = 1.1774  # median of the length of a normal vector of the plane
 # A step of 0.1 knots, the resolution of many logs, is never an outlier; and 2 % are not worth it.

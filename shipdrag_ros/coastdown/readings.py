@@ -10,7 +10,7 @@ from shipdrag_ros.inference.robust import MAD_TO_SD
 from shipdrag_ros.samples import Float64
 
 _BINS = 48  # of a stretch; a change in it is found to within one of them
-LEAST_READINGS = 8  # readings of an input that tells the speed
+LEAST_READINGS = 8  # readings of an input that shows the speed
 _HAMPEL = 5.0  # robust standard deviations from the median of 7 neighbours
 _NEIGHBOURS = 3
 
@@ -51,12 +51,12 @@ def seconds(series: Series, window: Window) -> Float64:
 
 def readings(window: Window) -> tuple[Float64, Float64]:
     """
-    Return the speed of a window, by the best input that tells it.
+    Return the speed of a window, by the best input that shows it.
 
     Returns
     -------
     time_s, speed
-        [s] after `window.start_ns`, [m/s]; empty where nothing tells a speed.
+        [s] after `window.start_ns`, [m/s]; empty where nothing shows a speed.
 
     Notes
     -----

@@ -7,8 +7,8 @@ import math
 from collections.abc import Callable
 
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     EndedBy,
+    EndedCoastdown,
     Event,
     NoEstimate,
     NotCoastdown,
@@ -26,7 +26,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
 
-Estimator = Callable[[Window, Ship, Parameters], Estimate]
+WindowEstimator = Callable[[Window, Ship, Parameters], Estimate]
 CutWindow = Callable[[int, int, int], Window]
 """From its first and last stamp, and the first of the record before it [ns]."""
 
@@ -72,7 +72,7 @@ class RunningCoastdown:
         start, step = self.onset.start_ns, round(self._parameters.update_s * SECOND_NS)
         return min(start + -(-(stamp_ns - start) // step) * step, ALWAYS)
 
-    def update(self, stamp_ns: int, estimator: Estimator) -> Event:
+    def update(self, stamp_ns: int, estimator: WindowEstimator) -> Event:
         """
         Estimate from what there is up to a stamp [ns], or say why that cannot be.
         """
@@ -88,7 +88,7 @@ class RunningCoastdown:
         return Update(stamp_ns, found)
 
     def end(
-        self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None, estimator: Estimator
+        self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None, estimator: WindowEstimator
     ) -> list[Event]:
         """
         Say what it was, as a whole.
@@ -116,7 +116,7 @@ class RunningCoastdown:
         else:
             failure, refused = f'withdrawn: {doubt.text}', True
             cuts = (NotCoastdown(start_ns, end_ns, doubt.reason, failure),)
-        ended = Coastdown(
+        ended = EndedCoastdown(
             start_ns,
             end_ns,
             self.onset.detected_ns,

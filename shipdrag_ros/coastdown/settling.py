@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Was power cut, or only reduced? The whole of a deceleration tells better than its beginning.
+Was power cut, or only reduced? The whole of a deceleration shows better than its beginning.
 
 A constant force beside that of the water, v' = -c v^p + d, is left-over thrust where d > 0
 and a brake, or a reversed propeller, where d < 0. With the p that the ship should have, c and d
@@ -65,7 +65,7 @@ def constant_force(
     Returns
     -------
     Force or None
-        None where there is too little to tell.
+        None where there is too little to say.
     """
     time, speed = speeds(bins, source, first, last)
     if len(time) < _BINS_MIN or not speed.min() > 0.0:

@@ -67,9 +67,9 @@ class Drive:
     Attributes
     ----------
     turning
-        Rate of turn [rad/s]; NaN where none drove, or nothing tells.
+        Rate of turn [rad/s]; NaN where none drove, or none is known.
     pitch
-        As sent; NaN where none is told.
+        As sent; NaN where none is stated.
     """
 
     turning: tuple[float, ...] = (math.nan,) * len(SHAFTS)
@@ -77,7 +77,7 @@ class Drive:
 
     @property
     def known(self) -> int:
-        """How many shafts told that they drove."""
+        """How many shafts drove by their own reading."""
         return sum(not math.isnan(turning) for turning in self.turning)
 
 
@@ -111,7 +111,7 @@ class ShaftEvidence:
     thrust
         What they do now.
     stop
-        First bin in which none drove as before; None where nothing tells.
+        First bin in which none drove as before; None where that is not known.
     drive
         Of the propeller that counts, as a fraction of its steady one; NaN where unknown.
     """
@@ -154,7 +154,7 @@ def drives(bins: Bins, steady: Drive, first: int, last: int) -> Float64:
     Returns
     -------
     (shafts that drove, last - first + 1)
-        NaN where nothing is told.
+        NaN where nothing is stated.
     """
     rows = []
     for shaft, blade, turning, pitch in zip(

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-When the thrust is gone, told by the speed alone.
+When the thrust is gone, by the speed alone.
 
 While the thrust runs down slowly, or one shaft stops after another, the
 deceleration grows; from where the thrust is gone it falls with the speed. So the
@@ -78,7 +78,7 @@ def thrust_end(window: Window, run_down_s: float = 0.0) -> ThrustEnd | None:
     Returns
     -------
     ThrustEnd or None
-        None where the deceleration is there at once, as far as the speed tells.
+        None where the deceleration is there at once, as far as the speed shows.
     """
     found = _about_onset(window)
     if found is None:

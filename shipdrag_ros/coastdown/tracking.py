@@ -2,7 +2,7 @@
 """
 Heading and course, read from the bins.
 
-A turn spoils a coastdown; it is told by comparing the bins since the onset with
+A turn spoils a coastdown; it is found by comparing the bins since the onset with
 those before it.
 """
 
@@ -65,7 +65,7 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
     -------
     int or None
         The last bin before the turn, where half of the change was not exceeded;
-        None where the ship has not turned, or nothing tells.
+        None where the ship has not turned, or nothing shows it.
 
     Notes
     -----
@@ -91,13 +91,13 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
         courses = [_course(bins, track, start - 1 - back, half) for back in (0, way)]
 
         def change(at: int) -> float:
-            # a way that begins before the onset tells nothing new
+            # a way that begins before the onset shows nothing new
             if at < start + way:
                 return math.nan
             now = _course(bins, track, at, half)
             return min(_apart(now, course) for course in courses)
 
-    # at some of the bins between, too few fixes may tell a course
+    # at some of the bins between, too few fixes may show a course
     if not all(change(at) > turn_rad for at in (number, number - way)) or any(
         change(at) <= turn_rad for at in range(number - way, number)
     ):

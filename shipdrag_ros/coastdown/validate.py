@@ -3,7 +3,7 @@
 Which samples may be used, and why not.
 
 One rule for every way in, walked sample by sample so that the way a record is
-cut cannot matter. Stamps decide; the time of arrival only tells a stamp from
+cut cannot matter. Stamps decide; the time of arrival only separates a stamp from
 the future and a clock that was set.
 
 The tests, in this order; the first that fails names the reason:
@@ -111,7 +111,7 @@ class CheckMemory(NamedTuple):
     held_since_ns : (channels,) int64
         Stamp since which it has not changed [ns].
     past
-        What tells an outlier.
+        What an outlier is known by.
     """
 
     last_ns: Int64

@@ -37,7 +37,7 @@ def warm(parameters: Parameters) -> None:
     few = Parameters(estimator=parameters.estimator, update_s=_UPDATE_S)
     monitor = Monitor(ship, few)
     monitor.update(_coastdown())
-    monitor.heading_doubt()
+    monitor.doubts()
     monitor.finish()
     compile_all()  # of the estimators, which were imported just now
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What would tell candidates apart, and how probably.
+What would separate candidates, and how probably.
 
 Another run and an instrument are simulated under each candidate; of what cannot
 be simulated, the declarations of the effects say that it would help.
@@ -73,9 +73,9 @@ def advice(
     posterior
         Of what was found.
     candidates
-        That the runs cannot tell apart.
+        That the runs cannot separate.
     progress
-        Told how many measurements are tried.
+        Called with how many measurements are tried.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def _by_cost(ranked: Mapping[Advice, float]) -> tuple[Advice, ...]:
 
 def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
     """
-    Return what the effects say tells them apart; first what costs least for what it serves.
+    Return what the effects say separates them; first what costs least for what it serves.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
 
 
 def _discriminating(one: Candidate, other: Candidate) -> list[Measure]:
-    """Return what tells two candidates apart, by what they do not share."""
+    """Return what separates two candidates, by what they do not share."""
     own, others = set(one.names) - set(other.names), set(other.names) - set(one.names)
     return [
         measure
@@ -179,7 +179,7 @@ def _discriminating(one: Candidate, other: Candidate) -> list[Measure]:
 def _reach(
     measure: Measure, candidates: Sequence[Candidate], inseparable: Sequence[frozenset[str]]
 ) -> float:
-    """Return how probably something is named if all is told apart that is said to be."""
+    """Return how probably something is named if all is separated that is said to be."""
     if measure is Measure.THIRD_SPEED:  # is taken for one with the source over ground there is
         return 0.0
     never = {name for group in inseparable for name in group}
@@ -210,7 +210,7 @@ def _rivals(posterior: Posterior) -> dict[tuple[str, ...], Fit]:
 
 
 def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
-    """Tell whether the runs hold something already."""
+    """Say whether the runs hold something already."""
     first = seen[0]
     match measure:
         case Measure.RECIPROCAL_RUN:

@@ -51,7 +51,7 @@ class CoastModel(CoastSimulation):
     Attributes
     ----------
     facts
-        Of the log book; None: none are told.
+        Of the log book; None: none are stated.
     """
 
     facts: Facts | None = None
@@ -106,7 +106,7 @@ class CoastModel(CoastSimulation):
         return replace(found, log_prior=log_prior + self._log_facts(found))
 
     def _log_facts(self, hypothesis: Hypothesis) -> float:
-        """Return the log probability that the facts are told; they are evidence, no prior."""
+        """Return the log probability that the facts are stated; they are evidence, no prior."""
         return 0.0 if self.facts is None else self.facts.log_likelihood(hypothesis)
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
@@ -244,7 +244,7 @@ class CoastModel(CoastSimulation):
 
     @property
     def inseparable(self) -> tuple[frozenset[str], ...]:
-        """Confounders that no record of a coastdown tells apart."""
+        """Confounders that no record of a coastdown separates."""
         return inseparable(self.effects)
 
     @property

@@ -42,7 +42,7 @@ class Term(Part, Protocol):
     """A part that acts on the ship."""
 
     def acts_in(self, run: int) -> bool:
-        """Tell whether it does anything in a run."""
+        """Say whether it does anything in a run."""
 
     def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
         """Return what it does in a run."""
@@ -90,7 +90,7 @@ class BaselineTerm:
         return tuple(found)
 
     def acts_in(self, run: int) -> bool:
-        """Tell that the ship is the same in all runs."""
+        """Say that the ship is the same in all runs."""
         return True
 
     def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
@@ -163,7 +163,7 @@ class ForceTerm:
         return tuple(free(f'force {k}', normal(sd)) for k in range(_DISCREPANCIES))
 
     def acts_in(self, run: int) -> bool:
-        """Tell that it acts in all runs."""
+        """Say that it acts in all runs."""
         return True
 
     def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:

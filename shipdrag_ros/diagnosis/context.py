@@ -31,7 +31,7 @@ _YAW_SD_RAD = 0.03  # of a mean over a bin: a ship yaws in the waves
 _SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and all of them
 _TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
-_FALL_RUN_DOWNS = 8.0  # after the stop; from then on the shaft tells of the propeller
+_FALL_RUN_DOWNS = 8.0  # after the stop; from then on the shaft speaks of the propeller
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
     Advice,
-    Diagnosis,
+    DiagnosisResult,
     EffectEstimate,
     Verdict,
     Where,
@@ -46,7 +46,7 @@ def diagnose(
     facts: Sequence[Fact] = (),
     advise: bool = True,
     progress: Progress = silent,
-) -> Diagnosis:
+) -> DiagnosisResult:
     """
     Name the effect that is missing in a ship's model.
 
@@ -63,7 +63,7 @@ def diagnose(
     advise
         Whether to work out what would decide, which takes as long as all the rest.
     progress
-        Told of each stage, how much of it is done, and of how much.
+        Called with each stage, how much of it is done, and of how much.
 
     Returns
     -------
@@ -172,7 +172,7 @@ def _searched(
 def _told(
     runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
 ) -> Facts:
-    """Gather what is told of the runs that are diagnosed."""
+    """Gather what is stated of the runs that are diagnosed."""
     own = {run.name: run.facts for run in runs}
     stops = [run.context.stop for run in seen]
     at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
@@ -180,7 +180,7 @@ def _told(
 
 
 def _has_both(run: Observation) -> bool:
-    """Tell whether a run has a log and the way over ground, to be held against each other."""
+    """Say whether a run has a log and the way over ground, to be held against each other."""
     by_log = run.along.rows.kind == LOG
     return bool(by_log.any() and not by_log.all())
 
@@ -200,7 +200,7 @@ def _observed(
     moved_s
         By how much the stop of each run is later than it is taken for at first.
     progress
-        Told how many runs are seen.
+        Called with how many runs are seen.
     """
     seen: list[Observation] = []
     refused: dict[str, DiagnosisError | EstimationError] = {}
@@ -231,7 +231,7 @@ def _observed(
 
 
 def _of_the_ship(found: SearchResult) -> bool:
-    """Tell whether what is missing acts on the ship, whatever water and instruments do."""
+    """Say whether what is missing acts on the ship, whatever water and instruments do."""
     names = found.best.hypothesis.names
     return bool(names) and {find(name).scope for name in names} <= {Scope.HULL, Scope.RUN}
 

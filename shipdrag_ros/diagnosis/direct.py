@@ -20,7 +20,7 @@ from scipy.optimize import minimize
 from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Model
-from shipdrag_ros.diagnosis.result import Diagnosis, Gap, Verdict, Where
+from shipdrag_ros.diagnosis.result import DiagnosisResult, Gap, Verdict, Where
 from shipdrag_ros.diagnosis.terms import trial_z
 from shipdrag_ros.diagnosis.verdict import Judgement
 from shipdrag_ros.samples import Float64
@@ -94,7 +94,7 @@ class DirectModel(Model):
         return np.ascontiguousarray(found, np.float64)
 
 
-def diagnosis_of_speeds(judged: Judgement, where: Where, **rest: Any) -> Diagnosis:
+def diagnosis_of_speeds(judged: Judgement, where: Where, **rest: Any) -> DiagnosisResult:
     """
     Return the result of a model whose rows are speeds.
 
@@ -105,7 +105,7 @@ def diagnosis_of_speeds(judged: Judgement, where: Where, **rest: Any) -> Diagnos
     where
         Where model and data may disagree.
     **rest
-        What else there is to be said, as in `Diagnosis`.
+        What else there is to be said, as in `DiagnosisResult`.
 
     Returns
     -------

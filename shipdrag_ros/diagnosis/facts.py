@@ -3,7 +3,7 @@
 What facts of the log book say of hypotheses.
 
 A fact is evidence with an error rate: a hypothesis under which it is not so is
-as much less probable as such a fact is seldom told wrongly. Which facts speak
+as much less probable as such a fact is seldom stated wrongly. Which facts speak
 about an effect, the effect declares.
 """
 
@@ -30,9 +30,9 @@ _SHAFT: Mapping[str, Mapping[str, float]] = {
 
 
 @dataclass(frozen=True)
-class Told:
+class StatedFact:
     """
-    A fact, and the run that it is told of.
+    A fact, and the run that it is stated of.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Told:
 @dataclass(frozen=True)
 class Facts:
     """
-    All facts that are told.
+    All facts that are stated.
 
     Attributes
     ----------
@@ -61,11 +61,11 @@ class Facts:
     """
 
     ship: Ship
-    told: tuple[Told, ...] = ()
+    told: tuple[StatedFact, ...] = ()
 
     def log_likelihood(self, hypothesis: Hypothesis) -> float:
         """
-        Return the logarithm of the probability that these facts are told.
+        Return the logarithm of the probability that these facts are stated.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class Facts:
         Returns
         -------
         tuple of ToldFact
-            In the order in which they were told.
+            In the order in which they were stated.
         """
         found = []
         for each in self.told:
@@ -122,14 +122,14 @@ class Facts:
         Parameters
         ----------
         posterior
-            Of hypotheses, with the facts that are told.
+            Of hypotheses, with the facts that are stated.
         decides
             Whether a posterior names something.
 
         Returns
         -------
         dict
-            By the name of each fact that is not told yet and has no date; a fact that is
+            By the name of each fact that is not stated yet and has no date; a fact that is
             not so counts as what the effects say that it denies.
         """
         known = {each.fact.name for each in self.told}
@@ -139,7 +139,7 @@ class Facts:
                 continue
             so = [
                 {
-                    names: self._so(Told(Fact(name, value), None, 0), one.hypothesis)[0]
+                    names: self._so(StatedFact(Fact(name, value), None, 0), one.hypothesis)[0]
                     for names, one in posterior.best.items()
                     if names in posterior.probability
                 }
@@ -150,7 +150,7 @@ class Facts:
             found[name] = math.fsum(_decided(posterior, each, decides) for each in so)
         return found
 
-    def _so(self, told: Told, hypothesis: Hypothesis) -> tuple[float, Fact]:
+    def _so(self, told: StatedFact, hypothesis: Hypothesis) -> tuple[float, Fact]:
         """Return how probable it is that a fact is so under a hypothesis, and the fact."""
         name = told.fact.name
         effects = [
@@ -198,20 +198,20 @@ def told_of(
     """
     first_ns = runs[0][1] if runs else 0
     above = {fact.name for fact in everywhere}
-    told = [Told(fact, None, first_ns) for fact in everywhere]
+    told = [StatedFact(fact, None, first_ns) for fact in everywhere]
     own = {fact.name for facts, _ in runs for fact in facts}
     for fact in ship.facts:
         if fact.name not in above | own:
-            told.append(Told(fact, None, first_ns))
+            told.append(StatedFact(fact, None, first_ns))
     for j, (facts, time_ns) in enumerate(runs):
         of_ship = [fact for fact in ship.facts if fact.name in own]
         for fact in overriding(of_ship, facts):
             if fact.name not in above:
-                told.append(Told(fact, j, time_ns))
+                told.append(StatedFact(fact, j, time_ns))
     return Facts(ship, tuple(told))
 
 
-def _goes_with(effect: Effect, told: Told) -> float:
+def _goes_with(effect: Effect, told: StatedFact) -> float:
     """Return how probable a fact is where an effect is there that it speaks about."""
     said, since_ns = effect.facts[told.fact.name], told.fact.time_ns
     if since_ns is None:
@@ -222,12 +222,12 @@ def _goes_with(effect: Effect, told: Told) -> float:
 
 
 def _told_wrongly(fact: Fact) -> float:
-    """Return how probable it is that it is told although it is not so."""
+    """Return how probable it is that it is stated although it is not so."""
     return fact.rate / max(len(KNOWN[fact.name].values) - 1, 1)
 
 
 def _likelihood(so: float, fact: Fact) -> float:
-    """Return how probable it is that a fact is told."""
+    """Return how probable it is that a fact is stated."""
     return so * (1.0 - fact.rate) + (1.0 - so) * _told_wrongly(fact)
 
 

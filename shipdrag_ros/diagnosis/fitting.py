@@ -82,7 +82,7 @@ def fit(
     starts
         (p,) each, as `Linear.z`.
     progress
-        Told how many are fitted.
+        Called with how many are fitted.
     stage
         What they are, for it.
 
@@ -150,7 +150,7 @@ class _FitState:
 
     def lost(self, cost: float, hopeless: float) -> bool:
         """
-        Tell whether it is far behind another one, and hardly comes nearer.
+        Say whether it is far behind another one, and hardly comes nearer.
         """
         behind = self.cost - cost
         return behind > hopeless and self.fallen < _NEARER * behind

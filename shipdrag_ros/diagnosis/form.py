@@ -5,7 +5,7 @@ What coastdowns of a ship without a stated baseline can still show.
 A form of the resistance, -dv/dt = (a v + b v |v|) (1 + a small, smooth shape), is
 fitted to the runs themselves. What has that form is then part of the baseline
 and cannot be seen: fouling, propellers, cables. A constant part can, but one run
-cannot tell whether it is a force or a speed; runs on other headings tell what
+cannot say whether it is a force or a speed; runs on other headings show what
 turns with the Earth. No single force is ever named.
 """
 
@@ -24,7 +24,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.diagnosis.direct import DirectModel, diagnosis_of_speeds, learn_factor
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
-from shipdrag_ros.diagnosis.result import FORCE, Diagnosis, Where
+from shipdrag_ros.diagnosis.result import FORCE, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.search import search
 from shipdrag_ros.diagnosis.speeds import CoastRun, MeanSpeeds
 from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
@@ -44,7 +44,7 @@ _OFFSET_SD, _SPLINE_SD, _SPLINES = 0.1, 0.05, 6  # of the reading, relative to t
 _WIDE = 3.0  # prior widths while noise is learnt
 _SD_OF_LOG_NOISE = np.array([1.5, 1.0])
 _EVALUATIONS = 80
-_APART_RAD = 0.5  # between headings of runs, from which they tell what turns with the Earth
+_APART_RAD = 0.5  # between headings of runs, from which they show what turns with the Earth
 _NOTHING, _ONE, _UNNAMED = 0.5, 0.42, 0.08  # probabilities before the data
 _SWINGS_RAD = 0.2
 
@@ -256,9 +256,9 @@ class FormModel(DirectModel):
         return Frame(self.ship, Scenario(speed_m_s=self._top_m_s), self.seen[0].heading_rad)
 
 
-def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> Diagnosis:
+def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> DiagnosisResult:
     """
-    Tell what is missing in a resistance that is fitted to the runs.
+    Say what is missing in a resistance that is fitted to the runs.
 
     Parameters
     ----------

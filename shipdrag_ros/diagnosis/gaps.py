@@ -11,8 +11,8 @@ import numpy as np
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, start
-from shipdrag_ros.diagnosis.observation import Measured
 from shipdrag_ros.diagnosis.result import Compared, Gap, RunTrace, Where
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
@@ -20,7 +20,7 @@ from shipdrag_ros.samples import Float64
 
 _PARTS = 12  # of a coastdown, in telling where a gap is
 _SHARE = 0.9  # of the excess, between the ends of where it is
-_EVEN_NATS = 3.0  # of evidence by which two channels are not told apart
+_EVEN_NATS = 3.0  # of evidence by which two channels are not separated
 _ROUNDS = 3
 _ACROSS = 'position_across'
 
@@ -84,7 +84,7 @@ def frozen(model: CoastModel) -> Fit:
 
 def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
     """
-    Predict each run from the others, and tell how far off that is.
+    Predict each run from the others, and show how far off that is.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
 
     Notes
     -----
-    What the other runs do not tell is allowed for: chi^2 is of residuals whose
+    What the other runs do not show is allowed for: chi^2 is of residuals whose
     covariance holds that of the prediction. A run with an effect that is its own
     cannot be predicted; None where that is so of all.
     """
@@ -127,7 +127,7 @@ def held_out(model: CoastModel, found: Fit | None) -> Gap | None:
 
 
 def _has_its_own(hypothesis: Hypothesis, run: int) -> bool:
-    """Tell whether an effect acts in a run that says nothing of the others."""
+    """Say whether an effect acts in a run that says nothing of the others."""
     return any(
         (term.of_single_run or term.sizes > 1) and term.acts_in(run)
         for term in hypothesis.terms

@@ -3,7 +3,7 @@
 The baseline that clean runs show, and how far single runs depart from it.
 
 A baseline from a towing tank is often worse than it says, which two runs cannot
-show; several clean runs can, and how they differ from each other tells what a
+show; several clean runs can, and how they differ from each other shows what a
 further run may do without anything being missing.
 """
 
@@ -24,8 +24,8 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Baseline, CoefficientBaseline, CoefficientSd, Ship, TableBaseline
 
-ENOUGH = 3  # runs that tell their scatter
-_ASKED = 5  # from which it is told well
+ENOUGH = 3  # runs that show their scatter
+_ASKED = 5  # from which it is well known
 _FORM_SD = 0.05  # of a baseline of which nothing is stated
 _FORM_POINTS = 12
 _MARGIN = 1.1  # above the highest speed
@@ -285,11 +285,11 @@ def _warnings(runs: Sequence[CleanRun], ship: Ship, problem: SharedBaseline) -> 
         if ship.baseline is None:
             holds = f'a relative_sd of {_FORM_SD:g} is stated'
         found.append(
-            f'{len(runs)} run(s) do not tell how runs differ: {holds}; with {_ASKED} runs their '
+            f'{len(runs)} run(s) do not show how runs differ: {holds}; with {_ASKED} runs their '
             'scatter replaces it'
         )
     elif len(runs) < _ASKED:
-        found.append(f'{len(runs)} runs tell their scatter roughly; {_ASKED} tell it well')
+        found.append(f'{len(runs)} runs show their scatter roughly; {_ASKED} show it well')
     if len(runs) >= ENOUGH:
         limit = float(student.isf(0.5 * _STANDS_OUT / len(runs), len(runs) - 2))
         worst = max(runs, key=lambda run: abs(run.factor.away))

@@ -239,7 +239,7 @@ class Model(Linearised, Protocol):
     effects
         That may be missing.
     inseparable
-        Pairs of names, or larger sets, that no record of this kind tells apart.
+        Pairs of names, or larger sets, that no record of this kind separates.
     nothing
         The hypothesis that nothing is missing.
     channels

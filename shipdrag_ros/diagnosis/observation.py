@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A run as a diagnosis sees it: condensed rows of measurements, and their noise.
+A run as a diagnosis sees it: condensed rows of measurements, and what is known of it.
 
 Rows are means over times in which the motion is as good as even, so that a few
-hundred hold all that a run can tell. The noise is that of the steady record
-before the stop, colour included: what a coastdown leaves over a fit would hold
-the very effect that is sought.
+hundred hold all that a run can show.
 """
 
 from __future__ import annotations
@@ -19,56 +17,27 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from shipdrag_ros.diagnosis.context import Context, Stop
+from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, SteadyNoise
 from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.window import Series, Window
-from shipdrag_ros.inference.learning import learn, of_steady
-from shipdrag_ros.inference.noise import WHITE, Noise, whiten
-from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, Rows, bin_means
-from shipdrag_ros.inference.settings import noise_of
+from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, bin_means
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 _STEADY_BIN_S = 30.0
 _FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
 _LEAST_LONGEST_S, _BINS = 12.0, 80.0  # the longest bin is at least this, or this part of all
-_NEIGHBOURS = 9  # an outlier is told from the median of so many
+_NEIGHBOURS = 9  # an outlier is found by the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
 _LEAST_ROWS = 8
 _KNOWN_S = 5.0  # of the time of the stop
 _DISCREPANCY_M_S = 0.15  # six times what is usual
-
-
-@dataclass(frozen=True)
-class Measured:
-    """
-    Rows along one direction, in ascending time.
-
-    Attributes
-    ----------
-    at : (n,)
-        Places of the rows in the times of the observation.
-    rows
-        `POSITION` rows are distances along the direction [m].
-    whitener : (n, n)
-        Inverse Cholesky factor of the noise covariance.
-    water_m_s
-        Slow motion of the water that the whitener takes for noise: by how much
-        log and way over ground wander apart in the steady record.
-    """
-
-    at: Int64
-    rows: Rows
-    whitener: Float64
-    water_m_s: float
-
-    def __len__(self) -> int:
-        return len(self.at)
 
 
 @dataclass(frozen=True)
@@ -165,11 +134,11 @@ class Observation:
             If no input has enough samples.
         """
         run_down = RunDown.of(window, ship)
-        record = Record.of(window, run_down, parameters)
+        record = RunRows.of(window, run_down, parameters)
         if record.steady_s < LEAST_S or window.before is None:
             raise DiagnosisError(
                 f'{record.steady_s:.0f} s of steady sailing before the stop, at least '
-                f'{LEAST_S:.0f} s are needed to tell an effect from the noise: give a record '
+                f'{LEAST_S:.0f} s are needed to separate an effect from the noise: give a record '
                 'that begins earlier'
             )
         if run_down.stop_sd_s > _KNOWN_S:
@@ -190,7 +159,7 @@ class Observation:
         parts, across = _condensed_all(series, seconds, edges, record.white_sd, heading_rad)
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
-        learnt = _Learner(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
+        noise = SteadyNoise(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
         return cls(
             name,
             lead_in_s,
@@ -201,94 +170,14 @@ class Observation:
             heading_rad,
             heading_sd,
             speed,
-            learnt.measured(parts, times),
-            learnt.measured(across, times) if across else None,
+            noise.measured(parts, times),
+            noise.measured(across, times) if across else None,
             Context.of(window, ship, times, Stop(since_ns, lead_in_s, heading_rad, speed)),
             replace(ship, effects=()),
         )
 
 
-@dataclass(frozen=True)
-class _CondensedRows:
-    """Condensed rows of one kind."""
-
-    time_s: Float64
-    kind: int
-    value: Float64
-    variance: Float64
-
-
-@dataclass(frozen=True)
-class _Learner:
-    """What is needed to learn the noise of rows from their steady part."""
-
-    ship: Ship
-    speed_m_s: float
-    lead_in_s: float
-    margin_s: float
-
-    def measured(self, parts: list[_CondensedRows], times: Float64) -> Measured:
-        """Put parts in the order of time, and learn their disturbances."""
-        time = np.concatenate([part.time_s for part in parts])
-        order = np.argsort(time, kind='stable')
-        kind = np.concatenate([np.full(len(part.time_s), part.kind) for part in parts])[order]
-        value = np.concatenate([part.value for part in parts])[order]
-        variance = np.concatenate([part.variance for part in parts])[order]
-        time = time[order]
-        rows = Rows(time, kind.astype(np.int64), value)
-        steady = time < self.lead_in_s - self.margin_s
-        damping, inertia = damping_of(self.ship, np.array([self.speed_m_s]))
-        seen = of_steady(
-            Rows(time[steady], rows.kind[steady], value[steady]),
-            variance[steady],
-            float(damping[0]),
-            float(inertia[0]),
-        )
-        # the engine damps the steady record; behind the stop the hull does
-        learnt = learn(seen, self.speed_m_s).typical
-        # the ship slows down about as v0 / (1 + t / t0)
-        after = np.maximum(time - self.lead_in_s, 0.0)
-        speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
-        whitener = np.eye(len(time))
-        white = Noise(variance, WHITE, *damping_of(self.ship, speed))
-        noise = noise_of(learnt, 0, rows, white, int(np.searchsorted(time, self.lead_in_s)))
-        whiten(rows, whitener, noise)
-        return Measured(
-            np.searchsorted(times, time),
-            rows,
-            np.ascontiguousarray(whitener.T),
-            # without a log it is not told from a gust
-            noise.slow.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
-        )
-
-
-def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:
-    """
-    Return how a ship's speed answers a small force.
-
-    Parameters
-    ----------
-    ship
-        With a baseline.
-    speed_m_s : (n,)
-        Through water.
-
-    Returns
-    -------
-    damping_1_s, inertia : (n,)
-        dr/dv / (1 + n_r) and 1 + n_r of the baseline.
-    """
-    low, high = ship.baseline_range_m_s
-    speed = np.clip(speed_m_s, max(low, 1e-3 * high), high)
-    step = 1e-3 * speed
-    above, below = np.minimum(speed + step, high), np.maximum(speed - step, low)
-    rise = ship.resistance_n(above) - ship.resistance_n(below)
-    inertia = 1.0 + ship.n_r(speed)
-    damping = np.maximum(rise / (above - below), 0.0) / (ship.mass_kg * inertia)
-    return np.maximum(damping, 1e-6), inertia
-
-
-def _stopped(window: Window, run_down: RunDown, record: Record) -> RunDown:
+def _stopped(window: Window, run_down: RunDown, record: RunRows) -> RunDown:
     """Move the stop to where the speed begins to fall, if there is a speed."""
     assert window.before is not None
     for input_ in ('speed_through_water', 'speed_over_ground'):
@@ -326,7 +215,7 @@ def _edges(lead_in_s: float, end_s: float) -> Float64:
 
 
 def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
-    """Tell what does not stand out from its neighbours."""
+    """Say what does not stand out from its neighbours."""
     away = np.abs(value - median_filter(value, _NEIGHBOURS, mode='nearest'))
     keep: NDArray[np.bool_] = away <= _OUTLIER * max(sd, float(np.median(away)))
     return keep
@@ -334,9 +223,9 @@ def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
 
 def _condensed(
     time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int
-) -> _CondensedRows:
+) -> CondensedRows:
     when, mean, count = bin_means(time_s, value, edges)
-    return _CondensedRows(when, kind, mean, sd**2 / count)
+    return CondensedRows(when, kind, mean, sd**2 / count)
 
 
 def _condensed_all(
@@ -345,11 +234,11 @@ def _condensed_all(
     edges: Float64,
     white_sd: Mapping[str, float],
     heading_rad: float,
-) -> tuple[list[_CondensedRows], list[_CondensedRows]]:
+) -> tuple[list[CondensedRows], list[CondensedRows]]:
     """Return the rows along the heading, and those to port of it."""
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
-    along: list[_CondensedRows] = []
-    across: list[_CondensedRows] = []
+    along: list[CondensedRows] = []
+    across: list[CondensedRows] = []
     for input_, found in series.items():
         sd, time = white_sd[input_], seconds[input_]
         if input_ != 'position':
@@ -388,7 +277,7 @@ def _heading(
     return math.atan2(slopes[1], slopes[0]), _COURSE_SD_RAD
 
 
-def _speed(parts: list[_CondensedRows], lead_in_s: float) -> float:
+def _speed(parts: list[CondensedRows], lead_in_s: float) -> float:
     for part in sorted(parts, key=lambda part: part.kind):
         steady = part.time_s < lead_in_s
         if steady.sum() < _LEAST_ROWS:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What a measurement that is yet to be made would tell apart.
+What a measurement that is yet to be made would separate.
 
 Each rival predicts it from the posterior given the existing runs; outcomes are
 drawn under each in turn, and the verdict on every one of them is found as it
@@ -19,8 +19,9 @@ import numpy as np
 from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, RunNuisance, SpeedErrorTerm, Term
 from shipdrag_ros.diagnosis.context import Context
 from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.model import Hypothesis
-from shipdrag_ros.diagnosis.observation import Measured, Observation
+from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.posterior import Posterior, prune_by_bayes_factor
 from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
@@ -195,7 +196,7 @@ def with_known(
     sd: Mapping[str, Sequence[float]],
 ) -> list[list[PredictedOutcome]]:
     """
-    Return the same where a measurement tells some unknowns directly.
+    Return the same where a measurement shows some unknowns directly.
 
     Parameters
     ----------
@@ -204,13 +205,13 @@ def with_known(
     fits
         Of the hypotheses.
     sd
-        By the name of an unknown of the baseline or of a run, one a run; 0: tells
+        By the name of an unknown of the baseline or of a run, one a run; 0: shows
         nothing.
 
     Returns
     -------
     list of list
-        With one row more for each unknown that is told.
+        With one row more for each unknown that is shown.
     """
     found = []
     for ways, one in zip(outcomes, fits, strict=True):
@@ -260,7 +261,7 @@ def probability_of_naming(
     rivals
         Nothing among them.
     inseparable
-        Effects that no record can tell apart.
+        Effects that no record can separate.
 
     Returns
     -------

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from shipdrag_ros.diagnosis import Diagnosis, pictures, tables, words
+from shipdrag_ros.diagnosis import DiagnosisResult, pictures, tables, words
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.display import LIGHT_KG, TRACK_LABELS, Picture, Section, Table, utc
 from shipdrag_ros.estimation import tables as estimate_tables
@@ -21,7 +21,7 @@ from shipdrag_ros.simulation.effects import LIBRARY
 
 def write_diagnosis(
     path: Path,
-    found: Diagnosis,
+    found: DiagnosisResult,
     ship: Ship | None,
     *,
     score: Score | None,
@@ -59,8 +59,8 @@ def write_diagnosis(
     )
 
 
-def _verdict(found: Diagnosis, ship: Ship | None) -> Iterator[Section]:
-    """Tell the verdict, what the ship needs, and what would decide."""
+def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
+    """Show the verdict, what the ship needs, and what would decide."""
     sentence, *rest = found.summary()
     needs = () if ship is None else in_service(found.estimates, ship)
     yield Section(
@@ -70,7 +70,7 @@ def _verdict(found: Diagnosis, ship: Ship | None) -> Iterator[Section]:
             picture(
                 pictures.probability_picture(words.answers(found)),
                 'How probable each answer is. One long bar is a name; several of like length are '
-                'what these runs cannot tell apart.',
+                'what these runs cannot separate.',
             )
         ],
     )
@@ -82,7 +82,7 @@ def _verdict(found: Diagnosis, ship: Ship | None) -> Iterator[Section]:
 
 
 def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section]:
-    """Tell the resistance that was measured, over that of the clean hull."""
+    """Show the resistance that was measured, over that of the clean hull."""
     usable = [each for each in estimates if len(each.valid_curve)]
     if ship is None or not usable:
         return
@@ -115,8 +115,8 @@ def _today(ship: Ship | None, estimates: Sequence[Estimate]) -> Iterator[Section
     )
 
 
-def _sizes(found: Diagnosis) -> Iterator[Section]:
-    """Tell how large the effects are, in the units of the ship file."""
+def _sizes(found: DiagnosisResult) -> Iterator[Section]:
+    """Show how large the effects are, in the units of the ship file."""
     shown = found.effects or tuple(each for one in found.candidates for each in one.effects)
     if not shown:
         return
@@ -130,7 +130,7 @@ def _sizes(found: Diagnosis) -> Iterator[Section]:
     )
 
 
-def _motions(found: Diagnosis, ship: Ship | None) -> Section:
+def _motions(found: DiagnosisResult, ship: Ship | None) -> Section:
     after, mass = words.added(found), _mass(ship)
     drawn = [
         picture(
@@ -154,7 +154,7 @@ def _motions(found: Diagnosis, ship: Ship | None) -> Section:
     )
 
 
-def _left(found: Diagnosis, ship: Ship | None) -> Iterator[Section]:
+def _left(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
     """Show what each model leaves."""
     if not found.traces:
         return
@@ -171,7 +171,7 @@ def _left(found: Diagnosis, ship: Ship | None) -> Iterator[Section]:
     yield Section('What is left', pictures=drawn)
 
 
-def _known(found: Diagnosis, ship: Ship | None) -> Section:
+def _known(found: DiagnosisResult, ship: Ship | None) -> Section:
     shown: list[tuple[str, Table]] = []
     text = []
     if found.traces:

@@ -140,7 +140,7 @@ def prune_by_bayes_factor(
 
 def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
     """
-    Return names, and what tells a mode apart from others of the same names.
+    Return names, and what separates a mode from others of the same names.
 
     Parameters
     ----------

@@ -115,7 +115,7 @@ class ToldFact:
     ----------
     fact
     run
-        Its name; '' where the fact is told of all runs.
+        Its name; '' where the fact is stated of all runs.
     wrong
         Probability that the fact is wrong; None: it says nothing about what was
         examined.
@@ -228,7 +228,7 @@ class RunTrace:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class DiagnosisResult:
     """
     The result.
 
@@ -267,7 +267,7 @@ class Diagnosis:
     estimates
         r(v) of the coastdowns as measured, where they were estimated.
     facts
-        All that were told, with what the data say of each.
+        All that were stated, with what the data say of each.
     runs_differ
         Where one state of the hull does not fit all runs: the size in each. The
         effects above have that of the last run.
@@ -304,7 +304,7 @@ class Diagnosis:
         tuple of str
             A paragraph each; the verdict first, where there is a coastdown.
         """
-        from shipdrag_ros.diagnosis import words  # it tells what this module holds
+        from shipdrag_ros.diagnosis import words  # it shows what this module holds
 
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
         first = (self.no_coastdown, words.sentence(self), words.differing(self))

@@ -3,7 +3,7 @@
 Sensor effects and current from any sailing, without a coastdown.
 
 The log is held against the way made good over ground, on many courses and at
-many speeds. No baseline is needed, and no force can be told.
+many speeds. No baseline is needed, and no force can be seen.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from shipdrag_ros.diagnosis.direct import diagnosis_of_speeds
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
-from shipdrag_ros.diagnosis.result import LOG_TRACK, Diagnosis, Where
+from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
 from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
 from shipdrag_ros.diagnosis.units import asked
@@ -38,7 +38,7 @@ def diagnose_sailing(
     parameters: Parameters,
     *,
     no_coastdown: str = 'No coastdown is used.',
-) -> Diagnosis:
+) -> DiagnosisResult:
     """
     Name what is wrong between log and way over ground.
 
@@ -73,7 +73,7 @@ def diagnose_sailing(
     return with_zeros(replace(found, notes=(units, *found.notes)) if units else found, still)
 
 
-def _diagnosed(legs: Legs, no_coastdown: str) -> Diagnosis:
+def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
     """Diagnose legs on which the log turns."""
     model = SailingModel.learnt(legs)
     # legs that no effect and no noise explains
@@ -109,7 +109,7 @@ def _where(model: SailingModel, best: Fit) -> Where:
 
 
 def _about(model: SailingModel, outliers: int) -> list[str]:
-    """Tell what was used."""
+    """Say what was used."""
     legs = model.legs
     found = [
         f'log and way over ground are compared on {len(legs)} legs of {legs.length_s:.0f} s, '
@@ -131,7 +131,7 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
 
 
 def _why(model: SailingModel, found: SearchResult) -> list[str]:
-    """Tell why it is this and none of the others."""
+    """Say why it is this and none of the others."""
     legs, best, names = model.legs, found.best, found.best.hypothesis.names
     told = [f'log over ground: {_by_speed(legs)}']
     action = model.action(best.hypothesis, best.best.z)

@@ -117,7 +117,7 @@ class SailingModel(DirectModel):
 
     @cached_property
     def inseparable(self) -> tuple[frozenset[str], ...]:
-        """Confounders that no sailing, or none of which the courses are unknown, tells apart."""
+        """Confounders that no sailing, or none of which the courses are unknown, separates."""
         measured = [Measure.OTHER_SPEED]
         if self.legs.direction is not Direction.UNKNOWN:
             measured += [Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE]
@@ -125,7 +125,7 @@ class SailingModel(DirectModel):
 
     @cached_property
     def together(self) -> tuple[Effect, ...]:
-        """As many effects as sailing tells apart."""
+        """As many effects as sailing separates."""
         found: list[Effect] = []
         sets = inseparable(self.effects, measured=_SAILED)
         for effect in self.effects:

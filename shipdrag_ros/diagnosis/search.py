@@ -87,7 +87,7 @@ def search(model: Model, *, progress: Progress = silent) -> SearchResult:
     model
         With the record that it is held against.
     progress
-        Told how many hypotheses are fitted.
+        Called with how many hypotheses are fitted.
 
     Returns
     -------
@@ -109,14 +109,14 @@ def with_pairs(found: SearchResult, *, progress: Progress = silent) -> SearchRes
     Fit pairs of effects besides, where something is missing.
 
     Pairs are of the most probable names with all others; confounders that nothing
-    tells apart are no pair.
+    separates are no pair.
 
     Parameters
     ----------
     found
         From `search`.
     progress
-        Told how many pairs are fitted.
+        Called with how many pairs are fitted.
 
     Returns
     -------

@@ -36,7 +36,7 @@ _SCATTERS = np.geomspace(1e-4, 1.0, 81)  # of the factors, that are tried
 @dataclass(frozen=True)
 class Normal:
     """
-    What a run tells, as normal equations about some point.
+    What a run shows, as normal equations about some point.
 
     Attributes
     ----------
@@ -358,7 +358,7 @@ def _opened(ship: Ship) -> Ship:
 
 
 def _normal(fitted: Fit, run: int, shared: list[int]) -> Normal:
-    """Return what a run tells of the shared unknowns, whatever its place and speed."""
+    """Return what a run shows of the shared unknowns, whatever its place and speed."""
     best = fitted.best
     table, unknowns = best.tables[run], best.hypothesis.unknowns
     own = [

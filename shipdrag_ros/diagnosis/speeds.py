@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the speed alone tells of a coastdown: its means over short times, and when it began."""
+"""What the speed alone shows of a coastdown: its means over short times, and when it began."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class MeanSpeeds:
 
 def stop_time_s(time_s: Float64, speed_m_s: Float64, *, sd_m_s: float, run_down_s: float) -> float:
     """
-    Return when the engine stopped, from the speed alone; 0 where that cannot be told.
+    Return when the engine stopped, from the speed alone; 0 where that cannot be seen.
 
     A diagnosis moves the stop by little steps about where it was taken to be, which
     serves for some seconds; an onset found without the shaft is off by more.

@@ -21,8 +21,9 @@ from scipy.special import logsumexp
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import Predicted
 from shipdrag_ros.diagnosis.fitting import Fit, fit
+from shipdrag_ros.diagnosis.measured import damping_of
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, start
-from shipdrag_ros.diagnosis.observation import Observation, damping_of
+from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.inference.noise import apply
 from shipdrag_ros.inference.rows import POSITION
@@ -152,7 +153,7 @@ def with_swinging(found: SearchResult, model: CoastModel) -> SearchResult:
 
 def swing_notes(found: Fit, model: CoastModel) -> tuple[str, ...]:
     """
-    Tell how a force swings in each run; nothing where none does.
+    Say how a force swings in each run; nothing where none does.
 
     Parameters
     ----------
@@ -242,7 +243,7 @@ def swung(
 
 
 def _periods_s(longest_s: float, *, apart_s: float) -> Float64:
-    """Return periods up to the length of a run, that one of another length can tell apart."""
+    """Return periods up to the length of a run, that one of another length can separate."""
     slowest = 1.0 / min(_LONGEST_S, longest_s)
     frequency = np.arange(slowest, 1.0 / _SHORTEST_S, _APART / apart_s)
     return 1.0 / np.append(frequency, 1.0 / _SHORTEST_S)

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipdrag_ros.diagnosis import Compared, Diagnosis, EffectEstimate, RunTrace
+from shipdrag_ros.diagnosis import Compared, DiagnosisResult, EffectEstimate, RunTrace
 from shipdrag_ros.diagnosis import words as words
 from shipdrag_ros.display import TRACK_LABELS, Table, plus_minus
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.simulation.effects import LIBRARY
 
 
-def probabilities(found: Diagnosis) -> Table:
+def probabilities(found: DiagnosisResult) -> Table:
     """
     Show how probable each answer is.
     """
@@ -37,7 +37,7 @@ def parameters(effects: Sequence[EffectEstimate]) -> Table:
     return Table(('effect', 'parameter', 'value', 'sd', 'meaning'), tuple(rows))
 
 
-def sizes(found: Diagnosis) -> Table:
+def sizes(found: DiagnosisResult) -> Table:
     """
     Show how large each candidate would be, were it the one.
     """
@@ -61,9 +61,9 @@ def _parameter(quantity: Parameter, effect: EffectEstimate) -> tuple[str, ...]:
     return quantity.name, value, sd, quantity.meaning
 
 
-def facts(found: Diagnosis) -> Table:
+def facts(found: DiagnosisResult) -> Table:
     """
-    Show the facts that were told, and how probable it is that each is wrong.
+    Show the facts that were stated, and how probable it is that each is wrong.
     """
     rows = [
         (
@@ -77,7 +77,7 @@ def facts(found: Diagnosis) -> Table:
     return Table(('fact', 'of run', 'says', 'wrong with probability'), tuple(rows))
 
 
-def gaps(found: Diagnosis) -> Table:
+def gaps(found: DiagnosisResult) -> Table:
     """
     Show how far model and data are apart.
     """

@@ -112,7 +112,7 @@ class EffectTerm:
         return () if self.stated or self.sizes > 1 or len(found) < 2 else found
 
     def acts_in(self, run: int) -> bool:
-        """Tell whether it does anything in a run."""
+        """Say whether it does anything in a run."""
         return self.only_run is None or self.only_run == run
 
     def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:

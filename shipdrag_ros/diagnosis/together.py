@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shipdrag_ros.diagnosis.result import Diagnosis, Verdict
+from shipdrag_ros.diagnosis.result import DiagnosisResult, Verdict
 from shipdrag_ros.diagnosis.words import names_text, probability, sentence
 
 
-def with_log_track(force: Diagnosis, log_track: Diagnosis) -> Diagnosis:
+def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> DiagnosisResult:
     """
     Join what coastdowns show of the force with what log and track show.
 
@@ -48,7 +48,7 @@ def with_log_track(force: Diagnosis, log_track: Diagnosis) -> Diagnosis:
     )
 
 
-def _besides(force: Diagnosis) -> str:
+def _besides(force: DiagnosisResult) -> str:
     """Say what the force shows besides."""
     if force.verdict is Verdict.UNKNOWN:
         return f'in the force besides: {sentence(force)}'

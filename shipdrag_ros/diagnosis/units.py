@@ -6,16 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.display import UNIT_RATIOS
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
 
-_RATIOS = {
-    3600.0 / 1852.0: 'knots over m/s',
-    1852.0 / 3600.0: 'm/s over knots',
-    3.6: 'km/h over m/s',
-    1.0 / 3.6: 'm/s over km/h',
-    1.852: 'km/h over knots',
-    1.0 / 1.852: 'knots over km/h',
-}
 _NEAR = 0.03  # relative
 
 
@@ -35,12 +28,12 @@ def asked(ratio: float) -> str:
     """
     if not ratio > 0.0:
         return ''
-    near = min(_RATIOS, key=lambda each: abs(np.log(ratio / each)))
+    near = min(UNIT_RATIOS, key=lambda each: abs(np.log(ratio / each)))
     if abs(ratio / near - 1.0) > _NEAR:
         return ''
     return (
-        f'the log reads {ratio:.2f} times the way over ground, which is {_RATIOS[near]}: is the '
-        'unit of one of them wrong? Import it again with its unit, as in '
+        f'the log reads {ratio:.2f} times the way over ground, which is {UNIT_RATIOS[near]}: is '
+        'the unit of one of them wrong? Import it again with its unit, as in '
         '--map speed_through_water=COLUMN:kn'
     )
 

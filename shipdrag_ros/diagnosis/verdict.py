@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-From a posterior to a verdict: a name only where the data can tell.
+From a posterior to a verdict: a name only where the data decide.
 
 Evidence names; a smooth discrepancy that a name does not explain takes the name
-back; what nothing in a record can tell apart stays a set.
+back; what nothing in a record can separate stays a set.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
-from shipdrag_ros.diagnosis.result import Candidate, Diagnosis, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.parameter import Parameter
@@ -60,16 +60,16 @@ class Judgement:
         fit = self.found.best
         return sized(fit, self.posterior.probability[fit.hypothesis.names])
 
-    def diagnosis(self, **rest: Any) -> Diagnosis:
+    def diagnosis(self, **rest: Any) -> DiagnosisResult:
         """
         Return the result.
 
         Parameters
         ----------
         **rest
-            What the verdict does not tell, as in `Diagnosis`.
+            What the verdict does not show, as in `DiagnosisResult`.
         """
-        return Diagnosis(
+        return DiagnosisResult(
             verdict=self.verdict,
             effects=self.best if self.verdict is Verdict.NAMED else (),
             candidates=self.candidates,
@@ -159,7 +159,7 @@ def sized(fit: Fit, probability: float) -> tuple[EffectEstimate, ...]:
 
 def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:
     """
-    Tell whether a hypothesis leaves more than noise.
+    Say whether a hypothesis leaves more than noise.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:
 
 def outside_prior(fit: Fit) -> bool:
     """
-    Tell whether a shape parameter of an effect lies beyond 2.5 prior sd.
+    Say whether a shape parameter of an effect lies beyond 2.5 prior sd.
 
     However large it is, a turn that hardly changes the heading, or is over in some
     seconds, is something else. Sizes, and components of one, are no shape.
@@ -207,7 +207,7 @@ def outside_prior(fit: Fit) -> bool:
 
 def exceeds_noise(chi2_per_row: float, rows: int) -> bool:
     """
-    Tell whether what is left is more than noise, as well as that is known.
+    Say whether what is left is more than noise, as well as that is known.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def decide(
     lacking
         Something is left that no name explains.
     inseparable
-        Effects that no record can tell apart.
+        Effects that no record can separate.
 
     Returns
     -------

@@ -6,7 +6,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from shipdrag_ros.diagnosis import FORCE, LOG_TRACK, Candidate, Diagnosis, EffectEstimate, Verdict
+from shipdrag_ros.diagnosis import (
+    FORCE,
+    LOG_TRACK,
+    Candidate,
+    DiagnosisResult,
+    EffectEstimate,
+    Verdict,
+)
 from shipdrag_ros.display import M_S_PER_KNOT, plus_minus
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
@@ -15,17 +22,17 @@ from shipdrag_ros.simulation.effects import LIBRARY
 _CHANNELS = {
     'log': 'in the speed log',
     'radar': 'in radar or GNSS',
-    'log_radar': 'between log and radar, which of them cannot be told',
+    'log_radar': 'between log and radar, which of the two is not known',
     'force': 'in the force on the ship',
 }
 NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
-_LEAST = 0.001  # probability that is told
+_LEAST = 0.001  # probability that is stated
 _WORTH_A_WORD = 0.01
-_LARGE_N = 1e4  # from here on a force is told in kN
+_LARGE_N = 1e4  # from here on a force is stated in kN
 
 
-def sentence(found: Diagnosis) -> str:
+def sentence(found: DiagnosisResult) -> str:
     """
     Return the verdict in a sentence.
     """
@@ -70,8 +77,8 @@ def sentence(found: Diagnosis) -> str:
             unnamed = f', or {UNNAMED} ({probability(found.unnamed)})'
             return (
                 f'Missing is one of these: {_listed(found.candidates)}'
-                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot tell '
-                'them apart.'
+                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot separate '
+                'them.'
             )
         case Verdict.UNKNOWN:
             first = found.candidates[0]
@@ -81,7 +88,7 @@ def sentence(found: Diagnosis) -> str:
             return f'Something is missing that is none of the known effects, {place(found)}.{why}'
 
 
-def differing(found: Diagnosis) -> str:
+def differing(found: DiagnosisResult) -> str:
     """
     Say how the runs differ; '' where one state of the hull fits all.
     """
@@ -99,7 +106,7 @@ def differing(found: Diagnosis) -> str:
     )
 
 
-def examined(found: Diagnosis) -> str:
+def examined(found: DiagnosisResult) -> str:
     """
     Say what was examined, and what was not.
     """
@@ -110,7 +117,7 @@ def examined(found: Diagnosis) -> str:
     return f'{said}; not examined: {" and ".join(unseen)}.' if unseen else f'{said}.'
 
 
-def facts(found: Diagnosis) -> list[str]:
+def facts(found: DiagnosisResult) -> list[str]:
     """
     Say which facts the data contradict, and which say nothing here, a line each.
     """
@@ -131,7 +138,7 @@ def facts(found: Diagnosis) -> list[str]:
     return told
 
 
-def advice(found: Diagnosis) -> list[str]:
+def advice(found: DiagnosisResult) -> list[str]:
     """
     Return what would decide, a line each.
     """
@@ -147,7 +154,7 @@ def advice(found: Diagnosis) -> list[str]:
     ]
 
 
-def place(found: Diagnosis) -> str:
+def place(found: DiagnosisResult) -> str:
     """
     Say where model and data disagree.
     """
@@ -165,7 +172,7 @@ def place(found: Diagnosis) -> str:
     )
 
 
-def model(found: Diagnosis) -> str:
+def model(found: DiagnosisResult) -> str:
     """
     Say what the runs were held against.
     """
@@ -178,16 +185,16 @@ def model(found: Diagnosis) -> str:
             return 'model as stated'
 
 
-def of_log_track(found: Diagnosis) -> bool:
+def of_log_track(found: DiagnosisResult) -> bool:
     """
-    Tell whether the answer rests on the log against the way over ground alone.
+    Say whether the answer rests on the log against the way over ground alone.
     """
     if found.baseline == 'fitted_here':
         return found.where is not None and found.where.channel != FORCE
     return found.baseline == 'none'
 
 
-def added(found: Diagnosis) -> str:
+def added(found: DiagnosisResult) -> str:
     """
     Say what the model after has that the one before has not.
     """
@@ -210,7 +217,7 @@ class Answer:
     probability: float
 
 
-def answers(found: Diagnosis) -> tuple[Answer, ...]:
+def answers(found: DiagnosisResult) -> tuple[Answer, ...]:
     """
     Return the candidates, then nothing and something unnamed, and what is left.
     """
@@ -242,7 +249,7 @@ def probability(value: float) -> str:
     return f'{100.0 * value:.1f} %' if value >= _LEAST else f'< {100.0 * _LEAST:g} %'
 
 
-def baseline(found: Diagnosis, ship: Ship | None) -> str:
+def baseline(found: DiagnosisResult, ship: Ship | None) -> str:
     """
     Say where the baseline comes from, and how well it is stated to be known.
     """

@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.posterior import CERTAIN
 from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
     Candidate,
-    Diagnosis,
+    DiagnosisResult,
     EffectEstimate,
     Gap,
     Verdict,
@@ -32,7 +32,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effect import Effect, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
 
-_MOVES_M_S = 0.1  # slower is at rest, as positions tell it
+_MOVES_M_S = 0.1  # slower is at rest, as positions show it
 _SCATTER_M_S = 0.08  # of the way over ground while the log reads 0, that no drift explains
 _SURE = 0.99  # probability from which it is part of an answer that holds something else
 _LEAST = 3  # stretches at 0 while the ship moves, and as many that are not
@@ -133,7 +133,7 @@ def _effect() -> Effect:
 
 
 def _drifts(way: np.ndarray[tuple[int], np.dtype[np.complex128]], by_place: bool) -> bool:
-    """Tell whether one velocity of the water may be all that moves the ship."""
+    """Say whether one velocity of the water may be all that moves the ship."""
     if not by_place:
         way = np.abs(way).astype(np.complex128)
     return float(np.sqrt(np.mean(np.abs(way - way.mean()) ** 2))) < _SCATTER_M_S
@@ -153,7 +153,7 @@ def _log_likelihood(
     return total
 
 
-def with_zeros(found: Diagnosis, still: StandsStill | None) -> Diagnosis:
+def with_zeros(found: DiagnosisResult, still: StandsStill | None) -> DiagnosisResult:
     """
     Add a log that stands still to what log and track show besides.
 
@@ -201,7 +201,7 @@ def with_zeros(found: Diagnosis, still: StandsStill | None) -> Diagnosis:
     )
 
 
-def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> Diagnosis:
+def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> DiagnosisResult:
     """
     Return the result where too little is left beside the zeros.
 
@@ -209,14 +209,14 @@ def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> Diagnosis
     ----------
     still
     why
-        Nothing more can be told.
+        Nothing more can be said.
     no_coastdown
         For the reader.
     """
     sure = still.effect.probability
     named = sure >= CERTAIN
     candidate = Candidate((still.effect.name,), sure, (still.effect,))
-    return Diagnosis(
+    return DiagnosisResult(
         verdict=Verdict.NAMED if named else Verdict.ONE_OF,
         effects=(still.effect,) if named else (),
         candidates=(candidate, Candidate((), 1.0 - sure)),

@@ -66,7 +66,7 @@ def coverage_notes(window: Window) -> tuple[str, ...]:
         rests = (
             f'there the estimate rests on {" and ".join(others)}'
             if others
-            else 'nothing else tells what happened there'
+            else 'nothing else shows what happened there'
         )
         notes.append(
             f'{name}: no usable reading for {seconds:.0f} of {length:.0f} s (silent, stuck or '

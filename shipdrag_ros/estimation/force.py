@@ -130,7 +130,7 @@ class Force:
 
     def has_clean(self, place: int) -> bool:
         """
-        Tell whether the clean hull is known at a point.
+        Say whether the clean hull is known at a point.
         """
         return bool(np.isfinite(self.over[place]))
 

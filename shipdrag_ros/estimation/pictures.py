@@ -15,6 +15,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from shipdrag_ros.display import TRACK_LABELS, force_unit, power_unit, speed_unit
@@ -47,6 +48,8 @@ LINES = (
 _CLEAN: dict[str, Any] = {'color': VERMILION, 'linestyle': '--'}
 _DATED = LINES[2:]  # not those of the clean hull and of all together
 _BAND_LABEL = '±2 standard deviations'
+_SHADES = matplotlib.colormaps['plasma']
+_LIGHTEST = 0.85  # of the shades; beyond it a line is lost on white
 _NAMED = 12  # curves that a legend has room for
 _MANY_POINTS = 500  # above this dots are drawn as pixels, or the page grows by megabytes
 
@@ -247,7 +250,7 @@ def curves_picture(
     Parameters
     ----------
     dated
-        A label and a curve each; those beyond the fourth share the look of the first.
+        A label and a curve each, oldest first; many are shaded from dark to light.
     ship
         For force, and for the clean hull.
     combined
@@ -257,6 +260,13 @@ def curves_picture(
         figure = Figure(figsize=SIZE, layout='constrained')
         draw_curves(figure.subplots(), dated, ship, combined=combined)
     return figure
+
+
+def is_shaded(count: int) -> bool:
+    """
+    Tell whether so many curves are told apart by shades, in their order.
+    """
+    return count > len(_DATED)
 
 
 def draw_curves(
@@ -274,6 +284,8 @@ def draw_curves(
     _draw_clean(axis, ship, scale, np.linspace(0.02 * highest, highest, 101))
     for number, (label, curve) in enumerate(dated):
         color, style = _DATED[number % len(_DATED)]
+        if is_shaded(len(dated)):
+            color, style = to_hex(_SHADES(_LIGHTEST * number / (len(dated) - 1))), '-'
         force = Force.of(curve, ship)
         if len(dated) == 1:
             _draw_force(axis, force, scale, label=label)
@@ -284,7 +296,7 @@ def draw_curves(
             color=color,
             linestyle=style,
             linewidth=0.9,
-            label=label if len(dated) <= _NAMED or number == 0 else '',
+            label=label if len(dated) <= _NAMED or number in (0, len(dated) - 1) else '',
         )
     if combined is not None:
         _draw_force(axis, Force.of(combined, ship), scale, label='all together')

@@ -21,7 +21,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 
 _POINTS = 101
-_OPPOSITE = 0.5  # cosine of the angle between runs below which they are told apart
+_OPPOSITE = 0.5  # cosine of the angle between runs below which they are separated
 _LARGEST_CURRENT = 0.4  # of the lowest speed
 
 
@@ -46,7 +46,7 @@ class Combined:
         How many.
     current_m_s, current_sigma_m_s
         Velocity of the water along the heading of the first run; None where
-        the runs do not tell it.
+        the runs do not show it.
     """
 
     speed_m_s: Float64

@@ -188,7 +188,7 @@ class Estimate:
         tuple of str
             A paragraph each.
         """
-        from shipdrag_ros.estimation import words  # it tells what this module holds
+        from shipdrag_ros.estimation import words  # it shows what this module holds
 
         return words.summary(self, ship)
 

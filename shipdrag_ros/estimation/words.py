@@ -155,7 +155,7 @@ def _range_notes(estimate: Estimate) -> list[str]:
 
 
 def _fastest_reading(estimate: Estimate, fastest_m_s: float) -> str:
-    """Tell the largest speed that was read, but for single bad readings."""
+    """Return the largest speed that was read, but for single bad readings."""
     for name in ('speed_through_water', 'speed_over_ground'):
         track = estimate.tracks.get(name)
         if track is not None and len(track.measured) >= _AROUND:
@@ -167,7 +167,7 @@ def _fastest_reading(estimate: Estimate, fastest_m_s: float) -> str:
 
 
 def _residual_notes(estimate: Estimate) -> list[str]:
-    """Tell of residuals that are not the independent scatter that the band counts on."""
+    """Say of residuals that are not the independent scatter that the band counts on."""
     if named(estimate.estimator).learns_noise:
         return []  # slow disturbances are learnt, or a note says that they are not
     found = []
@@ -197,7 +197,7 @@ def _residual_notes(estimate: Estimate) -> list[str]:
 
 
 def _astern_notes(estimate: Estimate) -> list[str]:
-    """Tell of a ship that drag alone would have left at rest."""
+    """Say of a ship that drag alone would have left at rest."""
     speed = estimate.tracks.get('speed_through_water')
     if speed is None:
         return []
@@ -207,7 +207,7 @@ def _astern_notes(estimate: Estimate) -> list[str]:
     return [
         f'The speed goes through zero, to {lowest:.2g} m/s: no drag does that. A constant force '
         '(wind, a propeller) or a current acts in this record and is part of r, most of it at '
-        'the lowest speeds; one run cannot tell which it is.'
+        'the lowest speeds; one run cannot show which it is.'
     ]
 
 
@@ -216,7 +216,8 @@ def _method_notes(estimate: Estimate) -> list[str]:
     if 'speed_through_water' not in estimate.samples and estimate.current_m_s is None:
         found.append(
             'Only the motion over ground was measured, on one run: a current along the track is '
-            'not separated and shifts the speed scale; a run on the opposite heading would tell.'
+            'not separated and shifts the speed scale; a run on the opposite heading would '
+            'show it.'
         )
     elif 'position' in estimate.samples and estimate.current_m_s is None:
         found.append(

@@ -2,14 +2,16 @@
 """
 The bags below folders: which files make up which, and what lies beside them.
 
-A bag is an MCAP file, a directory of rosbag2, a log of NMEA 0183, or a table
-whose columns have the names of the inputs. What is none of these is left alone.
+A bag is an MCAP file, a directory of rosbag2, or a log or table of a format that is
+imported. A file whose name does not say so is known by its first bytes: NMEA 2000,
+Signal K, GPX, or NMEA 0183 in a `.txt`. What is none of these is left alone.
 """
 
 from __future__ import annotations
 
 import posixpath
 import re
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +26,10 @@ LIMIT_BYTES = 64 << 30
 _NO_BAGS = (EVENTS_FILE, 'truth.csv')  # the second: of `shipdrag simulate-fleet`
 _METADATA = 'metadata.yaml'
 _BAGS = ('.mcap', '.mcap.zstd')
-_FOREIGN = ('.db3', '.bag')  # told, and refused with what to do
+_FOREIGN = ('.db3', '.bag')  # of rosbag2 in sqlite3, and of ROS 1
 LOGS = ('.nmea', '.nmea.gz')
 TABLES = ('.csv', '.tsv')
+_FIRST_BYTES = 1 << 13
 _PART = re.compile(r'(.*)_\d+\.mcap(\.zstd)?')
 
 
@@ -174,12 +177,10 @@ class _Search:
         if any(entry.name == _METADATA or entry.name.endswith('.db3') for entry in folder.files):
             yield from self._bag_folder(folder)
             return
-        known = (*_BAGS, *_FOREIGN, *LOGS, *TABLES)
-        bags = [e for e in folder.files if e.name.endswith(known) and e.name not in _NO_BAGS]
         beside = (SHIP_FILE, RUN_FILE, *_NO_BAGS)
-        self.left_alone += sum(
-            each not in bags and not each.name.endswith(beside) for each in folder.files
-        )
+        others = [e for e in folder.files if not e.name.endswith(beside)]
+        bags = [entry for entry in others if self._is_bag(entry)]
+        self.left_alone += len(others) - len(bags)
         # parts of one recording are one bag
         alone = len({_PART.sub(r'\1', entry.name) for entry in bags}) == 1
         if len(bags) > 1 and not alone and any(e.name == RUN_FILE for e in folder.files):
@@ -190,6 +191,13 @@ class _Search:
             )
         for entry in bags:
             yield from self._one(folder, entry, alone=alone)
+
+    def _is_bag(self, entry: Entry) -> bool:
+        if entry.name.endswith((*_BAGS, *_FOREIGN, *LOGS, *TABLES)):
+            return True
+        if entry.problem or not entry.size:
+            return False
+        return is_log(entry.name, self._tree.beginning(entry.path, _FIRST_BYTES))
 
     def _one(self, folder: Folder, entry: Entry, *, alone: bool) -> Iterator[BagToRead]:
         bag = _text('/'.join((*folder.parts, entry.name)))
@@ -259,6 +267,30 @@ class _Search:
 
     def _skip(self, bag: str, reason: str) -> None:
         self.skipped.append(Skipped(_text(self._tree.name), _text(bag), reason))
+
+
+def is_log(name: str, first: bytes) -> bool:
+    """
+    Say whether a file is a log that is imported, by its first bytes alone.
+
+    Parameters
+    ----------
+    name
+        Of the file.
+    first
+        Its first bytes, packed with gzip or not.
+    """
+    from shipdrag_ros.importing import formats  # where all names say what they are, not needed
+    from shipdrag_ros.importing.format import CERTAIN, Head
+    from shipdrag_ros.importing.opened import GZIP
+
+    if first.startswith(GZIP):
+        try:
+            first = zlib.decompressobj(wbits=31).decompress(first, _FIRST_BYTES)
+        except zlib.error:
+            return False
+    head = Head(Path(name), first)
+    return any(each.by_head and each.score(head) >= CERTAIN for each in formats.found())
 
 
 def _problem(entry: Entry) -> str:

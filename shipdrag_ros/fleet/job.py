@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
-from shipdrag_ros.coastdown.events import Coastdown
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose, diagnose_fitted
+from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose, diagnose_fitted
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
@@ -32,7 +32,7 @@ UNNAMED = 'unnamed'
 _LONGEST_NAME = 80  # [bytes], and three times as long in the name of a folder
 
 
-class Job(NamedTuple):
+class BagJob(NamedTuple):
     """
     A bag to do.
 
@@ -58,7 +58,7 @@ class _ShipInRun(NamedTuple):
     warnings: tuple[str, ...]
 
 
-def work(job: Job) -> BagResult:
+def work(job: BagJob) -> BagResult:
     """
     Replay and diagnose a bag.
 
@@ -86,7 +86,7 @@ def work(job: Job) -> BagResult:
         )
 
 
-def _result(job: Job, runs: Sequence[Run]) -> BagResult:
+def _result(job: BagJob, runs: Sequence[Run]) -> BagResult:
     source = job.sources[0]
     rows: list[Row] = []
     warnings: list[str] = []
@@ -94,7 +94,7 @@ def _result(job: Job, runs: Sequence[Run]) -> BagResult:
     hull: _ShipInRun | None = None
     for run in runs:
         hull = _hull(source, run)
-        result = replay(run, ship=hull.ship)
+        result = replay(run, ship=hull.ship, compare=False)
         messages += sum(topic.messages for topic in run.topics)
         warnings += [*hull.warnings, *hull.ship.warnings, *run_warnings(result)]
         found, told = _coastdowns(job, hull, result)
@@ -114,7 +114,9 @@ def _result(job: Job, runs: Sequence[Run]) -> BagResult:
     )
 
 
-def _coastdowns(job: Job, hull: _ShipInRun, result: ReplayResult) -> tuple[list[Row], list[str]]:
+def _coastdowns(
+    job: BagJob, hull: _ShipInRun, result: ReplayResult
+) -> tuple[list[Row], list[str]]:
     """Return a row for each coastdown, those withdrawn too, and what is to be said."""
     context = {
         'bag': job.sources[0].bag,
@@ -136,7 +138,7 @@ def _coastdowns(job: Job, hull: _ShipInRun, result: ReplayResult) -> tuple[list[
             coastdown_row(coastdown, hull.ship, diagnosis=diagnosis, context=context, flags=shared)
         )
     for event in result.events:
-        if isinstance(event, Coastdown) and event.withdrawn:
+        if isinstance(event, EndedCoastdown) and event.withdrawn:
             rows.append(
                 coastdown_row(event, hull.ship, diagnosis=None, context=context, flags=shared)
             )
@@ -147,7 +149,7 @@ def _coastdowns(job: Job, hull: _ShipInRun, result: ReplayResult) -> tuple[list[
 
 def _diagnosis(
     result: ReplayResult, hull: _ShipInRun, window: Window
-) -> tuple[Diagnosis | None, str]:
+) -> tuple[DiagnosisResult | None, str]:
     """Diagnose one coastdown, or say why that cannot be."""
     runs = [CoastRun(Path(result.run.name).name, window, hull.facts)]
     try:
@@ -197,7 +199,7 @@ def _name(ship: Ship, source: BagToRead) -> str:
     return name
 
 
-def _bag_row(job: Job) -> Row:
+def _bag_row(job: BagJob) -> Row:
     return {
         'root': job.sources[0].root,
         'bag': job.sources[0].bag,
@@ -211,7 +213,7 @@ def _bag_row(job: Job) -> Row:
     }
 
 
-def _failed(job: Job, why: str) -> BagResult:
+def _failed(job: BagJob, why: str) -> BagResult:
     return BagResult(_bag_row(job) | {'error': why})
 
 

@@ -20,7 +20,7 @@ _AT_ONCE_BYTES = 1 << 20
 @dataclass(frozen=True)
 class Identity:
     """
-    What tells one bag from another.
+    What separates one bag from another.
 
     Attributes
     ----------

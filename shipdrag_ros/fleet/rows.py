@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy
-from shipdrag_ros.diagnosis.result import Diagnosis, EffectEstimate, Verdict
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
+from shipdrag_ros.diagnosis.result import DiagnosisResult, EffectEstimate, Verdict
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -59,10 +59,10 @@ class BagResult:
 
 
 def coastdown_row(
-    coastdown: Coastdown,
+    coastdown: EndedCoastdown,
     ship: Ship,
     *,
-    diagnosis: Diagnosis | None,
+    diagnosis: DiagnosisResult | None,
     context: Mapping[str, Any],
     flags: Sequence[str] = (),
 ) -> Row:
@@ -148,7 +148,7 @@ def _curve(estimate: Estimate | None) -> Row:
     }
 
 
-def _flags(coastdown: Coastdown) -> list[str]:
+def _flags(coastdown: EndedCoastdown) -> list[str]:
     found = []
     if coastdown.withdrawn:
         found.append('withdrawn')
@@ -163,7 +163,7 @@ def _flags(coastdown: Coastdown) -> list[str]:
     return found
 
 
-def _error(coastdown: Coastdown) -> str | None:
+def _error(coastdown: EndedCoastdown) -> str | None:
     if coastdown.withdrawn:
         why = '; '.join(f'{cut.reason.value}: {cut.text}' for cut in coastdown.cuts)
         return f'withdrawn: {why or "it turned out to be no coastdown"}'
@@ -186,7 +186,7 @@ def _named(effects: Sequence[EffectEstimate]) -> list[Row]:
     ]
 
 
-def _candidates(diagnosis: Diagnosis) -> str:
+def _candidates(diagnosis: DiagnosisResult) -> str:
     found: list[Row] = [
         {
             'names': list(each.names) or ['none'],

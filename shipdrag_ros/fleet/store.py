@@ -233,7 +233,7 @@ def ship_texts(store: Path) -> dict[str, dict[str, str]]:
 
 def coastdown_schema(*, partitioned: bool = False) -> pa.Schema:
     """
-    Return the columns of a coastdown; `partitioned`: without the ship, which the folder tells.
+    Return the columns of a coastdown; `partitioned`: without the ship, which the folder shows.
     """
     import pyarrow as pa
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import posixpath
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,13 +18,11 @@ from shipdrag_ros import __version__
 from shipdrag_ros.fleet.engine import DIED, Engine, Lost
 from shipdrag_ros.fleet.events import read_events, write_events
 from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
-from shipdrag_ros.fleet.job import Job, work
+from shipdrag_ros.fleet.job import BagJob, work
 from shipdrag_ros.fleet.local import Identity, content_hash, identify
 from shipdrag_ros.fleet.rows import BagResult
 from shipdrag_ros.fleet.store import Done, Store
-
-Progress = Callable[[str, int, int], None]
-"""Told what is being done, how much of it is done, and of how much."""
+from shipdrag_ros.progress import Progress
 
 
 class Twin(NamedTuple):
@@ -76,7 +74,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     engine
         Running.
     progress
-        Told how far it is.
+        Called with how far it is.
 
     Raises
     ------
@@ -122,7 +120,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
 
 def _jobs(
     sources: Sequence[BagToRead], engine: Engine, progress: Progress
-) -> tuple[dict[str, Job], list[Twin], list[Skipped]]:
+) -> tuple[dict[str, BagJob], list[Twin], list[Skipped]]:
     """Return what is to be done by content hash, in the order of the search."""
     known: dict[int, Identity] = {}
     unread: list[Skipped] = []
@@ -134,7 +132,7 @@ def _jobs(
             reason = found.reason if isinstance(found, Lost) else found
             unread.append(Skipped(items[key].root, items[key].bag, reason))
         progress('reading the bags', len(known) + len(unread), len(items))
-    jobs: dict[str, Job] = {}
+    jobs: dict[str, BagJob] = {}
     twins: list[Twin] = []
     for numbers in _recordings(sources, known):
         parts = tuple(sources[number] for number in numbers)
@@ -142,7 +140,7 @@ def _jobs(
         if digest in jobs:
             twins.append(Twin(parts[0].bag, jobs[digest].sources[0].bag))
         else:
-            jobs[digest] = Job(parts, digest)
+            jobs[digest] = BagJob(parts, digest)
     return jobs, twins, unread
 
 
@@ -168,7 +166,7 @@ def _is_done(done: Done | None) -> bool:
 
 
 def _do(
-    jobs: Mapping[str, Job], store: Store, engine: Engine, progress: Progress
+    jobs: Mapping[str, BagJob], store: Store, engine: Engine, progress: Progress
 ) -> dict[str, str]:
     """Do what is to be done, and return the ship file of each, by content hash."""
     texts: dict[str, str] = {}
@@ -183,7 +181,7 @@ def _do(
     return texts
 
 
-def _unread(skipped: Skipped, job: Job | None = None) -> BagResult:
+def _unread(skipped: Skipped, job: BagJob | None = None) -> BagResult:
     """Return the row of a bag that could not be read."""
     source = None if job is None else job.sources[0]
     root, bag = (skipped.root, skipped.bag) if source is None else (source.root, source.bag)
@@ -204,7 +202,7 @@ def _unread(skipped: Skipped, job: Job | None = None) -> BagResult:
 
 
 def _keep_ships(
-    store: Store, jobs: Mapping[str, Job], bags: Mapping[str, Done], texts: Mapping[str, str]
+    store: Store, jobs: Mapping[str, BagJob], bags: Mapping[str, Done], texts: Mapping[str, str]
 ) -> list[str]:
     """Keep the ship file and the known events of each ship; return what is odd about them."""
     ship_files: dict[str, dict[str, None]] = defaultdict(dict)  # sets that keep the order

@@ -3,7 +3,7 @@
 Folders on a disk and in an object store, walked alike.
 
 A folder is entered once however many links lead to it, and what is no regular
-file is told apart before anything reads it.
+file is known before anything reads it.
 """
 
 from __future__ import annotations
@@ -156,6 +156,17 @@ class Tree:
         except UnicodeDecodeError as error:
             raise FleetError(f'{path!r} is not UTF-8: {error}') from error
         return text
+
+    def beginning(self, path: str, size: int) -> bytes:
+        """
+        Return the first bytes of a file; none where it cannot be read.
+        """
+        try:
+            with self._fs.open(path, 'rb') as file:
+                first: bytes = file.read(size)
+        except Exception:  # each file system has errors of its own
+            return b''
+        return first
 
     def url(self, path: str) -> str:
         """

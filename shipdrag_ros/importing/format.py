@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a format of log files declares: how it is recognised, read and told."""
+"""What a format of log files declares: how it is recognised, read and shown."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import Understood
 from shipdrag_ros.importing.opened import beginning
-
-Progress = Callable[[int, int], None]
+from shipdrag_ros.progress import PartDone
 
 CERTAIN, LIKELY, POSSIBLE, NO = 1.0, 0.7, 0.3, 0.0
 """Scores of `Format.score`; the highest of all formats is taken."""
@@ -107,18 +106,18 @@ class Job:
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how much is read, and of how much.
+        Called with how much is read, and of how much.
     """
 
     source: Path
     out: Path
     options: Mapping[str, Any] = field(default_factory=dict)
     attachments: Mapping[str, str] = field(default_factory=dict)
-    progress: Progress | None = None
+    progress: PartDone | None = None
 
 
-class Result(Protocol):
-    """What became of a file: a dataclass that tells itself."""
+class ImportResult(Protocol):
+    """What became of a file: a dataclass that shows itself."""
 
     @property
     def written(self) -> Mapping[str, int]:
@@ -158,15 +157,18 @@ class Format(NamedTuple):
         Those that it knows.
     chosen_by
         Key of an option that chooses it; '' for none.
+    by_head
+        Whether the score comes from the first bytes alone, and not from the file.
     """
 
     name: str
     kind: str
     about: str
     score: Callable[[Head], float]
-    write: Callable[[Job], Result]
+    write: Callable[[Job], ImportResult]
     options: tuple[Option, ...] = ()
     chosen_by: str = ''
+    by_head: bool = True
 
 
 def best_of(formats: Sequence[Format], head: Head) -> Format:
@@ -192,3 +194,20 @@ def best_of(formats: Sequence[Format], head: Head) -> Format:
             'as a table (CSV)'
         )
     return best
+
+
+def missing_library(job: Job, kind: str, library: str) -> ImportDataError:
+    """
+    Return the error of a file whose format needs a library that is not installed.
+
+    Parameters
+    ----------
+    job
+    kind
+        What the file is, with its article.
+    library
+        One of the extra `flight`.
+    """
+    return ImportDataError(
+        f"{str(job.source)!r} is {kind}, which needs {library}: pip install 'shipdrag_ros[flight]'"
+    )

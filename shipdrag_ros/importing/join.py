@@ -13,7 +13,9 @@ import numpy as np
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.importing.bag import ATTACHMENT, new_bag
-from shipdrag_ros.importing.format import Format, Job, Progress, Result
+from shipdrag_ros.importing.format import Format, ImportResult, Job
+from shipdrag_ros.importing.one_ship import LogTrack, refuse_two_ships
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 
@@ -30,7 +32,7 @@ class Joined:
         What was left out when they were put together, a sentence each.
     """
 
-    results: list[Result]
+    results: list[ImportResult]
     notes: list[str]
 
 
@@ -38,7 +40,7 @@ def import_joined(
     parts: Sequence[tuple[Format, Job]],
     out: Path,
     attachments: Mapping[str, str],
-    progress: Progress | None = None,
+    progress: PartDone | None = None,
 ) -> Joined:
     """
     Write the measurements of files as one bag.
@@ -52,18 +54,18 @@ def import_joined(
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how much of a file is read, and of how much.
+        Called with how much of a file is read, and of how much.
 
     Raises
     ------
     ImportDataError
-        If nothing in one of them can be used.
+        If nothing in one of them can be used, or they hold a ship at two places at a time.
     BagError
         If the bag cannot be made.
 
     Notes
     -----
-    Of an input that two files tell for the same time, the first file's is taken:
+    Of an input that two files hold for the same time, the first file's is taken:
     two instruments are never mixed.
     """
     if len(parts) == 1:
@@ -77,6 +79,9 @@ def import_joined(
         ]
         runs = [open_runs([path])[0] for path in made]
         names = [job.source.name for _, job in parts]
+        refuse_two_ships(
+            [LogTrack(name, _blocks(run)) for name, run in zip(names, runs, strict=True)]
+        )
         taken, notes = _taken(runs, names)
         with new_bag(out, attachments) as bag:
             about = {name: run.attachments.get(ATTACHMENT, '') for name, run in zip(names, runs)}
@@ -111,7 +116,7 @@ def _taken(runs: Sequence[Run], names: Sequence[str]) -> tuple[list[Spans], list
         if lost:
             notes.append(
                 f'{name}: {", ".join(sorted(lost))} not taken for the time that an earlier file '
-                'tells it too.'
+                'gives it too.'
             )
         for channel, (low, high) in own.items():
             covered.setdefault(channel.input, []).append((low, high))

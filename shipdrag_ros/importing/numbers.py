@@ -11,10 +11,10 @@ import numpy as np
 
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import DataError, ImportDataError
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.samples import Float64
 
-_SHOWN = 20  # cells that are told one by one
+_SHOWN = 20  # cells that are shown one by one
 _MOST = 1e30  # its tenth power is a number still
 
 
@@ -66,7 +66,7 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
     ImportDataError
         If the file is no table.
     """
-    table = Table(path)
+    table = LogTable(path)
     there = [name for name in optional if name in (table.header or ()) and name not in names]
     wanted = (*names, *there)
     places, problems = [], []

@@ -63,7 +63,7 @@ def opened(path: Path) -> Iterator[tuple[IO[bytes], IO[bytes]]]:
     Yields
     ------
     raw, file
-        The first tells how far the reading is, the second is read.
+        The first shows how far the reading is, the second is read.
     """
     with path.open('rb') as raw:
         if raw.peek(2)[:2] != GZIP:

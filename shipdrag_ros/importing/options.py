@@ -56,7 +56,7 @@ GEAR = Option(
     '--gear',
     'RATIO',
     'revolutions of the engine for one of the shaft: takes the shaft from the engine, of which '
-    'alone NMEA 2000 and Signal K tell; 1 without a gear',
+    'alone NMEA 2000 and Signal K hold; 1 without a gear',
     positive,
 )
 RATE = Option(

@@ -20,7 +20,7 @@ from shipdrag_ros.bags.locate import BagFiles, is_bag
 from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing import formats
-from shipdrag_ros.importing.format import Format, Job, Result, best_of, head_of
+from shipdrag_ros.importing.format import Format, ImportResult, Job, best_of, head_of
 from shipdrag_ros.importing.join import import_joined
 
 
@@ -40,11 +40,11 @@ class Understanding:
 
     path: Path
     kind: str
-    result: Result
+    result: ImportResult
 
     def lines(self) -> list[str]:
         """
-        Return what is to be told: what each input was taken from, and what was left out.
+        Return what is to be said: what each input was taken from, and what was left out.
         """
         told = [f'{self.path}: {self.kind}', *(f'  {each}' for each in self.result.understood)]
         return [*told, *self.result.summary(self.path)[1:], *self.result.details()]

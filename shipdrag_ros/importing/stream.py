@@ -4,7 +4,7 @@ A log of messages, each with its time, as a bag.
 
 What every format of messages shares: one source an input, times that do not
 jump, and a count of what is left out. A format gives a function that reads its
-file and yields readings; it is called twice, first to see who tells what.
+file and yields readings; it is called twice, first to see who sends what.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _LARGEST = {
 
 
 class Origin(NamedTuple):
-    """Who tells an input; of two with as many values the smaller is the better."""
+    """Who sends an input; of two with as many values the smaller is the better."""
 
     rank: int
     name: str
@@ -83,7 +83,7 @@ class Tally:
     rejected
         By input, 'time' or 'line', and reason.
     not_used
-        Messages that tell no input, by name.
+        Messages that state no input, by name.
     notes
         Sentences for the user.
     """
@@ -107,7 +107,7 @@ class Tally:
             self.notes.append(text)
 
 
-Reader = Callable[[Tally], Iterator[Reading]]
+FileReader = Callable[[Tally], Iterator[Reading]]
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class StreamResult:
     not_taken
         By input, values of the sources that it is not taken from.
     not_used
-        Messages that tell no input, by name.
+        Messages that state no input, by name.
     rejected
         By input, 'time' or 'line', and reason.
     start_ns, end_ns
@@ -187,7 +187,7 @@ class StreamResult:
 
 
 def import_stream(
-    job: Job, name: str, read: Reader, *, about: Mapping[str, object] | None = None
+    job: Job, name: str, read: FileReader, *, about: Mapping[str, object] | None = None
 ) -> StreamResult:
     """
     Write what a reader yields as a bag.
@@ -200,7 +200,7 @@ def import_stream(
     read
         Yields the readings of the file in their order; called twice.
     about
-        Told in the bag besides.
+        Said in the bag besides.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def import_stream(
         raise ImportDataError(_nothing(job.source, name, survey))
     chosen = {channel: _best(found) for channel, found in counts.items()}
     tally = Tally()
-    record = _Record()
+    record = _ArrivedSamples()
     with new_bag(job.out, job.attachments) as bag:
         for reading in _checked(read(tally), tally):
             if reading.origin == chosen[reading.channel]:
@@ -255,7 +255,7 @@ def _checked(readings: Iterator[Reading], tally: Tally) -> Iterator[Reading]:
 
 
 class _Jumps:
-    """Holds what stands after a step of the time until the next one tells whether it was one."""
+    """Holds what stands after a step of the time until the next one shows whether it was one."""
 
     def __init__(self, tally: Tally) -> None:
         self._tally = tally
@@ -304,7 +304,7 @@ def _possible(reading: Reading) -> bool:
     return abs(reading.a) <= largest and abs(reading.b) <= largest  # false of NaN too
 
 
-class _Record:
+class _ArrivedSamples:
     """Samples with a time of arrival that never goes back."""
 
     def __init__(self) -> None:
@@ -344,7 +344,7 @@ def _understood(bag: ImportBag, chosen: Mapping[Channel, Origin]) -> tuple[Under
 def _result(
     name: str,
     tally: Tally,
-    record: _Record,
+    record: _ArrivedSamples,
     understood: Sequence[Understood],
     counts: Mapping[Channel, Counter[Origin]],
     chosen: Mapping[Channel, Origin],

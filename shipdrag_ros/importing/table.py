@@ -9,7 +9,7 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import IO, NamedTuple, cast
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.opened import check_unpacked, opened
+from shipdrag_ros.progress import PartDone
 
 DELIMITERS = ',;\t|'
 BLANKS = ' '
@@ -37,7 +38,7 @@ UNITS = (
 _UNIT = re.compile(r'[\[(]?([^\[\]()]*)[\])]?')
 
 
-class Row(NamedTuple):
+class LogRow(NamedTuple):
     """The cells of a row, stripped, and the line it ends on."""
 
     line: int
@@ -52,7 +53,7 @@ class _Layout(NamedTuple):
     cells: Sequence[str]
 
 
-class Table:
+class LogTable:
     """
     A table in a file.
 
@@ -186,14 +187,14 @@ class Table:
             f'{str(self.path)!r} has no column {name!r}; it has {listed}, {hint}'
         )
 
-    def rows(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Row]:
+    def rows(self, progress: PartDone | None = None) -> Iterator[LogRow]:
         """
         Yield the rows below the header; lines without any cell are skipped.
 
         Parameters
         ----------
         progress
-            Told how many bytes are read, and of how many.
+            Called with how many bytes are read, and of how many.
         """
         total = self.path.stat().st_size
         above = (self.header is not None) + (self.units is not None)
@@ -212,11 +213,11 @@ class Table:
     def _cells(self, line: str, delimiter: str) -> Sequence[str]:
         return next((row.cells for row in self._rows([line], delimiter)), ())
 
-    def _rows(self, lines: Iterable[str], delimiter: str, above: int = 0) -> Iterator[Row]:
+    def _rows(self, lines: Iterable[str], delimiter: str, above: int = 0) -> Iterator[LogRow]:
         if delimiter == BLANKS:
             for number, line in enumerate(lines, start=above + 1):
                 if line.strip():
-                    yield Row(number, line.split())
+                    yield LogRow(number, line.split())
             return
         reader = csv.reader(lines, delimiter=delimiter)
         try:
@@ -226,7 +227,7 @@ class Table:
                 last = reader.line_num
                 stripped = [cell.strip() for cell in cells]
                 if any(stripped):
-                    yield Row(above + reader.line_num, stripped)
+                    yield LogRow(above + reader.line_num, stripped)
         except csv.Error as error:
             raise ImportDataError(
                 f'{str(self.path)!r} line {above + reader.line_num} is no row of a table: {error}'

@@ -22,7 +22,7 @@ def iso_ns(text: str, zone: tzinfo) -> int | None:
     ----------
     text
     zone
-        Of a time that tells none.
+        Of a time that states none.
     """
     found = _ISO.fullmatch(text)
     if found is None:

@@ -39,7 +39,7 @@ def table_of_messages(written: Mapping[str, int], sources: Mapping[str, str]) ->
 
 def not_taken_words(not_taken: Mapping[str, Mapping[str, int]]) -> list[str]:
     """
-    Say which other sources told an input.
+    Say which other sources held an input.
     """
     return [
         f'{name}: not taken from {", ".join(f"{source} {n}" for source, n in counts.items())}'

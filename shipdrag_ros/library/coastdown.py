@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,8 @@ from shipdrag_ros.display import Table, utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
-from shipdrag_ros.library.shown import Shown, drawing
+from shipdrag_ros.library.shown import ShownResistance
+from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.ship import Ship
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Coastdown(Shown):
+class Coastdown(ShownResistance):
     """
     One coastdown and what it gave.
 
@@ -57,7 +58,7 @@ class Coastdown(Shown):
     True
     """
 
-    event: events.Coastdown
+    event: events.EndedCoastdown
     ship: Ship
     bag: str
     run: RunResult
@@ -101,7 +102,7 @@ class Coastdown(Shown):
         """
         Say what it gave, in the engineer's units, then in SI; or why nothing.
         """
-        return words.summary(self.event, self.ship)
+        return tuple(map(in_python, words.summary(self.event, self.ship)))
 
     def table(self) -> Table:
         """
@@ -111,29 +112,14 @@ class Coastdown(Shown):
             return tables.facts(self.event)
         return self.event.estimate.table(self.ship)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """
-        Draw resistance against speed with its band, over the clean hull.
-
-        Parameters
-        ----------
-        ax
-            To draw on; None: new axes.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            Knots and kN, of a model ship m/s and N.
-        """
+    def _drawing(self) -> Callable[[Axes], None]:
         from shipdrag_ros.estimation.pictures import draw_resistance
 
         assert len(self.curve) >= 0  # raises where there is none
-        assert self.event.estimate is not None
-        truth = self.run.truth
+        estimate, truth = self.event.estimate, self.run.truth
+        assert estimate is not None
         shown = None if truth is None else (truth.speed_m_s, truth.resistance_m_s2)
-        with drawing(ax) as axis:
-            draw_resistance(axis, self.event.estimate, self.ship, truth=shown)
-        return axis
+        return lambda axis: draw_resistance(axis, estimate, self.ship, truth=shown)
 
     def _title(self) -> str:
         ended = words.ENDED_BY[self.event.ended_by]

@@ -10,7 +10,7 @@ from functools import partial
 from shipdrag_ros.bags import Run
 from shipdrag_ros.diagnosis import (
     CoastRun,
-    Diagnosis,
+    DiagnosisResult,
     SailingRecord,
     diagnose,
     diagnose_fitted,
@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
-from shipdrag_ros.library.windowed import Span, WindowedRun
+from shipdrag_ros.library.windowed import WindowedRun, WindowSpan
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay import (
@@ -44,14 +44,14 @@ def diagnose_runs(
     given: Ship | None,
     facts: Sequence[Fact],
     progress: Progress = silent,
-) -> tuple[Diagnosis, Ship | None]:
+) -> tuple[DiagnosisResult, Ship | None]:
     """
     Diagnose by what the records hold: coastdowns, or sailing alone.
 
     Parameters
     ----------
     listener
-        Told what is found on the way.
+        Called with what is found on the way.
     runs
         Together; effects of the earth are stated along the first.
     given
@@ -59,7 +59,7 @@ def diagnose_runs(
     facts
         Of all runs.
     progress
-        Told of each stage, how much of it is done, and of how much.
+        Called with each stage, how much of it is done, and of how much.
 
     Returns
     -------
@@ -90,8 +90,8 @@ def diagnose_runs(
 
 
 def _with_log_track(
-    found: Diagnosis, runs: Sequence[WindowedRun], progress: Progress
-) -> Diagnosis:
+    found: DiagnosisResult, runs: Sequence[WindowedRun], progress: Progress
+) -> DiagnosisResult:
     """Hold the logs against the ways over ground besides; a note says why not."""
     try:
         return with_log_track(found, _sailing(runs, '', progress))
@@ -100,12 +100,14 @@ def _with_log_track(
         return replace(found, notes=(*found.notes, why))
 
 
-def _unused(found: Diagnosis, facts: Sequence[Fact]) -> Diagnosis:
-    """Say of facts that they were told and not used."""
+def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
+    """Say of facts that they were stated and not used."""
     return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
 
 
-def _sailing(runs: Sequence[WindowedRun], no_coastdown: str, progress: Progress) -> Diagnosis:
+def _sailing(
+    runs: Sequence[WindowedRun], no_coastdown: str, progress: Progress
+) -> DiagnosisResult:
     """Hold the logs against the ways over ground."""
     read = []
     for done, (run, _) in enumerate(runs):
@@ -132,13 +134,13 @@ def coasts_of(
     Parameters
     ----------
     listener
-        Told what is found on the way.
+        Called with what is found on the way.
     runs
         Where to look.
     given
         The ship; None: the one attached to the first run.
     progress
-        Told of each stage, how much of it is done, and of how much.
+        Called with each stage, how much of it is done, and of how much.
 
     Returns
     -------
@@ -218,7 +220,7 @@ def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | N
     return sheet, None if of_run == ship else of_run
 
 
-def _tell_cuts(listener: Listener, result: ReplayResult, window: Span | None) -> None:
+def _tell_cuts(listener: Listener, result: ReplayResult, window: WindowSpan | None) -> None:
     """Say what of the coastdowns was cut; a window of which nothing is left is an error."""
     name = result.run.name
     for coastdown in result.coastdowns:

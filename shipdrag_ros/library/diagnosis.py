@@ -9,8 +9,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from shipdrag_ros.diagnosis import Candidate, Compared, EffectEstimate, Gap, tables, with_effects
-from shipdrag_ros.diagnosis import Diagnosis as Found
+from shipdrag_ros.diagnosis import (
+    Candidate,
+    Compared,
+    DiagnosisResult,
+    EffectEstimate,
+    Gap,
+    tables,
+    with_effects,
+)
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
@@ -19,7 +26,8 @@ from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.resistance import records_of
 from shipdrag_ros.library.shown import Shown, drawing
-from shipdrag_ros.library.windowed import Span, WindowedRun, refuse_overlaps
+from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_overlaps
+from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -62,7 +70,7 @@ class Diagnosis(Shown):
     True
     """
 
-    found: Found
+    found: DiagnosisResult
     ship: Ship | None
     notes: tuple[str, ...] = ()
 
@@ -111,7 +119,8 @@ class Diagnosis(Shown):
         """
         Say the verdict, what was examined and where, and what would decide.
         """
-        return (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
+        said = (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
+        return tuple(map(in_python, said))
 
     def table(self) -> Table:
         """
@@ -204,18 +213,19 @@ class Diagnosis(Shown):
         return {head: [row[place] for row in rows] for place, head in enumerate(heads)}
 
 
-def _first(found: Found) -> str:
+def _first(found: DiagnosisResult) -> str:
     """Name the most probable answer."""
     answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 
 
+@says_it_in_python
 def diagnose(
     records: Record | Sequence[Record],
     *,
     ship: Ship | None = None,
     facts: Sequence[str] = (),
-    window: Span | None = None,
+    window: WindowSpan | None = None,
 ) -> Diagnosis:
     """
     Name the effect that is missing in the model of a ship, as `shipdrag diagnose` does.
@@ -236,7 +246,7 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        A name only where the data can tell; a set and what would decide otherwise.
+        A name only where the data decide; a set and what would decide otherwise.
 
     Raises
     ------

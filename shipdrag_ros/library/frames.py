@@ -20,7 +20,7 @@ INDEX = 'time'
 
 def is_frame(source: object) -> bool:
     """
-    Tell whether a source has named columns.
+    Say whether a source has named columns.
     """
     return hasattr(source, 'columns') and hasattr(source, '__getitem__')
 

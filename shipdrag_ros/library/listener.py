@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who is told what happens while something long is done: a terminal, or nobody."""
+"""Who hears what happens while something long is done: a terminal, or nobody."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
-Progress = Callable[[int, int], None]
-"""Told how much is done, and of how much."""
+from shipdrag_ros.progress import PartDone
 
 
 class Listener(Protocol):
@@ -19,7 +17,7 @@ class Listener(Protocol):
         Take a line that is not part of the result.
         """
 
-    def progress(self, text: str) -> AbstractContextManager[Progress]:
+    def progress(self, text: str) -> AbstractContextManager[PartDone]:
         """
         Hear how far the work is that `text` names.
         """
@@ -44,7 +42,7 @@ class Notes:
         """
         self.lines.append(text)
 
-    def progress(self, text: str) -> AbstractContextManager[Progress]:
+    def progress(self, text: str) -> AbstractContextManager[PartDone]:
         """
         Show nothing.
         """

@@ -12,22 +12,25 @@ from typing import Any
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.format import Format, Job
+from shipdrag_ros.importing import formats
+from shipdrag_ros.importing.format import Format, Job, Option
 from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.importing.join import import_joined
 from shipdrag_ros.importing.reading import ImportedRun, format_of, job_of
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.library.frames import NANOSECONDS, is_frame, write_table
+from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.samples import SECOND_NS
 
 _NEAR_NS = 600 * SECOND_NS  # logs that begin so soon after another one ends continue it
 _FRAME = 'frame'
+_FORMAT = 'format'
 _COLUMNS = "give the column of each input, {'speed_through_water': 'log:kn'} for instance"
-_IN_PYTHON = 'In Python --map is columns=, --time is time=, --rate is rate_hz='
+_OWN = {'map': 'columns', 'time': 'time', 'rate': 'rate_hz'}  # options that are arguments
 
 
 @dataclass(frozen=True)
-class Told:
+class ReadOptions:
     """
     How a log is to be read, where it does not say so itself.
 
@@ -39,15 +42,18 @@ class Told:
         Column of the time, with its unit behind a colon.
     rate_hz
         Rows a second, where there is no column of the time.
+    others
+        Further options of `shipdrag import` by their names, as text or as numbers.
     """
 
     columns: Mapping[str, str | Sequence[str]] | None = None
     time: str | None = None
     rate_hz: float | None = None
+    others: Mapping[str, Any] | None = None
 
-    def of_dates(self, dates: Sequence[str]) -> Told:
+    def of_dates(self, dates: Sequence[str]) -> ReadOptions:
         """
-        Take the first column of dates for the time, where no other is told.
+        Take the first column of dates for the time, where no other is given.
 
         Parameters
         ----------
@@ -94,13 +100,62 @@ class Told:
             found['time'] = parse_time(self.time)
         if self.rate_hz is not None:
             found['rate'] = self.rate_hz
+        return found | self._read_others()
+
+    def format_of(self, source: Path, options: Mapping[str, Any]) -> Format:
+        """
+        Return the format of a file: the one that was named, or by its options or content.
+
+        Parameters
+        ----------
+        source, options
+
+        Raises
+        ------
+        ImportDataError
+            If there is none of the name, or it is of none that is known.
+        """
+        name = (self.others or {}).get(_FORMAT)
+        if name is None:
+            return format_of(source, options)
+        known = {each.name: each for each in formats.found()}
+        if name not in known:
+            raise ImportDataError(f'options {_FORMAT!r}: {name!r}, there are {", ".join(known)}')
+        return known[name]
+
+    def _read_others(self) -> dict[str, Any]:
+        """Return the further options as a format takes them."""
+        known = {option.key: option for each in formats.found() for option in each.options}
+        found: dict[str, Any] = {}
+        for key, value in (self.others or {}).items():
+            if key == _FORMAT:
+                continue
+            if key in _OWN:
+                raise ImportDataError(f'options {key!r}: give {_OWN[key]}=')
+            if key not in known:
+                names = ', '.join(sorted({*known, _FORMAT} - set(_OWN)))
+                raise ImportDataError(f'options {key!r}: not known; there are {names}')
+            try:
+                found[key] = _value(known[key], value)
+            except (ValueError, ImportDataError) as error:
+                raise ImportDataError(f'options {key!r}: {error}') from error
         return found
 
 
+def _value(option: Option, value: Any) -> Any:
+    """Read a value as the command line would; a switch is on or off."""
+    if not option.metavar:
+        return bool(value)
+    if not option.many:
+        return option.read(str(value))
+    several = value if isinstance(value, list | tuple) else [value]
+    return [option.read(str(each)) for each in several]
+
+
 def _is_in(text: str, source: Path) -> bool:
-    """Tell whether a file is a table that has the columns of an input."""
+    """Say whether a file is a table that has the columns of an input."""
     try:
-        table = Table(source)
+        table = LogTable(source)
         for name in parse_input(text).names:
             table.column(name)
     except ImportDataError:
@@ -120,7 +175,7 @@ class _Part:
 
 
 def read_logs(
-    sources: Sequence[Any], told: Told, attachments: Mapping[str, str]
+    sources: Sequence[Any], how: ReadOptions, attachments: Mapping[str, str]
 ) -> tuple[list[Run], list[str]]:
     """
     Make runs of logs, tables and frames.
@@ -129,7 +184,7 @@ def read_logs(
     ----------
     sources
         Paths and frames.
-    told
+    how
         How tables and frames are to be read.
     attachments
         Text by name, a ship file for instance.
@@ -149,10 +204,11 @@ def read_logs(
     notes: list[str] = []
     for place, source in enumerate(sources):
         place_of = (Path(folder.name), place, len(sources) == 1)
-        part, said = _part(source, place_of, told, attachments)
+        part, said = _part(source, place_of, how, attachments)
         parts.append(part)
         notes += said
-    _refuse_missing(told, [part.job.source for part in parts])
+    _refuse_missing(how, [part.job.source for part in parts])
+    _refuse_foreign(how, [part.declared for part in parts])
     runs: list[Run] = []
     for number, group in enumerate(_groups(parts)):
         if len(group) == 1:
@@ -169,37 +225,47 @@ def read_logs(
     return runs, notes
 
 
-def _refuse_missing(told: Told, sources: Sequence[Path]) -> None:
+def _refuse_missing(how: ReadOptions, sources: Sequence[Path]) -> None:
     """Refuse columns that none of the sources has."""
-    for text in told.maps:
+    for text in how.maps:
         if not any(_is_in(text, source) for source in sources):
             raise ImportDataError(f'columns {text!r}: none of the sources has them; name others')
 
 
+def _refuse_foreign(how: ReadOptions, chosen: Sequence[Format]) -> None:
+    """Refuse options that none of the formats knows."""
+    for key in how.others or {}:
+        if key != _FORMAT and not any(
+            key == option.key for each in chosen for option in each.options
+        ):
+            kinds = ' and '.join(dict.fromkeys(each.kind for each in chosen))
+            raise ImportDataError(f'options {key!r}: {kinds} has no use for it; leave it out')
+
+
 def _part(
-    source: Any, place_of: tuple[Path, int, bool], told: Told, attachments: Mapping[str, str]
+    source: Any, place_of: tuple[Path, int, bool], how: ReadOptions, attachments: Mapping[str, str]
 ) -> tuple[_Part, list[str]]:
     """Read a source by itself; return it, and what of it was not used."""
     folder, place, alone = place_of
     name, path = str(source), source
     if is_frame(source):
         name, path = _FRAME, folder / f'{place}.csv'
-        told = told.of_dates(write_table(source, path))
-    options = told.options(path, alone=alone)
+        how = how.of_dates(write_table(source, path))
+    options = how.options(path, alone=alone)
     bag = folder / f'{place}.mcap'
     try:
         # a frame is a table, however few columns it has
-        declared = format_of(path, {'map': (), **options} if is_frame(source) else options)
+        declared = how.format_of(path, {'map': (), **options} if is_frame(source) else options)
         job = job_of(declared, path, bag, options, attachments)
         found = declared.write(job)
     except ImportDataError as error:
-        said = str(error).replace(repr(str(path)), repr(name))
-        raise ImportDataError(f'{said}. {_IN_PYTHON}' if '--' in said else said) from error
+        raise ImportDataError(str(error).replace(repr(str(path)), repr(name))) from error
     run = ImportedRun(bag, [path])
     run.name = name
     notes = [*found.summary(path)[1:], *found.details()]
     dated = getattr(found, 'base_ns', None) is None
-    return _Part(place, declared, job, run, dated), [f'{name}: {note}' for note in notes]
+    said = [f'{name}: {in_python(note)}' for note in notes]
+    return _Part(place, declared, job, run, dated), said
 
 
 def _groups(parts: Sequence[_Part]) -> list[list[_Part]]:

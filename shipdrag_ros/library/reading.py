@@ -8,14 +8,16 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.bags import open_runs
+from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.library.record import Record
+from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Ship
 
 
+@says_it_in_python
 def read(
     source: Any,
     *,
@@ -24,6 +26,7 @@ def read(
     time: str | None = None,
     rate_hz: float | None = None,
     remap: Mapping[str, str] | None = None,
+    options: Mapping[str, Any] | None = None,
 ) -> Record:
     """
     Read what was measured on one ship.
@@ -49,6 +52,9 @@ def read(
         Rows a second [Hz], where there is no column of the time.
     remap
         Recorded topic of a bag -> input.
+    options
+        Further options of `shipdrag import` for logs and tables: `{'speed_unit': 'kn'}`,
+        `{'date': '2024-05-17'}`, `{'gear': 2.5}`.
 
     Returns
     -------
@@ -59,7 +65,7 @@ def read(
     Raises
     ------
     BagError, ImportDataError
-        If something cannot be read; the message says what to do.
+        If something cannot be read, or is of two ships; the message says what to do.
     ShipFileError
         If the ship file cannot be used.
 
@@ -91,14 +97,38 @@ def read(
     sources = [each if is_frame(each) else _path(each) for each in several]
     bags = [each for each in sources if isinstance(each, Path) and is_bag(each)]
     runs = open_runs(bags, remap=remap) if bags else []
+    if given is None:
+        _refuse_two_ships(runs)
     others = [each for each in sources if not (isinstance(each, Path) and is_bag(each))]
     if not others:
-        return Record(runs, given=given)
-    from shipdrag_ros.library.logs import Told, read_logs  # a bag needs no importer
+        given_for_logs = {'columns': columns, 'time': time, 'rate_hz': rate_hz, 'options': options}
+        idle = [f'{name}=' for name, value in given_for_logs.items() if value is not None]
+        notes = [f'{", ".join(idle)} not used: they are for logs and tables'] if idle else []
+        return Record(runs, given=given, notes=notes)
+    from shipdrag_ros.library.logs import ReadOptions, read_logs  # a bag needs no importer
 
+    how = ReadOptions(columns, time, rate_hz, options)
     attachments = {} if given is None else {SHIP_FILE: given.to_yaml()}
-    imported, notes = read_logs(others, Told(columns, time, rate_hz), attachments)
+    imported, notes = read_logs(others, how, attachments)
     return Record([*runs, *imported], given=given, notes=notes)
+
+
+def _refuse_two_ships(runs: Sequence[Run]) -> None:
+    """Refuse bags that name different ships; one without a name may be any."""
+    named: dict[str, str] = {}
+    for run in runs:
+        text = run.attachments.get(SHIP_FILE)
+        name = (
+            '' if text is None else Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}').name
+        )
+        if name:
+            named.setdefault(name, run.name)
+    if len(named) > 1:
+        (one, first), (other, second), *_ = named.items()
+        raise BagError(
+            f'{first!r} is of {one!r} and {second!r} of {other!r}; read the bags of each ship by '
+            'themselves, or say which ship it is with ship='
+        )
 
 
 def _path(source: Any) -> Path:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run, or a window of it, replayed and told."""
+"""A run, or a window of it, replayed and put into words."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.library.listener import Listener
-from shipdrag_ros.library.windowed import Span
+from shipdrag_ros.library.windowed import WindowSpan
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.replay.run_result import RunResult
@@ -23,7 +23,7 @@ def replay_run(
     *,
     ship: Ship | None = None,
     parameters: Parameters | None = None,
-    window: Span | None = None,
+    window: WindowSpan | None = None,
 ) -> RunResult:
     """
     Replay one run; its progress is shown.

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -18,8 +18,9 @@ from shipdrag_ros.library.coastdown import Coastdown, force_columns
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import replay_run
-from shipdrag_ros.library.shown import Shown, drawing
-from shipdrag_ros.library.windowed import Span
+from shipdrag_ros.library.shown import ShownResistance
+from shipdrag_ros.library.windowed import WindowSpan
+from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
@@ -31,14 +32,14 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class Resistance(Shown):
+class Resistance(ShownResistance):
     """
     r(v) of a ship, from all coastdowns of a record.
 
     Attributes
     ----------
     runs
-        What each run gave, as `shipdrag replay` tells it.
+        What each run gave, as `shipdrag replay` shows it.
 
     Raises
     ------
@@ -110,7 +111,7 @@ class Resistance(Shown):
             place = force.near(tables.common_speed_m_s(self.runs))
             told.append(f'{whole.combined.runs} coastdowns together. {force.at(place)}')
             told += words.combined_notes(whole.combined)
-        return tuple(told)
+        return tuple(map(in_python, told))
 
     def table(self) -> Table:
         """
@@ -121,31 +122,16 @@ class Resistance(Shown):
         except EstimationError:
             return tables.coastdowns_table(self.runs)
 
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """
-        Draw resistance against speed with its band, over the clean hull.
-
-        Parameters
-        ----------
-        ax
-            To draw on; None: new axes.
-
-        Returns
-        -------
-        matplotlib.axes.Axes
-            Knots and kN, of a model ship m/s and N.
-        """
+    def _drawing(self) -> Callable[[Axes], None]:
         from shipdrag_ros.estimation.pictures import draw_curves
 
         usable = [each for each in self.coastdowns if each.estimate is not None]
         if not usable:
             raise EstimationError(' '.join(self.summary()))
         if len(usable) == 1:
-            return usable[0].plot(ax)
+            return usable[0]._drawing()
         dated = [(utc(each.start_ns), each.curve) for each in usable]
-        with drawing(ax) as axis:
-            draw_curves(axis, dated, self.ship, combined=self.combined)
-        return axis
+        return lambda axis: draw_curves(axis, dated, self.ship, combined=self.combined)
 
     def report(self, path: str | PathLike[str]) -> None:
         """
@@ -177,10 +163,11 @@ class Resistance(Shown):
         return force_columns(self.curve, self.ship)
 
 
+@says_it_in_python
 def estimate(
     records: Record | Sequence[Record],
     *,
-    window: Span | None = None,
+    window: WindowSpan | None = None,
     parameters: Parameters | None = None,
 ) -> Resistance:
     """

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -65,6 +65,35 @@ class Shown(ABC):
 
     def _repr_html_(self) -> str:
         return html_of(self._title(), self.summary(), self.table())
+
+
+class ShownResistance(Shown):
+    """
+    A result that can be drawn as resistance against speed.
+    """
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """
+        Draw resistance against speed with its band, over the clean hull.
+
+        Parameters
+        ----------
+        ax
+            To draw on; None: new axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Knots and kN, of a model ship m/s and N.
+        """
+        draw = self._drawing()
+        with drawing(ax) as axis:
+            draw(axis)
+        return axis
+
+    @abstractmethod
+    def _drawing(self) -> Callable[[Axes], None]:
+        """Return what draws it; an EstimationError where there is nothing to draw."""
 
 
 def frame_of(columns: Mapping[str, Any]) -> DataFrame:

@@ -24,6 +24,7 @@ from shipdrag_ros.library.simulating import (
     usual_speed,
     write_bag,
 )
+from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS
 from shipdrag_ros.simulation.effects import find, parse
@@ -36,7 +37,7 @@ NAME = 'simulated'
 
 class Sensing(TypedDict, total=False):
     """
-    What a simulation may be told besides.
+    What a simulation may be given besides.
 
     Attributes
     ----------
@@ -60,6 +61,7 @@ class Sensing(TypedDict, total=False):
     inputs: Sequence[str]
 
 
+@says_it_in_python
 def simulate(
     ship: Ship,
     effects: Mapping[str, Size] | None = None,
@@ -147,7 +149,7 @@ def simulate(
     folder = TemporaryDirectory(prefix='shipdrag-')
     bag = Path(folder.name) / f'{NAME}.mcap'
     write_bag(bag, block, ship, truth, Notes())
-    # two runs of one day are told apart by their names
+    # two runs of one day are known by their names
     name = f'{NAME}, seed {seed}' + (f', heading {heading_rad:.4g} rad' if heading_rad else '')
     run = Run(BagFiles(name, (bag,)), [McapFile(bag)])
     weakref.finalize(run, folder.cleanup)

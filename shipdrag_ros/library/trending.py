@@ -23,7 +23,7 @@ def trends_of(listener: Listener, store: Path) -> tuple[list[ShipTrend], list[tu
     Parameters
     ----------
     listener
-        Told what of the ship files and of the events cannot be used.
+        Called with what of the ship files and of the events cannot be used.
     store
         Folder that `shipdrag fleet` has written.
 

@@ -16,6 +16,7 @@ from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.resistance import Resistance
 from shipdrag_ros.library.shown import Shown, drawing, time_column
 from shipdrag_ros.library.trending import trends_of
+from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
 
 if TYPE_CHECKING:
@@ -84,7 +85,8 @@ class Trends(Shown):
             f'{trend.series.name}: {line}' for trend in self.ships for line in words.lines(trend)
         ]
         told += [f'{bag} could not be used: {reason}' for bag, reason in self.skipped]
-        return (*(told or ['No coastdown was given: no trend.']), *self.notes)
+        said = (*(told or ['No coastdown was given: no trend.']), *self.notes)
+        return tuple(map(in_python, said))
 
     def table(self) -> Table:
         """
@@ -154,6 +156,7 @@ class Trends(Shown):
         }
 
 
+@says_it_in_python
 def trends(
     source: str | PathLike[str] | Sequence[Resistance],
     *,
@@ -166,7 +169,7 @@ def trends(
     ----------
     source
         Folder that `shipdrag fleet` has written, or what `estimate` gave for each
-        record; their ships are told apart by name.
+        record; their ships are known by name.
     events
         What was done to a hull, by name of the ship: date (ISO 8601) and one of
         `cleaning docking propeller_polish coating`. A store has its own.

@@ -10,14 +10,14 @@ from typing import NamedTuple
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import BagError
 
-Span = tuple[float, float]
+WindowSpan = tuple[float, float]
 
 
 class WindowedRun(NamedTuple):
     """A run, and the window of it that was given, [s] from its start."""
 
     run: Run
-    window: Span | None
+    window: WindowSpan | None
 
 
 def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:
@@ -41,5 +41,5 @@ def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:
                 )
 
 
-def _told(window: Span) -> str:
+def _told(window: WindowSpan) -> str:
     return 'whole' if math.isinf(window[1]) else f'{window[0]:g} to {window[1]:g} s'

@@ -97,7 +97,7 @@ def lead_check(lead_s: float | None, full_s: float | None) -> Check:
     """
     name = 'Steady lead'
     if lead_s is None or full_s is None:
-        return Check(name, Held.UNKNOWN, 'not told by the node')
+        return Check(name, Held.UNKNOWN, 'not said by the node')
     enough = lead_s >= min(READY_S, full_s)
     return Check(
         name, Held.YES if enough else Held.WAIT, f'{clock(lead_s)} of {full_s / 60.0:.0f} min'
@@ -178,7 +178,7 @@ def reciprocal_check(steer_deg: float | None, *, paired: bool, coasting: bool = 
     """
     name = 'Reciprocal run'
     if paired:
-        return Check(name, Held.YES, 'done: current and log are told apart')
+        return Check(name, Held.YES, 'done: current and log are separated')
     if steer_deg is None:
         return Check(name, Held.WAIT, 'after the first run')
     if coasting:

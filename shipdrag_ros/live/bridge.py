@@ -13,14 +13,22 @@ from typing import Any
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, verdicts
 from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.figures import at_usual_speed, curve_part, past_part, ship_part
-from shipdrag_ros.live.headline import ENDED_S, GOAL, Ended, Situation, headline
+from shipdrag_ros.live.figures import PagePart, at_usual_speed, curve_part, past_part, ship_part
+from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
 from shipdrag_ros.live.outlook import to_go_s
 from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
 from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.live.verdicts import VerdictView
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event
-from shipdrag_ros.messages.heard import ERROR, Health, Heard, NodeMessage, Samples, ShipFile
+from shipdrag_ros.messages.heard import (
+    ERROR,
+    STALE,
+    Health,
+    Heard,
+    NodeMessage,
+    Samples,
+    ShipFile,
+)
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
@@ -28,7 +36,7 @@ PAST_RUNS = 50  # that are listed
 _MESSAGES = 20
 _COURSE_S = 300
 
-Part = dict[str, Any] | list[Any] | None
+_AnyPart = PagePart | list[Any] | None
 
 
 class Bridge:
@@ -90,14 +98,14 @@ class Bridge:
 
     def keep_alive(self, now_s: float) -> None:
         """
-        Note that whoever tells is still there; a bag that is paused says nothing.
+        Note that whoever sends is still there; a bag that is paused says nothing.
         """
         if self._heard_s is not None:
             self._heard_s = now_s
 
     def tell(self, view: VerdictView) -> None:
         """
-        Take a verdict that no node told.
+        Take a verdict that no node gave.
         """
         self._verdict = view
 
@@ -203,7 +211,7 @@ class Bridge:
     def _now_ns(self) -> int:
         return self.trace.newest_s * 1_000_000_000
 
-    def parts(self, now_s: float) -> dict[str, Part]:
+    def parts(self, now_s: float) -> dict[str, _AnyPart]:
         """
         Return every part of the page but the traces.
 
@@ -219,7 +227,7 @@ class Bridge:
             'ship': ship_part(self._ship),
             'figures': self._figures(),
             'curve': curve_part(self._curve),
-            'inputs': self._inputs(),
+            'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now),
             'verdict': self._verdict_part(),
             'past': [past_part(run, self._ship) for run in self.past[-PAST_RUNS:]],
@@ -274,7 +282,7 @@ class Bridge:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
-    def _figures(self) -> Part:
+    def _figures(self) -> _AnyPart:
         figures: dict[str, Any] = {'speed_m_s': self.speed_m_s}
         if self._resistance is not None:
             figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
@@ -287,13 +295,16 @@ class Bridge:
             figures['usual']['run_s'] = ended[-1].start_ns // 1_000_000_000  # not of now
         return figures
 
-    def _inputs(self) -> Part:
+    def _inputs(self, silent_s: float) -> _AnyPart:
         if self._health is None:
             return []
+        silent = silent_s > SILENT_S  # what the node said last is no health of now
+        told_s = silent_s if silent else 0.0
         told = [status for status in self._health.statuses if status.input]
         told += [status for status in self._health.statuses if status.part == 'recording']
         rows = []
         for status in told:
+            age_s = status.number('age')
             rejected = {
                 key.removeprefix('rejected '): int(float(text))
                 for key, text in status.values.items()
@@ -302,16 +313,18 @@ class Bridge:
             rows.append(
                 {
                     'name': status.part.removeprefix('input ').replace('_', ' '),
-                    'level': status.level,
-                    'text': status.message,
-                    'rate_hz': status.number('rate'),
-                    'age_s': status.number('age'),
+                    'level': STALE if silent else status.level,
+                    'text': f'not known, the node is silent; its last word: {status.message}'
+                    if silent
+                    else status.message,
+                    'rate_hz': None if silent else status.number('rate'),
+                    'age_s': None if age_s is None else age_s + told_s,
                     'rejected': {name: count for name, count in rejected.items() if count},
                 }
             )
         return rows
 
-    def _checks(self, now: Situation) -> Part:
+    def _checks(self, now: Situation) -> _AnyPart:
         second, coasting = self._now_s, now.coast_s is not None
         of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
         course = self._recent.direction(second)
@@ -333,7 +346,7 @@ class Bridge:
         ]
         return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]
 
-    def _verdict_part(self) -> Part:
+    def _verdict_part(self) -> _AnyPart:
         view = self._verdict
         return {
             'state': view.state,

@@ -16,16 +16,16 @@ _CLEAN_POINTS = 60
 _CURVE_POINTS = 60
 _PAST_POINTS = 24
 
-Part = dict[str, Any]
+PagePart = dict[str, Any]
 
 
-def ship_part(ship: Ship | None) -> Part | None:
+def ship_part(ship: Ship | None) -> PagePart | None:
     """
     Return the ship's name, mass and clean hull; None where she is not known.
     """
     if ship is None:
         return None
-    part: Part = {'name': ship.name, 'mass_kg': ship.mass_kg, 'clean': None}
+    part: PagePart = {'name': ship.name, 'mass_kg': ship.mass_kg, 'clean': None}
     if ship.baseline is not None:
         low, high = ship.baseline_range_m_s
         speed = np.linspace(max(low, 0.02 * high), high, _CLEAN_POINTS)
@@ -36,7 +36,7 @@ def ship_part(ship: Ship | None) -> Part | None:
     return part
 
 
-def at_usual_speed(curve: Curve, ship: Ship | None) -> Part:
+def at_usual_speed(curve: Curve, ship: Ship | None) -> PagePart:
     """
     Return r at the speed at which figures are stated, and its share over the clean hull.
 
@@ -49,7 +49,7 @@ def at_usual_speed(curve: Curve, ship: Ship | None) -> Part:
     """
     at = curve.usual_m_s(ship)
     r, sigma = curve.at(at)
-    part: Part = {'speed_m_s': at, 'r': r, 'r_sigma': sigma}
+    part: PagePart = {'speed_m_s': at, 'r': r, 'r_sigma': sigma}
     if ship is not None:
         (clean,), (clean_sd,) = clean_hull(ship, np.array([at]))
         if np.isfinite(clean):
@@ -59,11 +59,11 @@ def at_usual_speed(curve: Curve, ship: Ship | None) -> Part:
     return part
 
 
-def past_part(run: PastRun, ship: Ship | None) -> Part:
+def past_part(run: PastRun, ship: Ship | None) -> PagePart:
     """
     Return a run that has ended, for the list and for the chart.
     """
-    part: Part = {
+    part: PagePart = {
         'start_s': run.start_ns // 1_000_000_000,
         'length_s': (run.end_ns - run.start_ns) * 1e-9,
         'heading_deg': run.compass_deg,
@@ -77,7 +77,7 @@ def past_part(run: PastRun, ship: Ship | None) -> Part:
     return part
 
 
-def curve_part(curve: Curve | None, *, points: int = _CURVE_POINTS) -> Part | None:
+def curve_part(curve: Curve | None, *, points: int = _CURVE_POINTS) -> PagePart | None:
     """
     Return a curve by a few points; None where there is none.
     """

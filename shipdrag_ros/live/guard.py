@@ -118,7 +118,7 @@ def pass_of(token: str) -> str:
 
 def same(given: str, expected: str) -> bool:
     """
-    Compare in a time that tells nothing.
+    Compare in a time that betrays nothing.
     """
     return hmac.compare_digest(given.encode(), expected.encode())
 

@@ -81,7 +81,7 @@ class Situation:
     trouble
         What keeps the node from estimating; '' for nothing.
     lead_s, lead_full_s
-        Steady sailing so far, and the longest that is used; None where it is not told.
+        Steady sailing so far, and the longest that is used; None where it is not known.
     coast_s
         Since the stop; None without a coastdown.
     band

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-LONGEST_S = 3600.0  # a time to go beyond it is not told
+LONGEST_S = 3600.0  # a time to go beyond it is not shown
 _LEAST_POINTS = 4
 _LEAST_SLOPE = 0.2  # of log band over log time; flatter is no promise
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from shipdrag_ros.bags.run import Run
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.live.bridge import Bridge
@@ -215,7 +215,7 @@ class BagSource:
         except ShipdragError as error:
             line.problem = str(error)
 
-    def _begin(self, coastdown: Coastdown, window: Window) -> None:
+    def _begin(self, coastdown: EndedCoastdown, window: Window) -> None:
         assert self._diagnosing is not None
         self._diagnosing.begin(coastdown, window)
 
@@ -257,7 +257,7 @@ class BagSource:
         self.bridge.keep_alive(now_s)
 
     def _tell_verdict(self) -> None:
-        """Tell what the diagnosis says of a coastdown that has ended by now."""
+        """Say what the diagnosis says of a coastdown that has ended by now."""
         assert self._diagnosing is not None
         status = self._diagnosing.status
         of, found = status.coastdown, status.found

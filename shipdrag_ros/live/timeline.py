@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A bag as a node would have told it: through the same monitor, second by second.
+A bag as a node would have shown it: through the same monitor, second by second.
 
 Read once, ahead of whoever plays it; playing, pausing and seeking only walk
 what is there.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import bisect
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -18,8 +18,7 @@ import numpy as np
 
 from shipdrag_ros.bags.run import Mark, Run
 from shipdrag_ros.coastdown import InputHealth, Monitor
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy, Event
-from shipdrag_ros.estimation import Window
+from shipdrag_ros.coastdown.events import EndedCoastdown, Event, OnCoastdown
 from shipdrag_ros.messages import outputs
 from shipdrag_ros.messages.heard import (
     OK,
@@ -39,8 +38,6 @@ from shipdrag_ros.ship import Ship
 SECOND_NS = 1_000_000_000
 _HEALTH_NS = 5 * SECOND_NS
 _SILENT_S = 10.0
-
-Ended = Callable[[Coastdown, Window], None]
 
 
 class Moment(NamedTuple):
@@ -73,7 +70,7 @@ class Timeline:
     """
 
     def __init__(
-        self, run: Run, ship: Ship, parameters: Parameters, *, ended: Ended | None = None
+        self, run: Run, ship: Ship, parameters: Parameters, *, ended: OnCoastdown | None = None
     ) -> None:
         self.start_ns, last_ns = run.span_ns or (0, 0)
         self.end_ns = last_ns + 1  # after the last message: what ends with the record
@@ -151,12 +148,7 @@ class Timeline:
         for event in events:
             for message in outputs(event):
                 heard.append(NodeMessage(message.topic.rpartition('/')[2], message.payload))
-            if (
-                self._ended is not None
-                and isinstance(event, Coastdown)
-                and event.ended_by is not EndedBy.RESET
-                and not event.withdrawn
-            ):
+            if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, monitor.ended_window(event))
         return heard
 

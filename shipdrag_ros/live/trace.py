@@ -32,7 +32,7 @@ _COLUMN_OF = {
 }
 _ESTIMATE = 2
 
-Row = tuple[int, float | None, float | None, float | None, float | None]
+TraceRow = tuple[int, float | None, float | None, float | None, float | None]
 
 
 @dataclass
@@ -46,7 +46,7 @@ class _Bin:
         self.sums[column] += total
         self.counts[column] += count
 
-    def row(self, second: int) -> Row:
+    def row(self, second: int) -> TraceRow:
         means = [
             float(f'{total / count:.5g}') if count else None
             for total, count in zip(self.sums, self.counts)
@@ -71,9 +71,9 @@ class Trace:
         self.restarted = False
         self._strange = 0
         self._open: dict[int, _Bin] = {}
-        self._fine: deque[Row] = deque()
-        self._coarse: deque[Row] = deque()
-        self._thinning: list[Row] = []
+        self._fine: deque[TraceRow] = deque()
+        self._coarse: deque[TraceRow] = deque()
+        self._thinning: list[TraceRow] = []
 
     def add(self, block: Block) -> None:
         """
@@ -102,7 +102,7 @@ class Trace:
         """
         self._bin(stamp_ns // 1_000_000_000, _ESTIMATE, speed_m_s, 1)
 
-    def closed(self, *, all_of_it: bool = False) -> list[Row]:
+    def closed(self, *, all_of_it: bool = False) -> list[TraceRow]:
         """
         Return the rows that no more reading is waited for, each once.
 
@@ -119,17 +119,17 @@ class Trace:
         return rows
 
     @property
-    def latest(self) -> Row | None:
+    def latest(self) -> TraceRow | None:
         """The last row, None before the first."""
         return self._fine[-1] if self._fine else None
 
     @property
-    def current(self) -> Row | None:
+    def current(self) -> TraceRow | None:
         """The newest second as far as it has been read, None before the first reading."""
         found = self._open.get(self.newest_s)
         return self.latest if found is None else found.row(self.newest_s)
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TraceRow]:
         """
         Return all that is kept, oldest first.
         """
@@ -157,14 +157,14 @@ class Trace:
         self._thinning.clear()
         self.restarted = True
 
-    def _keep(self, row: Row) -> None:
+    def _keep(self, row: TraceRow) -> None:
         self._fine.append(row)
         while self._fine and self._fine[0][0] < row[0] - FINE_S:
             self._thin(self._fine.popleft())
         while self._coarse and self._coarse[0][0] < row[0] - LONGEST_S:
             self._coarse.popleft()
 
-    def _thin(self, row: Row) -> None:
+    def _thin(self, row: TraceRow) -> None:
         if self._thinning and self._thinning[0][0] // COARSE_S != row[0] // COARSE_S:
             merged = _Bin()
             for each in self._thinning:

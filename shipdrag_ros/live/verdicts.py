@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 from shipdrag_ros.messages.heard import Status
 
 if TYPE_CHECKING:  # slow to import, and needed only once there is one
-    from shipdrag_ros.diagnosis import Diagnosis
+    from shipdrag_ros.diagnosis import DiagnosisResult
 
 _NO_SIZE = re.compile(r'probability|mean square|standard deviation|coastdown')
+_OPTION = re.compile(r' \(--fact [^)]*\)')  # of the command line, which a bridge has not
+_SETS_SIZED = 3  # candidates whose sizes are shown
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class VerdictView:
         As the node has it: `none yet`, `running`, `done`, ...
     sentence
     sizes
-        Name and text of each size.
+        Name and text of each size; of a set, what each candidate would have.
     probabilities
         Name and share of each candidate.
     decide
@@ -50,7 +52,7 @@ def of_status(status: Status) -> VerdictView:
         name, _, unit = key.partition(' [')
         unit = unit.rstrip(']').removesuffix('1')
         if name.startswith('advice'):
-            decide.append(text)
+            decide.append(_OPTION.sub('', text))
         elif name.startswith(('probability of ', 'probability that ')):
             try:
                 share = float(text)
@@ -71,19 +73,29 @@ def of_status(status: Status) -> VerdictView:
     )
 
 
-def of_diagnosis(found: Diagnosis) -> VerdictView:
+def of_diagnosis(found: DiagnosisResult) -> VerdictView:
     """
     Take a diagnosis.
     """
     from shipdrag_ros.diagnosis import words
     from shipdrag_ros.simulation.effects import LIBRARY
 
+    told = [(effect.name, effect) for effect in found.effects]
+    if not told:
+        told = [
+            (
+                f'if {" + ".join(each.names)}' + (f', {effect.name}' if each.names[1:] else ''),
+                effect,
+            )
+            for each in found.candidates[:_SETS_SIZED]
+            for effect in each.effects
+        ]
     sizes = [
         (
-            f'{effect.name}, {words.quantity_text(quantity)}'.replace('_', ' '),
+            f'{before}, {words.quantity_text(quantity)}'.replace('_', ' '),
             words.size(quantity, effect.parameters[quantity.name]),
         )
-        for effect in found.effects
+        for before, effect in told
         for quantity in LIBRARY[effect.name].parameters
     ]
     return VerdictView(
@@ -91,5 +103,5 @@ def of_diagnosis(found: Diagnosis) -> VerdictView:
         words.sentence(found),
         tuple(sizes),
         tuple((each.words, each.probability) for each in words.answers(found)),
-        tuple(words.advice(found)),
+        tuple(_OPTION.sub('', line) for line in words.advice(found)),
     )

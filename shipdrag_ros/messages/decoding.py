@@ -207,7 +207,7 @@ _UNREADABLE = {
     int(GatherResult.NO_JOINT): Unreadable.NO_JOINT,
 }
 _COLUMNS = 4  # two values and two variances, which the extra fields follow
-Columns = Callable[[Float64], Float64]
+Converted = Callable[[Float64], Float64]
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ class _Reading:
 
     channel: Channel
     steps: tuple[Int64, ...]
-    columns: Columns | None
+    columns: Converted | None
     width: int
     stamped: bool = True
 
@@ -321,7 +321,7 @@ def _joints(channel: Channel) -> tuple[Source, _Reading]:
 
 
 def _computed(
-    channel: Channel, type_name: str, columns: Columns, *fields: str
+    channel: Channel, type_name: str, columns: Converted, *fields: str
 ) -> tuple[Source, _Reading]:
     """Pair a source with how its fields are read, and with what is made of them."""
     behind = (*[''] * _COLUMNS, *fields)

@@ -3,7 +3,7 @@
 The numbers wanted out of the CDR bytes of many messages, compiled.
 
 One message or thousands, either byte order, strings of any length; bytes that
-are no message of the type are told and never read beyond. Of JointState, whose
+are no message of the type are named and never read beyond. Of JointState, whose
 names decide what is wanted, see `joints`.
 """
 

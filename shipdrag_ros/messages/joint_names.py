@@ -72,7 +72,7 @@ def _is_side(data: Any, start: int, end: int, name: Any) -> bool:
 
 @compiled
 def _place_of(data: Any, start: int, end: int) -> int:
-    """Return the place, from 0, that the rest of a name tells; `FREE` or `BEYOND`."""
+    """Return the place, from 0, that the rest of a name says; `FREE` or `BEYOND`."""
     digits = end
     while digits > start and 48 <= data[_U(digits - 1)] <= 57:
         digits -= 1

@@ -15,7 +15,7 @@ from enum import Enum
 import numpy as np
 
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
+    EndedCoastdown,
     Event,
     NoEstimate,
     NotCoastdown,
@@ -59,7 +59,7 @@ class EventKind(Enum):
     DISMISSED = 'dismissed'  # nearly a coastdown, or a part of one that was cut
     RESET = 'reset'  # done, whatever the cause
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
-    SILENCE = 'silence'  # by the clock, which no sample tells: an input of replay
+    SILENCE = 'silence'  # by the clock, which no sample shows: an input of replay
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
     FILES = 'files'  # recordings removed
@@ -106,7 +106,7 @@ def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
     match event:
         case Update(stamp_ns, estimate):
             return _figures(stamp_ns, estimate, node)
-        case Coastdown():
+        case EndedCoastdown():
             curve = [] if event.estimate is None else [_curve(event.end_ns, event.estimate, node)]
             return [*curve, event_message(_coastdown_note(event), node=node)]
         case Onset(start_ns, detected_ns):
@@ -258,7 +258,7 @@ def _curve(stamp_ns: int, estimate: Estimate, node: str) -> OutputMessage:
     return _message(RESISTANCE_CURVE, cloud, stamp_ns, node)
 
 
-def _coastdown_note(event: Coastdown) -> EventNote:
+def _coastdown_note(event: EndedCoastdown) -> EventNote:
     values = {
         'start_ns': str(event.start_ns),
         'end_ns': str(event.end_ns),

@@ -170,7 +170,7 @@ def definition(type_name: str) -> str:
 
 def type_hash(type_name: str) -> str:
     """
-    Return the RIHS01 hash by which ROS 2 tells definitions apart.
+    Return the RIHS01 hash by which ROS 2 knows definitions.
     """
     digest: str = _store.hash_rihs01(type_name)
     return digest

@@ -33,7 +33,7 @@ _KINDS = 50  # of unknown sentences are counted apart; a hostile talker may inve
 _OTHERS = 'others'
 
 # a source of an input, and the address it is heard on
-Heard = tuple[SentenceSource, str]
+HeardSentence = tuple[SentenceSource, str]
 
 
 def raw_message(text: str, *, receive_ns: int) -> EncodedMessage:
@@ -56,11 +56,11 @@ class _Choice:
     """Which source feeds a channel."""
 
     since_ns: int
-    counts: Counter[Heard] = field(default_factory=Counter)
-    held: Heard | None = None
+    counts: Counter[HeardSentence] = field(default_factory=Counter)
+    held: HeardSentence | None = None
     last_ns: int = 0
 
-    def takes(self, heard: Heard, now_ns: int) -> bool:
+    def takes(self, heard: HeardSentence, now_ns: int) -> bool:
         """Say whether a value of this source is used."""
         # a clock that was set back must not make it wait
         self.since_ns, self.last_ns = min(self.since_ns, now_ns), min(self.last_ns, now_ns)

@@ -74,7 +74,7 @@ class SourceCounts:
         return None if self.last_s is None else monotonic() - self.last_s
 
 
-class Listener:
+class LineListener:
     """
     Hears one source from `start` to `close`.
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from shipdrag_ros.nmea.address import Address
-from shipdrag_ros.nmea.listener import Listener, SourceCounts
+from shipdrag_ros.nmea.listener import LineListener, SourceCounts
 
 WAITING_LINES = 8000
 """That wait to be taken; what finds no room is counted."""
@@ -54,7 +54,7 @@ class LiveNmea:
         self._wake = wake
         self._waiting: deque[Line] = deque()
         self._lock = threading.Lock()
-        self._listeners = [Listener(address, self._deliver) for address in addresses]
+        self._listeners = [LineListener(address, self._deliver) for address in addresses]
 
     def start(self) -> None:
         """

@@ -2,7 +2,7 @@
 """
 What the sentences of NMEA 0183 measure, in the units of `Channel`.
 
-One row a value that a sentence may hold. Several sentences may tell the same
+One row a value that a sentence may hold. Several sentences may hold the same
 input; the one that comes first here is the better.
 """
 
@@ -31,7 +31,7 @@ MAGNETIC = 'magnetic'
 _GLL_OF_OLD = 4  # fields
 OWN_OFFSET = 'with its own offset'
 STATED_DEPTH = 'with the stated depth of the transducer'
-NOT_TOLD = 'depth of the transducer not told'
+NOT_TOLD = 'depth of the transducer not stated'
 
 
 class NoValue(Exception):
@@ -52,10 +52,10 @@ class MeasuredValue(NamedTuple):
     a, b
         Columns of the value, see `Channel`.
     detail
-        What tells it from others of the same sentence: the shaft, the rudder, a
+        What separates it from others of the same sentence: the shaft, the rudder, a
         heading that is magnetic.
     channel
-        What it is, where the sentence tells: which shaft.
+        What it is, where the sentence says it: which shaft.
     """
 
     a: float
@@ -119,7 +119,7 @@ class Mounting:
 
 
 # None: the sentence need not hold it, and does not
-Reader = Callable[[Fields, Mounting], MeasuredValue | None]
+FieldsReader = Callable[[Fields, Mounting], MeasuredValue | None]
 
 
 def _water_vhw(fields: Fields, mounting: Mounting) -> MeasuredValue:
@@ -216,7 +216,7 @@ def _shaft(fields: Fields, mounting: Mounting) -> MeasuredValue:
 
 
 def _pitch(fields: Fields, mounting: Mounting) -> MeasuredValue | None:
-    """Return the ratio to the greatest pitch; a fixed propeller has none to tell."""
+    """Return the ratio to the greatest pitch; a fixed propeller has none to give."""
     if not fields['pitch'] or fields['source'] != 'S':
         return None
     place, detail = _shaft_place(fields)
@@ -256,7 +256,7 @@ def _wind(fields: Fields, mounting: Mounting) -> MeasuredValue:
 
 def _depth_dpt(fields: Fields, mounting: Mounting) -> MeasuredValue:
     depth_m = fields.number('depth')
-    # negative: to the keel, whose depth is not told
+    # negative: to the keel, whose depth is not stated
     if fields['offset'] and (offset_m := fields.number('offset')) >= 0.0:
         return MeasuredValue(depth_m + offset_m, detail=OWN_OFFSET)
     return MeasuredValue(depth_m + _transducer(mounting), detail=STATED_DEPTH)
@@ -324,7 +324,7 @@ def _water_uhaw(fields: Fields, mounting: Mounting) -> MeasuredValue:
     return MeasuredValue((east * sin(heading) + north * cos(heading)) * M_S_PER_KNOT)
 
 
-READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
+READERS: Mapping[str, tuple[tuple[Channel, FieldsReader], ...]] = {
     'RMC': (
         (Channel.POSITION_GEODETIC, _position),
         (Channel.SPEED_OVER_GROUND, _ground_rmc),
@@ -350,7 +350,7 @@ READERS: Mapping[str, tuple[tuple[Channel, Reader], ...]] = {
 """What each sentence measures; the better source of an input first."""
 
 TIMED = ('RMC', 'GGA', 'GLL', 'ZDA')
-"""Sentences that tell the time."""
+"""Sentences that hold the time."""
 
 _PLACES = {
     kind: {name: place for place, name in enumerate(NMEA_PAYLOADS_GET[kind])}

@@ -16,7 +16,7 @@ _RANK = {kind: place for place, kind in enumerate(READERS)}
 
 
 class SentenceSource(NamedTuple):
-    """Who tells an input; the better source is the smaller."""
+    """Who sends an input; the better source is the smaller."""
 
     rank: int
     detail: str

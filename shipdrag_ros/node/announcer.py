@@ -47,7 +47,7 @@ class Announcer:
 
     def compiling(self, work: Compiling | None, waiting: int) -> None:
         """
-        Tell that it takes a while until the first estimate can be made, and its end.
+        Say that it takes a while until the first estimate can be made, and its end.
 
         Parameters
         ----------
@@ -72,7 +72,7 @@ class Announcer:
 
     def event(self, event: Event) -> None:
         """
-        Tell what the monitor reports.
+        Say what the monitor reports.
         """
         line = line_of(event)
         if line is not None:
@@ -80,7 +80,7 @@ class Announcer:
 
     def status(self, status: DiagnosticStatus) -> None:
         """
-        Tell that a part of the node is worse or better than before.
+        Say that a part of the node is worse or better than before.
         """
         before = self._levels.get(status.name, DiagnosticStatus.OK)
         self._levels[status.name] = status.level
@@ -93,7 +93,7 @@ class Announcer:
 
     def inputs(self, states: Sequence[InputState]) -> None:
         """
-        Tell of an input that was heard and is worse or better than before.
+        Say of an input that was heard and is worse or better than before.
         """
         now_s = time.monotonic()
         for state in states:
@@ -106,7 +106,7 @@ class Announcer:
 
     def silence(self, states: Sequence[InputState], candidates: str) -> None:
         """
-        Tell, once, that no input of the motion is heard, and that one is again.
+        Say, once, that no input of the motion is heard, and that one is again.
 
         Parameters
         ----------

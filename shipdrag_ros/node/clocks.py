@@ -38,7 +38,7 @@ def both_ns() -> tuple[int, int] | None:
 
 
 class OwnClock:
-    """The clock that arrivals are told by, held against one that nobody sets."""
+    """The clock that arrivals are timed by, held against one that nobody sets."""
 
     def __init__(self) -> None:
         self._before: tuple[int, int] | None = None

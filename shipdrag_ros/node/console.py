@@ -46,8 +46,8 @@ def line(health: Health) -> str:
         lead_s, used_s = state.number('steady lead'), state.number('steady lead used at most')
         if lead_s is not None and used_s is not None:
             said[0] = f'steady {lead_s / 60.0:.0f} of {used_s / 60.0:.0f} min'
-    if state is not None and state.level != OK:
-        said[0] = state.message
+    if state is not None and state.level != OK and not state.message.startswith(f'{monitor};'):
+        said[0] = state.message  # inputs that are not well are named behind it
     if estimate is not None:
         speed = estimate.number('speed through water')
         r = estimate.number('specific resistance')

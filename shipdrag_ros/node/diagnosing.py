@@ -19,14 +19,14 @@ from enum import Enum
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:  # the process that diagnoses imports it, the node need not
-    from shipdrag_ros.diagnosis import Diagnosis
+    from shipdrag_ros.diagnosis import DiagnosisResult
 
 LIMIT_S = 900.0  # the first diagnosis of a machine compiles
 _NICE = 10  # estimates come first
@@ -61,8 +61,8 @@ class DiagnosisStatus:
 
     state: DiagnosisState
     reason: str = ''
-    coastdown: Coastdown | None = None
-    found: Diagnosis | None = None
+    coastdown: EndedCoastdown | None = None
+    found: DiagnosisResult | None = None
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Diagnosing:
     ship
         Without a baseline none is possible, and the status says so.
     enabled
-        False: only tells that it is off.
+        False: only says that it is off.
     """
 
     def __init__(self, ship: Ship, parameters: Parameters, *, enabled: bool) -> None:
@@ -106,7 +106,7 @@ class Diagnosing:
         """Of the last coastdown."""
         return self._status
 
-    def begin(self, coastdown: Coastdown, window: Window) -> None:
+    def begin(self, coastdown: EndedCoastdown, window: Window) -> None:
         """
         Diagnose a coastdown after those that wait; returns at once.
         """
@@ -142,7 +142,7 @@ class Diagnosing:
         else:
             self._status = replace(running, state=DiagnosisState.DONE, found=found)
 
-    def _answer(self, task: _Task) -> Diagnosis | str:
+    def _answer(self, task: _Task) -> DiagnosisResult | str:
         """Return what a process says; str: why it can say nothing."""
         with self._lock:
             if self._closed:
@@ -163,7 +163,7 @@ class Diagnosing:
         if self._process.returncode != 0:
             last = complaint.decode(errors='replace').strip().rpartition('\n')[2]
             raise subprocess.SubprocessError(f'exit {self._process.returncode}: {last}')
-        found: Diagnosis | str = pickle.loads(answer)
+        found: DiagnosisResult | str = pickle.loads(answer)
         return found
 
 
@@ -178,7 +178,7 @@ def main() -> None:
     assert isinstance(task, _Task)
     run = CoastRun('the coastdown', task.window)
     try:
-        answer: Diagnosis | str = diagnose([run], task.ship, task.parameters)
+        answer: DiagnosisResult | str = diagnose([run], task.ship, task.parameters)
     except ShipdragError as error:
         answer = str(error)
     sys.stdout.buffer.write(pickle.dumps(answer))

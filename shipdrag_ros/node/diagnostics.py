@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from shipdrag_ros.coastdown.events import State
-from shipdrag_ros.coastdown.health import Progress
+from shipdrag_ros.coastdown.health import MonitorProgress
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
@@ -25,19 +25,22 @@ from shipdrag_ros.node.recorder import RecordingState, RecordingStatus
 from shipdrag_ros.samples import MOTION_INPUTS
 
 if TYPE_CHECKING:
-    from shipdrag_ros.diagnosis import Diagnosis  # slow to import, and known once there is one
+    from shipdrag_ros.diagnosis import (
+        DiagnosisResult,  # slow to import, and known once there is one
+    )
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
 STALE = DiagnosticStatus.STALE
+_SETS_SIZED = 3  # candidates of a set whose sizes are told
 
 
 def label(
     statuses: Sequence[DiagnosticStatus], *, node: str, hardware_id: str
 ) -> list[DiagnosticStatus]:
     """
-    Say whose statuses these are, so that two nodes are told apart.
+    Say whose statuses these are, so that two nodes are not mixed up.
 
     Parameters
     ----------
@@ -84,7 +87,7 @@ class Standing:
     candidates: str = ''
     steady_lead_s: float = 0.0
     steady_needed_s: float = 0.0
-    progress: Progress | None = None
+    progress: MonitorProgress | None = None
     compiling_s: float | None = None
     waiting: int = 0
 
@@ -130,8 +133,17 @@ def state_status(standing: Standing, inputs: Sequence[InputState]) -> Diagnostic
         return _status('state', ERROR, f'no input can be used: {why}', values)
     if monitor is State.WAITING:
         text = f'waiting: not enough steady sailing yet to know a coastdown by, {_lead(standing)}'
-        return _status('state', OK, text, values)
-    return _status('state', OK, monitor.value, values)
+    else:
+        text = monitor.value
+    # one good input is enough to estimate, but what it is held against is missing
+    unwell = [
+        f'{each.topic.name}: {each.finding.text}'
+        for each in motion
+        if each.topic.age_s is not None and each.finding.level is not Level.OK
+    ]
+    if unwell:
+        return _status('state', WARN, f'{text}; not well, {"; ".join(unwell)}', values)
+    return _status('state', OK, text, values)
 
 
 def _lead(standing: Standing) -> str:
@@ -145,7 +157,7 @@ def input_status(state: InputState) -> DiagnosticStatus:
     topic, health = state.topic, state.health
     values: dict[str, object] = {
         'topic': topic.topic,
-        'type': topic.type or 'not yet known',
+        'type': topic.fed_by or topic.type or 'not yet known',
         'publishers': sum(topic.publishers.values()),
         'published by': ', '.join(topic.senders) or 'none',
         'reliability': 'reliable' if topic.reliable else 'best effort',
@@ -263,7 +275,7 @@ def diagnosis_status(status: DiagnosisStatus) -> DiagnosticStatus:
     return _status('diagnosis', level, words.sentence(found), values | _figures(found))
 
 
-def _figures(found: Diagnosis) -> dict[str, object]:
+def _figures(found: DiagnosisResult) -> dict[str, object]:
     """Return the figures of a diagnosis."""
     from shipdrag_ros.diagnosis.words import advice
     from shipdrag_ros.simulation.effects import LIBRARY
@@ -276,11 +288,21 @@ def _figures(found: Diagnosis) -> dict[str, object]:
     for candidate in found.candidates:
         if candidate.names:
             values[f'probability of {" + ".join(candidate.names)} [1]'] = candidate.probability
-    for effect in found.effects:
+    told = [(effect.name, effect) for effect in found.effects]
+    if not told:  # a set: what each would have
+        told = [
+            (
+                f'if {" + ".join(each.names)}' + (f', {effect.name}' if each.names[1:] else ''),
+                effect,
+            )
+            for each in found.candidates[:_SETS_SIZED]
+            for effect in each.effects
+        ]
+    for before, effect in told:
         for quantity in LIBRARY[effect.name].parameters:
             size, unit = effect.parameters[quantity.name], quantity.unit or '1'
-            values[f'{effect.name}, {quantity.name} [{unit}]'] = size.value
-            values[f'standard deviation of {effect.name}, {quantity.name} [{unit}]'] = size.sd
+            name = f'{before}, {quantity.name} [{unit}]'
+            values |= {name: size.value, f'standard deviation of {name}': size.sd}
     values['mean square of whitened residuals, before [1]'] = found.before.chi2_per_sample
     if found.after is not None:
         values['mean square of whitened residuals, after [1]'] = found.after.chi2_per_sample

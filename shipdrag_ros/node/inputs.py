@@ -35,9 +35,10 @@ from shipdrag_ros.messages import Decoded
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.losses import Sequences
 
-# As deep as Fast DDS goes unless told otherwise, some seconds of a flood: one estimate may take
+# As deep as Fast DDS goes unless set otherwise, some seconds of a flood: one estimate may take
 # as long as many messages.
 DEPTH = 5000
+LONGEST_BYTES = 65536  # no instrument sends a message as long; thousands may have to wait
 _OFFSETS = 32  # readings whose clock offset is kept
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of rcl
 
@@ -52,7 +53,7 @@ def message_class(type_name: str) -> Any:
     return getattr(importlib.import_module(f'{package}.{kind}'), name)
 
 
-class Heard(NamedTuple):
+class HeardMessage(NamedTuple):
     """A message, and when the middleware of this computer got it [ns, 0 if it does not say]."""
 
     topic: InputTopic
@@ -90,6 +91,8 @@ class InputTopic:
         Messages heard; heard while not active or without a clock.
     reported_lost
         Messages that the middleware says it lost.
+    dropped
+        Messages that came while too many waited here.
     unreadable
         Messages that gave no sample, by reason, and joints that have no place.
     fed_by
@@ -107,7 +110,7 @@ class InputTopic:
         self._arrived = arrived
         self._subscription: Subscription | None = None
         self._last_s: float | None = None
-        self._taken: list[Heard] = []
+        self._taken: list[HeardMessage] = []
         self._found: list[Any] = []
         self._sequences = Sequences(self._identities)
         self._offsets_s: deque[float] = deque(maxlen=_OFFSETS)
@@ -123,6 +126,7 @@ class InputTopic:
         self.received = 0
         self.unused = 0
         self.reported_lost = 0
+        self.dropped = 0
         self.unstamped = 0
         self.unreadable: Counter[str] = Counter()
         self.fed_by = ''
@@ -169,8 +173,9 @@ class InputTopic:
 
     @property
     def lost(self) -> int:
-        """Messages that were sent and not heard."""
-        return self._sequences.lost if self._sequences.told else self.reported_lost
+        """Messages that were sent and not heard, or had no place."""
+        of_middleware = self._sequences.lost if self._sequences.told else self.reported_lost
+        return of_middleware + self.dropped
 
     @property
     def clock_offset_s(self) -> float | None:
@@ -184,7 +189,7 @@ class InputTopic:
         least, self._least_lag_s = self._least_lag_s, None
         return least
 
-    def take(self, most: int, *, ahead: bool = True) -> list[Heard]:
+    def take(self, most: int, *, ahead: bool = True) -> list[HeardMessage]:
         """
         Return the messages that have arrived, at most so many.
 
@@ -215,7 +220,7 @@ class InputTopic:
         for reason, times in decoded.unreadable.items():
             self.unreadable[reason.value] += times
         if self.type is not None and not is_stamped(self.type):
-            return  # arrivals tell nothing of a clock
+            return  # arrivals show nothing of a clock
         for stamp_ns, receive_ns in zip(
             decoded.block.stamp_ns.tolist(), decoded.block.receive_ns.tolist(), strict=True
         ):
@@ -257,7 +262,7 @@ class InputTopic:
         )
         try:
             self._subscription = self._create(type_name, qos, message_lost=self._on_message_lost)
-        except UnsupportedEventTypeError:  # not every middleware tells
+        except UnsupportedEventTypeError:  # not every middleware says so
             self._subscription = self._create(type_name, qos)
         self.type, self.reliable = type_name, reliable
         self.incompatible_qos = None
@@ -284,10 +289,16 @@ class InputTopic:
         self._arrived()
 
     def _note(self, data: bytes, info: Mapping[str, int | None]) -> None:
-        self.received += 1
         self._last_s = time.monotonic()
         self._sequences.take(info.get('publication_sequence_number'))
-        self._taken.append(Heard(self, data, info.get('received_timestamp') or 0))
+        if len(self._taken) >= DEPTH:
+            self.dropped += 1
+            return
+        self.received += 1
+        if len(data) > LONGEST_BYTES:
+            self.unreadable['too_long'] += 1
+        else:
+            self._taken.append(HeardMessage(self, data, info.get('received_timestamp') or 0))
 
     def _on_message_lost(self, event: QoSMessageLostInfo) -> None:
         self.reported_lost += event.total_count_change

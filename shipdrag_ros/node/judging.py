@@ -126,7 +126,7 @@ class InputFacts:
     Attributes
     ----------
     needed
-        Whether nothing else tells the motion.
+        Whether nothing else shows the motion.
     type
         Heard; None while there is none.
     stamped
@@ -273,6 +273,7 @@ _ADVICE = {
     'late': 'stamps are far behind those of other inputs: set its clock',
     'future': 'stamps are ahead of the clock of this computer: set either',
     'malformed': 'no message of its type: is the driver built for this ROS?',
+    'too_long': 'over 64 KiB, as no instrument sends: not recorded; look who publishes it',
     'no_joint': 'no joint with the name and value that is read: see the list of inputs',
     'surplus_joint': 'more joints than are read',
 }

@@ -6,8 +6,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     EndedBy,
+    EndedCoastdown,
     Event,
     NoEstimate,
     NotCoastdown,
@@ -50,7 +50,7 @@ def line_of(event: Event) -> LogLine | None:
                 f'a coastdown began at {utc(start_ns)}, confirmed {seen_s:.0f} s later: '
                 'hold rudder and engine'
             )
-        case Coastdown():
+        case EndedCoastdown():
             return _ended(event)
         case NotCoastdown():
             return LogLine(f'nearly a coastdown: {event.text}')
@@ -60,7 +60,7 @@ def line_of(event: Event) -> LogLine | None:
             return None
 
 
-def _ended(event: Coastdown) -> LogLine:
+def _ended(event: EndedCoastdown) -> LogLine:
     seconds = (event.end_ns - event.start_ns) * _NS
     why = f'{event.ended_by.value}: {_ENDED_BY[event.ended_by]}'
     if event.withdrawn:

@@ -2,7 +2,7 @@
 """
 What publishers sent and this node never got, from the sequence numbers of DDS.
 
-A middleware tells that a queue ran over, if at all, only where it notices; the
+A middleware says that a queue ran over, if at all, only where it notices; the
 numbers that a publisher gives its messages show every hole.
 """
 

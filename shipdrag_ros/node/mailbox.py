@@ -12,7 +12,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 
-from shipdrag_ros.node.inputs import Heard, InputTopic
+from shipdrag_ros.node.inputs import HeardMessage, InputTopic
 
 MOST = 200  # messages of a topic at once: some tens of ms, so that timers are kept
 
@@ -33,9 +33,9 @@ class Mailbox:
     def __init__(self, topics: Sequence[InputTopic], *, ahead: bool) -> None:
         self._topics = topics
         self._ahead = ahead
-        self._waiting: list[Heard] = []
+        self._waiting: list[HeardMessage] = []
 
-    def take(self) -> list[Heard]:
+    def take(self) -> list[HeardMessage]:
         """
         Return what has come so far, or the older part of it where that is much.
         """

@@ -20,15 +20,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
-
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.node.compiling import leave_if_compiling
-from shipdrag_ros.node.console import terminal_line
-from shipdrag_ros.node.node import CoastdownNode
+from shipdrag_ros.imports import uncollected
+
+with uncollected():
+    import rclpy
+    from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    from shipdrag_ros.node.compiling import leave_if_compiling
+    from shipdrag_ros.node.console import terminal_line
+    from shipdrag_ros.node.node import CoastdownNode
 
 USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'
 STOPPING = (signal.SIGINT, signal.SIGTERM)

@@ -232,9 +232,10 @@ class NmeaFeed:
             names = ', '.join(self._topic_refused)
             return WARN, f'{names}: also published as a topic, which is not used; NMEA was first'
         feeding = found.feeding()
-        named = '; '.join(f'{name} from {source}' for name, source in feeding.items())
+        used = [f'{name} from {source}' for name, source in feeding.items()]
         untold = any(each.endswith(NOT_TOLD) for each in found.no_value)
         if untold and 'depth' not in feeding:
-            named += '; ' if named else ''
-            named += 'depth is not used: set nmea_transducer_m, as the sentences state no offset'
-        return OK, named or 'heard, nothing used yet'
+            used.append(
+                'depth is not used: set nmea_transducer_m, as the sentences state no offset'
+            )
+        return OK, '; '.join(used) or 'heard, nothing used yet'

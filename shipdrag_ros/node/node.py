@@ -48,7 +48,6 @@ NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
 FIRST_S = 0.3  # by then who listens is found; compiling begins behind it
-WAITING_MOST = 200_000  # messages that wait for compiled code: some 100 MB
 RELIABLE = ReliabilityPolicy.RELIABLE
 # who joins late still gets the last message
 LATCHED = QoSProfile(depth=1, reliability=RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -288,8 +287,8 @@ class CoastdownNode(LifecycleNode):
 
     def _hear(self) -> None:
         """Take what has come on all topics, in its order."""
-        if self._session is not None and self._session.waiting > WAITING_MOST:
-            return  # the middleware keeps some more, and tells what it loses
+        if self._session is not None and self._session.full:
+            return  # each input keeps some more, and counts what it drops
         for topic, data, received_ns in self._mailbox.take():
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
@@ -366,8 +365,7 @@ class CoastdownNode(LifecycleNode):
         """Say what is odd about inputs besides what became of their readings."""
         if self._session is None or self._watching is None or self._compiling_s is not None:
             return {}
-        heading = self._session.monitor.heading_doubt()
-        return {'heading': heading} | self._watching.doubts()
+        return self._session.monitor.doubts() | self._watching.doubts()
 
     def _standing(self, now_ns: int) -> diagnostics.Standing:
         session, states = self._session, self._input_states.seen

@@ -146,7 +146,7 @@ class Rehearsal:
         self._join(_stamp_ns(message))
 
     def _join(self, stamp_ns: int) -> None:
-        """Tell of a moment once both of its figures are there, whichever came first."""
+        """Report a moment once both of its figures are there, whichever came first."""
         if stamp_ns not in self._speeds or stamp_ns not in self._resistances:
             return
         resistance, sigma = self._resistances.pop(stamp_ns)

@@ -74,7 +74,7 @@ def guard_services(
     change_state
         The one that is asked for transitions, which rclpy does not list among them.
     warn
-        Told what is refused.
+        Called with what is refused.
     """
     _refuse_illegal(change_state, warn)
     limit_services((*services, change_state), warn)
@@ -104,7 +104,7 @@ def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -
     services
         Of the node; those that change something have the narrower limit.
     warn
-        Told once a burst which service refuses.
+        Called once a burst with the service refuses.
     """
     for service in services:
         limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))

@@ -14,7 +14,7 @@ from shipdrag_ros.node.session import Session
 
 INACTIVE = 'the node is not active'
 
-Action = Callable[[Session], tuple[bool, str]]
+SessionAction = Callable[[Session], tuple[bool, str]]
 
 
 def add_services(node: Node, session: Callable[[], Session | None]) -> None:
@@ -39,7 +39,7 @@ def add_services(node: Node, session: Callable[[], Session | None]) -> None:
         active.reset('asked for', int(node.get_clock().now().nanoseconds))
         return True, 'all memory is dropped'
 
-    def answered(action: Action) -> Callable[[Any, Any], Any]:
+    def answered(action: SessionAction) -> Callable[[Any, Any], Any]:
         def answer(request: Any, response: Any) -> Any:
             active = session()
             found = (False, INACTIVE) if active is None else action(active)

@@ -13,14 +13,13 @@ from functools import partial
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
-    EndedBy,
+    EndedCoastdown,
     Event,
     NoEstimate,
+    OnCoastdown,
     State,
     Update,
 )
-from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.messages import (
     Decoded,
@@ -40,10 +39,11 @@ from shipdrag_ros.node.ring import RawMessage
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]
-Ended = Callable[[Coastdown, Window], None]
-Told = Callable[[Event], None]
+OnEvent = Callable[[Event], None]
 Count = Callable[[Decoded], None]
 
+WAITING_MOST = 200_000  # messages that wait for compiled code
+WAITING_BYTES = 128 * 1024 * 1024  # of them
 AT_ONCE = 2000  # of what waited, between two turns of everything else
 
 
@@ -54,7 +54,7 @@ class Session:
     Parameters
     ----------
     recorder
-        Told of every message in and out.
+        Called with every message in and out.
     publish
         Called with every message out.
     node
@@ -83,12 +83,13 @@ class Session:
         *,
         publish: Publish,
         node: str,
-        ended: Ended | None = None,
-        told: Told | None = None,
+        ended: OnCoastdown | None = None,
+        told: OnEvent | None = None,
         ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self.monitor = monitor
         self.recorder = recorder
+        self._waiting_bytes = 0
         self.latest: Estimate | None = None
         self._publish = publish
         self._node = node
@@ -96,7 +97,7 @@ class Session:
         self._told = told
         self.why_none = ''
         self._ready = ready
-        self._waiting: deque[tuple[int, Callable[[], None]]] = deque()
+        self._waiting: deque[tuple[int, int, Callable[[], None]]] = deque()
         self._arrival_ns = 0
         self._cause_ns = 0  # arrival of what the messages out come of, if not the last
 
@@ -104,6 +105,11 @@ class Session:
     def waiting(self) -> int:
         """What was heard and recorded, and waits for the monitor."""
         return len(self._waiting)
+
+    @property
+    def full(self) -> bool:
+        """Whether so much waits that no more is to be given."""
+        return len(self._waiting) > WAITING_MOST or self._waiting_bytes > WAITING_BYTES
 
     def receive(
         self, source: Source, payload: bytes, now_ns: int, count: Count | None = None
@@ -134,7 +140,7 @@ class Session:
             if count is not None:
                 count(decoded)
 
-        self._in_turn(use)
+        self._in_turn(use, len(payload))
 
     def go_on(self) -> None:
         """
@@ -144,14 +150,16 @@ class Session:
             for _ in range(min(len(self._waiting), AT_ONCE)):
                 if not self._ready():
                     return
-                self._cause_ns, use = self._waiting.popleft()
+                self._cause_ns, size, use = self._waiting.popleft()
+                self._waiting_bytes -= size
                 use()
         finally:
             self._cause_ns = 0
 
-    def _in_turn(self, use: Callable[[], None]) -> None:
+    def _in_turn(self, use: Callable[[], None], size: int = 0) -> None:
         """Do it behind what waits."""
-        self._waiting.append((self._arrival_ns, use))
+        self._waiting.append((self._arrival_ns, size, use))
+        self._waiting_bytes += size
         self.go_on()
 
     def keep(self, source: Source, payload: bytes, now_ns: int) -> None:
@@ -203,7 +211,7 @@ class Session:
         Parameters
         ----------
         ends
-            Whether readings that matter to a coastdown are told by that clock.
+            Whether readings that matter to a coastdown are timed by that clock.
         """
         self.watch_clock(now_ns)
         if ends and self.monitor.state in (State.CANDIDATE, State.COASTDOWN):
@@ -264,19 +272,14 @@ class Session:
 
     def _report(self, events: list[Event]) -> None:
         for event in events:
-            if isinstance(event, Update | Coastdown) and event.estimate is not None:
+            if isinstance(event, Update | EndedCoastdown) and event.estimate is not None:
                 self.latest = event.estimate
             self.why_none = event.reason if isinstance(event, NoEstimate) else ''
             if self._told is not None:
                 self._told(event)
             for message in outputs(event, node=self._node):
                 self._send(message)
-            if (
-                self._ended is not None
-                and isinstance(event, Coastdown)
-                and event.ended_by is not EndedBy.RESET
-                and not event.withdrawn
-            ):
+            if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:
                 self._ended(event, self.monitor.ended_window(event))
 
     def _send(self, message: OutputMessage) -> None:

@@ -32,7 +32,7 @@ from shipdrag_ros.nmea.address import FORMS as NMEA_FORMS
 from shipdrag_ros.nmea.address import parse_addresses
 from shipdrag_ros.parameters import Parameters
 
-Value = bool | int | float | str
+ParameterValue = bool | int | float | str
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Setting:
     """One parameter of the node, as documented and as declared."""
 
     name: str
-    default: Value
+    default: ParameterValue
     text: str
     unit: str = ''
     low: float | None = None
@@ -243,11 +243,11 @@ class NodeSettings:
             raise ParameterError('node parameters', problems)
         return found
 
-    def to_mapping(self) -> dict[str, Value]:
+    def to_mapping(self) -> dict[str, ParameterValue]:
         """
         Return the value in effect of every setting, by name.
         """
-        values: dict[str, Value] = {}
+        values: dict[str, ParameterValue] = {}
         for setting in SETTINGS:
             if setting.name.endswith('.type'):
                 values[setting.name] = self.types.get(setting.name.removesuffix('.type'), '')
@@ -291,7 +291,7 @@ def parameters_file() -> str:
     return '\n'.join(lines) + '\n'
 
 
-def _yaml(value: Value) -> str:
+def _yaml(value: ParameterValue) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     return repr(value)

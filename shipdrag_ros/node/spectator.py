@@ -143,7 +143,7 @@ class Spectator:
         try:
             heard = decode_health(payload)
         except MalformedMessage:
-            return  # of somebody else: nobody's health is told by it
+            return  # of somebody else: nobody's health is known by it
         own = [health for health in heard if self._is_own(health)]
         if own:
             self._hear_inputs(own[0])

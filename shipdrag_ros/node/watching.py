@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What no message tells: silence, clocks that are set, messages that were lost.
+What no message shows: silence, clocks that are set, messages that were lost.
 
 Looked at every tick; what comes of it goes through the session, so that it is
 published, recorded, and obeyed by a replay.
@@ -57,7 +57,7 @@ class Watching:
 
     def tick(self, session: Session, health: Mapping[str, InputHealth], now_ns: int) -> None:
         """
-        Look, and tell the session.
+        Look, and inform the session.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class Watching:
         if not step_s:
             return
         self._clocks = {topic.name: SensorClock() for topic in self._topics}
-        if step_s * 1e9 > -BACKWARD_JUMP_NS:  # further back, the arrivals tell
+        if step_s * 1e9 > -BACKWARD_JUMP_NS:  # further back, the arrivals show it
             session.clock_was_set(f'the clock of this computer {set_by(step_s)}', now_ns)
 
     def doubts(self) -> dict[str, str]:

@@ -72,7 +72,7 @@ class Surface:
         target
             Name of what was measured.
         """
-        from shipdrag_ros.regression import words  # it tells what this module holds
+        from shipdrag_ros.regression import words  # it shows what this module holds
 
         return (words.sentence(self, target), *self.notes)
 
@@ -208,7 +208,7 @@ def fit_surface(
             break
         if len(powers) >= len(points):
             notes.append(
-                f'Degree {degree} has {len(powers)} terms, {len(points)} rows cannot tell it.'
+                f'Degree {degree} has {len(powers)} terms, {len(points)} rows cannot determine it.'
             )
             break
         fit = least_squares(monomials(scaled, powers), values)

@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.coastdown import Monitor, validate
 from shipdrag_ros.coastdown.driving import gone_s
-from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, Event
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, Event
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
@@ -42,7 +42,7 @@ def _most_are_off(counts: InputCounts) -> bool:
     )
 
 
-def coast_windows(result: ReplayResult) -> list[tuple[Coastdown, Window]]:
+def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
     """
     Read the samples of each coastdown again.
 
@@ -73,7 +73,7 @@ def coast_windows(result: ReplayResult) -> list[tuple[Coastdown, Window]]:
     ]
 
 
-def _look_anew(result: ReplayResult) -> tuple[Coastdown, ...]:
+def _look_anew(result: ReplayResult) -> tuple[EndedCoastdown, ...]:
     """Look for coastdowns in what all inputs say, whatever their clocks."""
     parameters = replace(
         result.parameters,
@@ -86,7 +86,9 @@ def _look_anew(result: ReplayResult) -> tuple[Coastdown, ...]:
     for item in result.run.inputs():
         events += feed(monitor, _arrived_later(item) if isinstance(item, Block) else item)
     events += monitor.finish()
-    return tuple(event for event in events if isinstance(event, Coastdown) and not event.withdrawn)
+    return tuple(
+        event for event in events if isinstance(event, EndedCoastdown) and not event.withdrawn
+    )
 
 
 def _refuse(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
@@ -98,7 +100,7 @@ def _arrived_later(block: Block) -> Block:
     return replace(block, receive_ns=block.receive_ns + round(_CLOCKS_APART_S * SECOND_NS))
 
 
-def _window(result: ReplayResult, coastdown: Coastdown, apart: bool) -> Window:
+def _window(result: ReplayResult, coastdown: EndedCoastdown, apart: bool) -> Window:
     parameters = replace(result.parameters, late_s=_CLOCKS_APART_S)
     before_ns = round(parameters.steady_s * SECOND_NS)
     # the validation looks back; stamps may differ from times of arrival
@@ -118,7 +120,7 @@ def _window(result: ReplayResult, coastdown: Coastdown, apart: bool) -> Window:
     )
 
 
-def _start(coastdown: Coastdown, ship: Ship) -> tuple[int, bool]:
+def _start(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
     """
     Return the start of a coastdown, and whether what comes before it may be steady sailing.
 

@@ -168,7 +168,7 @@ def _figures(message: OutputMessage | None) -> Float64:
 
 
 def _content(message: OutputMessage | None) -> str:
-    """Describe a message so that it can be told from another."""
+    """Describe a message so that it can be known from another."""
     if message is None:
         return 'nothing'
     try:

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 
 _AROUND_NS = 60_000_000_000  # that clocks of sensors and recorder may be apart
 
-Span = tuple[int, int]
+StretchSpan = tuple[int, int]
 
 
-def cut_lines(coastdown: Coastdown, span_ns: Span | None) -> tuple[str, ...]:
+def cut_lines(coastdown: EndedCoastdown, span_ns: StretchSpan | None) -> tuple[str, ...]:
     """
     Say what was cut off a stretch, a sentence each.
 
@@ -34,7 +34,7 @@ def cut_lines(coastdown: Coastdown, span_ns: Span | None) -> tuple[str, ...]:
     return (first, *(cut_line(cut, span_ns) for cut in coastdown.cuts))
 
 
-def cut_line(cut: NotCoastdown, span_ns: Span | None) -> str:
+def cut_line(cut: NotCoastdown, span_ns: StretchSpan | None) -> str:
     """
     Say when and why a stretch is no coastdown.
     """
@@ -42,17 +42,17 @@ def cut_line(cut: NotCoastdown, span_ns: Span | None) -> str:
     return f'{start} to {end}, {cut.reason.value.replace("_", "-")}: {cut.text}'
 
 
-def stretch(coastdown: Coastdown) -> Span:
+def stretch(coastdown: EndedCoastdown) -> StretchSpan:
     """Return the bounds of what was examined."""
-    every: list[Coastdown | NotCoastdown] = [coastdown, *coastdown.cuts]
+    every: list[EndedCoastdown | NotCoastdown] = [coastdown, *coastdown.cuts]
     return min(each.start_ns for each in every), max(each.end_ns for each in every)
 
 
-def inside(time_ns: int, span_ns: Span | None) -> bool:
+def inside(time_ns: int, span_ns: StretchSpan | None) -> bool:
     return span_ns is not None and (span_ns[0] - _AROUND_NS <= time_ns <= span_ns[1] + _AROUND_NS)
 
 
-def _moment(time_ns: int, span_ns: Span | None) -> str:
+def _moment(time_ns: int, span_ns: StretchSpan | None) -> str:
     """Return a time in s from the start of the record, or of day where clocks are apart."""
     if span_ns is None or not inside(time_ns, span_ns):
         return display.utc(time_ns)

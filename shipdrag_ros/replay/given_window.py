@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.bags.run import Run, RunSamples
 from shipdrag_ros.coastdown import validate
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.coastdown.examination import Examined, estimate_examined
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, rep103_yaw
 from shipdrag_ros.errors import BagError
@@ -100,7 +100,7 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns)
 
 
-def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) -> Coastdown:
+def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) -> EndedCoastdown:
     """
     Estimate r(v) from a window, as of a coastdown that has ended.
 
@@ -119,7 +119,7 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     else:
         found = estimate_examined(window, ship, parameters, estimate_final, steady=False)
     heading = _heading(accepted, found.start_ns)
-    return Coastdown(
+    return EndedCoastdown(
         found.start_ns,
         found.end_ns,
         None,

@@ -104,7 +104,7 @@ def _notes(hulls: Sequence[RankedHull], missing: Sequence[str]) -> tuple[str, ..
         notes.append(
             f'No steepest rise of r was found for {", ".join(bounds)}: its Fr_max is only the '
             'highest speed of the fit, a lower bound. Such a hull may stand higher than '
-            'shown, never lower; a coastdown from a higher speed would tell.'
+            'shown, never lower; a coastdown from a higher speed would show it.'
         )
     notes.append(
         'Fr_max ranks the onset of wave making and nothing else: a hull with more resistance at '

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why no coastdown was found in a run, as far as a replay and the speed itself tell."""
+"""Why no coastdown was found in a run, as far as a replay and the speed itself show."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.display import Picture, Section, Table
 from shipdrag_ros.estimation import pictures as estimate_pictures
 from shipdrag_ros.estimation import tables as estimate_tables
@@ -20,6 +20,8 @@ from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import together
 from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import picture
+
+_MINUTES = len('2026-01-01 00:00')  # of a time in a list
 
 HOW_TO_READ = Section(
     'How to read the band',
@@ -72,7 +74,7 @@ def write_report(path: Path, runs: Sequence[RunResult], *, ranking: Ranking | No
 
 
 def _run(run: RunResult, speed_m_s: float) -> Iterator[Section]:
-    """Tell of one bag, its coastdowns in their order."""
+    """Show one bag, its coastdowns in their order."""
     yield Section(
         run.bag,
         quiet=run.ship.summary(),
@@ -97,7 +99,9 @@ def _run(run: RunResult, speed_m_s: float) -> Iterator[Section]:
     )
 
 
-def _coastdown(number: int, coastdown: Coastdown, run: RunResult, speed_m_s: float) -> Section:
+def _coastdown(
+    number: int, coastdown: EndedCoastdown, run: RunResult, speed_m_s: float
+) -> Section:
     estimate = coastdown.estimate
     found: list[tuple[str, Table]] = []
     if estimate is not None:
@@ -119,20 +123,23 @@ def _coastdown(number: int, coastdown: Coastdown, run: RunResult, speed_m_s: flo
         lines=cuts[1:],
         pictures=tuple(_pictures(coastdown, run)),
         tables=found,
-        entry=f'{display.utc(coastdown.start_ns)}, {run.bag}: {_line(coastdown, run, speed_m_s)}',
+        entry=f'{display.utc(coastdown.start_ns)[:_MINUTES]}, {Path(run.bag).name}: '
+        f'{_line(coastdown, run, speed_m_s)}',
     )
 
 
-def _line(coastdown: Coastdown, run: RunResult, speed_m_s: float) -> str:
+def _line(coastdown: EndedCoastdown, run: RunResult, speed_m_s: float) -> str:
     """Say what a coastdown gave in one line."""
     estimate = coastdown.estimate
     if estimate is None or not len(estimate.valid_curve):
         return words.summary(coastdown)[0]
     force = Force.of(estimate.valid_curve, run.ship)
-    return force.at(force.near(speed_m_s))
+    speed, resistance, power, over = force.cells(force.near(speed_m_s))
+    told = ', '.join(filter(None, (resistance, power, over.partition(' (')[0])))
+    return f'{told} at {speed}'
 
 
-def _pictures(coastdown: Coastdown, run: RunResult) -> Iterator[Picture]:
+def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:
     """Draw what there are data for."""
     if coastdown.stretch:
         yield picture(
@@ -177,7 +184,7 @@ def _pictures(coastdown: Coastdown, run: RunResult) -> Iterator[Picture]:
 
 
 def _all(runs: Sequence[RunResult]) -> Section:
-    """Tell of all coastdowns: a line each, their curves, and the one curve where there is one."""
+    """Show all coastdowns: a line each, their curves, and the one curve where there is one."""
     found = together(runs)
     lines, lead = [], []
     shown = [('All coastdowns, a line each', tables.coastdowns_table(runs))]
@@ -197,19 +204,21 @@ def _all(runs: Sequence[RunResult]) -> Section:
         lead.append(f'Not combined: {found.why_not}.')
     dated = [
         (f'{display.utc(part.start_ns)}', part.estimate.valid_curve)
-        for run in runs
-        for part in run.coastdowns
+        for part in sorted(
+            (part for run in runs for part in run.coastdowns), key=lambda part: part.start_ns
+        )
         if part.estimate is not None and len(part.estimate.valid_curve)
     ]
+    many = '; the darker the line, the earlier' if estimate_pictures.is_shaded(len(dated)) else ''
     whole = ', all together with their band' if found.combined is not None else ''
     drawn: list[Picture] = []
     if dated and len({run.ship for run in runs}) == 1:
         drawn.append(
             picture(
                 estimate_pictures.curves_picture(dated, ship, combined=found.combined),
-                f'Resistance of each coastdown by its date{whole}. Curves that rise from date to '
-                'date show a hull that fouls; curves of one day that differ show wind, sea or '
-                'current.',
+                f'Resistance of each coastdown by its date{whole}{many}. Curves that rise from '
+                'date to date show a hull that fouls; curves of one day that differ show wind, '
+                'sea or current.',
             )
         )
         if found.combined is not None:

@@ -11,19 +11,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.transforms import blended_transform_factory
 
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.display import speed_unit
 from shipdrag_ros.estimation.pictures import LINES
 from shipdrag_ros.estimation.result import ResistanceCurve
-from shipdrag_ros.replay.cuts import Span, inside, stretch
+from shipdrag_ros.replay.cuts import StretchSpan, inside, stretch
 from shipdrag_ros.replay.hulls import RankedHull
 from shipdrag_ros.report.drawing import BLUE, SIZE, STYLE
 
-_HATCHES = ('///', '\\\\\\', 'xxx', '...')  # told apart in print too
+_HATCHES = ('///', '\\\\\\', 'xxx', '...')  # distinct in print too
 _NARROW = 0.02  # of the time axis: no room for a label
 
 
-def cut_picture(coastdown: Coastdown, span_ns: Span | None, mass_kg: float) -> Figure:
+def cut_picture(coastdown: EndedCoastdown, span_ns: StretchSpan | None, mass_kg: float) -> Figure:
     """
     Draw the speed of the whole stretch, with what was cut of it hatched and named.
 
@@ -83,7 +83,7 @@ def cut_picture(coastdown: Coastdown, span_ns: Span | None, mass_kg: float) -> F
 
 
 def _labels(
-    coastdown: Coastdown, seconds: Callable[[int], float]
+    coastdown: EndedCoastdown, seconds: Callable[[int], float]
 ) -> list[tuple[float, float, str]]:
     """Return one label for cuts of one reason that overlap."""
     found: list[tuple[float, float, str]] = []

@@ -8,15 +8,24 @@ Also one window of it, given by hand, through the same estimator.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Dismissal, Event, NotCoastdown, Update
+from shipdrag_ros.coastdown.events import (
+    Dismissal,
+    EndedCoastdown,
+    Event,
+    NoEstimate,
+    NotCoastdown,
+    Update,
+)
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.estimation import estimate
 from shipdrag_ros.messages import DEFAULT_NODE, TOPICS, outputs
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
 from shipdrag_ros.samples import Block, Channel, Reason
@@ -27,7 +36,6 @@ PARAMETERS_FILE = 'parameters.yaml'
 WRONG_TYPE = 'type'
 
 # done, of how many messages
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -64,7 +72,7 @@ class ReplayResult:
     coastdowns
         In their order, without those that were withdrawn.
     events
-        All events but the updates, which recorded outputs stand for.
+        All but those of the estimates while a coastdown ran, which recorded outputs stand for.
     inputs
         Messages and readings counted, of inputs that have any.
     recorded
@@ -76,7 +84,7 @@ class ReplayResult:
     run: Run
     ship: Ship
     parameters: Parameters
-    coastdowns: tuple[Coastdown, ...]
+    coastdowns: tuple[EndedCoastdown, ...]
     events: tuple[Event, ...]
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
@@ -111,7 +119,8 @@ def replay(
     ship: Ship | None = None,
     parameters: Parameters | None = None,
     window: tuple[float, float] | None = None,
-    progress: Progress | None = None,
+    compare: bool = True,
+    progress: PartDone | None = None,
 ) -> ReplayResult:
     """
     Estimate from a run as the node would have.
@@ -126,8 +135,11 @@ def replay(
     window
         Begin and end [s from the start of the bag], instead of finding
         coastdowns; outputs are then not compared.
+    compare
+        Whether outputs in the bag are compared; the estimates while a coastdown runs are
+        made for that alone.
     progress
-        Told now and then how many messages are done, and of how many.
+        Called now and then with how many messages are done, and of how many.
 
     Raises
     ------
@@ -140,7 +152,8 @@ def replay(
     used_ship, used_parameters = settings_of(run, ship, parameters)
     if window is not None:
         return _in_window(run, used_ship, used_parameters, window)
-    return _as_on_board(run, used_ship, used_parameters, progress)
+    own = compare and _is_own(run, used_ship, used_parameters)
+    return _as_on_board(run, used_ship, used_parameters, own, progress)
 
 
 def settings_of(
@@ -182,19 +195,19 @@ def _no_input(run: Run) -> str:
 
 
 def _as_on_board(
-    run: Run, ship: Ship, parameters: Parameters, progress: Progress | None
+    run: Run, ship: Ship, parameters: Parameters, own: bool, progress: PartDone | None
 ) -> ReplayResult:
-    monitor = Monitor(ship, parameters)
-    own = _is_own(run, ship, parameters)
+    # what nothing is compared with is left out: an estimate depends on its window alone
+    monitor = Monitor(ship, parameters, estimate=estimate if own else None)
     comparison = Comparison(run.outputs() if own else iter(()))
-    coastdowns: list[Coastdown] = []
+    coastdowns: list[EndedCoastdown] = []
     kept: list[Event] = []
 
     def take(events: list[Event]) -> None:
         for event in events:
-            if not isinstance(event, Update):
+            if not isinstance(event, Update | NoEstimate):
                 kept.append(event)
-            if isinstance(event, Coastdown) and not event.withdrawn:
+            if isinstance(event, EndedCoastdown) and not event.withdrawn:
                 coastdowns.append(event)
             if own:
                 for message in outputs(event, node=run.node or DEFAULT_NODE):
@@ -223,7 +236,7 @@ def _as_on_board(
 
 def feed(monitor: Monitor, item: Block | Mark) -> list[Event]:
     """
-    Give a monitor what the node's had: samples, or what was told it by other means.
+    Give a monitor what the node's had: samples, or what it learnt by other means.
     """
     if isinstance(item, Block):
         return monitor.update(item)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What one bag gave, as the page, the terminal and the JSON tell it."""
+"""What one bag gave, as the page, the terminal and the JSON show it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 from shipdrag_ros.display import Table
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.replay.no_coastdown import why_no_coastdown
@@ -51,7 +51,7 @@ class RunResult:
 
     bag: str
     ship: Ship
-    coastdowns: tuple[Coastdown, ...]
+    coastdowns: tuple[EndedCoastdown, ...]
     inputs: Mapping[str, InputCounts]
     recorded: Recorded
     warnings: tuple[str, ...] = ()
@@ -63,7 +63,7 @@ class RunResult:
 
     @property
     def dismissed(self) -> tuple[NotCoastdown, ...]:
-        """What is no coastdown, without what is told as cut off one."""
+        """What is no coastdown, without what is named as cut off one."""
         told = [cut for coastdown in self.coastdowns for cut in coastdown.cuts]
         return tuple(one for one in self.not_coastdowns if one not in told)
 
@@ -76,7 +76,7 @@ class RunResult:
         tuple of str
             A paragraph each, the engineer's units first.
         """
-        from shipdrag_ros.replay import words  # it tells what this module holds
+        from shipdrag_ros.replay import words  # it shows what this module holds
 
         if not self.coastdowns:
             dismissed = len(self.not_coastdowns)
@@ -119,7 +119,7 @@ class RunResult:
 
 
 def _why_none(result: ReplayResult) -> str:
-    """Say what the speed did, where that is not told by anything else."""
+    """Say what the speed did, where that is not said by anything else."""
     messages = sum(counts.messages for counts in result.inputs.values())
     if result.coastdowns or result.not_coastdowns:
         return ''

@@ -23,7 +23,7 @@ def write_curves(path: Path, runs: Sequence[RunResult]) -> None:
     """
     Write every r(v) inside its valid range, one row a speed.
 
-    The first columns tell the bag and the number of the coastdown in it.
+    The first columns show the bag and the number of the coastdown in it.
     """
     with path.open('w', newline='', encoding='utf-8') as file:
         writer = csv.writer(file)

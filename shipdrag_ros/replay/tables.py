@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from shipdrag_ros import display
-from shipdrag_ros.coastdown.events import Coastdown, NotCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 from shipdrag_ros.display import Table
 from shipdrag_ros.estimation import tables
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
@@ -17,7 +17,7 @@ from shipdrag_ros.replay.hulls import Ranking
 from shipdrag_ros.replay.run_result import RunResult
 
 
-def facts(coastdown: Coastdown) -> Table:
+def facts(coastdown: EndedCoastdown) -> Table:
     """
     Show how a coastdown was found and what its estimate rests on.
     """

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from shipdrag_ros.coastdown.events import Coastdown, EndedBy
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.display import duration, plus_minus
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.replay import Recorded
@@ -68,7 +68,7 @@ def no_coastdown_sentence(steady_lead_s: float | None, dismissed: int, why: str 
     return f'No coastdown found: {"; ".join(known)}.'
 
 
-def summary(coastdown: Coastdown, ship: Ship | None = None) -> tuple[str, ...]:
+def summary(coastdown: EndedCoastdown, ship: Ship | None = None) -> tuple[str, ...]:
     """
     Say what a coastdown gave, or why it gave nothing.
 
@@ -89,7 +89,7 @@ def combined_notes(combined: Combined) -> tuple[str, ...]:
     """
     if combined.current_m_s is None or combined.current_sigma_m_s is None:
         current = (
-            'These runs do not tell a current: none is taken out. Runs on opposite headings would.'
+            'These runs do not show a current: none is taken out. Runs on opposite headings would.'
         )
     else:
         value = plus_minus(combined.current_m_s, 2.0 * combined.current_sigma_m_s)

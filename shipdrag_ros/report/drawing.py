@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.display import Picture
 
-# Okabe and Ito's colours, told apart by colour-blind readers; line styles and
+# Okabe and Ito's colours, distinct to colour-blind readers; line styles and
 # shades of grey differ as well, for print
 BLUE, VERMILION, GREEN, ORANGE, SKY, PURPLE = (
     '#0072B2',

@@ -81,7 +81,7 @@ _MODELS = {'merchant': MerchantAddedMass, 'constant': ConstantAddedMass, 'table'
 
 def added_mass() -> Kind:
     """
-    Expect one of the models, told apart by the key `model`.
+    Expect one of the models, known by the key `model`.
     """
     expectation = 'merchant, constant or table'
 

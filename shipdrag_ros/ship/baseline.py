@@ -142,7 +142,7 @@ Baseline = CoefficientBaseline | TableBaseline
 
 def baseline() -> Kind:
     """
-    Expect one of the two forms, told apart by their keys.
+    Expect one of the two forms, known by their keys.
     """
 
     def read(value: object, path: str, problems: Problems) -> object:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Facts that a log book knows, as they are told: `NAME[=VALUE][,rate=RATE]`.
+Facts that a log book knows, as they are stated: `NAME[=VALUE][,rate=RATE]`.
 
 A fact is evidence and no filter: it is wrong at times. What it says about an
 effect, the effect declares.
@@ -16,7 +16,7 @@ from datetime import UTC, date, datetime
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.fields import INVALID, Kind, Problems, number, show
 
-RATE = 0.02  # how often a fact that is told is wrong, unless stated
+RATE = 0.02  # how often a fact that is stated is wrong, unless given
 LEAST_RATE, MOST_RATE = 1e-4, 0.5
 DATE = 'DATE'
 _RATE = number(LEAST_RATE, MOST_RATE)
@@ -95,7 +95,7 @@ class Fact:
     value
         '' for one that has none.
     rate
-        How often such a fact is told although it is not so.
+        How often such a fact is stated although it is not so.
     """
 
     name: str
@@ -153,7 +153,7 @@ def parse_fact(text: str) -> Fact:
 
 def usage() -> str:
     """
-    Return the facts that may be told, in words.
+    Return the facts that may be stated, in words.
     """
     return ', '.join(
         f'{name}={"|".join(known.values)}' if known.values else name
@@ -163,7 +163,7 @@ def usage() -> str:
 
 def advice(name: str) -> str:
     """
-    Say how a fact is learnt and told.
+    Say how a fact is learnt and stated.
     """
     values = KNOWN[name].values
     return f'{KNOWN[name].look} (--fact {name}{"=" + "|".join(values) if values else ""})'

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.scenario import Turn
 
-Resistance = Callable[[Float64], Float64]
+ResistanceLaw = Callable[[Float64], Float64]
 Vector = tuple[float, float]
 
 
@@ -76,7 +76,7 @@ class Action:
         Positions and speeds over ground read (1 + radar_factor) times truth.
     """
 
-    resistance: tuple[Resistance, ...] = ()
+    resistance: tuple[ResistanceLaw, ...] = ()
     wind_m_s: Vector = (0.0, 0.0)
     wave_force_n: Vector = (0.0, 0.0)
     wave_encounter_s_m: float = 0.0

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-How an effect is declared: what it does, how large it may be, what tells it apart.
+How an effect is declared: what it does, how large it may be, what separates it.
 
 Simulation, command line, documentation and diagnosis read the declaration; no
 effect is known to them by name.
@@ -179,7 +179,7 @@ class Effect:
 
     def goes_with(self, other: Effect) -> bool:
         """
-        Tell whether two effects can be there at the same time.
+        Say whether two effects can be there at the same time.
         """
         return other.name not in (self.name, *self.not_with) and self.name not in other.not_with
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be done to tell effects apart, and what it costs the crew."""
+"""What can be done to separate effects, and what it costs the crew."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import StrEnum
 
 
 class Measure(StrEnum):
-    """What can be done to tell two effects apart, as it is advised."""
+    """What can be done to separate two effects, as it is advised."""
 
     RECIPROCAL_RUN = 'a run on the reciprocal heading'
     ANOTHER_COURSE = 'a leg on another course'

@@ -59,7 +59,7 @@ def top_m_s(law: SurgeLaw) -> float:
 
 def outside(law: SurgeLaw, speed_m_s: Float64) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
     """
-    Tell which speeds the table does not hold; NaN is one.
+    Say which speeds the table does not hold; NaN is one.
     """
     top = top_m_s(law)
     margin = 1e-9 * top  # rounding of a steady speed at the very end of the table

@@ -68,7 +68,7 @@ def search(runs: Runs, known: Steps, growth: Growth) -> Found:
     runs
         Of one ship.
     known
-        Steps that a log book tells.
+        Steps that a log book notes.
     growth
         Prior of the growth.
     """

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -27,8 +26,7 @@ from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.report.document import page_text
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.trend import pictures
-
-Row = Mapping[str, Any]
+from shipdrag_ros.trend.series import CoastdownRow
 
 _LINES = 12
 _VERDICTS = {
@@ -50,14 +48,14 @@ _FLAGS = {
 }
 
 
-def page_name(row: Row) -> str:
+def page_name(row: CoastdownRow) -> str:
     """
     Return the file name of a coastdown's page: the same for the same content.
     """
     return f'{row["content_hash"][:20]}-{row["time_ns"]}.html'
 
 
-def links(rows: list[Row], folder: str) -> dict[tuple[str, int], str]:
+def links(rows: list[CoastdownRow], folder: str) -> dict[tuple[str, int], str]:
     """
     Return where each coastdown's page is, by bag and start.
 
@@ -71,7 +69,7 @@ def links(rows: list[Row], folder: str) -> dict[tuple[str, int], str]:
     return {(row['bag'], row['time_ns']): f'{folder}{page_name(row)}' for row in rows}
 
 
-def coastdown_page(row: Row, *, fleet: str) -> str:
+def coastdown_page(row: CoastdownRow, *, fleet: str) -> str:
     """
     Return the page of a coastdown (HTML).
 
@@ -102,17 +100,17 @@ def coastdown_page(row: Row, *, fleet: str) -> str:
     )
 
 
-def _mass_kg(row: Row) -> float:
+def _mass_kg(row: CoastdownRow) -> float:
     return float(row['displaced_volume_m3'] * row['water_density_kg_m3'])
 
 
-def _known(row: Row) -> np.ndarray[Any, np.dtype[np.intp]]:
+def _known(row: CoastdownRow) -> np.ndarray[Any, np.dtype[np.intp]]:
     """Return the places of the grid where r is known."""
     r = np.asarray(row['resistance_m_s2'], dtype=float)
     return np.flatnonzero(np.isfinite(r) & (r > 0.0))
 
 
-def _sentence(row: Row) -> str:
+def _sentence(row: CoastdownRow) -> str:
     known = _known(row)
     if len(known) == 0:
         return f'No estimate: {row["error"] or "none was possible"}.'
@@ -123,7 +121,7 @@ def _sentence(row: Row) -> str:
     return f'{said}, {over} % over the clean hull; ± is two standard deviations.' if over else said
 
 
-def _cells(row: Row, place: int) -> tuple[str, str, str, str]:
+def _cells(row: CoastdownRow, place: int) -> tuple[str, str, str, str]:
     """Return speed, resistance, effective power and percent over the clean hull as text."""
     mass, speed = _mass_kg(row), float(row['speed_m_s'][place])
     newtons = mass * float(row['resistance_m_s2'][place])
@@ -142,7 +140,7 @@ def _cells(row: Row, place: int) -> tuple[str, str, str, str]:
     )
 
 
-def _facts(row: Row) -> Table:
+def _facts(row: CoastdownRow) -> Table:
     heading, end_ns = row['heading_rad'], row['end_ns']
     compass = None if heading is None else (90.0 - np.degrees(heading)) % 360.0
     flags = [_FLAGS.get(flag, flag.replace('_', ' ')) for flag in row['flags'] or ()]
@@ -156,7 +154,7 @@ def _facts(row: Row) -> Table:
         and ship_speed(row['speed_at_stop_m_s'], _mass_kg(row)),
         'draught': row['draught_m'] and f'{row["draught_m"]:.2f} m',
         'displaced volume': f'{row["displaced_volume_m3"]:.0f} m³',
-        'told by the log book': ', '.join(row['facts'] or ()),
+        'noted in the log book': ', '.join(row['facts'] or ()),
         'to be weighed': ', '.join(flags),
         'no estimate, because': row['error'],
         'software': f'shipdrag_ros {row["software_version"]}',
@@ -164,7 +162,7 @@ def _facts(row: Row) -> Table:
     return Table(('', ''), tuple((name, str(text)) for name, text in found.items() if text))
 
 
-def _curve(row: Row) -> list[Section]:
+def _curve(row: CoastdownRow) -> list[Section]:
     known = _known(row)
     if len(known) < 2:
         return []
@@ -181,7 +179,7 @@ def _curve(row: Row) -> list[Section]:
     ]
 
 
-def _verdict(row: Row) -> str:
+def _verdict(row: CoastdownRow) -> str:
     if row['verdict'] is None:
         return 'It was not diagnosed.'
     if row['verdict'] in _VERDICTS:
@@ -189,10 +187,10 @@ def _verdict(row: Row) -> str:
     if row['verdict'] == 'named':
         names = ' and '.join(each['name'].replace('_', ' ') for each in json.loads(row['effects']))
         return f'Missing in the model of the clean hull: {names}.'
-    return 'Missing is one of those below; this run alone cannot tell them apart.'
+    return 'Missing is one of those below; this run alone cannot separate them.'
 
 
-def _candidates(row: Row) -> tuple[tuple[str, Table], ...]:
+def _candidates(row: CoastdownRow) -> tuple[tuple[str, Table], ...]:
     rows = []
     for each in json.loads(row['candidates'] or '[]'):
         sizes = [

@@ -18,12 +18,14 @@ YEAR_NS = 365.25 * 86_400e9
 _ALONE_NS = YEAR_NS
 _LENGTH_TOLERANCE = 0.02  # between ship files of one ship
 _MANY_RUNS = 5  # of fewer each may stand alone
+_FEW_SHARE = 0.1  # of all runs: so many may one wrong clock have dated, if ...
+_FAR_NS = 3.0 * YEAR_NS  # ... they are so far off; a second season is nearer
 _EARLIEST_NS = 631_152_000_000_000_000  # 1990: before it a clock was not set
 _MOST_SHARED = 0.5  # a reference speed must lie inside the range of at least this many runs
 _NOMINAL_TEMPERATURE_C = 15.0
 _TEMPERATURE_SCALE = 0.02  # friction per 10 K, about: the unit in which its covariate counts
 
-Row = Mapping[str, Any]
+CoastdownRow = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -93,7 +95,7 @@ class ShipSeries:
 
 
 def series_of(
-    name: str, rows: Sequence[Row], *, service_speed_m_s: float | None = None
+    name: str, rows: Sequence[CoastdownRow], *, service_speed_m_s: float | None = None
 ) -> ShipSeries:
     """
     Return the runs of one ship at its reference speed.
@@ -132,7 +134,9 @@ def series_of(
     )
 
 
-def _reference_speed(rows: Sequence[Row], service: float | None) -> tuple[float, tuple[str, ...]]:
+def _reference_speed(
+    rows: Sequence[CoastdownRow], service: float | None
+) -> tuple[float, tuple[str, ...]]:
     """Return the speed at which runs are compared, and what is to be said of it."""
     ranges = [found for row in rows if (found := _range(row)) is not None]
     if not ranges:
@@ -158,7 +162,7 @@ def _reference_speed(rows: Sequence[Row], service: float | None) -> tuple[float,
     )
 
 
-def _range(row: Row) -> tuple[float, float] | None:
+def _range(row: CoastdownRow) -> tuple[float, float] | None:
     """Return the lowest and highest speed at which a row has r."""
     if row['resistance_m_s2'] is None or row['speed_m_s'] is None:
         return None
@@ -167,7 +171,7 @@ def _range(row: Row) -> tuple[float, float] | None:
     return (float(speed[known].min()), float(speed[known].max())) if known.any() else None
 
 
-def _point(row: Row, speed: float, clean: float, baseline: bool) -> Point:
+def _point(row: CoastdownRow, speed: float, clean: float, baseline: bool) -> Point:
     """Return the point of a row; without a baseline its value is r itself."""
     plain = Point(int(row['time_ns']), row['bag'])
     if row['error']:
@@ -213,20 +217,30 @@ def _of_one_hull(points: list[Point], lengths: Sequence[float]) -> list[Point]:
 
 
 def _dated(points: list[Point]) -> list[Point]:
-    """Leave out a run that stands alone, years from all others: its clock was wrong."""
-    times = np.array([point.time_ns for point in points if point.used])
+    """Leave out the few runs that are years from most of the others: their clock was wrong."""
+    used = [number for number, point in enumerate(points) if point.used]
+    times = np.array([points[number].time_ns for number in used])
     if len(times) < _MANY_RUNS:
         return points
-    found = []
-    for point in points:
-        apart_ns = np.sort(np.abs(times - point.time_ns))[1]  # the first is its own
-        if point.used and apart_ns > _ALONE_NS:
+    groups = np.split(np.arange(len(times)), np.flatnonzero(np.diff(times) > _ALONE_NS) + 1)
+    most = max(groups, key=len)
+    if len(most) < _MOST_SHARED * len(times):  # a ship that coasts once in a year or two
+        return points
+    found = list(points)
+    for group in groups:
+        if group is most or len(group) > max(_FEW_SHARE * len(times), 1.0):
+            continue
+        ends = np.abs(times[group][:, None] - times[most[[0, -1]]])
+        if len(group) > 1 and ends.min() < _FAR_NS:
+            continue
+        for number in group.tolist():
+            time_ns, apart_ns = times[number], np.abs(times[number] - times[most[[0, -1]]]).min()
+            others = 'every other run' if len(group) == 1 else f'all but {len(group)} runs'
             reason = (
-                f'its date, {day(point.time_ns)}, is {apart_ns / YEAR_NS:.1f} years from every '
-                'other run: a wrong clock'
+                f'its date, {day(int(time_ns))}, is {apart_ns / YEAR_NS:.1f} years from {others}: '
+                'a wrong clock'
             )
-            point = replace(point, reason=reason)
-        found.append(point)
+            found[used[number]] = replace(points[used[number]], reason=reason)
     return found
 
 
@@ -257,7 +271,7 @@ def _over_first_months(points: list[Point]) -> tuple[list[Point], float, str]:
     return scaled, clean, note
 
 
-def _with_covariates(points: Sequence[Point], rows: Sequence[Row]) -> list[Point]:
+def _with_covariates(points: Sequence[Point], rows: Sequence[CoastdownRow]) -> list[Point]:
     """Set displacement and water temperature, each against its mean over the used runs."""
     volume = np.array([np.log(row['displaced_volume_m3']) for row in rows])
     temperature = np.array(
@@ -282,7 +296,7 @@ def _centred(values: Float64) -> Float64:
     return np.where(known, values - values[known].mean(), 0.0)
 
 
-def _at(values: Sequence[float] | None, row: Row, speed: float) -> float:
+def _at(values: Sequence[float] | None, row: CoastdownRow, speed: float) -> float:
     """Return what a curve of a row is at a speed; NaN outside of what is known."""
     if values is None or row['speed_m_s'] is None or not np.isfinite(speed):
         return np.nan

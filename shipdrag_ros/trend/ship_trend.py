@@ -17,7 +17,7 @@ from shipdrag_ros.ship.sections import Economics
 from shipdrag_ros.trend.change_points import FoundStep, search
 from shipdrag_ros.trend.hull_state import Growth, HullState, Mixture, Runs, Steps
 from shipdrag_ros.trend.money import CleaningDate, cleaning_date, fuel_t_per_day, usd_per_year
-from shipdrag_ros.trend.series import YEAR_NS, Point, Row, ShipSeries, series_of
+from shipdrag_ros.trend.series import YEAR_NS, CoastdownRow, Point, ShipSeries, series_of
 
 _OUTLIER = 0.5
 _SISTER_SD = 0.05  # of growth per year, between ships of one drawing
@@ -138,7 +138,9 @@ class ShipTrend:
 
 
 def fleet_trends(
-    rows: Sequence[Row], ships: Mapping[str, Ship], events: Mapping[str, Sequence[HullEvent]]
+    rows: Sequence[CoastdownRow],
+    ships: Mapping[str, Ship],
+    events: Mapping[str, Sequence[HullEvent]],
 ) -> list[ShipTrend]:
     """
     Return the trend of every ship, the hull to be cleaned first in front.

@@ -121,7 +121,7 @@ def event_table(trend: ShipTrend) -> Table:
         tuple(
             (
                 day(event.time_ns),
-                event.kind if event.known else 'step that no log book tells',
+                event.kind if event.known else 'step that no log book notes',
                 '-' if event.known else f'{event.probability:.0%}',
                 percent(event.change),
             )

@@ -20,7 +20,7 @@ from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 
-WITHIN_S = 20.0
+WITHIN_S = 120.0
 SECOND_NS = 10**9
 FULL = BagError('No space left on device')
 

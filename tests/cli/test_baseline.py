@@ -37,7 +37,7 @@ def test_learns_from_two_bags_what_simulate_and_diagnose_take(
         assert abs(factor['value'] - 1.0) < 3.0 * factor['sd']
     assert found['scatter']['value'] is None
     assert found['relative_sd']['before'] == {'friction': 0.02, 'wave': 0.1}
-    assert 'WARNING: 2 run(s) do not tell how runs differ' in shown.err
+    assert 'WARNING: 2 run(s) do not show how runs differ' in shown.err
     assert Ship.load(out).baseline != Ship.load(ship_file).baseline
     assert main(['diagnose', bags[0], '--ship', str(out), '--json']) == 0
     assert json.loads(capsys.readouterr().out)['verdict'] == 'none'

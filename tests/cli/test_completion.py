@@ -13,7 +13,7 @@ import pytest
 from shipdrag_ros.cli import VERBS, main
 from shipdrag_ros.cli.completion import SHELLS, script
 
-LIMIT_S = 60
+LIMIT_S = 200
 PROGRAM = [sys.executable, '-m', 'shipdrag_ros.cli']
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`info` tells what is in a bag."""
+"""`info` shows what is in a bag, or in a log."""
 
 from __future__ import annotations
 
@@ -44,6 +44,21 @@ def test_a_remapping_changes_what_is_heard(
     assert main([*line, '--json']) == 0
     (about,) = json.loads(capsys.readouterr().out)['bags']
     assert 'speed_through_water' in about['missing_inputs']
+
+
+def test_a_log_is_shown_as_its_bag_would_be(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / 'log.csv'
+    log.write_text('time,STW [kn]\n0,12.0\n1,11.9\n')
+    capsys.readouterr()
+    assert main(['info', str(log), '--json']) == 0
+    captured = capsys.readouterr()
+    assert "speed_through_water <- 'STW [kn]'" in captured.err
+    (about,) = json.loads(captured.out)['bags']
+    assert about['files'] == [str(log)]
+    assert (about['duration_s'], about['messages']) == (1.0, 2)
+    assert (about['compression'], about['software']) == ('none', None)
 
 
 def test_no_bag_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:

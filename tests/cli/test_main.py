@@ -118,7 +118,7 @@ def test_help_is_there_at_once_and_needs_no_ros() -> None:
         ],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=True,
     )
     assert loaded.stdout.splitlines()[-1] == '[]'
@@ -134,5 +134,5 @@ def test_a_reader_that_goes_away_is_no_error(ship_file: Path, tmp_path: Path) ->
         assert process.stdout is not None
         assert process.stderr is not None
         process.stdout.close()
-        assert process.wait(timeout=60) == 141
+        assert process.wait(timeout=200) == 141
         assert process.stderr.read() == b''

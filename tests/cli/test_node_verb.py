@@ -15,7 +15,7 @@ import yaml
 from shipdrag_ros.cli import main
 
 SHIPDRAG = Path(sys.executable).with_name('shipdrag')
-LIMIT_S = 60.0
+LIMIT_S = 240.0
 
 
 @pytest.mark.parametrize('verb', ['node', 'demo'])

@@ -16,8 +16,8 @@ import pytest
 from numba.core import event
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.cli.compiling import Compiling
-from shipdrag_ros.cli.progress import Lines
+from shipdrag_ros.cli.compiling import CompilingNotice
+from shipdrag_ros.cli.progress import ProgressLines
 
 
 @pytest.fixture(scope='module')
@@ -39,7 +39,7 @@ def test_lines_are_told_now_and_then_with_the_time_left(monkeypatch: pytest.Monk
     clock = [100.0]
     monkeypatch.setattr('shipdrag_ros.cli.progress.time.monotonic', lambda: clock[0])
     said: list[str] = []
-    lines = Lines(said.append, every_s=15.0, at_once=False)
+    lines = ProgressLines(said.append, every_s=15.0, at_once=False)
     for done in range(5):
         lines.tell('replaying', done, 10)
         clock[0] += 10.0
@@ -52,7 +52,7 @@ def test_the_first_word_comes_at_once_and_the_others_wait(
     clock = [100.0]
     monkeypatch.setattr('shipdrag_ros.cli.progress.time.monotonic', lambda: clock[0])
     said: list[str] = []
-    lines = Lines(said.append, every_s=3.0, at_once=True)
+    lines = ProgressLines(said.append, every_s=3.0, at_once=True)
     lines.tell('reading', 0, 0)
     for done in range(8):
         lines.tell('fitting', done, 8)
@@ -63,7 +63,7 @@ def test_the_first_word_comes_at_once_and_the_others_wait(
 def test_compiling_is_said_once_and_only_when_something_is_compiled() -> None:
     said: list[str] = []
     first, second = numba.njit(lambda x: x + 1.0), numba.njit(lambda x: x - 1.0)
-    with event.install_listener('numba:compile', Compiling(said.append)):
+    with event.install_listener('numba:compile', CompilingNotice(said.append)):
         assert said == []
         assert first(1.0) == 2.0
         assert second(1.0) == 0.0
@@ -114,6 +114,6 @@ def test_a_terminal_is_shown_a_bar_that_goes_away(short_bag: Path) -> None:
 @pytest.mark.parametrize('at_once', [True, False])
 def test_nothing_done_is_nothing_divided(at_once: bool) -> None:
     said: list[str] = []
-    lines = Lines(said.append, every_s=0.0, at_once=at_once)
+    lines = ProgressLines(said.append, every_s=0.0, at_once=at_once)
     lines.tell('fitting', 0, 0)
     assert said == (['fitting'] if at_once else [])

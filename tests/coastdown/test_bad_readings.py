@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 
@@ -49,10 +49,10 @@ FAULTS = {
 }
 
 
-def found(ship, block: Block, **estimators) -> Coastdown:
+def found(ship, block: Block, **estimators) -> EndedCoastdown:
     monitor = Monitor(ship, Parameters(), **estimators)
     events = monitor.update(block) + monitor.finish()
-    [coastdown] = [event for event in events if isinstance(event, Coastdown)]
+    [coastdown] = [event for event in events if isinstance(event, EndedCoastdown)]
     return coastdown
 
 
@@ -72,8 +72,8 @@ def clean(record, sensors) -> Block:
 
 @pytest.mark.parametrize('name', FAULTS)
 def test_bad_readings_neither_hide_nor_move_a_coastdown(ship, clean, watch, name) -> None:
-    def the_one(block: Block) -> Coastdown:
-        [one] = [event for event in watch(block) if isinstance(event, Coastdown)]
+    def the_one(block: Block) -> EndedCoastdown:
+        [one] = [event for event in watch(block) if isinstance(event, EndedCoastdown)]
         return one
 
     as_it_is, bad = the_one(clean), the_one(spoilt(clean, *FAULTS[name]))

@@ -35,7 +35,7 @@ def doubt(
     monitor = Monitor(SHIP, Parameters(heading_convention=convention))
     track = Block.of(Channel.POSITION, stamps, way + rng.normal(0.0, 0.5, way.shape))
     monitor.update(in_arrival_order([track, Block.of(Channel.HEADING, stamps, heading)]))
-    return monitor.heading_doubt()
+    return monitor.doubts().get('heading', '')
 
 
 @pytest.mark.parametrize('course_deg', [0.0, 100.0, 180.0, 250.0, 330.0])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, NotCoastdown, Onset
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown, Onset
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.simulation import EngineOrder, Turn
@@ -17,12 +17,12 @@ S = 1_000_000_000
 STOP = EngineOrder(0.0, shaft=0.0, thrust=0.0)
 
 
-def the_coastdown(events) -> Coastdown:
-    (coastdown,) = [event for event in events if isinstance(event, Coastdown)]
+def the_coastdown(events) -> EndedCoastdown:
+    (coastdown,) = [event for event in events if isinstance(event, EndedCoastdown)]
     return coastdown
 
 
-def end_s(coastdown: Coastdown) -> float:
+def end_s(coastdown: EndedCoastdown) -> float:
     return (coastdown.end_ns - START_NS) / S - 900.0
 
 
@@ -190,7 +190,7 @@ def test_a_slow_down_that_passed_for_a_coastdown_is_withdrawn_when_it_settles(
 ) -> None:
     order = EngineOrder(0.0, shaft=left**0.5, thrust=left)
     events = watch(record(orders=(order,), duration_s=2400.0, seed=seed))
-    ended = [event for event in events if isinstance(event, Coastdown)]
+    ended = [event for event in events if isinstance(event, EndedCoastdown)]
     assert all(event.withdrawn for event in ended)
     dismissed = [event for event in events if isinstance(event, NotCoastdown)]
     assert dismissed
@@ -229,7 +229,7 @@ def test_a_brake_from_the_stop_on_is_no_coastdown(
     brake = EngineOrder(0.0, shaft=0.0, thrust=-4.0)
     let_go = EngineOrder(90.0, shaft=0.0, thrust=0.0)
     events = watch(record(sensors=told, orders=(brake, let_go), seed=seed))
-    assert all(event.withdrawn for event in events if isinstance(event, Coastdown))
+    assert all(event.withdrawn for event in events if isinstance(event, EndedCoastdown))
     assert any(isinstance(event, NotCoastdown) for event in events)
 
 
@@ -240,7 +240,7 @@ def test_several_coastdowns_in_one_record(watch, record) -> None:
     onsets = [event for event in events if isinstance(event, Onset)]
     starts = [(onset.start_ns - START_NS) / S - 900.0 for onset in onsets]
     np.testing.assert_allclose(starts, [6.0, 2006.0], atol=12.0)
-    ends = [event.ended_by for event in events if isinstance(event, Coastdown)]
+    ends = [event.ended_by for event in events if isinstance(event, EndedCoastdown)]
     assert ends == [EndedBy.ENGINE, EndedBy.RECORD_END]
 
 

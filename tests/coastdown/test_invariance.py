@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     EndedBy,
+    EndedCoastdown,
     NotCoastdown,
     Onset,
     Reset,
@@ -175,7 +175,7 @@ def test_a_reset_in_mid_coastdown_is_a_fresh_start(
     before, after = eventful[:place], spoil(eventful[place:], seed)
     first, monitor = watching(ship), watching(ship)
     expected = [*first.update(before), *first.reset(7, 'asked for'), *run(ship, [after])[0]]
-    assert any(isinstance(e, Coastdown) and e.ended_by is EndedBy.RESET for e in expected)
+    assert any(isinstance(e, EndedCoastdown) and e.ended_by is EndedBy.RESET for e in expected)
 
     def pieces(block: Block) -> list[Block]:
         return cut(block, data.draw(st.lists(st.integers(0, len(block)), max_size=20)))
@@ -189,7 +189,7 @@ def test_a_reset_in_mid_coastdown_is_a_fresh_start(
 def test_sample_by_sample_changes_no_bit(ship, eventful, bits) -> None:
     block = spoil(eventful, 5)
     events, _ = run(ship, [block])
-    assert {Onset, Update, Coastdown, Reset} <= {type(event) for event in events}
+    assert {Onset, Update, EndedCoastdown, Reset} <= {type(event) for event in events}
     assert bits(run(ship, cut(block, range(1, len(block))))[0]) == bits(events)
 
 
@@ -244,7 +244,7 @@ def test_a_monitor_that_starts_later_says_the_same(
     known_ns = START_NS + start_s * S + Monitor(ship, QUICK).history_ns
 
     def known(events) -> list:
-        spans = Onset | Coastdown | NotCoastdown
+        spans = Onset | EndedCoastdown | NotCoastdown
         return [
             event
             for event in events

@@ -8,8 +8,8 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     EndedBy,
+    EndedCoastdown,
     NoEstimate,
     Onset,
     Reset,
@@ -92,7 +92,7 @@ def test_no_estimate_says_why(ship, record) -> None:
     watched = monitor(ship, estimate=refuse)
     events = watched.update(record()) + watched.finish()
     assert {event.reason for event in of(NoEstimate, events)} == {'too short for anything'}
-    (coastdown,) = of(Coastdown, events)
+    (coastdown,) = of(EndedCoastdown, events)
     assert coastdown.estimate is None
     assert coastdown.failure == 'too short for anything'
 
@@ -101,7 +101,7 @@ def test_the_end_of_the_record_ends_a_coastdown(ship, record) -> None:
     watched = monitor(ship)
     block = record()
     events = watched.update(block) + watched.finish()
-    (onset,), (coastdown,) = of(Onset, events), of(Coastdown, events)
+    (onset,), (coastdown,) = of(Onset, events), of(EndedCoastdown, events)
     assert coastdown.ended_by is EndedBy.RECORD_END
     assert coastdown.start_ns == onset.start_ns == coastdown.estimate.start_ns
     assert coastdown.onset_detected_ns == onset.detected_ns
@@ -150,7 +150,7 @@ def test_a_clock_that_was_set_resets_and_says_so(ship, record, jumps: str) -> No
         )
     watched = monitor(ship)
     events = watched.update(concatenate([block[:half], later]))
-    (coastdown,), (reset,) = of(Coastdown, events), of(Reset, events)
+    (coastdown,), (reset,) = of(EndedCoastdown, events), of(Reset, events)
     assert coastdown.ended_by is EndedBy.RESET
     assert coastdown.end_ns == int(block.stamp_ns[half - 1])
     assert reset.receive_ns == int(later.receive_ns[0])
@@ -165,7 +165,7 @@ def test_silence_of_the_log_ends_a_coastdown_though_others_go_on(ship, record, s
     silent = (block.channel == LOG) & (block.stamp_ns > START_NS + 1300 * S)
     watched = monitor(ship, data_stop_s=30.0)
     events = watched.update(block[~silent])
-    (coastdown,) = of(Coastdown, events)
+    (coastdown,) = of(EndedCoastdown, events)
     assert coastdown.ended_by is EndedBy.DATA_STOP
     assert coastdown.end_ns == START_NS + 1300 * S
     # noticed as soon as 30 s are over, not when the record is
@@ -173,7 +173,7 @@ def test_silence_of_the_log_ends_a_coastdown_though_others_go_on(ship, record, s
     assert late == []
     kept = block[~silent]
     before = kept[kept.stamp_ns <= START_NS + 1330 * S]
-    assert of(Coastdown, monitor(ship, data_stop_s=30.0).update(before)) == []
+    assert of(EndedCoastdown, monitor(ship, data_stop_s=30.0).update(before)) == []
 
 
 def test_a_gap_shorter_than_data_stop_s_does_not_end_a_coastdown(ship, record) -> None:
@@ -181,29 +181,29 @@ def test_a_gap_shorter_than_data_stop_s_does_not_end_a_coastdown(ship, record) -
     time = (block.stamp_ns - START_NS) / S
     gap = block[(time < 1300.0) | (time > 1350.0)]
     events = monitor(ship).update(gap)
-    assert of(Coastdown, events) == []
+    assert of(EndedCoastdown, events) == []
     # one update for each part of the grid that holds data
     stamps = [update.stamp_ns for update in of(Update, events)]
     assert len(stamps) == len(set(stamps))
     ends = [int(update.estimate.speed_through_water.time_ns[-1]) for update in of(Update, events)]
     assert len(ends) == len(set(ends))
     ended = monitor(ship, data_stop_s=40.0).update(gap)
-    assert of(Coastdown, ended)[0].ended_by is EndedBy.DATA_STOP
+    assert of(EndedCoastdown, ended)[0].ended_by is EndedBy.DATA_STOP
 
 
 def test_the_heading_before_the_onset_is_given(ship, record, sensors) -> None:
     block = record(sensors=(sensors['log'], sensors['compass']), heading_rad=2.9)
     finish = monitor(ship)
-    (coastdown,) = of(Coastdown, finish.update(block) + finish.finish())
+    (coastdown,) = of(EndedCoastdown, finish.update(block) + finish.finish())
     np.testing.assert_allclose(coastdown.heading_rad, 2.9, atol=0.005)
     compass = monitor(ship, heading_convention='compass')
-    (turned,) = of(Coastdown, compass.update(block) + compass.finish())
+    (turned,) = of(EndedCoastdown, compass.update(block) + compass.finish())
     np.testing.assert_allclose(turned.heading_rad, np.pi / 2 - 2.9, atol=0.005)
 
 
 def test_without_a_heading_none_is_given(ship, record) -> None:
     watched = monitor(ship)
-    assert of(Coastdown, watched.update(record()) + watched.finish())[0].heading_rad is None
+    assert of(EndedCoastdown, watched.update(record()) + watched.finish())[0].heading_rad is None
 
 
 def test_other_sources_take_over_from_a_silent_log(ship, record, sensors) -> None:
@@ -292,6 +292,6 @@ def test_silence_of_all_speeds_ends_a_coastdown_though_the_heading_goes_on(
     silent_ns = START_NS + 1500 * S
     heard = everything[(everything.stamp_ns < silent_ns) | (everything.channel == Channel.HEADING)]
     watched = monitor(ship)
-    (ended,) = of(Coastdown, watched.update(heard))
+    (ended,) = of(EndedCoastdown, watched.update(heard))
     assert ended.ended_by is EndedBy.DATA_STOP
     assert silent_ns - S <= ended.end_ns < silent_ns

@@ -8,9 +8,9 @@ import pytest
 
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     Dismissal,
     EndedBy,
+    EndedCoastdown,
     NotCoastdown,
     Onset,
     State,
@@ -98,7 +98,7 @@ def test_a_shaft_that_is_ahead_of_a_slow_log_tells_the_onset(
     (onset,) = onsets(events)
     assert -1.0 <= after_s(onset.start_ns, 900.0) <= 3.0
     assert onset.start_ns < onset.detected_ns
-    (coastdown,) = [event for event in events if isinstance(event, Coastdown)]
+    (coastdown,) = [event for event in events if isinstance(event, EndedCoastdown)]
     assert coastdown.ended_by is EndedBy.RECORD_END
 
 
@@ -236,7 +236,7 @@ def test_a_crash_stop_and_its_end_are_no_coastdown(watch, record, sensors, wait_
         EngineOrder(wait_s + 150.0, shaft=0.0, thrust=0.0),
     )
     events = watch(record(sensors=(sensors['log'], sensors['shaft']), orders=orders))
-    assert [e for e in events if isinstance(e, Coastdown) and not e.withdrawn] == []
+    assert [e for e in events if isinstance(e, EndedCoastdown) and not e.withdrawn] == []
     assert Dismissal.ASTERN in {one.reason for one in dismissed(events)}
 
 
@@ -364,7 +364,7 @@ def test_a_small_craft_with_short_windows() -> None:
     (onset,) = onsets(events)
     assert abs(after_s(onset.start_ns, 60.0)) <= 3.0
     assert after_s(onset.detected_ns, 60.0) <= 20.0
-    (coastdown,) = [event for event in events if isinstance(event, Coastdown)]
+    (coastdown,) = [event for event in events if isinstance(event, EndedCoastdown)]
     assert coastdown.ended_by is EndedBy.RECORD_END
 
 

@@ -38,7 +38,7 @@ def test_systemd_accepts_the_unit(tmp_path: Path) -> None:
         [ANALYZE, 'verify', '--recursive-errors=no', unit],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, '')
@@ -51,7 +51,7 @@ def test_the_unit_exposes_little() -> None:
         [ANALYZE, 'security', '--offline=true', '--no-pager', UNIT],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=200,
         check=False,
     )
     found = re.search(r'exposure level for shipdrag.service: ([\d.]+)', done.stdout)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, Verdict, diagnose
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.fitting import fit
@@ -41,7 +41,7 @@ def run(effect: str, *more: str, heading_rad: float = HEADING_RAD, seed: int = 1
     return CoastRun(effect, window)
 
 
-def resolves(found: Diagnosis) -> dict[Measure, float | None]:
+def resolves(found: DiagnosisResult) -> dict[Measure, float | None]:
     """Return what is measured, of what is advised; facts are asked for besides."""
     known = {measure.value for measure in Measure}
     return {
@@ -52,12 +52,12 @@ def resolves(found: Diagnosis) -> dict[Measure, float | None]:
 
 
 @pytest.fixture(scope='module')
-def current() -> Diagnosis:
+def current() -> DiagnosisResult:
     """A weak current, seen in one run, which may be an offset of the log as well."""
     return diagnose([run('current=0.06')], SHIP, Parameters())
 
 
-def test_reciprocal_run_is_advised_for_a_current_and_names_it(current: Diagnosis) -> None:
+def test_reciprocal_run_is_advised_for_a_current_and_names_it(current: DiagnosisResult) -> None:
     assert current.verdict is Verdict.ONE_OF
     # a leg on another course costs less than a run, and tells a current from an offset too
     assert [each.measure for each in current.would_decide[:2]] == [
@@ -73,7 +73,7 @@ def test_reciprocal_run_is_advised_for_a_current_and_names_it(current: Diagnosis
     assert after.would_decide == ()
 
 
-def test_advice_is_ranked_and_its_probabilities_are_some(current: Diagnosis) -> None:
+def test_advice_is_ranked_and_its_probabilities_are_some(current: DiagnosisResult) -> None:
     known = [each for each in current.would_decide if each.probability is not None]
     assert known
     assert all(0.0 <= (each.probability or 0.0) <= 1.0 for each in known)
@@ -113,7 +113,7 @@ def test_echo_sounder_would_name_shallow_water_as_often_as_it_is_shallow() -> No
     assert ranked.index(Measure.WITHOUT_CABLE) < ranked.index(Measure.CLEAN_HULL)
 
 
-def test_what_is_measured_already_is_not_advised(current: Diagnosis) -> None:
+def test_what_is_measured_already_is_not_advised(current: DiagnosisResult) -> None:
     assert Measure.RADAR not in resolves(current)
     with_wind = diagnose([run('current=0.06', 'wind_apparent')], SHIP, Parameters())
     assert with_wind.verdict is Verdict.ONE_OF

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
-from shipdrag_ros.diagnosis.facts import Facts, Told, told_of
+from shipdrag_ros.diagnosis.facts import Facts, StatedFact, told_of
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.estimation import Window
@@ -30,7 +30,7 @@ def hypothesis(*names: str, only_run: int | None = None) -> Hypothesis:
 
 
 def chance(fact: Fact, found: Hypothesis, *, ship: Ship = SHIP, run: int | None = None) -> float:
-    told = Told(fact, run, YEAR_NS)
+    told = StatedFact(fact, run, YEAR_NS)
     return math.exp(Facts(ship, (told,)).log_likelihood(found))
 
 

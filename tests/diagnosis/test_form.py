@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, Verdict, diagnose_fitted
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, Verdict, diagnose_fitted
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
@@ -53,7 +53,7 @@ def coast(
     return CoastRun('coast', Window.from_block(block, int(stamps[0]), int(stamps[-1])))
 
 
-def names(found: Diagnosis) -> set[tuple[str, ...]]:
+def names(found: DiagnosisResult) -> set[tuple[str, ...]]:
     """Return the candidates."""
     return {each.names for each in found.candidates}
 

@@ -15,7 +15,7 @@ from shipdrag_ros.diagnosis import (
     Advice,
     Candidate,
     CoastRun,
-    Diagnosis,
+    DiagnosisResult,
     EffectEstimate,
     Verdict,
     diagnose,
@@ -39,7 +39,7 @@ SCORE = Score(900, 7, {'precision of a name': (98, 100)}, 0.031)
 
 
 @pytest.fixture(scope='module')
-def found() -> Diagnosis:
+def found() -> DiagnosisResult:
     """A run with a current, that the ship file does not have."""
     scenario = Scenario(speed_m_s=8.0, lead_in_s=1800.0, duration_s=1500.0)
     truth = simulate(SHIP, scenario, effects=[parse('current=0.4')])
@@ -54,7 +54,7 @@ def found() -> Diagnosis:
 
 @pytest.fixture
 def written(tmp_path: Path, read_page: ReadPage) -> Callable[..., Any]:
-    def write(found: Diagnosis, ship: Ship | None = SHIP, score: Score | None = None) -> Any:
+    def write(found: DiagnosisResult, ship: Ship | None = SHIP, score: Score | None = None) -> Any:
         write_diagnosis(tmp_path / 'page.html', found, ship, score=score)
         return read_page(tmp_path / 'page.html')
 
@@ -62,7 +62,7 @@ def written(tmp_path: Path, read_page: ReadPage) -> Callable[..., Any]:
 
 
 def test_the_page_says_all_and_needs_no_network(
-    found: Diagnosis, written: Callable[..., Any]
+    found: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
     assert found.verdict is Verdict.NAMED
     page = written(found)
@@ -88,7 +88,7 @@ def test_the_page_says_all_and_needs_no_network(
 
 
 def test_the_score_of_the_method_stands_on_the_page(
-    found: Diagnosis, written: Callable[..., Any]
+    found: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
     page = written(found, score=SCORE)
     assert 'not scored' not in page.text
@@ -97,7 +97,7 @@ def test_the_score_of_the_method_stands_on_the_page(
     assert '0.031' in page.text
 
 
-def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., Any]) -> None:
+def test_a_set_says_what_would_decide(found: DiagnosisResult, written: Callable[..., Any]) -> None:
     offset = EffectEstimate('log_offset', 0.395, {'offset_m_s': Parameter(0.4321, 0.02)})
     candidates = (
         Candidate(('current',), 0.6, found.effects),
@@ -121,7 +121,7 @@ def test_a_set_says_what_would_decide(found: Diagnosis, written: Callable[..., A
 
 
 def test_what_is_unknown_is_none_of_the_candidates(
-    found: Diagnosis, written: Callable[..., Any]
+    found: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
     page = written(replace(found, verdict=Verdict.UNKNOWN, effects=()))
     assert 'Of each candidate, were it the one' in page.text
@@ -129,7 +129,7 @@ def test_what_is_unknown_is_none_of_the_candidates(
 
 
 def test_a_fact_that_the_data_contradict_stands_on_the_page(
-    found: Diagnosis, written: Callable[..., Any]
+    found: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
     told = (
         ToldFact(Fact('deep_water'), '', 0.97, ('shallow_water',)),
@@ -143,7 +143,7 @@ def test_a_fact_that_the_data_contradict_stands_on_the_page(
 
 
 def test_a_record_without_coastdown_has_a_page_without_traces(
-    found: Diagnosis, written: Callable[..., Any]
+    found: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
     sailing = replace(
         found, traces=(), baseline='none', notes=('compared on 40 legs',), estimates=()
@@ -159,7 +159,7 @@ def test_a_record_without_coastdown_has_a_page_without_traces(
     assert 'a form of the resistance was fitted to these runs' in fitted.text
 
 
-def test_pictures_show_what_they_are_given(found: Diagnosis) -> None:
+def test_pictures_show_what_they_are_given(found: DiagnosisResult) -> None:
     (trace,) = found.traces
     log, position, _ = trace.compared
     drawn = pictures.motion_pictures(trace, after='with current', mass_kg=SHIP.mass_kg)

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import Diagnosis, SailingRecord, Verdict, diagnose_sailing
+from shipdrag_ros.diagnosis import DiagnosisResult, SailingRecord, Verdict, diagnose_sailing
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
@@ -103,7 +104,7 @@ def degrees(place: Float64) -> Float64:
     return place[:, ::-1] / METRES_A_DEGREE
 
 
-def found_in(sailing: Sailing, seed: int = 1) -> Diagnosis:
+def found_in(sailing: Sailing, seed: int = 1) -> DiagnosisResult:
     """Diagnose one record."""
     return diagnose_sailing([SailingRecord('sailing', sailing.block(seed))], PARAMETERS)
 
@@ -191,6 +192,11 @@ def test_without_turns_a_current_and_an_offset_are_not_told_apart(
 def test_two_at_once() -> None:
     found = found_in(Sailing(scale=-0.06, current_m_s=(0.4, 0.3), geodetic=True))
     assert [effect.name for effect in found.effects] == ['current', 'log_scale']
+    # the log reads less than the way over ground where the water goes along, more against it
+    by_course = next(note for note in found.notes if note.startswith('log over ground by course'))
+    ratio = {name: float(read) for name, read in re.findall(r'(\w+) (\d\.\d+) \(', by_course)}
+    assert ratio['north'] < 1.0 - 0.06 < ratio['south']
+    assert ratio['east'] < 1.0 - 0.06 < ratio['west']
 
 
 def test_a_strong_current_across_the_first_leg_is_a_current() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis import CoastRun, Diagnosis, diagnose
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -21,7 +21,7 @@ LEAD_IN_S, COAST_S, CURRENT_M_S = 1800.0, 1500.0, 0.3
 
 
 @pytest.fixture(scope='module')
-def found() -> Diagnosis:
+def found() -> DiagnosisResult:
     """A run into which a current is put."""
     scenario = Scenario(speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=COAST_S, heading_rad=0.3)
     truth = simulate(SHIP, scenario, effects=[parse(f'current={CURRENT_M_S}')], reference_rad=0.3)
@@ -33,7 +33,7 @@ def found() -> Diagnosis:
     return diagnose([CoastRun('at sea', window)], SHIP, Parameters())
 
 
-def test_each_quantity_is_held_against_the_model(found: Diagnosis) -> None:
+def test_each_quantity_is_held_against_the_model(found: DiagnosisResult) -> None:
     (trace,) = found.traces
     assert trace.name == 'at sea'
     assert trace.lead_in_s == pytest.approx(LEAD_IN_S, abs=60.0)
@@ -46,7 +46,7 @@ def test_each_quantity_is_held_against_the_model(found: Diagnosis) -> None:
         assert each.speed_m_s[-1] < 4.0
 
 
-def test_the_gap_is_that_of_the_traces(found: Diagnosis) -> None:
+def test_the_gap_is_that_of_the_traces(found: DiagnosisResult) -> None:
     log, ahead, across = found.traces[0].compared
     coasting = log.time_s >= 0.0
     for gap, simulated in ((found.before, log.before), (found.after, log.after)):
@@ -59,7 +59,7 @@ def test_the_gap_is_that_of_the_traces(found: Diagnosis) -> None:
     assert np.mean(white**2) == pytest.approx(found.after.chi2_per_sample, rel=0.3)
 
 
-def test_what_a_current_carries_away_is_missing_before(found: Diagnosis) -> None:
+def test_what_a_current_carries_away_is_missing_before(found: DiagnosisResult) -> None:
     position = found.traces[0].compared[1]
     missed = (position.measured - position.before)[-1] - (position.measured - position.before)[0]
     assert missed == pytest.approx(CURRENT_M_S * (LEAD_IN_S + COAST_S), rel=0.05)
@@ -67,7 +67,7 @@ def test_what_a_current_carries_away_is_missing_before(found: Diagnosis) -> None
     assert np.abs(position.white_before).max() > 3.0 > np.abs(position.white_after).max() - 1.0
 
 
-def test_noise_grows_where_it_adds_up(found: Diagnosis) -> None:
+def test_noise_grows_where_it_adds_up(found: DiagnosisResult) -> None:
     log, position, _ = found.traces[0].compared
     assert (log.sd > 0.0).all()
     assert log.sd.max() < 0.1

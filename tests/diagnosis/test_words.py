@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.diagnosis import Candidate, Diagnosis, EffectEstimate, Gap, Verdict, Where
+from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict, Where
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.words import answers, probability, sentence
 from shipdrag_ros.parameter import Parameter
@@ -22,8 +22,8 @@ def diagnosis(
     nothing: float = 0.0,
     unnamed: float = 0.0,
     effects: tuple[EffectEstimate, ...] = (),
-) -> Diagnosis:
-    return Diagnosis(
+) -> DiagnosisResult:
+    return DiagnosisResult(
         verdict=verdict,
         effects=effects,
         candidates=tuple(Candidate(*each) for each in candidates),
@@ -70,12 +70,12 @@ def diagnosis(
         (
             diagnosis(Verdict.ONE_OF, (('log_scale',), 0.6), (('radar_scale',), 0.4)),
             'Missing is one of these: log scale (60.0 %), radar scale (40.0 %). These runs cannot '
-            'tell them apart.',
+            'separate them.',
         ),
         (
             diagnosis(Verdict.ONE_OF, (('waves',), 0.3), (('wind',), 0.2), unnamed=0.5),
             'Missing is one of these: waves (30.0 %), wind (20.0 %), or something without a name '
-            '(50.0 %). These runs cannot tell them apart.',
+            '(50.0 %). These runs cannot separate them.',
         ),
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),
@@ -90,7 +90,7 @@ def diagnosis(
         ),
     ],
 )
-def test_a_verdict_in_a_sentence(found: Diagnosis, said: str) -> None:
+def test_a_verdict_in_a_sentence(found: DiagnosisResult, said: str) -> None:
     assert sentence(found) == said
 
 

@@ -60,11 +60,11 @@ class QuadraticCoast:
         )
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def coast() -> QuadraticCoast:
     return QuadraticCoast()
 
 
-@pytest.fixture
+@pytest.fixture(scope='session')
 def ship() -> Ship:
     return Ship(length_m=150.0, displaced_volume_m3=20200.0)

@@ -17,9 +17,9 @@ from scipy.integrate import solve_ivp
 
 from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.ode_fit.first_fits import fit_robustly
-from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.problem import Problem
-from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
@@ -191,8 +191,8 @@ def test_variance_is_that_of_the_bound_where_the_family_is_known() -> None:
         )
         window = Window.from_block(block, int(stamps[0]), int(stamps[-1]))
         run_down = RunDown.of(window, SHIP)
-        each = Record.of(window, run_down, Parameters())
-        guess = Guess.of(each.coast, float(SHIP.n_r(1.0)))
+        each = RunRows.of(window, run_down, Parameters())
+        guess = InitialGuess.of(each.coast, float(SHIP.n_r(1.0)))
         first, _ = fit_robustly(Problem.of(each, run_down, SHIP, guess))
         found.append(first.resistance(speed)[0])
     error = np.array(found) - of_law(LAW, speed)

@@ -99,7 +99,7 @@ def test_notes_say_what_the_record_cannot_show(estimate: Estimate) -> None:
         froude_max_by=FroudeMax.BRANCH_TOP,
     )
     notes = ' '.join(words.notes(ground))
-    assert 'a run on the opposite heading would tell' in notes
+    assert 'a run on the opposite heading would show' in notes
     assert 'only a lower bound' in notes
 
 

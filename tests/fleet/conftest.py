@@ -11,7 +11,7 @@ import pytest
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.fleet.find import BagToRead, find
-from shipdrag_ros.fleet.job import Job
+from shipdrag_ros.fleet.job import BagJob
 from shipdrag_ros.fleet.local import Identity, content_hash, identify
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -61,8 +61,8 @@ def only_source(path: Path) -> BagToRead:
     return source
 
 
-def job_of(source: BagToRead) -> Job:
+def job_of(source: BagToRead) -> BagJob:
     """Return what is to be done for one bag."""
     identity = identify(source)
     assert isinstance(identity, Identity), identity
-    return Job((source,), content_hash([identity.digest], source))
+    return BagJob((source,), content_hash([identity.digest], source))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 from pathlib import Path
 
@@ -162,3 +163,25 @@ def test_a_ship_file_that_is_no_text_is_told_for_each_bag(tmp_path: Path) -> Non
     assert skipped.bag == 'a.mcap'
     assert 'ship.yaml' in skipped.reason
     assert 'is not UTF-8' in skipped.reason
+
+
+_SENTENCES = '$IIVHW,,T,,M,12.10,N,22.41,K*52\n$IIVHW,,T,,M,12.00,N,22.22,K*56\n' * 3
+_LOGS = {
+    'nmea 0183.txt': _SENTENCES,
+    'signalk.jsonl': '{"context":"vessels.self","updates":[{"$source":"a","values":[]}]}\n' * 3,
+    'track.gpx': '<?xml version="1.0"?>\n<gpx version="1.1"><trk></trk></gpx>\n',
+    'n2k.log': '(1502979132.106111) slcan0 09F50374#000A00FFFF00FFFF\n' * 3,
+}
+
+
+def test_a_log_whose_name_does_not_say_so_is_known_by_its_first_bytes(tmp_path: Path) -> None:
+    for name, text in _LOGS.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / 'packed').write_bytes(gzip.compress(_SENTENCES.encode()))
+    (tmp_path / 'read me.md').write_text('Speeds by VHW, in knots.\n' * 3)
+    (tmp_path / 'table.txt').write_text('time,speed_through_water\n0,6.0\n')
+    (tmp_path / 'picture.png').write_bytes(b'\x89PNG\r\n\x1a\n' + bytes(64))
+    (tmp_path / 'broken.gz').write_bytes(gzip.compress(_SENTENCES.encode())[:20] + bytes(64))
+    found = find([str(tmp_path)])
+    assert {source.bag for source in found.sources} == {*_LOGS, 'packed'}
+    assert found.left_alone == 4

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,14 @@ from hypothesis import strategies as st
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
-from shipdrag_ros.importing.formats.csv.importer import BASE_NS, ImportResult, import_csv
+from shipdrag_ros.importing.formats.csv.importer import BASE_NS, TableColumns, import_csv
+from shipdrag_ros.importing.formats.csv.result import TableResult
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 
-Imported = tuple[ImportResult, Block]
+Imported = tuple[TableResult, Block]
 Import = Callable[..., Imported]
 
 
@@ -36,16 +37,16 @@ def import_text(tmp_path: Path) -> Import:
         source, out = tmp_path / 'in.csv', tmp_path / 'out.mcap'
         source.write_bytes(text if isinstance(text, bytes) else text.encode())
         out.unlink(missing_ok=True)
-        result = import_csv(
-            source,
-            out,
-            inputs=[parse_input(each) for each in maps],
-            time=None if time is None else parse_time(time),
-            **options,
-        )
+        progress = options.pop('progress', None)
+        result = import_csv(source, out, columns(maps, time, **options), progress=progress)
         return result, samples(out)
 
     return run
+
+
+def columns(maps: Sequence[str], time: str | None = None, **options: Any) -> TableColumns:
+    inputs = [parse_input(each) for each in maps]
+    return TableColumns(inputs, None if time is None else parse_time(time), **options)
 
 
 def samples(path: Path) -> Block:
@@ -342,15 +343,15 @@ def test_tables_that_cannot_be_used(
 
 
 def test_a_source_that_is_not_there_and_a_bag_that_is(tmp_path: Path) -> None:
-    inputs = [parse_input('shaft=1')]
+    shaft = columns(['shaft=1'], rate_hz=1.0)
     with pytest.raises(ImportDataError, match='cannot be read: No such file'):
-        import_csv(tmp_path / 'a.csv', tmp_path / 'a.mcap', inputs=inputs, rate_hz=1.0)
+        import_csv(tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
     with pytest.raises(ImportDataError, match='cannot be read: Is a directory'):
-        import_csv(tmp_path, tmp_path / 'a.mcap', inputs=inputs, rate_hz=1.0)
+        import_csv(tmp_path, tmp_path / 'a.mcap', shaft)
     (tmp_path / 'a.csv').write_text('1\n')
     (tmp_path / 'a.mcap').write_text('precious')
     with pytest.raises(BagError, match='exists'):
-        import_csv(tmp_path / 'a.csv', tmp_path / 'a.mcap', inputs=inputs, rate_hz=1.0)
+        import_csv(tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
     assert (tmp_path / 'a.mcap').read_text() == 'precious'
 
 
@@ -419,14 +420,7 @@ needs_data = pytest.mark.skipif(
 def test_measured_records(
     tmp_path: Path, name: str, maps: list[str], options: dict[str, Any], count: int
 ) -> None:
-    time = options.pop('time', None)
-    result = import_csv(
-        DATA / name,
-        tmp_path / 'a.mcap',
-        inputs=[parse_input(each) for each in maps],
-        time=None if time is None else parse_time(time),
-        **options,
-    )
+    result = import_csv(DATA / name, tmp_path / 'a.mcap', columns(maps, **options))
     assert sum(result.written.values()) == count == len(samples(tmp_path / 'a.mcap'))
     assert result.rejected == {}
     assert result.backward == 0
@@ -437,11 +431,7 @@ def test_the_coasting_ferry_gives_a_resistance(tmp_path: Path) -> None:
     import_csv(
         DATA / 'milliampere_coast_t457_20hz.csv',
         tmp_path / 'a.mcap',
-        inputs=[
-            parse_input('speed_over_ground=speed_mps'),
-            parse_input('position=pos_e_m,pos_n_m'),
-        ],
-        time=parse_time('t_s'),
+        columns(['speed_over_ground=speed_mps', 'position=pos_e_m,pos_n_m'], 't_s'),
     )
     (run,) = open_runs([tmp_path / 'a.mcap'])
     ferry = Ship(

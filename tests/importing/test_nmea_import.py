@@ -247,8 +247,8 @@ def test_every_form(body: str, channel: Channel, value: float) -> None:
         ('WIMWV,10,T,5,N,A', 'wind_apparent', 'WIMWV: true wind, computed and not measured'),
         ('WIMWV,10,R,5,N,V', 'wind_apparent', 'WIMWV: status V'),
         ('WIMWV,10,R,5,,A', 'wind_apparent', 'WIMWV: no unit'),
-        ('SDDBT,,f,10.0,M,,F', 'depth', 'SDDBT: depth of the transducer not told'),
-        ('SDDPT,10.0,-3.0', 'depth', 'SDDPT: depth of the transducer not told'),
+        ('SDDBT,,f,10.0,M,,F', 'depth', 'SDDBT: depth of the transducer not stated'),
+        ('SDDPT,10.0,-3.0', 'depth', 'SDDPT: depth of the transducer not stated'),
         ('GPGGA,1260,4612.9,N,00610.1,E,1,00', 'time', 'GPGGA: no time of day'),
         ('GPGLL,4612.9,N,00610.1,E,246000,A', 'time', 'GPGLL: no time of day'),
         ('GPRMC,120000,A,4612.9,N,00610.1,E,1,1,310224', 'time', 'GPRMC: no possible date'),
@@ -509,7 +509,7 @@ def test_times_of_receipt_are_enough() -> None:
     # and tell the day of a time without a date
     _, block = run(lines(f'{START.timestamp():.3f} {gga("120000")}'))
     assert seconds(block, Channel.POSITION_GEODETIC) == [0.0]
-    with pytest.raises(ImportDataError, match='tells no time'):
+    with pytest.raises(ImportDataError, match='states no time'):
         run(lines(vhw(1)))
 
 

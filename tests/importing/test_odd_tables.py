@@ -52,6 +52,14 @@ def test_a_longitude_in_degrees_stays_one(tmp_path: Path, written: str, degrees:
     assert "line 52: '999.9'" in told
 
 
+def test_a_time_in_large_steps_and_no_unit_is_asked_about(tmp_path: Path) -> None:
+    with pytest.raises(ImportDataError, match=r'its steps are 100\. Give --time t:ms, or :s'):
+        read(tmp_path, 't,STW [kn]', [f'{100 * i},10.{i % 10}' for i in range(60)])
+    block, said = read(tmp_path, 't,STW [kn]', [f'{i},10.{i % 10}' for i in range(60)])
+    assert np.ptp(block.stamp_ns) == 59 * 10**9
+    assert 'states no unit and is taken as s' in said
+
+
 def test_longitudes_in_the_column_of_latitudes_are_none(tmp_path: Path) -> None:
     rows = [f'{i},110.25,{latitude(i)},10' for i in range(20)]
     block, told = read(tmp_path, 'time,Lat,Lon,STW [kn]', rows)

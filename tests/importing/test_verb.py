@@ -183,7 +183,7 @@ def test_the_words_tell_what_of_a_log_was_not_used(
     assert 'The heading is MAGNETIC' in said
     assert 'The log is attached to the bag.' in said
     assert re.search(r'speed_over_ground +GPRMC +2\n', said)
-    assert 'depth: 1 rejected, SDDBT: depth of the transducer not told: line 4' in said
+    assert 'depth: 1 rejected, SDDBT: depth of the transducer not stated: line 4' in said
     assert 'line: 1 rejected, wrong checksum: line 7' in said
     assert 'Sentences not used: XXMTW 1' in said
     assert 'Talkers that NMEA 0183 does not know: XX 1' in said

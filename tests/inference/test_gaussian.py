@@ -8,13 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from shipdrag_ros.inference.gaussian import (
-    average,
-    condense,
-    deviations,
-    posterior,
-    root,
-)
+from shipdrag_ros.inference.averaging import average
+from shipdrag_ros.inference.gaussian import condense, deviations, posterior, root
 from shipdrag_ros.samples import Float64
 
 K, N = 5, 40

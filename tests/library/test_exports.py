@@ -48,7 +48,7 @@ def test_the_import_brings_no_other_module_of_the_package() -> None:
         '{"shipdrag_ros", "numpy", "numba"}))'
     )
     done = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, '-c', code], capture_output=True, text=True, check=True, timeout=200
     )
     assert done.stdout.split() == ['shipdrag_ros']
 
@@ -60,6 +60,6 @@ def test_reading_and_estimating_imports_no_pictures() -> None:
         '& {*sys.modules}))'
     )
     done = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, '-c', code], capture_output=True, text=True, check=True, timeout=200
     )
     assert done.stdout.split() == []

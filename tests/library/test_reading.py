@@ -183,3 +183,56 @@ def test_no_file_is_left_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     del record, simulated
     gc.collect()
     assert list(tmp_path.iterdir()) == []
+
+
+def places(latitude: float) -> pd.DataFrame:
+    """A minute of a ship that goes north, with dates."""
+    going = latitude + np.arange(60.0) * 5e-5
+    return pd.DataFrame({'lat': going, 'lon': np.full(60, 10.25)}, index=dates())
+
+
+def test_a_ship_is_nowhere_twice_at_one_time() -> None:
+    columns = {'position': ('lat:deg', 'lon:deg')}
+    receivers = sd.read([places(54.5), places(54.5005)], columns=columns)
+    assert len(receivers.runs) == 1
+    with pytest.raises(sd.ShipdragError, match='are 11 km apart about 2026-03-01 08:00'):
+        sd.read([places(54.5), places(54.6)], columns=columns)
+
+
+def test_bags_of_two_ships_are_refused(tmp_path: Path) -> None:
+    other = sd.Ship(name='Other', length_m=90.0, displaced_volume_m3=5000.0)
+    bags = [
+        sd.read(pd.DataFrame(table()), ship=ship, columns=LOG, time='t').save(tmp_path / name)
+        for ship, name in ((SHIP, 'one.mcap'), (other, 'two.mcap'))
+    ]
+    with pytest.raises(sd.ShipdragError, match=r"is of 'Coaster' and .* of 'Other'"):
+        sd.read(bags)
+    assert sd.read(bags, ship=SHIP).ship == SHIP
+
+
+def test_options_of_the_import(tmp_path: Path) -> None:
+    path = tmp_path / 'log.csv'
+    path.write_text('time,STW\n' + ''.join(f'{k},{12.0 - k / 100.0}\n' for k in range(60)))
+    with pytest.raises(sd.ShipdragError, match=r"options=\{'speed_unit': 'kn'\}") as refused:
+        sd.read(path)
+    assert ' --' not in str(refused.value)
+    assert speeds(sd.read(path, options={'speed_unit': 'kn'}))[0] == 12.0 * KNOT
+    for options, why in (
+        ({'speed_unit': 'furlong'}, 'expected one of'),
+        ({'rate': 1.0}, 'give rate_hz='),
+        ({'unit': 'kn'}, 'there are date, '),
+        ({'gear': 2.0}, 'has no use for it'),
+        ({'format': 'txt'}, 'there are ardupilot, '),
+    ):
+        with pytest.raises(sd.ShipdragError, match=why):
+            sd.read(path, options={'speed_unit': 'kn', **options})
+
+
+def test_arguments_that_a_bag_has_no_use_for_are_named(bag: Path) -> None:
+    assert sd.read(bag, time='t').notes == ('time= not used: they are for logs and tables',)
+
+
+def test_a_folder_of_logs_says_what_to_give(tmp_path: Path) -> None:
+    (tmp_path / 'log.csv').write_text('time,STW [kn]\n0,12.0\n')
+    with pytest.raises(sd.ShipdragError, match=r"holds log\.csv\. Logs are given .*log\.csv'"):
+        sd.read(tmp_path)

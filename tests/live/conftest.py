@@ -104,7 +104,7 @@ class Process:
 
     def stop(self) -> int:
         self._process.send_signal(signal.SIGTERM)
-        return self._process.wait(timeout=60.0)
+        return self._process.wait(timeout=200.0)
 
     def kill(self) -> None:
         if self._process.poll() is None:

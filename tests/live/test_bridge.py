@@ -159,13 +159,18 @@ def test_trouble_of_the_node_is_the_headline_and_rejections_are_listed() -> None
     bridge = Bridge()
     values = {'lifecycle': 'active', 'monitor': 'waiting'}
     state = Status('n', 'state', ERROR, 'no data: nothing on any of a, b', values)
-    rejected = {'rejected nan': '3', 'rejected late': '0'}
-    heading = Status('n', 'input heading', 1, 'frozen', rejected)
+    values_of = {'rejected nan': '3', 'rejected late': '0', 'rate [Hz]': '2', 'age [s]': '0.5'}
+    heading = Status('n', 'input heading', 1, 'frozen', values_of)
     bridge.hear(Health((state, heading)), 10.0)
     parts = bridge.parts(11.0)
     assert parts['headline']['text'] == 'NO SPEED HEARD'
     assert parts['inputs'][0]['rejected'] == {'nan': 3}
-    assert bridge.parts(20.0)['headline']['text'].startswith('NODE SILENT')
+    assert [parts['inputs'][0][name] for name in ('level', 'rate_hz', 'age_s')] == [1, 2.0, 0.5]
+
+    later = bridge.parts(20.0)
+    assert later['headline']['text'].startswith('NODE SILENT')
+    assert [later['inputs'][0][name] for name in ('level', 'rate_hz', 'age_s')] == [3, None, 10.5]
+    assert later['inputs'][0]['text'] == 'not known, the node is silent; its last word: frozen'
 
 
 def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
@@ -184,12 +189,16 @@ def test_a_verdict_is_read_from_the_status_of_the_node() -> None:
         'fouling, friction_factor [1]': '0.31',
         'standard deviation of fouling, friction_factor [1]': '0.02',
         'mean square of whitened residuals, before [1]': '9',
-        'advice 1': 'a run after the hull is cleaned',
+        'if towed_cable, drag_area [m^2]': '4.5',
+        'advice 1': 'look at the hull (--fact hull_cleaned=DATE); costs a look',
     }
     view = verdicts.of_status(Status('n', 'diagnosis', 1, 'Missing: fouling.', values))
-    assert view.sizes == (('fouling, friction factor', '0.31 ± 0.04'),)
+    assert view.sizes == (
+        ('fouling, friction factor', '0.31 ± 0.04'),
+        ('if towed cable, drag area', '4.5 m^2'),
+    )
     assert view.probabilities == (('fouling', 0.98), ('nothing is missing', 0.01))
-    assert view.decide == ('a run after the hull is cleaned',)
+    assert view.decide == ('look at the hull; costs a look',)  # no options of a command line
 
 
 @pytest.mark.parametrize(

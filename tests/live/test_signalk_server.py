@@ -99,7 +99,7 @@ def server(program: str, tmp_path: Path, played: tuple[str, int]) -> Iterator[st
 def read(url: str) -> Any:
     """What a server answers; None while it does not."""
     try:
-        answer = httpx.get(url, timeout=10.0)
+        answer = httpx.get(url, timeout=30.0)
     except httpx.TransportError:
         return None
     return answer.json() if answer.status_code == 200 else None

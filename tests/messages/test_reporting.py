@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     Dismissal,
     EndedBy,
+    EndedCoastdown,
     NoEstimate,
     NotCoastdown,
     Onset,
@@ -103,7 +103,7 @@ def test_an_update_is_speed_resistance_and_curve(reference: Any, estimate: Estim
 
 def test_rclpy_reads_what_is_published(estimate: Estimate) -> None:
     serialization = pytest.importorskip('rclpy.serialization')
-    events = [Update(STAMP_NS, estimate), Coastdown(1, 2, 3, EndedBy.TURN, estimate)]
+    events = [Update(STAMP_NS, estimate), EndedCoastdown(1, 2, 3, EndedBy.TURN, estimate)]
     for message in [message for event in events for message in outputs(event)]:
         package, _, name = message.type.split('/')
         kind = getattr(importlib.import_module(f'{package}.msg'), name)
@@ -125,7 +125,7 @@ def test_the_node_name_is_that_given(estimate: Estimate) -> None:
 
 
 def test_a_coastdown_gives_its_curve_and_an_event(estimate: Estimate) -> None:
-    event = Coastdown(1, STAMP_NS, 3, EndedBy.TURN, estimate, heading_rad=0.5)
+    event = EndedCoastdown(1, STAMP_NS, 3, EndedBy.TURN, estimate, heading_rad=0.5)
     curve, note = outputs(event)
     assert curve.topic.endswith('/resistance_curve')
     assert curve.stamp_ns == STAMP_NS
@@ -144,7 +144,7 @@ def test_a_coastdown_gives_its_curve_and_an_event(estimate: Estimate) -> None:
 
 
 def test_a_coastdown_without_estimate_says_why() -> None:
-    (note,) = outputs(Coastdown(1, 2, None, EndedBy.GIVEN, None, failure='too short'))
+    (note,) = outputs(EndedCoastdown(1, 2, None, EndedBy.GIVEN, None, failure='too short'))
     assert 'too short' in read_event(note.payload).text
 
 

@@ -20,7 +20,7 @@ from shipdrag_ros.nmea.address import parse_addresses
 from shipdrag_ros.nmea.listener import SourceCounts
 from shipdrag_ros.nmea.live import LiveNmea
 
-WITHIN_S = 30.0
+WITHIN_S = 120.0
 TEXT = '$HEHDT,90.0,T*18'
 
 

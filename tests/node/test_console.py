@@ -40,5 +40,10 @@ def test_what_keeps_it_from_estimating_comes_first() -> None:
     assert line(health).startswith('no data: nothing on any of a |')
 
 
+def test_an_input_that_is_not_well_hides_no_state() -> None:
+    state = Status('n', 'state', 1, 'steady; not well, heading: stuck', STATE)
+    assert line(Health((state,))).startswith('steady 10 of 30 min |')
+
+
 def test_without_a_terminal_there_is_no_line() -> None:
     assert terminal_line(io.StringIO()) is None

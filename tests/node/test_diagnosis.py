@@ -13,7 +13,7 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import Coastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.estimation import Window
@@ -53,9 +53,9 @@ def values_of(status: Any) -> dict[str, str]:
     return {item.key: item.value for item in status.values}
 
 
-def coastdown_of(block: Block) -> tuple[Coastdown, Window]:
+def coastdown_of(block: Block) -> tuple[EndedCoastdown, Window]:
     monitor = Monitor(SHIP, PARAMETERS)
-    (ended,) = (event for event in monitor.update(block) if isinstance(event, Coastdown))
+    (ended,) = (event for event in monitor.update(block) if isinstance(event, EndedCoastdown))
     return ended, monitor.ended_window(ended)
 
 
@@ -183,6 +183,6 @@ def test_end_of_the_node_does_not_wait_for_a_diagnosis() -> None:
     for _ in range(3):
         diagnosing.begin(ended, window)
     time.sleep(0.5)
-    start = time.monotonic()
     diagnosing.close()
-    assert time.monotonic() - start < 2.0  # a diagnosis takes longer
+    # killed, or not begun; the others are dropped
+    assert diagnosing.status.reason.startswith(('exit -9', 'the node has ended'))

@@ -26,7 +26,7 @@ from shipdrag_ros.ship import Ship
 
 SHIP = Ship.from_yaml('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n', subject='test')
 PARAMETERS = Parameters(window_s=60.0, steady_s=60.0)
-WITHIN_S = 20.0
+WITHIN_S = 120.0
 
 
 def recorder(

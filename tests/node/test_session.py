@@ -197,6 +197,20 @@ def test_what_comes_before_compiled_code_is_recorded_at_once_and_used_in_its_ord
     assert sorted(one) == sorted(other)
 
 
+def test_what_waits_is_bounded_by_its_size_too(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr('shipdrag_ros.node.session.WAITING_BYTES', 1000)
+    desk.ready = False
+    desk.feed(speeds([0]))
+    assert not desk.session.full
+    desk.feed(speeds([1, 2, 3]))
+    assert desk.session.full
+    desk.ready = True
+    desk.session.go_on()
+    assert not desk.session.full
+
+
 def test_what_still_waits_at_the_end_is_in_the_recording(desk: Desk) -> None:
     desk.ready = False
     desk.feed(speeds([0, 1, 2]))

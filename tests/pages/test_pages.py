@@ -135,35 +135,35 @@ def words(tmp_path_factory: pytest.TempPathFactory, fleet_store: Path) -> dict[s
 
 @pytest.mark.parametrize('kind', PAGES)
 def test_a_page_opens_and_no_picture_is_without_data(
-    browser: Any, words: dict[str, str], tmp_path: Path, kind: str
+    tab: Any, words: dict[str, str], tmp_path: Path, kind: str
 ) -> None:
     page = tmp_path / 'page.html'
     line = PAGES[kind].format_map(words).split()
     assert main([*line, '--report', str(page)]) == 0
-    for width, media in ((PHONE, ''), (PAPER, 'print'), (DESK, '')):
-        browser.show_as(media)
-        browser.open(page, width=width)
-        assert browser.problems == []
-        assert browser.run(NOT_LOADED) == []
-        assert browser.run(TOO_WIDE) == 0, (width, media)
-        assert browser.run(BESIDE) <= (1 if width == PHONE else 2)
-        assert browser.run(UNTOLD) == []
-    found = browser.run(EMPTY_AXES)
+    for width, media in ((PHONE, 'screen'), (PAPER, 'print'), (DESK, 'screen')):
+        tab.show_as(media)
+        tab.open(page, width=width)
+        assert tab.problems == []
+        assert tab.run(NOT_LOADED) == []
+        assert tab.run(TOO_WIDE) == 0, (width, media)
+        assert tab.run(BESIDE) <= (1 if width == PHONE else 2)
+        assert tab.run(UNTOLD) == []
+    found = tab.run(EMPTY_AXES)
     assert found['empty'] == []
     assert found['axes'] >= found['pictures'] >= ('no coastdown' not in kind)
 
 
 @pytest.mark.parametrize(('scheme', 'darkest', 'lightest'), [('light', 0.9, 1), ('dark', 0, 0.1)])
 def test_a_page_is_read_by_day_and_by_night(
-    browser: Any, tmp_path: Path, scheme: str, darkest: float, lightest: float
+    tab: Any, tmp_path: Path, scheme: str, darkest: float, lightest: float
 ) -> None:
     page = tmp_path / 'page.html'
     line = f'cable --length 50 --diameter 0.1 --speed 3 --report {page}'
     assert main(line.split()) == 0
-    browser.show_as(scheme=scheme)
-    browser.open(page, width=DESK)
-    found = browser.run(CONTRAST)
-    browser.show_as()
+    tab.show_as(scheme=scheme)
+    tab.open(page, width=DESK)
+    found = tab.run(CONTRAST)
+    tab.show_as()
     assert darkest <= found['paper'] <= lightest
     assert found['least'] >= 4.5  # WCAG AA
 
@@ -196,7 +196,7 @@ def options(top: argparse.ArgumentParser, verb: str) -> set[str]:
     ],
 )
 def test_the_check_knows_empty_axes(
-    browser: Any, tmp_path: Path, draw: Callable[[Any], object], empty: int
+    tab: Any, tmp_path: Path, draw: Callable[[Any], object], empty: int
 ) -> None:
     from matplotlib.figure import Figure
 
@@ -209,6 +209,17 @@ def test_the_check_knows_empty_axes(
     axis.set_title('a title')
     page = tmp_path / 'page.html'
     page.write_text(f'<html><body><img src="{data_uri(figure)}" alt="it"></body></html>')
-    browser.open(page, width=DESK)
-    found = browser.run(EMPTY_AXES)
+    tab.open(page, width=DESK)
+    found = tab.run(EMPTY_AXES)
     assert (found['axes'], len(found['empty'])) == (1, empty)
+
+
+def test_what_a_page_complains_about_and_asks_for_is_noticed(tab: Any, tmp_path: Path) -> None:
+    page = tmp_path / 'page.html'
+    page.write_text(
+        '<html><body><img src="http://127.0.0.1:9/no.png"><script>console.log("said");'
+        'throw new Error("thrown")</script></body></html>'
+    )
+    tab.open(page, width=DESK)
+    for part in ('asks for http://127.0.0.1:9/no.png', 'said', 'thrown'):
+        assert any(part in problem for problem in tab.problems), part

@@ -107,7 +107,7 @@ def test_the_search_ends_where_the_data_do() -> None:
     points = grid(5)
     surface = fit_surface(points, c_x(points), inputs=ANGLES)
     assert surface.degree == 4
-    assert '25 rows cannot tell it' in surface.notes[0]
+    assert '25 rows cannot determine it' in surface.notes[0]
     three = fit_surface(grid(3), c_x(grid(3)), inputs=ANGLES)
     assert three.degrees == (2, 3)
     circle = np.linspace(0.0, 6.0, 25)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.bags import BagWriter, open_runs
-from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, Event
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, Event
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import Recorded, replay
@@ -24,7 +24,7 @@ START_NS = 1_700_000_000_000_000_000
 BOAT = Ship(length_m=10.0, displaced_volume_m3=5.0, added_mass=ConstantAddedMass(value=0.1))
 
 
-def coasted(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> Coastdown:
+def coasted(path: Path, yaw_rad: np.ndarray, parameters: Parameters) -> EndedCoastdown:
     """Coast for 100 s with this heading, and after 100 s turn right round."""
     time_s = np.arange(200.0)
     stamps = START_NS + (time_s * 1e9).astype(np.int64)

@@ -18,10 +18,13 @@ from shipdrag_ros.replay.run_result import RunResult
 ReadPage = Callable[[Path], Any]
 
 
-@pytest.fixture
-def page(simulated: RunResult, tmp_path: Path, read_page: ReadPage) -> Any:
-    write_report(tmp_path / 'report.html', [simulated])
-    return read_page(tmp_path / 'report.html')
+@pytest.fixture(scope='module')
+def page(
+    simulated: RunResult, tmp_path_factory: pytest.TempPathFactory, read_page: ReadPage
+) -> Any:
+    path = tmp_path_factory.mktemp('page') / 'report.html'
+    write_report(path, [simulated])
+    return read_page(path)
 
 
 def test_the_page_needs_no_network(page: Any) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from shipdrag_ros.coastdown.events import Coastdown, Dismissal, NotCoastdown
+from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown
 from shipdrag_ros.estimation.result import Estimate, FroudeMax
 from shipdrag_ros.replay import pictures
 from shipdrag_ros.replay.hulls import RankedHull
@@ -26,7 +26,7 @@ def test_hulls_beyond_the_colours_are_still_drawn(estimate: Estimate) -> None:
     assert dot.get_xdata() == [0.1]
 
 
-def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: Coastdown) -> None:
+def test_a_cut_is_named_where_there_is_room_for_its_name(coastdown: EndedCoastdown) -> None:
     start_ns, end_ns = coastdown.start_ns, coastdown.end_ns
     length_ns = end_ns - start_ns
     cuts = tuple(

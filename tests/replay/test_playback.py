@@ -13,8 +13,8 @@ import pytest
 
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.coastdown.events import (
-    Coastdown,
     EndedBy,
+    EndedCoastdown,
     Event,
     NoEstimate,
     Onset,
@@ -56,7 +56,7 @@ def test_replay_gives_the_live_figures_bit_for_bit(
         curve.resistance_m_s2[5:-5], curve.speed_m_s[5:-5] ** 2 / 3000.0, rtol=0.2
     )
     known = [event for event in result.events if not isinstance(event, NoEstimate)]
-    assert [type(event) for event in known] == [Onset, Coastdown]
+    assert [type(event) for event in known] == [Onset, EndedCoastdown]
     assert result.inputs['shaft'].messages == result.inputs['shaft'].used == 1100
     assert list(result.inputs) == ['speed_through_water', 'position', 'heading', 'shaft']
 

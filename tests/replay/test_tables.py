@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shipdrag_ros.coastdown.events import Coastdown, Dismissal, EndedBy, NotCoastdown
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, NotCoastdown
 from shipdrag_ros.replay import tables as cells
 from shipdrag_ros.replay.hulls import rank
 from shipdrag_ros.replay.run_result import RunResult
 
 
-def test_facts_leave_out_what_is_not_known(coastdown: Coastdown) -> None:
+def test_facts_leave_out_what_is_not_known(coastdown: EndedCoastdown) -> None:
     facts = dict(cells.facts(coastdown).rows)
     assert facts['argmax dr/dFr, as S1 has it'] == 'Fr 0.200'
     names = list(facts)
@@ -20,7 +20,7 @@ def test_facts_leave_out_what_is_not_known(coastdown: Coastdown) -> None:
     assert [row[0] for row in cells.facts(given).rows] == ['start', 'duration', 'ended because']
 
 
-def test_facts_show_a_current_and_an_average(coastdown: Coastdown) -> None:
+def test_facts_show_a_current_and_an_average(coastdown: EndedCoastdown) -> None:
     assert coastdown.estimate is not None
     other = replace(coastdown.estimate, order=None, current_m_s=0.25, current_sigma_m_s=0.02)
     facts = dict(cells.facts(replace(coastdown, estimate=other)).rows)
@@ -46,7 +46,7 @@ def test_a_ranking_starts_with_the_best(run: RunResult) -> None:
 def test_a_coastdown_is_confirmed_after_it_seemed_to_begin_though_that_was_cut() -> None:
     second = 1_000_000_000
     cut = NotCoastdown(0, 77 * second, Dismissal.THRUST, 'the shaft drives')
-    coastdown = Coastdown(
+    coastdown = EndedCoastdown(
         77 * second, 900 * second, 12 * second, EndedBy.SPEED, None, 'no figure', cuts=(cut,)
     )
     assert ('confirmed after', '12 s') in cells.facts(coastdown).rows

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from urllib.parse import urljoin
@@ -52,6 +53,15 @@ def test_it_says_what_the_store_knows_of_a_run(row: Any, tmp_path: Path, read_pa
     assert 'fouling 90.0%' in said
     assert 'x 0.110 ± 0.040' in said
     assert "shipdrag diagnose '<i>' --report" in said
+
+
+def test_it_speaks_of_three_quarters_of_the_speed_at_the_stop(
+    row: Any, tmp_path: Path, read_page: Any
+) -> None:
+    said = text_of(row, tmp_path, read_page)
+    knots = float(said.partition('At ')[2].partition(' knots')[0])
+    step = max(b - a for a, b in pairwise(row['speed_m_s']))
+    assert knots * 1852.0 / 3600.0 == pytest.approx(0.75 * row['speed_at_stop_m_s'], abs=step)
 
 
 def test_without_an_estimate_it_says_why(row: Any, tmp_path: Path, read_page: Any) -> None:

@@ -73,6 +73,20 @@ def test_a_run_years_from_all_others_has_a_wrong_clock():
     # a second season is no wrong clock
     later = [row(900.0 + 15.0 * number) for number in range(3)]
     assert all(point.used for point in series_of('Test', rows + later).points)
+    # nor is a coastdown every other year
+    rare = [row(700.0 * number) for number in range(6)]
+    assert all(point.used for point in series_of('Test', rare).points)
+
+
+def test_two_runs_of_one_wrong_clock_are_no_step():
+    rows = [row(15.0 * number) for number in range(20)]
+    first, second, *others = series_of('Test', [row(-4000.0), row(-3990.0), *rows]).points
+    assert 'is 10.9 years from all but 2 runs: a wrong clock' in second.reason
+    assert first.reason
+    assert all(point.used for point in others)
+    # two runs in another season are none
+    late = [row(900.0), row(910.0)]
+    assert all(point.used for point in series_of('Test', rows + late).points)
 
 
 def test_without_a_baseline_the_first_months_are_the_clean_hull():

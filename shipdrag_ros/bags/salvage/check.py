@@ -9,7 +9,7 @@ held against it.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from shipdrag_ros.bags.salvage.statements import ChunkFacts, DataContents, hold_
 from shipdrag_ros.bags.salvage.unpack import Unpacked, opened, unpack_chunk_partly
 from shipdrag_ros.bags.salvage.whole_chunk import WholeChunk, read_whole
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import Int64
 
 _INDEX_HEAD = struct.Struct('<HI')  # channel, bytes of the entries
@@ -72,7 +73,7 @@ class FileCheck:
 
 
 def check(
-    paths: Iterable[Path], *, progress: Callable[[int, int], None] = lambda done, total: None
+    paths: Iterable[Path], *, progress: PartDone = lambda done, total: None
 ) -> list[FileCheck]:
     """
     Check the files of bags.
@@ -82,7 +83,7 @@ def check(
     paths
         MCAP files and rosbag2 directories.
     progress
-        Told bytes done, and in all, of each file.
+        Called with bytes done, and in all, of each file.
 
     Raises
     ------
@@ -99,7 +100,7 @@ def check(
     return found
 
 
-def _check_file(path: Path, progress: Callable[[int, int], None]) -> FileCheck:
+def _check_file(path: Path, progress: PartDone) -> FileCheck:
     damages = DamageList()
     with opened(path, damages) as data:
         if not data:
@@ -135,7 +136,7 @@ class _FilePass:
         self._indexed: set[int] = set()
         self._told: set[str] = set()
 
-    def run(self, progress: Callable[[int, int], None]) -> None:
+    def run(self, progress: PartDone) -> None:
         """Gather what is there."""
         data = self._data
         damages = self._damages
@@ -212,7 +213,7 @@ class _FilePass:
             self._reference(offset, 'channel', f'schema {record.schema_id}')
 
     def _reference(self, offset: int, record: str, target: str) -> None:
-        """Tell once what is not there; a thousand messages may refer to it."""
+        """Say once what is not there; a thousand messages may refer to it."""
         if target not in self._told:
             self._told.add(target)
             self._damages.add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')

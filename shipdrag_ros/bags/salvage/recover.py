@@ -9,7 +9,6 @@ doubtful is taken for data.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,6 +33,7 @@ from shipdrag_ros.bags.salvage.scan import GARBAGE, MAGIC_PLACE, ScannedRecord, 
 from shipdrag_ros.bags.salvage.unpack import opened, unpack_chunk_partly
 from shipdrag_ros.bags.salvage.whole_chunk import read_whole
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.progress import PartDone
 
 # with one of these, or none, the record itself is whole
 _WHOLE = (None, DamageKind.OPCODE, DamageKind.LENGTH)
@@ -74,7 +74,7 @@ class Recovery:
 
 
 def recover(
-    source: Path, output: Path, *, progress: Callable[[int, int], None] = lambda done, total: None
+    source: Path, output: Path, *, progress: PartDone = lambda done, total: None
 ) -> Recovery:
     """
     Save every whole message of a bag.
@@ -87,7 +87,7 @@ def recover(
         File to make; one that exists is never overwritten. What is doubtful
         goes beside it, into `NAME.quarantine.mcap`.
     progress
-        Told bytes done, and in all, of each file.
+        Called with bytes done, and in all, of each file.
 
     Raises
     ------
@@ -149,7 +149,7 @@ class _Salvage:
         sound: SalvagedBag,
         doubtful: SalvagedBag,
         bag: BagFiles,
-        progress: Callable[[int, int], None],
+        progress: PartDone,
     ) -> None:
         self.sound = sound
         self.doubtful = doubtful

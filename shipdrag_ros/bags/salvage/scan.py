@@ -53,7 +53,7 @@ class ScannedRecord(NamedTuple):
     A record, or what is left of one.
 
     Without `damage` it is as it should be, by its lengths. With it, the content
-    is what can be told: of kind OPCODE or LENGTH it is whole, and what
+    is what can be said: of kind OPCODE or LENGTH it is whole, and what
     it is was inferred from its neighbours.
     """
 
@@ -126,7 +126,7 @@ class Scanner:
 
     def noted(self, data: Buffer, found: ScannedRecord) -> ScannedRecord:
         """
-        Remember what tells a later record from chance; returns the record.
+        Remember what separates a later record from chance; returns the record.
         """
         if found.damage is None:
             if found.opcode == Opcode.MESSAGE:
@@ -157,7 +157,7 @@ class Scanner:
         self, data: Buffer, at: int, end: int, kinds: frozenset[int], held: ScannedRecord | None
     ) -> tuple[ScannedRecord | None, ScannedRecord]:
         """
-        Tell what is at an offset where no record fits.
+        Say what is at an offset where no record fits.
 
         Returns the record before, None where that one is the damaged one, and what the
         damaged bytes are.
@@ -221,7 +221,7 @@ class Scanner:
     def _by_own_fields(
         self, data: Buffer, at: int, end: int, kinds: frozenset[int]
     ) -> ScannedRecord | None:
-        """Return the record whose length is wrong, and whose fields tell where it ends."""
+        """Return the record whose length is wrong, and whose fields show where it ends."""
         opcode = data[at]
         if opcode not in kinds & _NAMED or (
             opcode == Opcode.CHUNK and not self._is_chunk(data, at, end)
@@ -236,7 +236,7 @@ class Scanner:
     def _span(
         self, data: Buffer, at: int, after: int, end: int, kinds: frozenset[int]
     ) -> ScannedRecord:
-        """Tell what the bytes up to the next record are."""
+        """Say what the bytes up to the next record are."""
         start = at + HEAD.size
         if start > after:
             return ScannedRecord(GARBAGE, at, at, after, _end_or(DamageKind.GARBAGE, after == end))

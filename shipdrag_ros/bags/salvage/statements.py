@@ -75,7 +75,7 @@ class DataContents:
     chunks, attachments, metadata
         By offset: what a chunk is, and the lengths of the records.
     ended
-        Where the data section ends [bytes], 0 where nothing tells.
+        Where the data section ends [bytes], 0 where nothing says it.
     summary
         Records that state something, as found.
     """
@@ -163,7 +163,7 @@ class _Statements:
         self._groups: dict[int, list[ScannedRecord]] = {}
 
     def run(self) -> None:
-        """Hold each record against the facts, then tell what no record states."""
+        """Hold each record against the facts, then say what no record states."""
         for found, record in self._records:
             if found.opcode != Opcode.HEADER:
                 self._groups.setdefault(found.opcode, []).append(found)
@@ -226,7 +226,7 @@ class _Statements:
 
     def _statistics(self, found: ScannedRecord, stated: Statistics) -> None:
         facts = self._facts
-        # a topic without messages may be told in the summary alone
+        # a topic without messages may be stated in the summary alone
         schemas = set(facts.schemas) | self._seen.get(Opcode.SCHEMA, set())
         channels = set(facts.channels) | self._seen.get(Opcode.CHANNEL, set())
         pairs = {

@@ -34,7 +34,8 @@ from shipdrag_ros.estimation.log_time.robust import robust_fit
 from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.gaussian import average, condense, deviations, root
+from shipdrag_ros.inference.averaging import average
+from shipdrag_ros.inference.gaussian import condense, deviations, root
 from shipdrag_ros.inference.robust import GROSS
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Input
 from shipdrag_ros.parameters import Parameters
@@ -238,19 +239,19 @@ def _loose(polynomials: int, distance: float, deceleration: float) -> tuple[Floa
 
 
 def _told(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
-    """Say whether the data tell current and factor of the log, and why not."""
+    """Say whether the data show current and factor of the log, and why not."""
     if not inputs.tells_water_from_ground:
         return (False, False), []
     current, scale = sd[0] < _IDENTIFIED * CURRENT_SD_M_S, sd[1] < _IDENTIFIED * SCALE_SD
     notes = []
     if not current:
         notes.append(
-            f'a current was left out: this window tells it to +-{sd[0]:.2g} m/s only, which is no '
+            f'a current was left out: this window gives it to +-{sd[0]:.2g} m/s only, which is no '
             'better than not knowing'
         )
     if not scale:
         notes.append(
-            f'a factor of the log was left out: this window tells it to +-{100.0 * sd[1]:.2g} % '
+            f'a factor of the log was left out: this window gives it to +-{100.0 * sd[1]:.2g} % '
             'only'
         )
     return (bool(current), bool(scale)), notes

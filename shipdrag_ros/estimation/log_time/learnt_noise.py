@@ -2,7 +2,7 @@
 """
 Slow disturbances of a coastdown, as the steady record before it shows them.
 
-The coastdown itself cannot tell them from its own motion.
+The coastdown itself cannot separate them from its own motion.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.estimation.log_time.inputs import Inputs
-from shipdrag_ros.estimation.ode_fit.record import LEAST_STAMPS, Record
+from shipdrag_ros.estimation.ode_fit.record import LEAST_STAMPS, RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S, condense, white_sd
 from shipdrag_ros.estimation.window import Series, Window
@@ -71,7 +71,7 @@ class LearntNoise:
         speed = before.speed_through_water
         if len(speed) >= LEAST_STAMPS and not _wanders(speed):
             return None
-        record = Record.of(window, RunDown.of(window, ship), parameters)
+        record = RunRows.of(window, RunDown.of(window, ship), parameters)
         if record.steady_s < LEAST_S:
             return None
         # an onset found from the speed alone may be late

@@ -17,7 +17,7 @@ HUBER = 2.0  # standard deviations: 99 % efficient in Gaussian noise
 _SPIKE = 6.0
 _OF_HUBER = huber_square(HUBER)
 _PASSES = 2
-_LAGS = 5  # of the samples; noise that is slower cannot be told from the motion
+_LAGS = 5  # of the samples; noise that is slower cannot be separated from the motion
 
 
 @compiled('f8(f8[::1])')

@@ -18,7 +18,7 @@ from shipdrag_ros.estimation.ode_fit.coast import predict
 from shipdrag_ros.estimation.ode_fit.families import Priors
 from shipdrag_ros.estimation.ode_fit.law import Law
 from shipdrag_ros.estimation.ode_fit.solve import whitened_equations
-from shipdrag_ros.inference.gaussian import average as mix
+from shipdrag_ros.inference.averaging import average as mix
 from shipdrag_ros.inference.noise import Noise
 from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.inference.settings import Settings, noise_of

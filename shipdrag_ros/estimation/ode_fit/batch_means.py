@@ -9,7 +9,7 @@ import numpy as np
 
 from shipdrag_ros.samples import Float64
 
-_LEAST_BLOCKS = 16  # of a size: fewer do not tell their scatter
+_LEAST_BLOCKS = 16  # of a size: fewer do not show their scatter
 _BY_CHANCE = 3.5  # standard deviations of that scatter: less is chance
 
 

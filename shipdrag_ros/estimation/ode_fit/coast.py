@@ -133,7 +133,7 @@ def integrate(law: Law, unknowns: Float64, grid_s: Float64) -> tuple[Float64, Fl
 @compiled
 def _behind(t: float, lag: float) -> tuple[float, float, float]:
     """
-    Return the time whose speed a log tells, and how it follows the time and falls by the lag.
+    Return the time whose speed a log shows, and how it follows the time and falls by the lag.
 
     A filter of the time constant `lag`, at an even deceleration since 0; an earlier log is ahead.
     """

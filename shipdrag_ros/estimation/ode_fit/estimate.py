@@ -24,9 +24,9 @@ from shipdrag_ros.estimation.ode_fit.first_fits import (
     with_log_scale,
 )
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
-from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.problem import Problem
-from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
@@ -64,8 +64,8 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         If the window does not hold a coastdown that can be estimated.
     """
     run_down = RunDown.of(window, ship)
-    record = Record.of(window, run_down, parameters)
-    guess = Guess.of(record.coast, float(ship.n_r(1.0)))
+    record = RunRows.of(window, run_down, parameters)
+    guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
     notes = [*window.notes, *ship.warnings, *run_down.notes]
     # first the coastdown alone, as if nothing but sensor noise disturbed
     alone = record.without_steady()
@@ -101,7 +101,9 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     return _result(found, full, record, window, ship, parameters, tuple(notes))
 
 
-def _at_first(record: Record, problem: Problem, run_down: RunDown, guess: Guess) -> NoisePosterior:
+def _at_first(
+    record: RunRows, problem: Problem, run_down: RunDown, guess: InitialGuess
+) -> NoisePosterior:
     """Learn the noise of the steady record alone; that of the prior where there is none."""
     steady = record.steady
     quiet = -ONSET_SD_S if run_down.stop_sd_s > _QUIET_S else -_QUIET_S
@@ -125,7 +127,7 @@ def _at_first(record: Record, problem: Problem, run_down: RunDown, guess: Guess)
     )
 
 
-def _noise_notes(noise: NoisePosterior, record: Record) -> list[str]:
+def _noise_notes(noise: NoisePosterior, record: RunRows) -> list[str]:
     if not noise.learnt:
         length_s = record.steady_s + float(np.ptp(record.coast.time_s))
         why = (
@@ -172,7 +174,7 @@ def _correlation_notes(correlated: dict[int, BatchMeans]) -> list[str]:
 def _result(
     found: FittedMotion,
     problem: Problem,
-    record: Record,
+    record: RunRows,
     window: Window,
     ship: Ship,
     parameters: Parameters,
@@ -221,7 +223,7 @@ def _result(
     )
 
 
-def _tracks(record: Record, residual: Float64) -> dict[str, Track]:
+def _tracks(record: RunRows, residual: Float64) -> dict[str, Track]:
     """Return each input of the coastdown, measured and fitted; residual (n,)."""
     coast, found = record.coast, {}
     for name, stamps in record.stamps.items():
@@ -231,7 +233,7 @@ def _tracks(record: Record, residual: Float64) -> dict[str, Track]:
     return found
 
 
-def _noise_sd(record: Record, problem: Problem) -> dict[str, float]:
+def _noise_sd(record: RunRows, problem: Problem) -> dict[str, float]:
     """Return the white noise of a sample of each input."""
     found = {}
     for name in record.white_sd:

@@ -5,7 +5,7 @@ What is known of r(v) before any measurement: powers of the speed, and humps of 
 Friction is nearly quadratic; wave making rises by the fourth to the eighth
 power, with humps and hollows where the waves of bow and stern meet, and is small
 at low Froude numbers. Humps are B-splines. How large the parts may be is averaged
-over, so that what counts grows with what the samples tell.
+over, so that what counts grows with what the samples show.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from shipdrag_ros.samples import Float64
 
 FIRST = (1, 2, 3, 4)  # powers fitted first, to find the outliers
-PLAIN = (2, 3)  # hardly ever negative, and right enough to tell how a force is damped
+PLAIN = (2, 3)  # hardly ever negative, and right enough to show how a force is damped
 POWERS = (1, 2, 3, 4, 6, 8)  # of the law
 # Standard deviations of parts of r, over r at the start. Of the quadratic one nothing is known.
 LINEAR_SDS = (0.1, 1.0)  # one or the other

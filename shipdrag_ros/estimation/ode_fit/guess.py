@@ -16,7 +16,7 @@ _BLOCKS = 12  # whose medians outliers do not reach
 
 
 @dataclass(frozen=True)
-class Guess:
+class InitialGuess:
     """
     Purely quadratic drag.
 
@@ -38,7 +38,7 @@ class Guess:
     lowest: float
 
     @classmethod
-    def of(cls, coast: Rows, n_r: float) -> Guess:
+    def of(cls, coast: Rows, n_r: float) -> InitialGuess:
         """
         Fit a line through 1/v.
 

@@ -26,9 +26,9 @@ from shipdrag_ros.estimation.ode_fit.coast import (
 from shipdrag_ros.estimation.ode_fit.condensing import means
 from shipdrag_ros.estimation.ode_fit.families import FIRST, PLAIN, POWERS, Humps
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
-from shipdrag_ros.estimation.ode_fit.guess import Guess
+from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.law import Law
-from shipdrag_ros.estimation.ode_fit.record import Record
+from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.solve import fit
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
@@ -82,13 +82,13 @@ class Problem:
     white: Noise
     settings: Settings
     run_down: RunDown
-    guess: Guess
+    guess: InitialGuess
     first: Law
     humps: Humps
     extras: tuple[int, ...]
 
     @classmethod
-    def of(cls, record: Record, run_down: RunDown, ship: Ship, guess: Guess) -> Problem:
+    def of(cls, record: RunRows, run_down: RunDown, ship: Ship, guess: InitialGuess) -> Problem:
         """
         Set up the fit of a record that nothing but sensor noise disturbs.
         """
@@ -251,7 +251,7 @@ class Problem:
         Fit the first family, None where that fails; return whitened residuals too.
 
         How the thrust ended is held as it is most likely: without the priors of the whole law
-        it cannot be told from the highest powers.
+        it cannot be separated from the highest powers.
         """
         converged, _, unknowns, covariance, white = fit(
             self.first,

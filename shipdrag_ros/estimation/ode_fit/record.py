@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,12 +24,13 @@ from shipdrag_ros.inference.rows import CODES, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64, Int64
 
-LEAST_STAMPS = 12  # of an input: fewer do not tell its noise
+LEAST_STAMPS = 12  # of an input: fewer do not show its noise
 _FINE_S = 60.0  # of the steady record, its end, in which the stop may be
+_WeightedRows = tuple[Float64, int, Float64, Float64]
 
 
 @dataclass(frozen=True)
-class Record:
+class RunRows:
     """
     Rows of the coastdown and of the steady record before it.
 
@@ -55,7 +57,7 @@ class Record:
     display_sd: dict[str, float]
 
     @classmethod
-    def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> Record:
+    def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> RunRows:
         """
         Take what a window offers.
 
@@ -81,51 +83,17 @@ class Record:
             'position': parameters.position_sigma_m,
         }
         since = -np.inf if window.before is None else _steady_since(window, inputs, zero_ns)
-        steady: list[tuple[Float64, int, Float64, Float64]] = []
-        coast: list[tuple[Float64, int, Float64, Float64]] = []
-        white: dict[str, float] = {}
-        display: dict[str, float] = {}
-        for name, series in inputs.items():
-            time_s = _seconds(series.time_ns, zero_ns)
-            before_s: Float64 = np.empty(0)
-            before, variance = series.value[:0], series.variance[:0]
-            if window.before is not None:
-                earlier: Series = getattr(window.before, name)
-                before_s = _seconds(earlier.time_ns, zero_ns)
-                keep = before_s >= since
-                before_s, before = before_s[keep], earlier.value[keep]
-                variance = earlier.variance[keep]
-            value = series.value
-            if name == 'position':
-                both = _distance(
-                    np.concatenate([before_s, time_s]), np.concatenate([before, value])
-                )
-                before, value = both[: len(before_s)], both[len(before_s) :]
-            weight = stated_weight(
-                np.concatenate([before_s, time_s]),
-                np.concatenate([before, value]),
-                np.concatenate([variance, series.variance]),
-            )
-            white[name] = known[name] or max(
-                weighted_white_sd(np.concatenate([before, value]), weight),
-                1e-6 * float(np.ptp(value)),
-                1e-9,
-            )
-            display[name] = display_sd(series.value, white[name])
-            coast.append((time_s, CODES[name], value, weight[len(before_s) :]))
-            if len(before_s):
-                means = condense(before_s, before, weight[: len(before_s)], _FINE_S)
-                steady.append((means[0], CODES[name], *means[1:]))
-        steady_rows, steady_weight = _merge(steady)
-        coast_rows, coast_weight = _merge(coast)
+        each_input = {
+            name: _condensed(name, window, zero_ns, since, known[name]) for name in inputs
+        }
+        steady = _merge([each.steady for each in each_input.values() if each.steady is not None])
+        coast = _merge([each.coast for each in each_input.values()])
         return cls(
-            steady_rows,
-            steady_weight,
-            coast_rows,
-            coast_weight,
-            white,
+            *steady,
+            *coast,
+            {name: each.white_sd for name, each in each_input.items()},
             {name: series.time_ns for name, series in inputs.items()},
-            display,
+            {name: each.display_sd for name, each in each_input.items()},
         )
 
     @property
@@ -133,7 +101,7 @@ class Record:
         """Length of the steady record [s]."""
         return float(np.ptp(self.steady.time_s)) if len(self.steady.time_s) else 0.0
 
-    def without_steady(self) -> Record:
+    def without_steady(self) -> RunRows:
         """
         Return the coastdown alone.
         """
@@ -161,6 +129,43 @@ class Record:
         return result + of_kind[self.steady.kind]
 
 
+class _InputRows(NamedTuple):
+    """Times, kind, values and weights of one input, and the white noise of its samples."""
+
+    coast: _WeightedRows
+    steady: _WeightedRows | None
+    white_sd: float
+    display_sd: float
+
+
+def _condensed(
+    name: str, window: Window, zero_ns: int, since_s: float, known_sd: float
+) -> _InputRows:
+    """Take one input as it is from the stop on, and as means from `since_s` up to it."""
+    series: Series = getattr(window, name)
+    time_s, value = _seconds(series.time_ns, zero_ns), series.value
+    before_s: Float64 = np.empty(0)
+    before, variance = value[:0], series.variance[:0]
+    if window.before is not None:
+        earlier: Series = getattr(window.before, name)
+        before_s = _seconds(earlier.time_ns, zero_ns)
+        keep = before_s >= since_s
+        before_s, before, variance = before_s[keep], earlier.value[keep], earlier.variance[keep]
+    both_s = np.concatenate([before_s, time_s])
+    both = np.concatenate([before, value])
+    if name == 'position':
+        both = _distance(both_s, both)
+    before, value = both[: len(before_s)], both[len(before_s) :]
+    weight = stated_weight(both_s, both, np.concatenate([variance, series.variance]))
+    white_sd = known_sd or max(weighted_white_sd(both, weight), 1e-6 * float(np.ptp(value)), 1e-9)
+    steady: _WeightedRows | None = None
+    if len(before_s):
+        means = condense(before_s, before, weight[: len(before_s)], _FINE_S)
+        steady = (means[0], CODES[name], *means[1:])
+    coast = (time_s, CODES[name], value, weight[len(before_s) :])
+    return _InputRows(coast, steady, white_sd, display_sd(series.value, white_sd))
+
+
 def _check_finite(inputs: dict[str, Series]) -> None:
     for name, series in inputs.items():
         bad = int((~np.isfinite(series.value)).sum())
@@ -174,7 +179,7 @@ def _seconds(time_ns: Int64, zero_ns: int) -> Float64:
     return np.asarray((time_ns - zero_ns) * 1e-9, np.float64)
 
 
-def _merge(parts: list[tuple[Float64, int, Float64, Float64]]) -> tuple[Rows, Float64]:
+def _merge(parts: list[_WeightedRows]) -> tuple[Rows, Float64]:
     """Sort rows of several inputs by time; ties keep the order of the inputs."""
     if not parts:
         return Rows(np.empty(0), np.empty(0, np.int64), np.empty(0)), np.empty(0)
@@ -196,7 +201,7 @@ def _steady_since(window: Window, inputs: dict[str, Series], zero_ns: int) -> fl
             series: Series = getattr(window.before, name)
             time_s = _seconds(series.time_ns, zero_ns)
             return float(steady_since(time_s, series.value, heading_s, heading.value))
-    # positions alone do not tell from sample to sample: by their means
+    # positions alone do not show it from sample to sample: by their means
     series = window.before.position
     if len(series) < LEAST_STAMPS:
         return np.inf

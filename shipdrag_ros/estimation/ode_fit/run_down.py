@@ -24,7 +24,7 @@ _THRUST = (0.25, 0.7)
 _THRUST_FAST = (0.5, 1.2)
 _UNSEEN = 0.6  # of these sds where the stop is not seen: its time takes up the impulse
 _SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
-_KEPT = 0.05  # of the steady shaft speed: less is not told
+_KEPT = 0.05  # of the steady shaft speed: less is not measured
 _AT_START = 1.0  # run-downs after the start of a window: a stop by then is at the start
 _FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven
 

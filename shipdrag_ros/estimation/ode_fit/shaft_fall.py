@@ -17,7 +17,7 @@ _EARLIEST_S = 300.0  # before the onset as found
 _SOON = (8.0, 16.0)  # after the fall, in half-lives
 _ROUNDS = 3
 _LEAST_SD = 0.01  # of the run-down, relative: no shaft falls exactly so
-_FEW = 3  # samples that tell a level
+_FEW = 3  # samples that show a level
 _BLOCKS = 40  # of a window, whose median speeds are taken
 _SLOWEST = 0.05  # of her first speed: below it the readings are noise
 _LONGEST = 0.15  # of the window: what falls more slowly falls with the ship
@@ -232,7 +232,7 @@ def say(
     if high < STANDS_RAD_S:
         past = np.empty(0) if earlier is None else np.abs(earlier.value)
         if len(past) >= _FEW and np.median(past) < STANDS_RAD_S:
-            return f'{name} stood before the stop too: it tells nothing, or its sensor is dead'
+            return f'{name} stood before the stop too: it shows nothing, or its sensor is dead'
         return f'{name} stands whenever it is heard in the window: no thrust is left then'
     turns = f'{name} turns at {low:.3g} to {high:.3g} rad/s'
     if IDLING in window.notes:

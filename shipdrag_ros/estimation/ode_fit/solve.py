@@ -14,7 +14,7 @@ from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.samples import Float64, Int64
 
 _RISES = 8  # of the damping, in one iteration
-_CONVERGED = 1e-3  # fall of chi^2: far below what tells laws apart
+_CONVERGED = 1e-3  # fall of chi^2: far below what separates laws
 _LAST_FALL = 0.03  # of chi^2, by a step so small that what it leads to need not be computed
 
 

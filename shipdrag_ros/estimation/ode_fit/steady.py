@@ -121,7 +121,7 @@ def steady_since(time_s: Float64, speed: Float64, heading_s: Float64, heading: F
     """
     if len(time_s) == 0:
         return np.inf
-    # the stop may be earlier than it was taken for: the last block tells nothing of the speed
+    # the stop may be earlier than it was taken for: the last block shows nothing of the speed
     late = settled = float(time_s[-1]) - _BLOCK_S
     last = np.searchsorted(time_s, late - 2.0 * _BLOCK_S, side='right')
     level = np.median(speed[last : np.searchsorted(time_s, late, side='right')])
@@ -167,11 +167,11 @@ def condense(
     time_s, value, weight : (b,)
         The weight is the sum of those of the samples.
     """
-    # outliers are told from what is near in time: the record may drift
+    # outliers are found by what is near in time: the record may drift
     edges = _parts(time_s, 2.0 * _BLOCK_S)
     near = np.interp(time_s, block_medians(time_s, edges), block_medians(value, edges))
     away = np.abs(value - near)
-    # of a coarse display most readings are the median itself: that does not tell the scatter
+    # of a coarse display most readings are the median itself: that does not show the scatter
     scatter = max(MAD_TO_SD * np.median(away), weighted_white_sd(value, np.ones(len(value))))
     keep = away <= _OUTLIER * scatter
     time_s, value, weight = time_s[keep], value[keep], weight[keep]

@@ -42,7 +42,7 @@ class _Requirement:
     order: int  # coefficients without which there is no deceleration
 
 
-# joint: fewer stamps of an input do not tell its noise, hence not its weight
+# joint: fewer stamps of an input do not show its noise, hence not its weight
 PROBLEMS = {
     's1_speed': _Requirement(speed=True, position=False, stamps=4, order=2),
     's1_position': _Requirement(speed=False, position=True, stamps=4, order=3),

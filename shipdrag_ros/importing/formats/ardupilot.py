@@ -10,8 +10,7 @@ from io import StringIO
 from math import isfinite, pi, radians, remainder
 from typing import Any
 
-from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.format import CERTAIN, NO, Format, Head, Job
+from shipdrag_ros.importing.format import CERTAIN, NO, Format, Head, Job, missing_library
 from shipdrag_ros.importing.stream import Origin, Reading, StreamResult, Tally, import_stream
 from shipdrag_ros.samples import SHAFTS, Channel
 
@@ -31,10 +30,7 @@ def _write(job: Job) -> StreamResult:
     try:
         from pymavlink.DFReader import DFReader_binary
     except ModuleNotFoundError:
-        raise ImportDataError(
-            f'{str(job.source)!r} is a log of ArduPilot, which needs pymavlink: pip install '
-            "'shipdrag_ros[flight]'"
-        ) from None
+        raise missing_library(job, 'a log of ArduPilot', 'pymavlink') from None
 
     def read(tally: Tally) -> Iterator[Reading]:
         found: list[Reading] = []
@@ -70,7 +66,7 @@ def _readings(log: Any, tally: Tally) -> Iterator[Reading]:
         stamp_ns = round(float(message._timestamp) * 1e6) * 1000
         if stamp_ns < _DATE_S * 1e9:
             stamp_ns += _BASE_NS
-            tally.note('The log has no fix that tells the date; its times count from 2000-01-01.')
+            tally.note('The log has no fix that gives the date; its times count from 2000-01-01.')
         told = message.to_dict()
         for channel, rank, name, a, b in _values(told):
             if isfinite(a) and isfinite(b):

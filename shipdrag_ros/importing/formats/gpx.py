@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Tracks of GPX: positions, and speeds where they are told.
+Tracks of GPX: positions, and speeds where they are stated.
 
 The parser is expat's, which fetches nothing; a declaration of an entity ends
 the reading, so that none can be expanded.

@@ -264,4 +264,5 @@ FORMAT = Format(
     'as CDR; a folder of rosbag2 is given as a whole. Other bags (MCAP) need no import.',
     score=_score,
     write=_write,
+    by_head=False,
 )

@@ -51,7 +51,7 @@ def _write(job: Job) -> StreamResult:
 
 
 def _own_vessel(job: Job) -> str:
-    """Return the context of the ship of the log: `vessels.self`, or the one told most often."""
+    """Return the context of the ship of the log: `vessels.self`, or the one named most often."""
     counts = Counter(found[1] for line in Lines(job.source) for found in _CONTEXT.finditer(line))
     if _SELF in counts or not counts:
         return _SELF
@@ -103,7 +103,7 @@ class _Deltas:
                 yield from self._update(update)
 
     def _is_own(self, context: Any) -> bool:
-        """Say whether a delta is of the ship of the log, and not of another that AIS tells."""
+        """Say whether a delta is of the ship of the log, and not of another that AIS shows."""
         if context in (None, '', _SELF, self._own):
             return True
         if not isinstance(context, str) or context != self._own:

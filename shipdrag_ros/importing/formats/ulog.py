@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing.format import CERTAIN, NO, Format, Head, Job
+from shipdrag_ros.importing.format import CERTAIN, NO, Format, Head, Job, missing_library
 from shipdrag_ros.importing.stream import Origin, Reading, StreamResult, Tally, import_stream
 from shipdrag_ros.samples import SHAFTS, Channel, Float64
 
@@ -38,10 +38,7 @@ def _write(job: Job) -> StreamResult:
     try:
         from pyulog import ULog
     except ModuleNotFoundError:
-        raise ImportDataError(
-            f'{str(job.source)!r} is an ULog, which needs pyulog: pip install '
-            "'shipdrag_ros[flight]'"
-        ) from None
+        raise missing_library(job, 'an ULog', 'pyulog') from None
     if job.source.stat().st_size > _LIMIT_BYTES:
         raise ImportDataError(
             f'{str(job.source)!r} has more than {_LIMIT_BYTES >> 30} GiB; cut it into parts'
@@ -71,7 +68,7 @@ def _read(log: Any, tally: Tally) -> Iterator[Reading]:
     """Yield the readings of all topics by time."""
     epoch_us = _epoch_us(log)
     if epoch_us is None:
-        tally.note('The log has no fix that tells the date; its times count from 2000-01-01.')
+        tally.note('The log has no fix that gives the date; its times count from 2000-01-01.')
     found: list[Reading] = []
     for data in log.data_list:
         name = data.name if data.multi_id == 0 else f'{data.name} {data.multi_id}'
@@ -93,7 +90,7 @@ def _read(log: Any, tally: Tally) -> Iterator[Reading]:
 
 
 def _epoch_us(log: Any) -> int | None:
-    """Return the date of time 0 [us], of the first fix that tells one."""
+    """Return the date of time 0 [us], of the first fix that gives one."""
     for data in log.data_list:
         utc = data.data.get('time_utc_usec')
         if data.name in _GPS and utc is not None:

@@ -5,7 +5,15 @@
 
 const POINTS = 120;
 
-const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const inks = { mode: null, known: new Map() };
+
+/** A colour of the display that is on; asked of the browser once, since each asking costs it a look at all styles. */
+function ink(name) {
+  const { mode } = document.documentElement.dataset;
+  if (inks.mode !== mode) { inks.mode = mode; inks.known.clear(); }
+  if (!inks.known.has(name)) inks.known.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return inks.known.get(name);
+}
 
 /** Values of a curve at the places x; null outside of it. */
 export function at(x, xs, ys) {
@@ -45,11 +53,16 @@ export class Chart {
     box.after(this.legend);
     this.plot = null;
     this.key = '';
-    new ResizeObserver(() => this.plot?.setSize(this.size())).observe(box);
+    this.size = null;
+    new ResizeObserver(([{ contentRect }]) => { if (this.fit(contentRect)) this.plot?.setSize(this.size); }).observe(box);
   }
 
-  size() {
-    return { width: Math.max(this.box.clientWidth, 100), height: Math.max(this.box.clientHeight, 80) };
+  /** Note the size, and return whether it has changed; to ask for it at each drawing would lay the page out anew. */
+  fit({ width, height }) {
+    const [wide, high] = [Math.max(Math.floor(width), 100), Math.max(Math.floor(height), 80)];
+    if (this.size?.width === wide && this.size.height === high) return false;
+    this.size = { width: wide, height: high };
+    return true;
   }
 
   draw(key, options, data) {
@@ -58,8 +71,9 @@ export class Chart {
     if (this.plot && this.key === whole) { this.plot.setData(data); this.name(); return; }
     this.clear();
     this.key = whole;
+    if (!this.size) this.fit(this.box.getBoundingClientRect());
     const made = options();
-    this.plot = new uPlot({ ...this.size(), legend: { show: false }, cursor: { drag: { x: false, y: false } }, hooks: { setCursor: [u => this.read(u)] }, ...made }, data, this.box);
+    this.plot = new uPlot({ ...this.size, legend: { show: false }, cursor: { drag: { x: false, y: false } }, hooks: { setCursor: [u => this.read(u)] }, ...made }, data, this.box);
     this.values = made.series.map(({ label, legend = true, ...look }) => {
       const value = document.createElement('b');
       if (legend) {

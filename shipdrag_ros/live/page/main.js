@@ -8,6 +8,7 @@ const OLD_MS = 4000; // the server says something every second
 const AGAIN_MS = 2000;
 const LONGEST_S = 2 * 86400;
 const FINE_S = 1800;
+const THIN_EVERY = 300; // rows
 const MODES = ['day', 'dusk', 'night'];
 const SIGNS = { good: '✓', act: '►', watch: '…', bad: '✕' };
 const HELD = { yes: ['✓', 'yes'], no: ['✕', 'no'], wait: ['…', 'not yet'], unknown: ['?', 'not measured'] };
@@ -19,7 +20,9 @@ const charts = { curve: new Chart(el('curve')), speeds: new Chart(el('speeds')),
 let units = recall('units') === 'si' ? SI : BRIDGE;
 let zone = Number(recall('zone') ?? Math.round(-new Date().getTimezoneOffset() / 30) / 2);
 let heardMs = 0;
-window.shipdrag = { picture, late: [] }; // for tests and for the curious
+let thinned = 0; // rows that were left
+const due = { parts: new Set(), rows: false, asked: false, wholeMs: 0 };
+window.shipdrag = { picture, wholeMs: null }; // for tests and for the curious: how long the last whole picture took
 
 function recall(name) { try { return localStorage.getItem(`shipdrag.${name}`); } catch { return null; } }
 function keep(name, value) { try { localStorage.setItem(`shipdrag.${name}`, value); } catch { /* private window */ } }
@@ -39,11 +42,14 @@ function connect() {
   const stream = new EventSource('/stream');
   const take = whole => event => {
     heardMs = Date.now();
+    if (whole) due.wholeMs = performance.now();
     const { rows = [], ...parts } = JSON.parse(event.data);
-    if (whole) { picture.rows = rows; } else { picture.rows.push(...rows); }
+    if (whole) { picture.rows = rows; thinned = rows.length; } else { picture.rows.push(...rows); }
     if (rows.length && !whole) thin();
     Object.assign(picture, parts);
-    show(new Set(Object.keys(parts)), rows.length > 0 || whole);
+    for (const name of Object.keys(parts)) due.parts.add(name);
+    due.rows ||= rows.length > 0 || whole;
+    ask();
   };
   stream.addEventListener('whole', take(true));
   stream.addEventListener('frame', take(false));
@@ -52,11 +58,24 @@ function connect() {
   });
 }
 
+/** Draw what has come once for each picture of the screen, however many frames came; a page that nobody sees, once a second. */
+function ask() {
+  if (due.asked) return;
+  due.asked = true;
+  const draw = () => {
+    const { parts, rows, wholeMs } = due;
+    Object.assign(due, { parts: new Set(), rows: false, asked: false, wholeMs: 0 });
+    show(parts, rows);
+    if (wholeMs) setTimeout(() => { window.shipdrag.wholeMs = performance.now() - wholeMs; }); // it stands on the screen by then
+  };
+  if (document.hidden) setTimeout(draw, 1000); else requestAnimationFrame(draw);
+}
+
 /** Forget what is older than two days; a point in ten seconds is enough of what is older than half an hour. */
 function thin() {
   const { rows } = picture;
   const newest = rows[rows.length - 1][0];
-  if (rows.length < 3 * FINE_S + LONGEST_S / 10) return;
+  if (rows.length < thinned + THIN_EVERY) return;
   let last = -1;
   picture.rows = rows.filter(([second]) => {
     if (second < newest - LONGEST_S) return false;
@@ -66,6 +85,7 @@ function thin() {
     last = tens;
     return first;
   });
+  thinned = picture.rows.length;
 }
 
 // what is shown
@@ -244,7 +264,6 @@ function showTraces() {
     drawShafts(charts.shafts, rows, span, zone);
     text('shaft-say', last[4] == null ? 'Not read in the last second.' : `Now: ${Math.round(last[4] * 60 / (2 * Math.PI)) || 0} rpm.`);
   }
-  requestAnimationFrame(() => { window.shipdrag.late.push(Date.now()); if (window.shipdrag.late.length > 1000) window.shipdrag.late.shift(); });
 }
 
 // a bag that is played

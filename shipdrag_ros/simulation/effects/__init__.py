@@ -68,7 +68,7 @@ def confounders(name: str) -> tuple[str, ...]:
 
 def discriminating_measurements(one: str, other: str) -> tuple[Measure, ...]:
     """
-    Return what tells two look-alikes apart; nothing: no record can.
+    Return what separates two look-alikes; nothing: no record can.
     """
     declared = (*LIBRARY[one].confounders.get(other, ()), *LIBRARY[other].confounders.get(one, ()))
     return tuple(dict.fromkeys(declared))
@@ -78,7 +78,7 @@ def inseparable(
     effects: Sequence[Effect], *, measured: Collection[Measure] = tuple(Measure)
 ) -> tuple[frozenset[str], ...]:
     """
-    Return pairs of confounders that some measurements do not tell apart.
+    Return pairs of confounders that some measurements do not separate.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def parse(text: str) -> StatedEffect:
     ------
     SimulationError
         If it cannot be read; whether a value is possible depends on the ship
-        and is told by `action_of`.
+        and is described by `action_of`.
     """
     name, separator, rest = text.partition('=')
     effect = find(name.strip())

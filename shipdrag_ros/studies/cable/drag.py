@@ -188,7 +188,7 @@ class Tangent:
         tolerance
             Relative error that it may have.
         """
-        from shipdrag_ros.studies.cable import words  # it tells of this module
+        from shipdrag_ros.studies.cable import words  # it speaks of this module
 
         return (words.line(self, tolerance),)
 

@@ -16,7 +16,7 @@ from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
 
 STATES = 7  # of a path: u, v, r, x, y, heading, rudder
-State = tuple[float, float, float, float, float, float, float]
+MotionState = tuple[float, float, float, float, float, float, float]
 
 
 class HullModel(NamedTuple):
@@ -127,7 +127,9 @@ def _rudder(hull: HullModel, d: float, ordered: float, after_s: float) -> float:
 
 
 @compiled
-def _step(hull: HullModel, c: Float64, state: State, ordered: float, h: float) -> State:
+def _step(
+    hull: HullModel, c: Float64, state: MotionState, ordered: float, h: float
+) -> MotionState:
     """Return the state a step later, in which the rudder moves smoothly."""
     du, v, r, x, y, heading, d = state
     e = 0.5 * h
@@ -162,18 +164,20 @@ def _over_ground(hull: HullModel, du: float, v: float, heading: float) -> tuple[
 
 
 @compiled
-def _advance(hull: HullModel, c: Float64, state: State, ordered: float, h: float) -> State:
+def _advance(
+    hull: HullModel, c: Float64, state: MotionState, ordered: float, h: float
+) -> MotionState:
     """Return the state a time later, in two steps where the rudder leaves its largest rate."""
     ramp_s = abs(ordered - state[6]) / hull.rate_rad_s - hull.lag_s
     if 0.0 < ramp_s < h:
         state = _step(hull, c, state, ordered, ramp_s)
         h -= ramp_s
-    after: State = _step(hull, c, state, ordered, h)
+    after: MotionState = _step(hull, c, state, ordered, h)
     return after
 
 
 @compiled
-def _reached(before: State, after: State, heading: float, h: float) -> float:
+def _reached(before: MotionState, after: MotionState, heading: float, h: float) -> float:
     """Return the part of a step after which a heading is reached."""
     low, high = 0.0, 1.0
     gain = after[5] - before[5]

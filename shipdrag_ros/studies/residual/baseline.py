@@ -45,7 +45,7 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
     """
     base = ship.baseline
     missing = [name for name in ('breadth_m', 'draught_m') if getattr(ship, name) is None]
-    problems = [f'{name}: missing, the hull is told by its ratios' for name in missing]
+    problems = [f'{name}: missing, the hull is described by its ratios' for name in missing]
     if not isinstance(base, CoefficientBaseline):
         problems.append('baseline: expected one of coefficients, its friction is kept')
     if fitted.form.needs_lcb and lcb is None:
@@ -78,7 +78,7 @@ def with_residual(ship: Ship, fitted: ResidualFit, *, lcb: float | None) -> Ship
             ship.name or 'ship file',
             [
                 f'wave_coefficient: the sd is up to {relative:.2g} times the value, expected at '
-                f'most {_VAGUE:g}; the data do not tell it'
+                f'most {_VAGUE:g}; the data do not determine it'
             ],
         )
     low, high = froude[rows[0]], froude[rows[-1]]

@@ -24,7 +24,7 @@ class Expectation:
     Attributes
     ----------
     text
-        What is expected, to be told where it is not met.
+        What is expected, to be stated where it is not met.
     move
         Multiplies a ratio of hulls, the ratios tied to it along.
     sign

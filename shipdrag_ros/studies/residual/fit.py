@@ -19,14 +19,14 @@ from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression import Domain, LinearFit, Prediction, least_squares
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.expectations import EXPECTATIONS
-from shipdrag_ros.studies.residual.forms import FORMS, Form
+from shipdrag_ros.studies.residual.forms import FORMS, RegressionForm
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 AUTO = 'auto'
 OPEN = 1e-6  # which part of a row the data may leave open: the digits of printed ratios
 FIRM = 2.0  # standard deviations by which a trend must be wrong
 _STEP = 1e-4  # of a ratio, for derivatives
-_ENOUGH = 3  # hulls left out that tell how far a new hull scatters
+_ENOUGH = 3  # hulls left out that say how far a new hull scatters
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class ResidualFit:
         What a reader must know, a sentence each.
     """
 
-    form: Form
+    form: RegressionForm
     hulls: Hulls
     count: int
     fit: LinearFit
@@ -72,7 +72,7 @@ class ResidualFit:
         target
             Name of what was measured.
         """
-        from shipdrag_ros.studies.residual import words  # it tells what this module holds
+        from shipdrag_ros.studies.residual import words  # it shows what this module holds
 
         return (words.sentence(self, target, ()), words.technical(self), *self.notes)
 
@@ -178,7 +178,9 @@ def fit_residual(hulls: Hulls, values: Float64, *, form: str) -> ResidualFit:
     return min(fits, key=lambda found: (found.left_out, found.fit.variance))
 
 
-def leave_hulls_out(form: Form, hulls: Hulls, values: Float64) -> tuple[Float64, Float64, Float64]:
+def leave_hulls_out(
+    form: RegressionForm, hulls: Hulls, values: Float64
+) -> tuple[Float64, Float64, Float64]:
     """
     Predict each hull from all others.
 
@@ -207,7 +209,7 @@ def leave_hulls_out(form: Form, hulls: Hulls, values: Float64) -> tuple[Float64,
     return error, sd, leverage
 
 
-def fit_form(form: Form, hulls: Hulls, values: Float64) -> ResidualFit:
+def fit_form(form: RegressionForm, hulls: Hulls, values: Float64) -> ResidualFit:
     """
     Fit any form that is linear in its coefficients; see `fit_residual`.
     """

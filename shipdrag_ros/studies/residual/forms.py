@@ -13,7 +13,7 @@ from shipdrag_ros.studies.residual.hulls import Hulls
 
 
 @dataclass(frozen=True)
-class Form:
+class RegressionForm:
     """
     A regression that is linear in its coefficients.
 
@@ -26,7 +26,7 @@ class Form:
     terms
         What each column is; psi is the slenderness L / V^(1/3).
     variables
-        Ratios of `Hulls` that tell its hulls apart, Fr included.
+        Ratios of `Hulls` that separate its hulls, Fr included.
     froude_max
         What its author made it for.
     """
@@ -115,12 +115,12 @@ _SIROTINA_TERMS = (
 )
 
 # S4 (1) and (2)
-SAKHNOVSKY = Form(
+SAKHNOVSKY = RegressionForm(
     'sakhnovsky',
     _sakhnovsky,
     _SAKHNOVSKY_TERMS,
     ('L_B', 'B_T', 'C_B', 'lcb', 'Fr'),
     froude_max=0.14,
 )
-SIROTINA = Form('sirotina', _sirotina, _SIROTINA_TERMS, ('L_B', 'B_T', 'C_B', 'Fr'))
+SIROTINA = RegressionForm('sirotina', _sirotina, _SIROTINA_TERMS, ('L_B', 'B_T', 'C_B', 'Fr'))
 FORMS = {form.name: form for form in (SAKHNOVSKY, SIROTINA)}

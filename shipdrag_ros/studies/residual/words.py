@@ -40,6 +40,19 @@ def technical(found: ResidualFit) -> str:
     )
 
 
+def what_it_is(target: str) -> str:
+    """
+    Say what is fitted, and what the terms are made of.
+    """
+    return (
+        f'{target} is residual resistance, in the measure of the data: what is left when friction '
+        'is taken away, mostly waves. It is a sum of the terms in the table below, each times its '
+        'coefficient. L, B and T are length, breadth and draught, C_B is the block coefficient, '
+        'lcb the place of the centre of buoyancy, psi the slenderness L / V^(1/3), Fr the Froude '
+        'number of the length (Fr_V: of V^(1/3), V the displaced volume).'
+    )
+
+
 def coefficients(found: ResidualFit) -> Table:
     """
     Show the coefficients of the form, by the terms that they stand before.

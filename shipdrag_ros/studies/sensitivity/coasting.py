@@ -111,7 +111,7 @@ class CoastStudy:
         Say what matters most, what was done and what it means, a paragraph each.
         """
         from shipdrag_ros.studies.sensitivity import (
-            coasting_words as words,  # it tells of this module
+            coasting_words as words,  # it speaks of this module
         )
 
         return (words.sentence(self), *words.notes(self))

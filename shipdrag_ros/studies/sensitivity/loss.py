@@ -249,7 +249,7 @@ def partial_contribution(slopes: Float64) -> Float64:
     -------
     (p,)
         0: a change of the others looks the same, so that this experiment
-        cannot tell the parameter; 1: nothing else looks like it.
+        cannot determine the parameter; 1: nothing else looks like it.
     """
     size = np.linalg.norm(slopes, axis=1)
     seen = size > 0.0

@@ -3,7 +3,7 @@
 Which wrong value of a ship file looks like which effect.
 
 What a diagnosis is to name may as well be a value that was stated wrong: it is
-told by how much of an effect such an error leaves unexplained.
+measured by how much of an effect such an error leaves unexplained.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Mimic:
     error
         Relative error of the value, within `WORST`, that comes nearest to it.
     left
-        Part of the distance that this leaves: 0, no record tells the two apart.
+        Part of the distance that this leaves: 0, no record separates the two.
     """
 
     effect: Effect

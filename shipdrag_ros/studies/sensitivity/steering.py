@@ -145,7 +145,7 @@ class SteeringStudy:
         """
         Say what is kept, what was done and what it means, a paragraph each.
         """
-        from shipdrag_ros.studies.sensitivity import steering_words as words  # it tells of this
+        from shipdrag_ros.studies.sensitivity import steering_words as words  # it speaks of this
 
         return (words.sentence(self), *words.notes(self))
 

@@ -16,7 +16,10 @@ from shipdrag_ros.studies.sensitivity.steering import (
     SteeringStudy,
 )
 
-LOSSES = 'Loss, root mean square of the differences in u, v and r; times 1000'
+LOSSES = (
+    'Loss by a derivative that is 10 or 50 per cent wrong: root mean square of the differences in '
+    'u, v and r, times 1000'
+)
 CHECK = (
     f'The check; rudder amidships for {APPROACH_S:g} s, then first to starboard, the helmsman '
     f'looks every {CONTROL_S:g} s; differences over the whole manoeuvre'
@@ -37,7 +40,7 @@ def sentence(found: SteeringStudy) -> str:
     return (
         f'{found.ship.name}, {found.manoeuvre.name}: of {len(kept) + len(dropped)} derivatives '
         f'{len(kept)} have a mean loss above {found.selection.threshold:.3g} and are kept; '
-        f'{kept[0]} matters most.'
+        f'{kept[0]} ({meaning(kept[0])}) matters most.'
     )
 
 
@@ -50,6 +53,9 @@ def notes(found: SteeringStudy) -> tuple[str, ...]:
     ship, kept = found.ship, found.selection.kept
     after = sum(ship.multiples.get(name) in kept for name in found.selection.dropped)
     return (
+        'A derivative says how much of a force or moment (X ahead, Y sideways, N turning) comes '
+        'with a motion (u change of speed, v sway, r yaw) or with the rudder (d). The loss is how '
+        'far the manoeuvre moves when it is wrong, as a part of the speed.',
         'One derivative is changed at a time, all simulations in one call: from steady sailing, '
         'first to starboard, the rudder reversed at the very heading, 1200 samples 0.5 s apart; '
         f'u and v over {ship.speed_m_s:g} m/s, r over speed per length.',

@@ -260,7 +260,7 @@ def in_a_process(use: Callable[[], Any]) -> tuple[Any, int]:
 
     process = context.Process(target=run)
     process.start()
-    found: tuple[Any, int] = results.get(timeout=60)
+    found: tuple[Any, int] = results.get(timeout=200)
     process.join(60)
     assert process.exitcode == 0
     return found

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.studies.residual.forms import FORMS, Form
+from shipdrag_ros.studies.residual.forms import FORMS, RegressionForm
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 
@@ -45,7 +45,7 @@ def test_sirotina() -> None:
 
 
 @pytest.mark.parametrize('form', FORMS.values(), ids=lambda form: form.name)
-def test_terms_in_words_are_the_columns(form: Form) -> None:
+def test_terms_in_words_are_the_columns(form: RegressionForm) -> None:
     values = {'L_B': 6.5, 'B_T': 3.1, 'C_B': 0.7, 'Fr': 0.13, 'lcb': 0.02, 'psi': 5.6}
     one = {name: np.array([value]) for name, value in values.items()}
     hulls = Hulls(one['L_B'], one['B_T'], one['C_B'], one['psi'], one['Fr'], one['lcb'])

@@ -35,10 +35,12 @@ def coasted():
 
 def test_bars_of_kept_and_dropped_derivatives(steered):
     axis = pictures.ranking_picture(steered).axes[0]
-    assert names(axis.get_xticklabels()) == list(steered.losses.ranking)
+    shown = [label.split()[-1] for label in names(axis.get_yticklabels())]
+    assert shown == list(steered.losses.ranking)
+    assert names(axis.get_yticklabels())[0] == 'yaw moment by rudder  Nd'
     kept, dropped = axis.containers
     assert (len(kept), len(dropped)) == (24, 16)
-    assert kept[0].get_height() == pytest.approx(float(np.max(steered.losses.mean)))
+    assert kept[0].get_width() == pytest.approx(float(np.max(steered.losses.mean)))
 
 
 def test_three_models_in_four_panels(steered):

@@ -47,7 +47,7 @@ def test_json_to_the_letter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert len(check['overshoot_reduced_deg']) == 2
     assert all(value > 0.0 for value in check['rms_difference'].values())
     assert found['independent'] == 18
-    assert 'Nd matters most' in told
+    assert 'Nd (yaw moment by rudder) matters most' in told
     assert '14 of the 40' in told
     text = page.read_text(encoding='utf-8')
     assert text.count('data:image/svg+xml') == 3

@@ -131,9 +131,9 @@ def are_in_minutes(latitudes: Iterable[str], longitudes: Iterable[str]) -> bool:
     """
     Say whether coordinates are written as ddmm.mmmm.
 
-    The latitudes tell it: four digits before the point are no degrees. Three may
+    The latitudes show it: four digits before the point are no degrees. Three may
     be a longitude in the wrong column, unless the longitudes are written so too.
-    A longitude alone tells nothing: 200.5 is one from 0 to 360 degrees.
+    A longitude alone shows nothing: 200.5 is one from 0 to 360 degrees.
     """
     if _share_in_minutes(latitudes, 90.0, 4) > 0.5:
         return True

@@ -109,7 +109,7 @@ class TimeColumn:
     order
         Of year, month and day in a date, see `dates.ORDERS`; '' to be found.
     zone
-        Of dates that tell none.
+        Of dates that state none.
     """
 
     names: tuple[str, ...]

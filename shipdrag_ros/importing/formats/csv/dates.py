@@ -37,7 +37,7 @@ class DateForm:
     order
         One of `ORDERS`; '' for times of day alone.
     zone
-        Of times that tell none.
+        Of times that state none.
     """
 
     order: str
@@ -120,7 +120,7 @@ def order_of(texts: Iterable[str], hints: Sequence[str]) -> tuple[str, str]:
     Returns
     -------
     order, known_by
-        The order is '' where day and month cannot be told apart.
+        The order is '' where day and month are ambiguous.
     """
     days = [day for text in texts if (day := parts(text)[0])]
     if not days:
@@ -184,7 +184,7 @@ def _numbers(day: str, order: str, text: str) -> tuple[int, int, int]:
 
 
 def _clock_ns(text: str, whole: str) -> tuple[int, tzinfo | None]:
-    """Return the time of day [ns], and its zone where it tells one."""
+    """Return the time of day [ns], and its zone where it states one."""
     if not text:
         return 0, None
     found = _CLOCK.fullmatch(text)

@@ -10,42 +10,36 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.format import LIKELY, NO, POSSIBLE, Format, Head, Job, Option
 from shipdrag_ros.importing.formats.csv.columns import SPEED_UNITS, parse_input, parse_time
 from shipdrag_ros.importing.formats.csv.dates import ORDERS, zone_of
-from shipdrag_ros.importing.formats.csv.guess import (
-    Guess,
-    guess,
-    guess_time,
-    is_table,
-    with_dates,
-)
-from shipdrag_ros.importing.formats.csv.importer import ImportResult, import_csv
+from shipdrag_ros.importing.formats.csv.first_rows import FirstRows
+from shipdrag_ros.importing.formats.csv.guess import Guess, guess, is_table
+from shipdrag_ros.importing.formats.csv.guess_time import time_column, with_dates
+from shipdrag_ros.importing.formats.csv.importer import TableColumns, import_csv
 from shipdrag_ros.importing.formats.csv.names import role_and_unit
+from shipdrag_ros.importing.formats.csv.result import TableResult
 from shipdrag_ros.importing.options import RATE
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 
 
 def _score(head: Head) -> float:
     if not head.lines or head.lines[0][0] in '{<[' or not is_table(head.path):
         return NO
-    names = Table(head.path).header or ()
+    names = LogTable(head.path).header or ()
     return LIKELY if any(role_and_unit(name)[0] for name in names) else POSSIBLE
 
 
-def _write(job: Job) -> ImportResult:
+def _write(job: Job) -> TableResult:
     options = job.options
     time, rate = options.get('time'), options.get('rate')
     if time is not None and rate is not None:
-        raise ImportDataError('--time and --rate: both tell the times of the rows; keep one')
+        raise ImportDataError('--time and --rate: both give the times of the rows; keep one')
     time = with_dates(time, options.get('date_order', ''), options.get('zone'))
-    table = Table(job.source)
+    table = LogTable(job.source)
     found = _inputs(table, time, options)
     time = with_dates(found.time, options.get('date_order', ''), options.get('zone'))
     result = import_csv(
         job.source,
         job.out,
-        inputs=found.inputs,
-        time=time,
-        rate_hz=rate,
-        where=options.get('where', ()),
+        TableColumns(found.inputs, time, rate, options.get('where', ())),
         attachments=job.attachments,
         progress=job.progress,
     )
@@ -53,7 +47,7 @@ def _write(job: Job) -> ImportResult:
     return replace(result, notes=(*found.notes, *result.notes, *doubts))
 
 
-def _inputs(table: Table, time: Any, options: Any) -> Guess:
+def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
     """Return the columns that were given, or else those that are guessed."""
     counted = options.get('rate') is not None
     mapped = options.get('map', ())
@@ -64,7 +58,7 @@ def _inputs(table: Table, time: Any, options: Any) -> Guess:
     if time is None and not counted:
         if table.header is None:
             raise ImportDataError('the times of the rows: give --time COLUMN[:unit] or --rate HZ')
-        found.time = guess_time(table, found)
+        found.time = time_column(FirstRows(table), found.notes)
     return found
 
 
@@ -143,4 +137,5 @@ FORMAT = Format(
         ),
     ),
     chosen_by='map',
+    by_head=False,
 )

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from shipdrag_ros import display, strict_yaml
+from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import (
     ATTACHMENT,
@@ -35,141 +35,27 @@ from shipdrag_ros.importing.formats.csv.cells import (
     number_with_comma,
 )
 from shipdrag_ros.importing.formats.csv.columns import InputColumns, TimeColumn
+from shipdrag_ros.importing.formats.csv.result import TableResult
 from shipdrag_ros.importing.formats.csv.row_clock import BASE_NS, RowClock
-from shipdrag_ros.importing.table import Row, Table
+from shipdrag_ros.importing.table import LogRow, LogTable
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel
 
 _FEW = 10
-_SAMPLE_ROWS = 2000  # by which the way of writing is told
+_SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
-Reader = Callable[[str], float]
+CellReader = Callable[[str], float]
 
 
 @dataclass(frozen=True)
-class ImportResult:
+class TableColumns:
     """
-    What became of a table.
+    What is to be taken from a table.
 
     Attributes
     ----------
-    rows
-        Below the header.
-    left_out
-        Rows that `where` does not choose.
-    written
-        Samples by input; pitches are of `shaft`.
-    rejected
-        By input, or 'time' for a whole row, and reason.
-    start_ns, end_ns
-        First and last time written [ns].
-    base_ns
-        What was added to the times of the table [ns]; None if they are dates.
-    backward
-        Rows whose time is before that of an earlier row; a replay rejects
-        them and says so.
-    repeated
-        Rows whose time is that of the newest row before; a replay rejects them
-        too.
-    delimiter
-        That of the table.
-    header
-        Whether the table has one.
-    understood
-        What each input was taken from.
-    notes
-        What is to be known of it, a sentence each.
-    not_used
-        Columns that nothing is taken from.
-    """
-
-    rows: int
-    left_out: int
-    written: dict[str, int]
-    rejected: dict[str, dict[str, Rejected]]
-    start_ns: int
-    end_ns: int
-    base_ns: int | None
-    backward: int
-    repeated: int
-    delimiter: str
-    header: bool
-    understood: tuple[Understood, ...]
-    notes: tuple[str, ...]
-    not_used: tuple[str, ...]
-
-    def summary(self, bag: Path) -> list[str]:
-        """
-        Say how much was read, and what is to be known of it.
-        """
-        length_s = (self.end_ns - self.start_ns) * 1e-9
-        told = [
-            f'{bag}: {sum(self.written.values())} messages of {self.rows - self.left_out} rows, '
-            f'{display.duration(length_s)}, from {display.utc(self.start_ns)}'
-        ]
-        if self.base_ns is not None:
-            told.append(
-                f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
-            )
-        told += self.notes
-        if self.left_out:
-            told.append(f'{self.left_out} rows were not chosen by --where.')
-        if self.backward:
-            told.append(
-                f'In {self.backward} rows the time is before that of an earlier row; a replay '
-                'rejects those.'
-            )
-        if self.repeated:
-            told.append(
-                f'In {self.repeated} rows the time is that of an earlier row; a replay rejects '
-                'those.'
-            )
-        return told
-
-    def table(self) -> display.Table:
-        """
-        Return messages by input.
-        """
-        return display.Table(
-            ('input', 'messages'), tuple((name, f'{n}') for name, n in self.written.items())
-        )
-
-    def details(self) -> list[str]:
-        """
-        Say what was not used, and why.
-        """
-        told = [
-            f'{name}: {rejected.count} cell(s) rejected, {reason}: {", ".join(rejected.first)}'
-            for name, reasons in self.rejected.items()
-            for reason, rejected in reasons.items()
-        ]
-        if self.not_used:
-            told.append(f'Columns not used: {", ".join(map(repr, self.not_used))}')
-        return told
-
-
-def import_csv(
-    source: Path,
-    out: Path,
-    *,
-    inputs: Sequence[InputColumns],
-    time: TimeColumn | None = None,
-    rate_hz: float | None = None,
-    where: Sequence[tuple[str, str]] = (),
-    start_ns: int = BASE_NS,
-    attachments: Mapping[str, str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> ImportResult:
-    """
-    Write the measurements of a table as a bag.
-
-    Parameters
-    ----------
-    source
-        Table, see `Table`.
-    out
-        MCAP file to make.
     inputs
-        Columns to take, from `parse_input`.
+        Columns of the inputs, from `parse_input`.
     time
         Column of the time, from `parse_time`; or else
     rate_hz
@@ -178,10 +64,56 @@ def import_csv(
         (column, text): only rows with this text there are taken.
     start_ns
         Date of time 0, for times that count from the start of a test [ns].
+    """
+
+    inputs: Sequence[InputColumns]
+    time: TimeColumn | None = None
+    rate_hz: float | None = None
+    where: Sequence[tuple[str, str]] = ()
+    start_ns: int = BASE_NS
+
+    def check(self) -> None:
+        """
+        Refuse what is missing, or given twice.
+
+        Raises
+        ------
+        ImportDataError
+        """
+        if (self.time is None) == (self.rate_hz is None):
+            raise ImportDataError(
+                'the times of the rows: give either --time COLUMN[:unit] or --rate'
+            )
+        if not self.inputs:
+            raise ImportDataError('no column is mapped; give --map INPUT=COLUMN[:unit]')
+        for name, count in Counter(each.name for each in self.inputs).items():
+            if count > 1:
+                raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
+
+
+def import_csv(
+    source: Path,
+    out: Path,
+    columns: TableColumns,
+    *,
+    attachments: Mapping[str, str] | None = None,
+    progress: PartDone | None = None,
+) -> TableResult:
+    """
+    Write the measurements of a table as a bag.
+
+    Parameters
+    ----------
+    source
+        Table, see `LogTable`.
+    out
+        MCAP file to make.
+    columns
+        Which of it to take.
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how many bytes are read, and of how many.
+        Called with how many bytes are read, and of how many.
 
     Raises
     ------
@@ -190,17 +122,17 @@ def import_csv(
     BagError
         If the bag cannot be made.
     """
-    if (time is None) == (rate_hz is None):
-        raise ImportDataError('the times of the rows: give either --time COLUMN[:unit] or --rate')
-    _check_inputs(inputs)
-    table = Table(source)
+    columns.check()
+    table = LogTable(source)
+    time = columns.time
     places = [] if time is None else [table.column(name) for name in time.names]
-    channels = [each for mapped in inputs for each in mapped.by_channel()]
+    channels = [each for mapped in columns.inputs for each in mapped.by_channel()]
     mapped_places = [[table.column(name) for name in each.names] for each in channels]
-    chosen = [(table.column(name), text) for name, text in where]
+    chosen = [(table.column(name), text) for name, text in columns.where]
     sample = list(islice(table.rows(), _SAMPLE_ROWS))
-    clock = RowClock.of(time, rate_hz, start_ns, [row_text(row, places) for row in sample], table)
-    record = _Record(
+    texts = [row_text(row, places) for row in sample]
+    clock = RowClock.of(time, columns.rate_hz, columns.start_ns, texts, table)
+    record = _RowSamples(
         list(zip(channels, mapped_places, _readers(channels, mapped_places, sample), strict=True)),
         chosen,
         clock,
@@ -208,7 +140,7 @@ def import_csv(
         table.width,
     )
     with new_bag(out, attachments) as bag:
-        bag.attach(ATTACHMENT, _provenance(source, inputs, time, rate_hz, where))
+        bag.attach(ATTACHMENT, _provenance(source, columns))
         for row in table.rows(progress):
             record.take(row)
             if len(record) >= BATCH_SAMPLES:
@@ -217,19 +149,19 @@ def import_csv(
         return record.result(table, bag)
 
 
-def row_text(row: Row, places: Sequence[int]) -> str:
+def row_text(row: LogRow, places: Sequence[int]) -> str:
     """
     Return the text of one or two cells of a row, as a date and its time of day stand in them.
     """
     return ' '.join(_cell(row, place) for place in places)
 
 
-class _Record:
+class _RowSamples:
     """Turns rows into samples and counts what becomes of them."""
 
     def __init__(
         self,
-        inputs: Sequence[tuple[InputColumns, Sequence[int], Sequence[Reader]]],
+        inputs: Sequence[tuple[InputColumns, Sequence[int], Sequence[CellReader]]],
         where: Sequence[tuple[int, str]],
         clock: RowClock,
         time_places: Sequence[int],
@@ -256,7 +188,7 @@ class _Record:
     def __len__(self) -> int:
         return len(self._samples)
 
-    def take(self, row: Row) -> None:
+    def take(self, row: LogRow) -> None:
         """Take the samples of one row."""
         self._rows += 1
         for place, text in self._where:
@@ -298,13 +230,13 @@ class _Record:
         samples, self._samples = self._samples, []
         return Block.of_samples(samples)
 
-    def result(self, table: Table, bag: ImportBag) -> ImportResult:
+    def result(self, table: LogTable, bag: ImportBag) -> TableResult:
         """Sum up; ImportDataError if there is nothing."""
         if self._first_ns is None or not self._written:
             raise ImportDataError(
                 f'{str(table.path)!r} gave no sample from {self._rows} row(s); {self._why_not()}'
             )
-        return ImportResult(
+        return TableResult(
             rows=self._rows,
             left_out=self._left_out,
             written=dict(self._written),
@@ -335,7 +267,7 @@ class _Record:
             if columns.channel in bag.first
         )
 
-    def _notes(self, table: Table) -> Iterator[str]:
+    def _notes(self, table: LogTable) -> Iterator[str]:
         if table.titles:
             yield f'{len(table.titles)} line(s) above the table were left out.'
         if table.joined_lines:
@@ -365,16 +297,16 @@ class _Record:
             'times in seconds or in the unit given'
         )
 
-    def _reject(self, name: str, row: Row, bad: BadCell) -> None:
+    def _reject(self, name: str, row: LogRow, bad: BadCell) -> None:
         by_reason = self._rejected.setdefault(name, {})
         by_reason.setdefault(bad.reason, Rejected()).add(row.line, bad.cell)
 
 
-def _cell(row: Row, place: int) -> str:
+def _cell(row: LogRow, place: int) -> str:
     return row.cells[place] if place < len(row.cells) else ''
 
 
-def _check_width(row: Row, width: int) -> None:
+def _check_width(row: LogRow, width: int) -> None:
     """Refuse a row that does not fit the columns, as decimal commas make it."""
     beyond = [cell for cell in row.cells[width:] if cell]
     if beyond:
@@ -382,14 +314,14 @@ def _check_width(row: Row, width: int) -> None:
 
 
 def _readers(
-    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: Sequence[Row]
-) -> list[list[Reader]]:
+    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: Sequence[LogRow]
+) -> list[list[CellReader]]:
     """Return what reads the cells of each column, as they are written in the first rows."""
     cells = {place: [_cell(row, place) for row in sample] for each in places for place in each}
     plain = number
     if has_decimal_commas(cell for row in sample for cell in row.cells):
         plain = number_with_comma
-    found: list[list[Reader]] = []
+    found: list[list[CellReader]] = []
     for columns, here in zip(inputs, places, strict=True):
         if columns.channel is Channel.POSITION_GEODETIC:
             minutes = are_in_minutes(*(cells[each] for each in here))
@@ -400,7 +332,7 @@ def _readers(
     return found
 
 
-def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> Reader:
+def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> CellReader:
     if minutes:
         return minutes_of(side)
     if has_decimal_commas(cells):
@@ -409,27 +341,13 @@ def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> Reader:
     return degrees_of(side)
 
 
-def _check_inputs(inputs: Sequence[InputColumns]) -> None:
-    if not inputs:
-        raise ImportDataError('no column is mapped; give --map INPUT=COLUMN[:unit]')
-    for name, count in Counter(each.name for each in inputs).items():
-        if count > 1:
-            raise ImportDataError(f'--map {name}=...: given {count} times; keep one')
-
-
-def _provenance(
-    source: Path,
-    inputs: Sequence[InputColumns],
-    time: TimeColumn | None,
-    rate_hz: float | None,
-    where: Sequence[tuple[str, str]],
-) -> str:
+def _provenance(source: Path, columns: TableColumns) -> str:
     """Say where the samples come from; the name alone, whatever the machine."""
     about = {
         'source': source.name,
-        'inputs': {each.name: list(each.names) for each in inputs},
-        'time': None if time is None else ', '.join(time.names),
-        'rate_hz': rate_hz,
-        'where': dict(where),
+        'inputs': {each.name: list(each.names) for each in columns.inputs},
+        'time': None if columns.time is None else ', '.join(columns.time.names),
+        'rate_hz': columns.rate_hz,
+        'where': dict(columns.where),
     }
     return strict_yaml.dump(about)

@@ -14,7 +14,7 @@ from shipdrag_ros.importing.bag import LIMIT_NS
 from shipdrag_ros.importing.formats.csv.cells import BadCell, has_decimal_commas, number
 from shipdrag_ros.importing.formats.csv.columns import NANOSECONDS, TimeColumn
 from shipdrag_ros.importing.formats.csv.dates import DateForm, is_date, order_of, parts
-from shipdrag_ros.importing.table import Table
+from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.samples import SECOND_NS
 
 BASE_NS = 946_684_800 * SECOND_NS
@@ -57,7 +57,7 @@ class RowClock:
         rate_hz: float | None,
         start_ns: int,
         cells: Sequence[str],
-        table: Table,
+        table: LogTable,
     ) -> RowClock:
         """
         Make the clock of a table.
@@ -71,12 +71,12 @@ class RowClock:
         cells
             Of the time, in the first rows.
         table
-            Whose titles and name may tell the date.
+            Whose titles and name may show the date.
 
         Raises
         ------
         ImportDataError
-            If the rate is none, or day and month cannot be told apart.
+            If the rate is none, or day and month are ambiguous.
         """
         clock = cls(start_ns)
         if time is None:
@@ -95,13 +95,13 @@ class RowClock:
             clock._read_counts(time, texts)
         return clock
 
-    def _read_dates(self, time: TimeColumn, texts: Sequence[str], table: Table) -> None:
+    def _read_dates(self, time: TimeColumn, texts: Sequence[str], table: LogTable) -> None:
         order, known_by = time.order, ''
         if not order:
             order, known_by = order_of(texts, (*table.titles, table.path.name))
             if not order and texts and parts(texts[0])[0]:
                 raise ImportDataError(
-                    f'{str(table.path)!r}: day and month cannot be told apart, {known_by}; give '
+                    f'{str(table.path)!r}: day and month are ambiguous, {known_by}; give '
                     '--date-order dmy or --date-order mdy'
                 )
         self._dates = DateForm(order, time.zone)
@@ -112,10 +112,10 @@ class RowClock:
         if known_by and order != 'ymd':
             words = {'d': 'day', 'm': 'month', 'y': 'year'}
             written = '/'.join(words[each] for each in order)
-            self.notes.append(f'Dates are {written}, as {known_by} tell.')
+            self.notes.append(f'Dates are {written}, as {known_by} show.')
         told = 'utc' in ' '.join(time.names).lower() or any(map(_tells_zone, texts[:1]))
         if time.zone is UTC and not told:
-            self.notes.append('The times tell no zone and are taken as UTC (--zone).')
+            self.notes.append('The times state no zone and are taken as UTC (--zone).')
 
     def _read_counts(self, time: TimeColumn, texts: Sequence[str]) -> None:
         self._comma = has_decimal_commas(texts)

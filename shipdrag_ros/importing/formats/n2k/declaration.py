@@ -15,12 +15,12 @@ def _score(head: Head) -> float:
 
 def _write(job: Job) -> StreamResult:
     # the table of messages takes long to import
-    from shipdrag_ros.importing.formats.n2k.reader import Reader, clock_of
+    from shipdrag_ros.importing.formats.n2k.reader import N2kReader, clock_of
 
     clock = clock_of(job)
     about = {key: job.options.get(key) for key in ('date', 'gear', 'rate', 'transducer')}
     return import_stream(
-        job, 'n2k', lambda tally: Reader(tally, clock, job.options).read(job), about=about
+        job, 'n2k', lambda tally: N2kReader(tally, clock, job.options).read(job), about=about
     )
 
 

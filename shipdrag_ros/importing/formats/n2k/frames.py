@@ -41,14 +41,14 @@ _CANBOAT = re.compile(
 )
 
 
-class Frame(NamedTuple):
+class N2kFrame(NamedTuple):
     """
     A frame, or a whole message.
 
     Attributes
     ----------
     time_ns
-        Since 1970; since midnight where `of_day`; None where the line tells none.
+        Since 1970; since midnight where `of_day`; None where the line states none.
     of_day
     pgn, sender, data
     whole
@@ -63,21 +63,21 @@ class Frame(NamedTuple):
     whole: bool
 
 
-def parse(line: str) -> Frame | None:
+def parse(line: str) -> N2kFrame | None:
     """
     Take a line apart; None where it is no frame.
     """
     return next((frame for read in _READERS if (frame := read(line)) is not None), None)
 
 
-def _candump_log(line: str) -> Frame | None:
+def _candump_log(line: str) -> N2kFrame | None:
     found = _CANDUMP_LOG.fullmatch(line)
     if found is None or len(found[4]) % 2:
         return None
     return _of_can_id(_epoch_ns(found[1], found[2]), False, found[3], bytes.fromhex(found[4]))
 
 
-def _candump(line: str) -> Frame | None:
+def _candump(line: str) -> N2kFrame | None:
     found = _CANDUMP.fullmatch(line)
     if found is None:
         return None
@@ -85,25 +85,25 @@ def _candump(line: str) -> Frame | None:
     return _of_can_id(time_ns, False, found[3] or found[4], bytes.fromhex(found[5]))
 
 
-def _j1939(line: str) -> Frame | None:
+def _j1939(line: str) -> N2kFrame | None:
     found = _J1939.fullmatch(line)
     if found is None or len(found[6].replace(' ', '')) % 2:
         return None
     time_ns = None if found[1] is None else _epoch_ns(found[1], found[2])
     data = bytes.fromhex(found[6].replace(' ', ''))
-    return Frame(time_ns, False, int(found[4], 16), found[3], data, False)
+    return N2kFrame(time_ns, False, int(found[4], 16), found[3], data, False)
 
 
-def _actisense(line: str) -> Frame | None:
+def _actisense(line: str) -> N2kFrame | None:
     found = _ACTISENSE.fullmatch(line)
     if found is None or len(found[9]) % 2:
         return None
     time_ns = _of_day_ns(found[1], found[2], found[3], found[4])
     data = bytes.fromhex(found[9])
-    return Frame(time_ns, True, int(found[8], 16), str(int(found[5], 16)), data, True)
+    return N2kFrame(time_ns, True, int(found[8], 16), str(int(found[5], 16)), data, True)
 
 
-def _yacht_devices(line: str) -> Frame | None:
+def _yacht_devices(line: str) -> N2kFrame | None:
     found = _YACHT_DEVICES.fullmatch(line)
     if found is None:
         return None
@@ -111,17 +111,17 @@ def _yacht_devices(line: str) -> Frame | None:
     return _of_can_id(time_ns, True, found[5], bytes.fromhex(found[6]))
 
 
-def _canboat(line: str) -> Frame | None:
+def _canboat(line: str) -> N2kFrame | None:
     found = _CANBOAT.fullmatch(line)
     if found is None:
         return None
     text = found[1]
     time_ns = iso_ns(f'{text[:10]}T{text[11:]}', UTC)
     data = bytes.fromhex(found[7].replace(',', ' '))
-    return Frame(time_ns, False, int(found[3]), found[4], data, len(data) > 8)
+    return N2kFrame(time_ns, False, int(found[3]), found[4], data, len(data) > 8)
 
 
-_READERS: tuple[Callable[[str], Frame | None], ...] = (
+_READERS: tuple[Callable[[str], N2kFrame | None], ...] = (
     _candump_log,
     _candump,
     _j1939,
@@ -131,7 +131,7 @@ _READERS: tuple[Callable[[str], Frame | None], ...] = (
 )
 
 
-def _of_can_id(time_ns: int | None, of_day: bool, text: str, data: bytes) -> Frame | None:
+def _of_can_id(time_ns: int | None, of_day: bool, text: str, data: bytes) -> N2kFrame | None:
     """Take a 29 bit identifier apart; a PGN below 0xF000 is addressed."""
     number = int(text, 16) & 0x1FFFFFFF
     pgn = (number >> 8) & 0x3FFFF
@@ -139,7 +139,7 @@ def _of_can_id(time_ns: int | None, of_day: bool, text: str, data: bytes) -> Fra
         pgn &= 0x3FF00
     if len(data) > 8:
         return None
-    return Frame(time_ns, of_day, pgn, str(number & 0xFF), data, False)
+    return N2kFrame(time_ns, of_day, pgn, str(number & 0xFF), data, False)
 
 
 def _epoch_ns(seconds: str, fraction: str) -> int:

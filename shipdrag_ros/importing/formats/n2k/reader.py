@@ -19,7 +19,7 @@ from nmea2000 import backend
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.format import Job
-from shipdrag_ros.importing.formats.n2k.frames import Frame, parse
+from shipdrag_ros.importing.formats.n2k.frames import N2kFrame, parse
 from shipdrag_ros.importing.opened import Lines
 from shipdrag_ros.importing.stream import Origin, Reading, Tally
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
@@ -41,9 +41,9 @@ class FrameClock:
     Attributes
     ----------
     rate_hz
-        Frames a second, where the lines tell no time.
+        Frames a second, where the lines state no time.
     day
-        Days since 1970 of the first line, where the lines tell times of day.
+        Days since 1970 of the first line, where the lines have times of day.
     base_ns
         Added to times that count from the start of the log [ns].
     """
@@ -60,7 +60,7 @@ def clock_of(job: Job) -> FrameClock:
     Raises
     ------
     ImportDataError
-        If its lines tell no time, or no date, and it is not given either.
+        If its lines state no time, or no date, and it is not given either.
     """
     name = repr(str(job.source))
     rate_hz = job.options.get('rate')
@@ -74,7 +74,7 @@ def clock_of(job: Job) -> FrameClock:
         return FrameClock(rate_hz, days or 0)
     if first.time_ns is None:
         raise ImportDataError(
-            f'{name}: its lines tell no time; log with `candump -L`, or give --rate HZ, how '
+            f'{name}: its lines state no time; log with `candump -L`, or give --rate HZ, how '
             'many frames came in a second'
         )
     if not first.of_day:
@@ -91,14 +91,14 @@ def clock_of(job: Job) -> FrameClock:
         days = _date_in(islice(frames, _DATED_FRAMES))
     if days is None:
         raise ImportDataError(
-            f'{name} tells times of day, and no date (no PGN 126992 or 129029 with one); give '
+            f'{name} has times of day, and no date (no PGN 126992 or 129029 with one); give '
             '--date YYYY-MM-DD of its first time, in UTC'
         )
     return FrameClock(None, days)
 
 
-def _date_in(frames: Iterator[Frame]) -> int | None:
-    """Return the days since 1970 that a message tells, of the first that does."""
+def _date_in(frames: Iterator[N2kFrame]) -> int | None:
+    """Return the days since 1970 that a message shows, of the first that does."""
     packets = _Packets()
     for frame in frames:
         if frame.pgn in (_SYSTEM_TIME, _GNSS):
@@ -117,7 +117,7 @@ class _Packets:
     def __init__(self) -> None:
         self._parts = backend.canboat.Reassembler()
 
-    def whole(self, frame: Frame) -> bytes | None:
+    def whole(self, frame: N2kFrame) -> bytes | None:
         if frame.whole or frame.pgn not in _FAST:
             return frame.data
         sender = int(frame.sender) if frame.sender.isdecimal() else hash(frame.sender) % 254
@@ -128,11 +128,11 @@ class _Packets:
         return data
 
 
-Value = tuple[Channel, int, float, float]
-Fields = Mapping[str, Any]
+N2kValue = tuple[Channel, int, float, float]
+N2kFields = Mapping[str, Any]
 
 
-class Reader:
+class N2kReader:
     """
     Takes the messages of a log.
 
@@ -154,7 +154,7 @@ class Reader:
         self._frames = 0
         self._midnights = 0
         self._of_day_ns = 0
-        self._readers: dict[int, Callable[[Fields], Value | str]] = {
+        self._readers: dict[int, Callable[[N2kFields], N2kValue | str]] = {
             128259: _water,
             129026: _ground,
             129025: _position,
@@ -186,7 +186,7 @@ class Reader:
         if lines.damage:
             self._tally.note(f'The log could not be read to its end, {lines.damage}.')
 
-    def _frame(self, frame: Frame, line: str) -> Iterator[Reading]:
+    def _frame(self, frame: N2kFrame, line: str) -> Iterator[Reading]:
         stamp_ns = self._stamp_ns(frame)
         read = self._readers.get(frame.pgn)
         if read is None:
@@ -214,7 +214,7 @@ class Reader:
         origin = Origin(rank, f'PGN {frame.pgn} from {frame.sender}')
         yield Reading(channel, origin, stamp_ns, a, b)
 
-    def _stamp_ns(self, frame: Frame) -> int | None:
+    def _stamp_ns(self, frame: N2kFrame) -> int | None:
         self._frames += 1
         if self._clock.rate_hz is not None:
             start_ns = self._clock.day * _DAY_NS or _BASE_NS
@@ -230,7 +230,7 @@ class Reader:
         self._of_day_ns = frame.time_ns
         return (self._clock.day + self._midnights) * _DAY_NS + frame.time_ns
 
-    def _heading(self, fields: Fields) -> Value | str:
+    def _heading(self, fields: N2kFields) -> N2kValue | str:
         heading, reference = fields['heading'].value, fields['reference'].value
         if heading is None:
             return _EMPTY
@@ -247,18 +247,18 @@ class Reader:
         )
         return Channel.HEADING, 2, _yaw(heading), 0.0
 
-    def _depth(self, fields: Fields) -> Value | str:
+    def _depth(self, fields: N2kFields) -> N2kValue | str:
         depth, offset = fields['depth'].value, fields['offset'].value
         if depth is None:
             return _EMPTY
-        # negative: to the keel, whose depth is not told
+        # negative: to the keel, whose depth is not stated
         if offset is None or offset <= 0.0:
             if self._transducer_m is None:
-                return 'depth of the transducer not told'
+                return 'depth of the transducer not stated'
             offset = self._transducer_m
         return Channel.DEPTH, 0, depth + offset, 0.0
 
-    def _engine(self, fields: Fields) -> Value | str:
+    def _engine(self, fields: N2kFields) -> N2kValue | str:
         if self._gear is None:
             return 'revolutions of the engine, and not of the shaft: give --gear RATIO'
         rate_hz, place = fields['speed'].value, fields['instance'].raw_value
@@ -276,28 +276,28 @@ def _yaw(compass: float) -> float:
     return remainder(pi / 2.0 - compass, 2.0 * pi)
 
 
-def _water(fields: Fields) -> Value | str:
+def _water(fields: N2kFields) -> N2kValue | str:
     speed = fields['speedWaterReferenced'].value
     return _EMPTY if speed is None else (Channel.SPEED_THROUGH_WATER, 0, speed, 0.0)
 
 
-def _ground(fields: Fields) -> Value | str:
+def _ground(fields: N2kFields) -> N2kValue | str:
     speed = fields['sog'].value
     return _EMPTY if speed is None else (Channel.SPEED_OVER_GROUND, 0, speed, 0.0)
 
 
-def _position(fields: Fields) -> Value | str:
+def _position(fields: N2kFields) -> N2kValue | str:
     return _where(fields, 0)
 
 
-def _gnss(fields: Fields) -> Value | str:
+def _gnss(fields: N2kFields) -> N2kValue | str:
     method = fields['method'].value
     if method in (None, 'no GNSS', 'Estimated (DR) mode', 'Manual Input', 'Simulate mode'):
         return f'no fix: {method}'
     return _where(fields, 1)
 
 
-def _where(fields: Fields, rank: int) -> Value | str:
+def _where(fields: N2kFields, rank: int) -> N2kValue | str:
     latitude, longitude = fields['latitude'].value, fields['longitude'].value
     if latitude is None or longitude is None:
         return _EMPTY
@@ -306,7 +306,7 @@ def _where(fields: Fields, rank: int) -> Value | str:
     return Channel.POSITION_GEODETIC, rank, latitude, longitude
 
 
-def _wind(fields: Fields) -> Value | str:
+def _wind(fields: N2kFields) -> N2kValue | str:
     speed, angle = fields['windSpeed'].value, fields['windAngle'].value
     if fields['reference'].value != 'Apparent':
         return f'wind that is not apparent: {fields["reference"].value}'
@@ -315,7 +315,7 @@ def _wind(fields: Fields) -> Value | str:
     return Channel.WIND_APPARENT, 0, -speed * cos(angle), speed * sin(angle)
 
 
-def _rudder(fields: Fields) -> Value | str:
+def _rudder(fields: N2kFields) -> N2kValue | str:
     angle = fields['position'].value
     if angle is None:
         return _EMPTY

@@ -2,7 +2,7 @@
 """
 When the sentences of a log were measured.
 
-Few sentences tell their time. The others have that of the last one that did;
+Few sentences state their time. The others have that of the last one that did;
 where an input speaks several times before the next, its samples are spread
 evenly until then. Where the logger noted when it received each line, the time
 since is measured instead, on its clock.
@@ -114,7 +114,7 @@ def rollover_days(day: int, true: date) -> int | None:
     return difference if difference % _ROLLOVER_DAYS == 0 else None
 
 
-class Clock:
+class SentenceClock:
     """
     Follows the time through a log.
 
@@ -122,7 +122,7 @@ class Clock:
     ----------
     near_ns
         A time at most half a day from the first one [ns since the epoch]; None
-        if nothing tells it but the receipt of the lines.
+        if nothing states it but the receipt of the lines.
     shift_days
         Added to every date of the log.
 
@@ -133,7 +133,7 @@ class Clock:
     dates_put_right
         Number of times whose date was a day off at midnight.
     now_ns
-        Last time told [ns since the epoch]; None before the first.
+        Last time stated [ns since the epoch]; None before the first.
     """
 
     def __init__(self, near_ns: int | None, *, shift_days: int = 0) -> None:
@@ -153,7 +153,7 @@ class Clock:
         Raises
         ------
         NoValue
-            If nothing tells the date, or a time without a fix does not go on
+            If nothing states the date, or a time without a fix does not go on
             from the last one.
         """
         if moment.day is None:

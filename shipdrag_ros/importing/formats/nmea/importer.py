@@ -10,7 +10,7 @@ is attached, if it is not too long, so that nothing is lost.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -39,6 +39,7 @@ from shipdrag_ros.importing.words import (
 )
 from shipdrag_ros.nmea.framing import Checksum
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import INPUTS, Channel
 
 LOG_ATTACHMENT = 'log.nmea'
@@ -62,7 +63,7 @@ class NmeaResult:
     not_taken
         By input, values of the sentences that it is not taken from.
     not_used
-        Sentences that tell no input and no time, by address.
+        Sentences that state no input and no time, by address.
     unknown_talkers
         Sentences by talker, where NMEA 0183 knows none of the name.
     rejected
@@ -172,7 +173,7 @@ def import_nmea(
     transducer_m: float | None = None,
     checksum: Checksum = Checksum.REQUIRED,
     attachments: Mapping[str, str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: PartDone | None = None,
 ) -> NmeaResult:
     """
     Write the measurements of a log as a bag.
@@ -189,13 +190,13 @@ def import_nmea(
         away from it, the dates are shifted.
     transducer_m
         Depth of the echo sounder below the surface [m], for sentences that
-        do not tell it.
+        do not state it.
     checksum
         Whether sentences without one are taken.
     attachments
         Text by name, a ship file for instance.
     progress
-        Told how much is read, and of how much.
+        Called with how much is read, and of how much.
 
     Raises
     ------
@@ -206,7 +207,7 @@ def import_nmea(
 
     Notes
     -----
-    The log is read twice: first to see who tells what. Each input is taken
+    The log is read twice: first to see who sends what. Each input is taken
     from one talker and sentence, the first in `READERS` of those that have at
     least half as many values as the most frequent; two instruments of
     different place or scale are never mixed.
@@ -237,9 +238,7 @@ def import_nmea(
     return result
 
 
-def _part(
-    progress: Callable[[int, int], None] | None, part: int
-) -> Callable[[int, int], None] | None:
+def _part(progress: PartDone | None, part: int) -> PartDone | None:
     """Return the progress of one of two readings."""
     if progress is None:
         return None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import datetime
 from fractions import Fraction
 from io import BufferedReader, TextIOWrapper
@@ -20,6 +20,7 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.bag import LIMIT_NS, Rejected
 from shipdrag_ros.importing.opened import check_unpacked, opened
 from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
 
 _UTF_16 = (b'\xff\xfe', b'\xfe\xff')
@@ -96,14 +97,14 @@ class NmeaLog:
             except (EOFError, OSError, zlib.error, UnicodeDecodeError):
                 return None
 
-    def sentences(self, progress: Callable[[int, int], None] | None = None) -> Iterator[Sentence]:
+    def sentences(self, progress: PartDone | None = None) -> Iterator[Sentence]:
         """
         Yield the sentences in the order of the log.
 
         Parameters
         ----------
         progress
-            Told how many bytes are read, and of how many.
+            Called with how many bytes are read, and of how many.
         """
         self.rejected = {}
         self.damage = ''
@@ -167,7 +168,7 @@ class NmeaLog:
 
 
 def _receive_ns(prefix: str) -> int | None:
-    """Return the time before a sentence [ns]; ValueError tells why there is none."""
+    """Return the time before a sentence [ns]; ValueError says why there is none."""
     if _TAGS.fullmatch(prefix):
         tags = _TAG.findall(prefix)
         if any(calc_checksum(content) != checksum.upper() for content, checksum in tags):

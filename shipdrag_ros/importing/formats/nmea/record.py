@@ -2,7 +2,7 @@
 """
 Sentences of NMEA 0183 to samples with a time, in their order.
 
-A sample whose sentence tells no time waits until the next time is told.
+A sample whose sentence states no time waits until the next time is stated.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from shipdrag_ros.importing.bag import Rejected
-from shipdrag_ros.importing.formats.nmea.clock import GAP_NS, Clock, SentenceTime
+from shipdrag_ros.importing.formats.nmea.clock import GAP_NS, SentenceClock, SentenceTime
 from shipdrag_ros.nmea.framing import Sentence
 from shipdrag_ros.nmea.sentences import (
     TIMED,
@@ -30,7 +30,7 @@ _GAP = 'in a gap of the time'
 
 @dataclass
 class _Waiting:
-    """A sample; its time is None until the next time is told."""
+    """A sample; its time is None until the next time is stated."""
 
     channel: Channel
     value: MeasuredValue
@@ -65,7 +65,7 @@ class SentenceConverter:
     """
 
     chosen: Mapping[Channel, SentenceSource]
-    clock: Clock
+    clock: SentenceClock
     mounting: Mounting
     written: Counter[str] = field(default_factory=Counter)
     rejected: dict[str, dict[str, Rejected]] = field(default_factory=dict)
@@ -115,7 +115,7 @@ class SentenceConverter:
         return Block.of_samples(samples)
 
     def _time(self, sentence: Sentence) -> int | None:
-        """Return the time of a sentence, None if only the next one tells; NoValue if none."""
+        """Return the time of a sentence, None if only the next one states it; NoValue if none."""
         fields = Fields(sentence.kind, sentence.fields) if sentence.kind in TIMED else None
         if fields is None or not fields['time']:
             return self.clock.since(sentence.receive_ns)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Who tells what in a log of NMEA 0183, before anything is taken from it.
+Who sends what in a log of NMEA 0183, before anything is taken from it.
 
-Several instruments, and several sentences of one, may tell the same input.
+Several instruments, and several sentences of one, may hold the same input.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from datetime import date
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.formats.nmea.clock import (
     DAY_NS,
-    Clock,
+    SentenceClock,
     SentenceTime,
     days_of,
     rollover_days,
@@ -27,7 +27,7 @@ from shipdrag_ros.samples import Channel
 
 class Survey:
     """
-    Sees who tells what, and on which day.
+    Sees who sends what, and on which day.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Survey:
         """
         return {channel: best(counts) for channel, counts in self.values.items()}
 
-    def clock(self, log: NmeaLog, day: date | None) -> Clock:
+    def clock(self, log: NmeaLog, day: date | None) -> SentenceClock:
         """
         Return the clock at the start of the log.
 
@@ -88,7 +88,7 @@ class Survey:
         Raises
         ------
         ImportDataError
-            If there is no sentence, or nothing tells time and date.
+            If there is no sentence, or nothing states time and date.
         """
         name = repr(str(log.path))
         if not self.addresses:
@@ -113,18 +113,18 @@ class Survey:
                     )
                 shift_days = shifted
             near_ns = (self._first.day + shift_days) * DAY_NS + self._first.of_day_ns
-            return Clock(near_ns, shift_days=shift_days)
+            return SentenceClock(near_ns, shift_days=shift_days)
         if day is not None:
-            return Clock(days_of(day) * DAY_NS + DAY_NS // 2 - 1)  # noon: of the whole day
+            return SentenceClock(days_of(day) * DAY_NS + DAY_NS // 2 - 1)  # noon: of the whole day
         if self._received:
-            return Clock(None)
+            return SentenceClock(None)
         if self._timed:
             raise ImportDataError(
-                f'{name} tells times of day, but no date (no RMC or ZDA with a fix and a date); '
+                f'{name} has times of day, but no date (no RMC or ZDA with a fix and a date); '
                 'give --date YYYY-MM-DD of its first time, in UTC'
             )
         raise ImportDataError(
-            f'{name} tells no time: it has none of {", ".join(TIMED)} with a time, and no time '
+            f'{name} states no time: it has none of {", ".join(TIMED)} with a time, and no time '
             'of receipt before its lines'
         )
 

@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Compute and tell.
+    Compute and show it.
     """
     output = Output(options.json)
     cable = Cable(options.length, options.diameter, options.drag)

@@ -15,7 +15,13 @@ from shipdrag_ros.report.document import write_page
 from shipdrag_ros.report.drawing import picture
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.fit import ResidualFit, leave_hulls_out
-from shipdrag_ros.studies.residual.words import coefficients, domain, sentence, technical
+from shipdrag_ros.studies.residual.words import (
+    coefficients,
+    domain,
+    sentence,
+    technical,
+    what_it_is,
+)
 from shipdrag_ros.studies.surface.face import pictures as fit_pictures
 
 _NOTES = 'What these data can and cannot show'
@@ -56,7 +62,8 @@ def write_residual(
     pictures = [
         picture(
             fit_pictures.residual_picture(fitted, values, target),
-            'What the form leaves of its own data.',
+            'What the form leaves of its own data, a dot a row. Good: dots on both sides of the '
+            'line everywhere; a bow or a slope shows a term that the form lacks.',
         )
     ]
     error, _, leverage = leave_hulls_out(found.form, found.hulls, values)
@@ -64,12 +71,13 @@ def write_residual(
         pictures.append(
             picture(
                 fit_pictures.left_out_picture(error, leverage, target),
-                'Each hull foretold from the others: the error to expect of a new one, within '
-                'the leverages of the data and beyond.',
+                'Each hull foretold from the others, so the error to expect of a new one. To the '
+                'right of 1 a hull is more unusual (leverage) than any of the others: there the '
+                'form goes beyond its data, and its predictions are marked as not to be used.',
             )
         )
     shown = [
-        Section(text=(technical(found),)),
+        Section(text=(technical(found), what_it_is(target))),
         Section(_NOTES if found.notes else '', lines=found.notes),
         Section(pictures=pictures, tables=tables),
     ]

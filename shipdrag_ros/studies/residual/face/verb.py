@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Fit, predict and tell.
+    Fit, predict and show it.
     """
     output = Output(options.json)
     if (options.ship is None) != (options.write is None):

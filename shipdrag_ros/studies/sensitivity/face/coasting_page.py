@@ -38,8 +38,9 @@ def write_coasting(path: Path, found: CoastStudy) -> None:
             'What a wrong value is taken for',
             picture(
                 pictures.mimic_picture(found),
-                'What is left of each effect when the value that looks most like it is blamed: 0, '
-                'no record tells the two apart.',
+                'What is left of each effect when the value beside its bar is blamed for it. A '
+                'short bar: a ship file that is so far wrong is taken for the effect, and no '
+                'record separates the two; a long bar: the effect looks like nothing else.',
             ),
             words.MIMICS,
             words.mimic_table(found),

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION
 from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
+from shipdrag_ros.studies.manoeuvring.ship import meaning
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.steering import Experiment, SteeringStudy
 
@@ -23,33 +24,33 @@ def ranking_picture(found: SteeringStudy) -> Figure:
     Draw the mean losses of all derivatives, the largest first.
     """
     losses, order = found.losses, found.losses.ranking
-    places = np.arange(len(order))
+    places = np.arange(len(order))[::-1]
     chosen = [losses.names.index(name) for name in order]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 3.8), layout='constrained')
+        figure = Figure(figsize=(9.0, 0.8 + 0.2 * len(order)), layout='constrained')
         axis = figure.subplots()
         count = len(found.selection.kept)
         for part, color, label in (
             (slice(0, count), BLUE, 'kept'),
             (slice(count, None), _PALE, 'set to 0'),
         ):
-            axis.bar(places[part], losses.mean[chosen][part], color=color, label=label)
+            axis.barh(places[part], losses.mean[chosen][part], color=color, label=label)
         axis.plot(
-            places,
             found.mean_norms.mean[chosen],
+            places,
             linestyle='none',
-            marker='_',
+            marker='|',
             color=VERMILION,
             label='by the mean norm',
         )
         if found.selection.threshold > 0.0:
-            axis.axhline(found.selection.threshold, color='#555555', linewidth=0.8)
-        axis.set_yscale('log')
-        axis.set_xticks(places, order, rotation=90)
-        axis.set_xlim(-0.7, len(order) - 0.3)
-        axis.set_ylabel('mean loss [-]')
-        axis.grid(visible=False, axis='x')
-        axis.legend(loc='upper right')
+            axis.axvline(found.selection.threshold, color='#555555', linewidth=0.8)
+        axis.set_xscale('log')
+        axis.set_yticks(places, [f'{meaning(name)}  {name}' for name in order], fontsize=8)
+        axis.set_ylim(-0.7, len(order) - 0.3)
+        axis.set_xlabel('mean loss [of the speed: 0.1 is a tenth]')
+        axis.grid(visible=False, axis='y')
+        axis.legend(loc='lower right')
     return figure
 
 
@@ -70,9 +71,9 @@ def check_picture(found: SteeringStudy) -> Figure:
         for motion, label, color, style in lines:
             for axis, name, values in (
                 (axes[0, 0], 'heading [deg]', np.degrees(motion.heading_rad)),
-                (axes[0, 1], 'r [deg/s]', np.degrees(motion.yaw_rate_rad_s)),
-                (axes[1, 0], 'u [m/s]', motion.surge_m_s),
-                (axes[1, 1], 'v [m/s]', motion.sway_m_s),
+                (axes[0, 1], 'yaw rate r [deg/s]', np.degrees(motion.yaw_rate_rad_s)),
+                (axes[1, 0], 'speed ahead u [m/s]', motion.surge_m_s),
+                (axes[1, 1], 'sway v [m/s]', motion.sway_m_s),
             ):
                 axis.plot(motion.time_s, values, color=color, linestyle=style, label=label)
                 axis.set_ylabel(name)
@@ -104,7 +105,9 @@ def design_picture(shown: Experiment) -> Figure:
         )
         axis.set_xticks(np.arange(len(shown.names)), shown.names, rotation=90)
         axis.set_yticks(np.arange(len(manoeuvres)), manoeuvres)
-        figure.colorbar(image, label='loss of 10 %; dot: most')
+        axis.set_xlabel('derivative')
+        axis.set_ylabel('manoeuvre')
+        figure.colorbar(image, label='loss of 10 %\n[of the speed]')
     return figure
 
 
@@ -153,6 +156,6 @@ def mimic_picture(found: CoastStudy) -> Figure:
         axis.set_yticks(places, [mimic.effect.name for mimic in found.mimics])
         axis.set_xlim(0.0, 1.5)
         axis.set_xticks([0.0, 0.25, 0.5, 0.75, 1.0])
-        axis.set_xlabel('part of the effect that is left')
+        axis.set_xlabel('part of the effect that is left [1]')
         axis.grid(visible=False, axis='y')
     return figure

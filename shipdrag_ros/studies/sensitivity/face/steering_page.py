@@ -35,8 +35,9 @@ def write_steering(path: Path, found: SteeringStudy, shown: Experiment) -> None:
             'How much each matters',
             picture(
                 pictures.ranking_picture(found),
-                'How much the motion changes when a derivative is wrong: the taller the bar, the '
-                'better it must be known. Bars below the line may be left out of the model.',
+                'How much the motion changes when a derivative is wrong: the longer the bar, the '
+                'better it must be known. Pale bars, short of the line, may be left out of the '
+                'model.',
             ),
             words.LOSSES,
             words.loss_table(found),
@@ -52,7 +53,7 @@ def write_steering(path: Path, found: SteeringStudy, shown: Experiment) -> None:
             picture(
                 pictures.design_picture(shown),
                 'Loss of 10 per cent of each derivative in each manoeuvre: the darker, the better '
-                'it is seen.',
+                'it is seen. Dot: the manoeuvre that shows it best.',
             ),
             words.DESIGN,
             words.design_table(shown),

@@ -31,15 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.description = (
-        'Change one number of a model at a time, by 10 and 50 per cent up and down, and tell how '
+        'Change one number of a model at a time, by 10 and 50 per cent up and down, and show how '
         'far the motion moves: root mean square of its differences. With a manoeuvring model: '
         'which derivatives matter in a zigzag or a turning circle, a check of the model without '
         'the others, and which manoeuvre shows which derivative. With a ship file: which of its '
-        'values must be known well for a coastdown to be told right, and which effect a wrong '
+        'values must be known well for a coastdown to be judged right, and which effect a wrong '
         'one is taken for.'
     )
     subject = parser.add_mutually_exclusive_group()
-    # without a default of argparse, which would not tell that both are given
+    # without a default of argparse, which would not say that both are given
     subject.add_argument(
         '--model', choices=list(_MODELS), help=f'manoeuvring model (default: {_MODEL})'
     )
@@ -66,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Analyse and tell.
+    Analyse and show it.
     """
     output = Output(options.json)
     if options.ship is None:

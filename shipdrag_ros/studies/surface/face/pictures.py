@@ -6,7 +6,7 @@ from __future__ import annotations
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter, ScalarFormatter
 
 from shipdrag_ros.regression import Surface
 from shipdrag_ros.report.drawing import BLUE, STYLE, VERMILION
@@ -86,7 +86,9 @@ def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
         )
         axis.axvline(1.0, color='#777777', linestyle='--')
         axis.axhline(0.0, color='#777777', linewidth=1.0)
-        axis.set_xlabel('leverage over the largest of the other hulls')
+        axis.set_xlabel('leverage over the largest of the other hulls [1]')
+        axis.xaxis.set_major_formatter(ScalarFormatter())
+        axis.xaxis.set_minor_formatter(NullFormatter())
         axis.set_ylabel(f'{target}, foretold - measured')
         axis.legend()
     return figure

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """
-    Fit and tell.
+    Fit and show it.
     """
     output = Output(options.json)
     inputs, target = options.inputs, options.target

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Rows of measurements along one direction, whitened.
+
+The noise is that of the steady record before the stop, colour included: what a
+coastdown leaves over a fit would hold the very effect that is sought.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.inference.learning import learn, of_steady
+from shipdrag_ros.inference.noise import WHITE, Noise, whiten
+from shipdrag_ros.inference.rows import LOG, Rows
+from shipdrag_ros.inference.settings import noise_of
+from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.ship import Ship
+
+
+@dataclass(frozen=True)
+class Measured:
+    """
+    Rows along one direction, in ascending time.
+
+    Attributes
+    ----------
+    at : (n,)
+        Places of the rows in the times of the observation.
+    rows
+        `POSITION` rows are distances along the direction [m].
+    whitener : (n, n)
+        Inverse Cholesky factor of the noise covariance.
+    water_m_s
+        Slow motion of the water that the whitener takes for noise: by how much
+        log and way over ground wander apart in the steady record.
+    """
+
+    at: Int64
+    rows: Rows
+    whitener: Float64
+    water_m_s: float
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
+@dataclass(frozen=True)
+class CondensedRows:
+    """
+    Means of the samples of one input over times in which the motion is even.
+
+    Attributes
+    ----------
+    time_s, value, variance : (n,)
+    kind
+        Of `inference.rows.CODES`.
+    """
+
+    time_s: Float64
+    kind: int
+    value: Float64
+    variance: Float64
+
+
+@dataclass(frozen=True)
+class SteadyNoise:
+    """
+    Whitens rows by the noise of their steady part.
+
+    Attributes
+    ----------
+    ship
+    speed_m_s
+        In the lead-in, roughly.
+    lead_in_s
+        Length of the steady part, the stop at its end.
+    margin_s
+        Before the stop, that is not learnt from.
+    """
+
+    ship: Ship
+    speed_m_s: float
+    lead_in_s: float
+    margin_s: float
+
+    def measured(self, parts: list[CondensedRows], times: Float64) -> Measured:
+        """
+        Put parts in the order of time, and learn their disturbances.
+
+        Parameters
+        ----------
+        parts
+            Of one direction.
+        times : (m,)
+            Of all rows of the observation, ascending [s].
+        """
+        time = np.concatenate([part.time_s for part in parts])
+        order = np.argsort(time, kind='stable')
+        kind = np.concatenate([np.full(len(part.time_s), part.kind) for part in parts])[order]
+        value = np.concatenate([part.value for part in parts])[order]
+        variance = np.concatenate([part.variance for part in parts])[order]
+        time = time[order]
+        rows = Rows(time, kind.astype(np.int64), value)
+        steady = time < self.lead_in_s - self.margin_s
+        damping, inertia = damping_of(self.ship, np.array([self.speed_m_s]))
+        seen = of_steady(
+            Rows(time[steady], rows.kind[steady], value[steady]),
+            variance[steady],
+            float(damping[0]),
+            float(inertia[0]),
+        )
+        # the engine damps the steady record; behind the stop the hull does
+        learnt = learn(seen, self.speed_m_s).typical
+        # the ship slows down about as v0 / (1 + t / t0)
+        after = np.maximum(time - self.lead_in_s, 0.0)
+        speed = self.speed_m_s / (1.0 + 0.5 * float(damping[0]) * after)
+        whitener = np.eye(len(time))
+        white = Noise(variance, WHITE, *damping_of(self.ship, speed))
+        noise = noise_of(learnt, 0, rows, white, int(np.searchsorted(time, self.lead_in_s)))
+        whiten(rows, whitener, noise)
+        return Measured(
+            np.searchsorted(times, time),
+            rows,
+            np.ascontiguousarray(whitener.T),
+            # without a log it is not told from a gust
+            noise.slow.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
+        )
+
+
+def damping_of(ship: Ship, speed_m_s: Float64) -> tuple[Float64, Float64]:
+    """
+    Return how a ship's speed answers a small force.
+
+    Parameters
+    ----------
+    ship
+        With a baseline.
+    speed_m_s : (n,)
+        Through water.
+
+    Returns
+    -------
+    damping_1_s, inertia : (n,)
+        dr/dv / (1 + n_r) and 1 + n_r of the baseline.
+    """
+    low, high = ship.baseline_range_m_s
+    speed = np.clip(speed_m_s, max(low, 1e-3 * high), high)
+    step = 1e-3 * speed
+    above, below = np.minimum(speed + step, high), np.maximum(speed - step, low)
+    rise = ship.resistance_n(above) - ship.resistance_n(below)
+    inertia = 1.0 + ship.n_r(speed)
+    damping = np.maximum(rise / (above - below), 0.0) / (ship.mass_kg * inertia)
+    return np.maximum(damping, 1e-6), inertia
