@@ -24,7 +24,7 @@ from shipdrag_ros.estimation.ode_fit.coast import (
     predict,
 )
 from shipdrag_ros.estimation.ode_fit.condensing import means
-from shipdrag_ros.estimation.ode_fit.families import FIRST, POWERS, Humps
+from shipdrag_ros.estimation.ode_fit.families import FIRST, PLAIN, POWERS, Humps
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.law import Law
@@ -40,6 +40,9 @@ from shipdrag_ros.ship import Ship
 
 _STEPS = 72  # of the integration, longer as the ship slows down
 _ITERATIONS = 30
+# Of a shorter coast the errors that go over in seconds look like powers of the speed: four of
+# them run away at its ends, and with them r at the top, by which the slow noise is scaled.
+_SHORT_S = 60.0
 _SCALE_SD = 0.02  # of a log's scale, before the fit
 _LAG_S, _LAG_SD_S = 0.0, 6.0  # of a log behind other inputs, by its filter
 
@@ -66,7 +69,7 @@ class Problem:
     guess
         Where the first fit starts.
     first
-        Law of the first fit.
+        Law of the first fit: four powers, two of a short coast.
     humps
         Where humps may be.
     extras
@@ -115,6 +118,7 @@ class Problem:
         grid = typical * np.expm1(np.linspace(0.0, math.log1p(end / typical), _STEPS + 1))
         ones = np.ones(len(variance))
         v_ref = guess.speed_m_s
+        powers = FIRST if float(np.ptp(coast.time_s)) > _SHORT_S else PLAIN
         return cls(
             rows,
             len(steady.time_s),
@@ -123,7 +127,7 @@ class Problem:
             SENSORS_ALONE,
             run_down,
             guess,
-            Law(np.array(FIRST, np.int64), v_ref, run_down.shaft_s, ship.n_r_polynomial()),
+            Law(np.array(powers, np.int64), v_ref, run_down.shaft_s, ship.n_r_polynomial()),
             Humps.between(guess.lowest, float(ship.froude(v_ref))),
             tuple(extras),
         )
@@ -235,7 +239,7 @@ class Problem:
         """
         size = self.first.size
         unknowns = np.zeros(size + EXTRAS)
-        unknowns[FIRST.index(2)] = self._unit_m_s2
+        unknowns[self.first.powers.tolist().index(2)] = self._unit_m_s2
         unknowns[size + V0] = self.guess.speed_m_s
         for extra, mean, _ in self.run_down.priors:
             unknowns[size + extra] = mean
@@ -273,7 +277,7 @@ class Problem:
         )
         start = np.zeros(law.size + EXTRAS)
         start[law.size :] = first.unknowns[first.law.size :]
-        for power, coefficient in zip(FIRST, first.unknowns):
+        for power, coefficient in zip(first.law.powers, first.unknowns):
             start[POWERS.index(power)] = coefficient
         return FittedMotion(law, start, np.zeros((len(start), len(start))))
 
