@@ -74,6 +74,7 @@ _domain, _lock = _own_domain()
 os.environ['ROS_DOMAIN_ID'] = str(_domain)
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_PYTHON_CHECK_FIELDS'] = '1'
+gc.disable()  # what is imported and collected stays
 
 
 @pytest.fixture(scope='session')
@@ -86,6 +87,7 @@ def pytest_collection_finish() -> None:
     """Let the collector of garbage look no more at half a million things that stay."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

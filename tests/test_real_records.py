@@ -18,6 +18,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / 'docs' / 'real_records.md').read_text(encoding='utf-8')
 COMMANDS = re.findall(r'^ +(shipdrag (?:import|replay) .*)$', PAGE, flags=re.MULTILINE)
+SPANS = re.findall(r'`(shipdrag (?:import|replay|diagnose) \S[^`]*)`', PAGE)
 ROWS = {
     cells[0]: cells[1:]
     for line in PAGE.splitlines()
@@ -72,6 +73,9 @@ def test_the_page_shows_the_commands_of_the_script(script: ModuleType) -> None:
     assert len(COMMANDS) == 10
     assert set(COMMANDS) <= known
     assert list(ROWS) == [record.name for record in script.RECORDS]
+    known |= {line for both in loaded('real_diagnosis').RECORDS.values() for line in both}
+    assert len(SPANS) == 3
+    assert {line.replace('log.mcap', 'yacht.mcap') for line in SPANS} <= known
 
 
 def test_without_the_records_the_script_says_so(

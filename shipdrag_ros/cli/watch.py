@@ -107,13 +107,18 @@ def run(options: argparse.Namespace) -> int:
             output.log(note)
         name, port = page_socket.getsockname()[:2]
         shown = f'[{name}]' if ':' in name else name
-        output.say(f'the page: http://{shown}:{port}/')
-        if deltas is not None:
-            output.say(f'Signal K deltas: tcp://{LOOPBACK}:{deltas.getsockname()[1]}')
-        if token is not None:
-            output.log('a viewer gives the token once; there is no encryption, see docs/bridge.md')
-        output.log('Ctrl-C ends it; the node is not touched')
-        serve(page, [page_socket], deltas=deltas)
+
+        def announce() -> None:
+            output.say(f'the page: http://{shown}:{port}/')
+            if deltas is not None:
+                output.say(f'Signal K deltas: tcp://{LOOPBACK}:{deltas.getsockname()[1]}')
+            if token is not None:
+                output.log(
+                    'a viewer gives the token once; there is no encryption, see docs/bridge.md'
+                )
+            output.log('Ctrl-C ends it; the node is not touched')
+
+        serve(page, [page_socket], deltas=deltas, ready=announce)
     return 0
 
 

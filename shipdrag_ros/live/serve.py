@@ -8,7 +8,7 @@ import resource
 import signal
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import uvicorn
@@ -49,6 +49,15 @@ def listen(address: str, port: int) -> socket.socket:
 
 
 class _Server(uvicorn.Server):
+    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._ready = ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begin to answer; signals are captured by now."""
+        await super().startup(sockets)
+        self._ready()
+
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
         """End on SIGINT and SIGTERM, and return to whoever called."""
@@ -70,6 +79,7 @@ def serve(
     *,
     deltas: socket.socket | None = None,
     until: threading.Event | None = None,
+    ready: Callable[[], None] = lambda: None,
 ) -> None:
     """
     Serve until a signal.
@@ -82,6 +92,8 @@ def serve(
         The same for Signal K; None for none.
     until
         Ends it too, for a caller in another thread.
+    ready
+        Called once it answers, and a signal ends it in order.
     """
     _allow_files()
     config = uvicorn.Config(
@@ -94,7 +106,7 @@ def serve(
         timeout_graceful_shutdown=_GOODBYE_S,
         timeout_keep_alive=5,
     )
-    server = _Server(config)
+    server = _Server(config, ready)
 
     async def run() -> None:
         sending = None

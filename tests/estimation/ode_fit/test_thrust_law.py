@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[3] / 'benchmarks'))
 
 from thrust_law import CARGO, CASES, LAWS, YACHT, Hull, score
 
-RUNS = 10  # seeds 0..9
+RUNS = 5  # seeds 0..4
 SHAFT, WITHOUT, DOUBLED = 0, 2, 3  # of CASES
 
 
@@ -25,7 +25,7 @@ def test_a_shaft_never_makes_r_worse(hull: Hull, rmse: float) -> None:
     )
     squares = [np.mean([one.rmse**2 for one in each]) for each in (seen, unseen)]
     assert np.sqrt(squares[0]) < rmse
-    # ten seeds scatter by about a tenth
+    # five seeds scatter by about a seventh
     assert squares[0] < 1.3 * squares[1]
     assert np.mean([one.covered for one in seen]) > 0.88
     assert all(one.failed == 0 for one in seen)

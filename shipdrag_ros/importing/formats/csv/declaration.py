@@ -12,7 +12,7 @@ from shipdrag_ros.importing.formats.csv.columns import SPEED_UNITS, parse_input,
 from shipdrag_ros.importing.formats.csv.dates import ORDERS, zone_of
 from shipdrag_ros.importing.formats.csv.first_rows import FirstRows
 from shipdrag_ros.importing.formats.csv.guess import Guess, guess, is_table
-from shipdrag_ros.importing.formats.csv.guess_time import time_column, with_dates
+from shipdrag_ros.importing.formats.csv.guess_time import guessed_time, with_dates
 from shipdrag_ros.importing.formats.csv.importer import TableColumns, import_csv
 from shipdrag_ros.importing.formats.csv.names import role_and_unit
 from shipdrag_ros.importing.formats.csv.result import TableResult
@@ -58,7 +58,7 @@ def _inputs(table: LogTable, time: Any, options: Any) -> Guess:
     if time is None and not counted:
         if table.header is None:
             raise ImportDataError('the times of the rows: give --time COLUMN[:unit] or --rate HZ')
-        found.time = time_column(FirstRows(table), found.notes)
+        found.time = guessed_time(FirstRows(table), found.notes)
     return found
 
 

@@ -28,7 +28,7 @@ from shipdrag_ros.importing.formats.csv.columns import (
     columns_of,
 )
 from shipdrag_ros.importing.formats.csv.first_rows import FirstRows, NamedColumn, coordinates
-from shipdrag_ros.importing.formats.csv.guess_time import seconds, time_column
+from shipdrag_ros.importing.formats.csv.guess_time import guessed_time, row_seconds
 from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.samples import MOTION_INPUTS, Float64
 
@@ -102,7 +102,7 @@ def guess(
     rows = FirstRows(table)
     made = _Guesser(rows, speed_unit)
     if time is None and not counted:
-        time = time_column(rows, made.found.notes)
+        time = guessed_time(rows, made.found.notes)
     made.found.time = time
     if made.is_plain():
         made.plain()
@@ -191,7 +191,7 @@ class _Guesser:
     def _position(self, time: TimeColumn | None) -> None:
         latitude, longitude = self._one('lat'), self._one('lon')
         x, y = self._one('x'), self._one('y')
-        time_s = seconds(self._rows, time)
+        time_s = row_seconds(self._rows, time)
         if latitude is not None and longitude is not None:
             for unit in (latitude.unit, longitude.unit):
                 if unit in _NO_COORDINATES:

@@ -21,7 +21,7 @@ _DAYS = 20_000.0  # a spreadsheet's count of days, from 1954 on
 _QUICK_S = 0.002  # of rows a day apart by that, 86400 / 500 s
 
 
-def time_column(rows: FirstRows, notes: list[str]) -> TimeColumn:
+def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
     """
     Find the column of the time; how it is known goes to the notes.
 
@@ -94,7 +94,7 @@ def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColu
     return TimeColumn((column.key,), NANOSECONDS['s'])
 
 
-def seconds(rows: FirstRows, time: TimeColumn | None) -> Float64 | None:
+def row_seconds(rows: FirstRows, time: TimeColumn | None) -> Float64 | None:
     """
     Return (n,) times of the first rows from the first one [s], NaN where there is none.
     """
