@@ -64,6 +64,27 @@ class _Plan:
 
 
 @dataclass(frozen=True)
+class _Predictions:
+    """What all columns of a simulation predict of a run: as `Predicted`, a line a column."""
+
+    along: Float64
+    across: Float64
+    speed: Float64
+    over_ground: Float64
+    distance: Float64
+
+    def of(self, column: int) -> Predicted:
+        """Return what one column predicts."""
+        return Predicted(
+            self.along[column],
+            self.across[column],
+            self.speed[column],
+            self.over_ground[column],
+            self.distance[column],
+        )
+
+
+@dataclass(frozen=True)
 class CoastSimulation:
     """
     Runs, and the simulation of hypotheses about them.
@@ -163,12 +184,8 @@ class CoastSimulation:
                 batch.add(whole + more, speed)
             columns = self._simulate(j, batch)
             context = seen.context.predict(columns, batch.actions)
-            rows = np.array(
-                [
-                    np.concatenate([each.along, each.across, of_context])
-                    for each, of_context in zip(_predicted(seen, columns), context, strict=True)
-                ]
-            )
+            predicted = _predicted(seen, columns)
+            rows = np.hstack([predicted.along, predicted.across, context])
             change = rows[1:] - rows[0]
             change[~np.isfinite(change).all(axis=1)] = 0.0
             found.append(self._whitened(j, change))
@@ -193,7 +210,7 @@ class CoastSimulation:
         batch = _Batch()
         plan = self._plan(run, linear.hypothesis, linear.z, batch)
         columns = self._simulate(run, batch)
-        return _predicted(self.seen[run], columns)[plan.base]
+        return _predicted(self.seen[run], columns).of(plan.base)
 
     def _simulate(self, run: int, batch: _Batch) -> Columns:
         frame = self.frames[run]
@@ -273,11 +290,11 @@ class CoastSimulation:
         hypothesis: Hypothesis,
         z: Float64,
         plan: _Plan,
-        predicted: list[Predicted],
+        predicted: _Predictions,
         context: Float64,
     ) -> tuple[Float64, Float64]:
         """Return whitened rows, and the residual as it is."""
-        seen, base = self.seen[run], predicted[plan.base]
+        seen, base = self.seen[run], predicted.of(plan.base)
         n = len(seen.along)
         k = 0 if seen.across is None else len(seen.across)
         table = np.zeros((1 + len(z), n + k + len(seen.context)))
@@ -285,21 +302,23 @@ class CoastSimulation:
         if seen.across is not None:
             table[0, n : n + k] = seen.across.rows.value - base.across
         table[0, n + k :] = seen.context.value - context[plan.base]
-        for unknown, column, step in plan.steps:
-            table[1 + unknown, :n] = (predicted[column].along - base.along) / step
-            table[1 + unknown, n : n + k] = (predicted[column].across - base.across) / step
-            table[1 + unknown, n + k :] = (context[column] - context[plan.base]) / step
+        at = [1 + unknown for unknown, _, _ in plan.steps]
+        column = [column for _, column, _ in plan.steps]
+        step = np.array([step for _, _, step in plan.steps])[:, None]
+        table[at, :n] = (predicted.along[column] - base.along) / step
+        table[at, n : n + k] = (predicted.across[column] - base.across) / step
+        table[at, n + k :] = (context[column] - context[plan.base]) / step
         added = [term.columns(seen, run, base) for term in hypothesis.measurement_terms]
         for error, other in zip(hypothesis.model_errors, plan.without):
-            trace = base.along - predicted[other].along, base.across - predicted[other].across
+            trace = base.along - predicted.along[other], base.across - predicted.across[other]
             added.append(error.columns(seen, trace))
         behind = hypothesis.parts[len(hypothesis.terms) :]
         for (part, place), (along, across) in zip(behind, added, strict=True):
             for i, of_part in enumerate(part.unknowns):
-                at = place + i
-                table[1 + at, :n], table[1 + at, n : n + k] = along[i], across[i]
-                table[0] -= table[1 + at] * of_part.prior.at(z[at])
-                table[1 + at] *= of_part.prior.slope(z[at])
+                of_unknown = table[1 + place + i]
+                of_unknown[:n], of_unknown[n : n + k] = along[i], across[i]
+                table[0] -= of_unknown * of_part.prior.at(z[place + i])
+                of_unknown *= of_part.prior.slope(z[place + i])
         residual = table[0].copy()
         return self._whitened(run, table), residual
 
@@ -327,7 +346,7 @@ def _known(hypothesis: Hypothesis) -> list[int]:
     ]
 
 
-def _predicted(seen: Observation, columns: Columns) -> list[Predicted]:
+def _predicted(seen: Observation, columns: Columns) -> _Predictions:
     """Return what each column predicts of the rows."""
     cos, sin = math.cos(seen.heading_rad), math.sin(seen.heading_rad)
     place, velocity = columns.radar_position_m, columns.velocity_over_ground_m_s
@@ -339,7 +358,4 @@ def _predicted(seen: Observation, columns: Columns) -> list[Predicted]:
     along[:, kind == LOG] = columns.log_m_s[:, at[kind == LOG]]
     along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
     across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
-    speed = columns.speed_through_water_m_s
-    return [
-        Predicted(along[i], across[i], speed[i], ground[i], ahead[i]) for i in range(len(along))
-    ]
+    return _Predictions(along, across, columns.speed_through_water_m_s, ground, ahead)
