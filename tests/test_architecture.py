@@ -138,6 +138,13 @@ def test_every_room_has_a_floor() -> None:
     assert rooms <= set(FLOORS), f'give {rooms - set(FLOORS)} a floor'
 
 
+def test_the_picture_shows_every_room() -> None:
+    shown = (ROOT / 'docs' / 'architecture.md').read_text(encoding='utf-8').split('```')[1]
+    names = set(re.findall(r'\w+/|\w+\.py', shown))
+    wanted = {room.rpartition('.')[2] for room in FLOORS}
+    assert {room for room in wanted if not {f'{room}/', f'{room}.py'} & names} == set()
+
+
 def named(path: Path) -> Iterator[str]:
     """Yield the names of the classes and types that a source file makes."""
     for node in ast.parse(path.read_text()).body:

@@ -58,7 +58,7 @@ class SilenceMark:
 
 
 Mark = ResetMark | SilenceMark
-"""What the node learnt but by samples, and what a replay obeys at its place."""
+"""What the node learnt other than from samples, and what a replay obeys at its place."""
 
 
 @dataclass(frozen=True)

@@ -42,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='DIR_OR_URL',
         help='folder, or URL as s3://bucket/folder (the usual AWS variables say where and who): '
         'bags (MCAP, rosbag2, ROS 1), tables (.csv, .tsv) whose columns `shipdrag import` knows '
-        'without options, and logs of NMEA 0183, NMEA 2000, Signal K or GPX whatever their names',
+        'without options, and logs that `shipdrag import` knows by their first bytes, whatever '
+        'their names',
     )
     parser.add_argument(
         '-o', '--out', required=True, type=Path, metavar='STORE', help='folder; made if missing'

@@ -3,8 +3,8 @@
 The bags below folders: which files make up which, and what lies beside them.
 
 A bag is an MCAP file, a directory of rosbag2, or a log or table of a format that is
-imported. A file whose name does not say so is known by its first bytes: NMEA 2000,
-Signal K, GPX, or NMEA 0183 in a `.txt`. What is none of these is left alone.
+imported. A file whose name does not say so is known by its first bytes, where its
+format shows in them (`Format.by_head`). What is none of these is left alone.
 """
 
 from __future__ import annotations

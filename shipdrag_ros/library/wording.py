@@ -4,39 +4,44 @@ What is said in the words of the command line, said in those of Python.
 
 Estimation, diagnosis and importers say what to do as options of `shipdrag`, which
 is their usual face. A script has arguments for these; here is the one place that
-knows which.
+knows which. What a format of log files takes, the format declares.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from functools import wraps
+from functools import cache, wraps
 from typing import ParamSpec, TypeVar
 
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.importing import formats
 
 P = ParamSpec('P')
 R = TypeVar('R')
 
-_READ = {
-    'date',
-    'date-order',
-    'format',
-    'gear',
-    'no-checksum',
-    'speed-unit',
-    'transducer',
-    'where',
-    'zone',
-}
-"""Options of `shipdrag import` that `read` takes as `options`."""
+_ARGUMENTS = {'window', 'remap', 'ship', 'fact', 'map', 'time', 'rate'}
+"""Options that the functions take as arguments of their own."""
 _PLAIN = {'and', 'or', 'where', 'with', 'otherwise', 'chooses'}  # no value of an option
 _VALUE = r"((?:'[^']*'|,(?=\S)|[^\s;()'\"`,])+)"
-_OPTION = re.compile(
-    rf'--(window|remap|ship|fact|map|time|rate|{"|".join(sorted(_READ, reverse=True))})\b(?!-)'
-    rf'(?: START END|[ =](?!(?:{"|".join(sorted(_PLAIN))})\b){_VALUE})?'
-)
+
+
+@cache
+def _read() -> dict[str, bool]:
+    """Return the options that `read` takes as `options`, and whether each has a value."""
+    known = {'format': True}
+    for each in formats.found():
+        known |= {option.flag.lstrip('-'): bool(option.metavar) for option in each.options}
+    return {name: has_value for name, has_value in known.items() if name not in _ARGUMENTS}
+
+
+@cache
+def _option() -> re.Pattern[str]:
+    names = sorted({*_ARGUMENTS, *_read()}, reverse=True)  # the longer of two that begin alike
+    return re.compile(
+        rf'--({"|".join(map(re.escape, names))})\b(?!-)'
+        rf'(?: START END|[ =](?!(?:{"|".join(sorted(_PLAIN))})\b){_VALUE})?'
+    )
 
 
 def in_python(text: str) -> str:
@@ -55,7 +60,8 @@ def in_python(text: str) -> str:
     >>> in_python('say so with --window START END')
     'say so with window=(START, END)'
     """
-    return _OPTION.sub(_argument, text)
+    # without an option nothing of the formats need be known
+    return _option().sub(_argument, text) if '--' in text else text
 
 
 def _argument(found: re.Match[str]) -> str:
@@ -63,9 +69,9 @@ def _argument(found: re.Match[str]) -> str:
     value, end = _split(typed)
     if name == 'window':
         return 'window=(START, END)' + end
-    if name in _READ:
+    if name in _read():
         key = name.replace('-', '_')
-        shown = 'True' if name == 'no-checksum' else repr(value) if value else '...'
+        shown = (repr(value) if value else '...') if _read()[name] else 'True'
         return f'options={{{key!r}: {shown}}}{end}'
     if name == 'rate':
         return f'rate_hz={value or "HZ"}{end}'

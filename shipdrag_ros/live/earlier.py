@@ -90,7 +90,7 @@ def recorded_runs(folder: Path) -> Iterator[PastRun | str]:
     """
     Yield the coastdowns that nodes recorded in the bags of a folder, and why a bag gave none.
 
-    A folder that is not there is said: the node that makes it may start later.
+    A folder that is not there is noted: the node that makes it may start later.
 
     Raises
     ------

@@ -93,7 +93,7 @@ class Announcer:
 
     def inputs(self, states: Sequence[InputState]) -> None:
         """
-        Say of an input that was heard and is worse or better than before.
+        Report an input that was heard and is worse or better than before.
         """
         now_s = time.monotonic()
         for state in states:

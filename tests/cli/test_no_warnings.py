@@ -12,11 +12,11 @@ import pytest
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.cli import main
+from shipdrag_ros.parameters import ESTIMATORS
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 
 NOT_SHOWN = (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning)
 SHIP = 'name: Odd\nlength_m: 10.0\ndisplaced_volume_m3: 12.0\nadded_mass: {model: constant}\n'
-ESTIMATORS = ('auto', 'log_time', 'ode_fit', 's1_speed', 's1_joint', 's1_position')
 DATA = 'SHIPDRAG_DATA'
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,9 @@ import pandas as pd
 import pytest
 
 import shipdrag_ros as sd
+from shipdrag_ros.importing import formats
+from shipdrag_ros.importing.format import Option
+from shipdrag_ros.library import wording
 from shipdrag_ros.library.wording import in_python
 
 PACKAGE = Path(sd.__file__).parent
@@ -40,6 +44,27 @@ PACKAGE = Path(sd.__file__).parent
 )
 def test_options_become_arguments(typed: str, argument: str) -> None:
     assert in_python(typed) == argument
+
+
+@pytest.fixture
+def new_format(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A format that takes options which no other one takes."""
+    options = Option('--gain', 'FACTOR', 'of the speeds'), Option('--as-it-is', '', 'no filter')
+    formats_then = (*formats.found(), formats.found()[0]._replace(name='new', options=options))
+    monkeypatch.setattr(formats, 'found', lambda: formats_then)
+    for kept in (wording._read, wording._option):
+        kept.cache_clear()
+    yield
+    for kept in (wording._read, wording._option):
+        kept.cache_clear()
+
+
+@pytest.mark.usefixtures('new_format')
+def test_options_of_a_new_format_need_no_list() -> None:
+    assert in_python('give --gain 2 or --as-it-is.') == (
+        "give options={'gain': '2'} or options={'as_it_is': True}."
+    )
+    assert in_python('as UTC (--zone).') == "as UTC (options={'zone': ...})."
 
 
 def test_no_option_that_a_message_of_the_library_names_is_left_over() -> None:
