@@ -110,7 +110,7 @@ def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
         *monitor.update(in_arrival_order(inputs(world, instruments))),
         *monitor.finish(),
     ]
-    ended = _named(events, 'Coastdown')
+    ended = _named(events, 'EndedCoastdown')
     # a version of the program that takes nothing back says nothing of it
     standing = [event for event in ended if not getattr(event, 'withdrawn', False)]
     kept = [event for event in standing if event.estimate is not None]
