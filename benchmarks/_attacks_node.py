@@ -150,6 +150,8 @@ class Node:
         self, payloads: list[Any], topic: str = 'speed_through_water', kind: str = SPEED_TYPE
     ) -> None:
         """Publish bytes or messages, as a speed log if nothing else is said."""
+        from rclpy.duration import Duration
+
         from shipdrag_ros.node.inputs import message_class
 
         publisher = self.peer.create_publisher(message_class(kind), topic, 1000)
@@ -157,6 +159,8 @@ class Node:
         self.spin_for(0.3)
         for payload in payloads:
             publisher.publish(payload)
+        # a publisher that goes takes with it what is still on its way
+        publisher.wait_for_all_acked(Duration(seconds=ANSWER_S))
         self.spin_for(1.0)
         self.peer.destroy_publisher(publisher)
 

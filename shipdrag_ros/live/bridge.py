@@ -69,6 +69,7 @@ class Bridge:
         self._curve: Curve | None = None
         self._verdict = VerdictView('', '')
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
+        self._told: EventKind | None = None
         self._unread = 0
 
     # heard
@@ -183,6 +184,9 @@ class Bridge:
 
     def _take_event(self, payload: bytes) -> None:
         note = read_event(payload)
+        if note.kind is EventKind.NO_ESTIMATE is self._told and self._notes:
+            self._notes.pop()  # the same again at every update; it would hide all the rest
+        self._told = note.kind
         self._notes.append((note.stamp_ns, note.text))
         if note.kind is EventKind.ONSET:
             self._begin(int(note.values['start_ns']))

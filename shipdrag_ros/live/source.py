@@ -19,7 +19,7 @@ from shipdrag_ros.live.verdicts import VerdictView, of_diagnosis
 from shipdrag_ros.messages.heard import Heard, Samples
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisState
 from shipdrag_ros.replay.playback import settings_of
-from shipdrag_ros.samples import concatenate
+from shipdrag_ros.samples import SECOND_NS, concatenate
 from shipdrag_ros.ship import Ship
 
 WAITING = 20_000  # messages heard and not yet looked at; more are dropped and counted
@@ -229,6 +229,8 @@ class BagSource:
 
     def _seek(self, to_ns: int) -> None:
         line = self._timeline
+        if to_ns // SECOND_NS >= line.end_ns // SECOND_NS:
+            to_ns = line.end_ns  # a page knows whole seconds, and what ends there has to be heard
         to_ns = min(max(to_ns, line.start_ns), line.read_ns)
         if to_ns < self._at_ns:
             self._rewind()

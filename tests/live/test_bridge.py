@@ -102,6 +102,9 @@ def test_two_bags_make_a_pair_and_seeking_back_shows_what_was(bags: list[Path]) 
         assert {name: part for name, part in again.items() if name != 'verdict'} == {
             name: part for name, part in there.items() if name != 'verdict'
         }
+        source.control('seek', float(source.player()['end_s']))  # the right end of the slider
+        source.advance(now_s)
+        assert not source.bridge.parts(now_s)['headline']['text'].startswith('COASTDOWN')
         for action, value in (('speed', 0.0), ('speed', math.nan), ('bag', 2), ('dance', 1.0)):
             with pytest.raises(ShipdragError, match='play, pause, speed'):
                 source.control(action, value)
@@ -171,6 +174,16 @@ def test_trouble_of_the_node_is_the_headline_and_rejections_are_listed() -> None
     assert later['headline']['text'].startswith('NODE SILENT')
     assert [later['inputs'][0][name] for name in ('level', 'rate_hz', 'age_s')] == [3, None, 10.5]
     assert later['inputs'][0]['text'] == 'not known, the node is silent; its last word: frozen'
+
+
+def test_an_estimate_that_still_waits_is_one_line_of_the_log(bags: list[Path]) -> None:
+    (run,) = open_runs(bags[:1])
+    timeline = Timeline(run, Ship.load(SHIP), Parameters())
+    timeline.read()
+    bridge = Bridge(Ship.load(SHIP))
+    play(timeline, timeline.end_ns, bridge)
+    texts = [text for _, text in bridge.parts(0.0)['notes']]
+    assert sum('first figure waits' in text for text in texts) <= 1
 
 
 def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
