@@ -164,7 +164,7 @@ def place(found: DiagnosisResult) -> str:
     (first, last), (slow, fast) = where.time_s, where.speed_m_s
     since = 'of the record' if of_log_track(found) else 'after the stop'
     if last <= 0.0:
-        first, last, since = -first, -last, 'before the stop'
+        first, last, since = abs(first), abs(last), 'before the stop'
     return (
         f'{_CHANNELS[where.channel]}, {first:.0f} to {last:.0f} s {since}, '
         f'at {slow / M_S_PER_KNOT:.1f} to {fast / M_S_PER_KNOT:.1f} knots ({slow:.1f} to '

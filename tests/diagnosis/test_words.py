@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict, Where
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
-from shipdrag_ros.diagnosis.words import answers, probability, sentence
+from shipdrag_ros.diagnosis.words import answers, place, probability, sentence
 from shipdrag_ros.parameter import Parameter
 
 FOULING = EffectEstimate('fouling', 0.9995, {'friction_factor': Parameter(0.4013, 0.0121)})
@@ -124,3 +126,10 @@ def test_tables_leave_out_what_is_not_there() -> None:
     assert size[2:4] == ('51200', '3000')
     assert side[2:4] == ('astern', '-')
     assert diagnosis_cells.noise(found.traces).rows == ()
+
+
+def test_a_place_before_the_stop_ends_at_zero_and_not_at_minus_zero() -> None:
+    found = diagnosis(Verdict.NONE)
+    before = replace(found, where=Where('log', (-1786.0, 0.0), (7.2, 7.2)))
+    assert '1786 to 0 s before the stop' in place(before)
+    assert '12 to 900 s after the stop' in place(found)
