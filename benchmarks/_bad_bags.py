@@ -260,7 +260,7 @@ CASES = (
         'a directory without any bag',
         _directory(notes__txt='nothing here'),
         1,
-        "'bag' holds no .mcap file; it holds notes.txt. Logs are given by their own names",
+        "'bag' holds no .mcap file; it holds notes.txt",
     ),
     _case(
         'a rosbag2 directory in sqlite3',

@@ -157,7 +157,7 @@ COMMANDS = (
         'a bag that is not there',
         lambda folder: ['replay', str(folder / 'no.mcap')],
         1,
-        "'no.mcap' does not exist; give a .mcap file",
+        "'no.mcap' does not exist; give the path of a bag or a log",
     ),
     _use(
         'a directory for a ship file',

@@ -141,7 +141,7 @@ def ros_developer(machine: Machine) -> int:
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
     from geometry_msgs.msg import TwistStamped
-    from sensor_msgs.msg import NavSatFix
+    from sensor_msgs.msg import NavSatFix, NavSatStatus
 
     from shipdrag_ros.messages.heard import health_of
 
@@ -161,9 +161,10 @@ def ros_developer(machine: Machine) -> int:
         nonlocal sent
         stamp = peer.get_clock().now().to_msg()
         place = NavSatFix(latitude=54.5 + sent * 5e-6, longitude=10.25)
+        place.status.status = NavSatStatus.STATUS_FIX
         speed = TwistStamped()
         place.header.stamp = speed.header.stamp = stamp
-        speed.twist.linear.x = 5.0
+        speed.twist.linear.x = 5.5 + 0.01 * (sent % 7)  # a value that repeats is frozen
         fix.publish(place)
         velocity.publish(speed)
         sent += 1

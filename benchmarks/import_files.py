@@ -67,7 +67,8 @@ def main() -> int:
         second, _ = attempt(data / name, option) if option else (first, '')
         without += bool(set(first) & set(MOTION))
         with_one += bool(set(second) & set(MOTION))
-        shown = ', '.join(first) or f'refused: {why.rpartition(name)[2].lstrip(chr(39))[:70]}...'
+        reason = why.rpartition(name)[2].lstrip("': ")
+        shown = ', '.join(first) or f'refused: {reason[:70]}...'
         more = ', '.join(each for each in second if each not in first)
         lines.append(f'| {name} | {shown} | {more or "-"} | {f"`{option}`" if option else "-"} |')
     lines += ['', f'{without} of {len(FILES)} without an option, {with_one} with at most one.']

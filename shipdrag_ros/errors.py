@@ -22,7 +22,7 @@ class ShipdragError(Exception):
     ...     sd.read('missing.mcap')
     ... except sd.ShipdragError as error:
     ...     print(error)
-    'missing.mcap' does not exist; give a .mcap file or a rosbag2 directory
+    'missing.mcap' does not exist; give the path of a bag or a log
     """
 
 

@@ -67,7 +67,7 @@ def locate(path: Path) -> list[BagFiles]:
         If there is none that can be read.
     """
     if not path.exists():
-        raise BagError(f'{str(path)!r} does not exist; give a .mcap file or a rosbag2 directory')
+        raise BagError(f'{str(path)!r} does not exist; give the path of a bag or a log')
     if path.name == 'metadata.yaml':
         path = path.parent
     if not path.is_dir():

@@ -57,23 +57,27 @@ class Understood:
         In which it stands there; '' where the format fixes it.
     first
         First value, in the unit of `Channel`.
+    geodetic
+        Whether it is a latitude and a longitude.
     """
 
     input: str
     source: str
     unit: str
     first: tuple[float, ...]
+    geodetic: bool = False
 
     def __str__(self) -> str:
         unit = f' [{self.unit}]' if self.unit else ''
         values = ', '.join(f'{value:.6g}' for value in self.first)
-        return f'{self.input} <- {self.source}{unit}, first {values} {_SI[self.input]}'
+        si = 'deg' if self.geodetic else _SI[self.input]
+        return f'{self.input} <- {self.source}{unit}, first {values} {si}'
 
 
 _SI = {
     'speed_through_water': 'm/s',
     'speed_over_ground': 'm/s',
-    'position': '(m, or deg of latitude and longitude)',
+    'position': 'm',
     'heading': 'rad (yaw)',
     'shaft': 'rad/s (pitch: ratio or rad)',
     'rudder': 'rad',

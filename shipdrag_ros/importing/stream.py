@@ -336,7 +336,13 @@ class _ArrivedSamples:
 
 def _understood(bag: ImportBag, chosen: Mapping[Channel, Origin]) -> tuple[Understood, ...]:
     return tuple(
-        Understood(channel.input, chosen[channel].name, chosen[channel].unit, first)
+        Understood(
+            channel.input,
+            chosen[channel].name,
+            chosen[channel].unit,
+            first,
+            geodetic=channel is Channel.POSITION_GEODETIC,
+        )
         for channel, first in sorted(bag.first.items())
     )
 

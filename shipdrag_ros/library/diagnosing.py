@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
-from shipdrag_ros.library.windowed import WindowedRun, WindowSpan
+from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_two_ships
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay import (
@@ -68,9 +68,13 @@ def diagnose_runs(
 
     Raises
     ------
+    BagError
+        If no ship is given, and the runs are of several.
     DiagnosisError
         If neither a coastdown nor the log and the track can be examined.
     """
+    if given is None:
+        refuse_two_ships((run, None) for run, _ in runs)
     windowed = any(window is not None for _, window in runs)
     if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'

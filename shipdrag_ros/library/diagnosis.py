@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shipdrag_ros.diagnosis import (
@@ -25,8 +24,13 @@ from shipdrag_ros.library.diagnosing import diagnose_runs
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.resistance import records_of
-from shipdrag_ros.library.shown import Shown, drawing
-from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_overlaps
+from shipdrag_ros.library.shown import Shown, drawing, writing
+from shipdrag_ros.library.windowed import (
+    WindowedRun,
+    WindowSpan,
+    refuse_overlaps,
+    refuse_two_ships,
+)
 from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -176,7 +180,8 @@ class Diagnosis(Shown):
         from shipdrag_ros.diagnosis.page import write_diagnosis
         from shipdrag_ros.diagnosis.score import Score
 
-        write_diagnosis(Path(path), self.found, self.ship, score=Score.published())
+        with writing(path) as page:
+            write_diagnosis(page, self.found, self.ship, score=Score.published())
 
     def _compared(self, run: int, quantity: str | None) -> Compared:
         from shipdrag_ros.diagnosis.pictures import ALONG
@@ -251,7 +256,7 @@ def diagnose(
     Raises
     ------
     BagError
-        If the same part of a recording is given twice.
+        If the same part of a recording is given twice, or the runs are of two ships.
     DiagnosisError
         If neither a coastdown nor the log and the track can be examined.
     ShipFileError
@@ -273,6 +278,8 @@ def diagnose(
     parts = records_of(records)
     runs = [WindowedRun(run, window) for record in parts for run in record.runs]
     refuse_overlaps(runs)
+    if ship is None:
+        refuse_two_ships((run, record.given) for record in parts for run in record.runs)
     listener = Notes()
     given: Sequence[Fact] = [
         parse_fact(text) for text in ([facts] if isinstance(facts, str) else facts)

@@ -127,6 +127,11 @@ class ReadOptions:
         """Return the further options as a format takes them."""
         known = {option.key: option for each in formats.found() for option in each.options}
         found: dict[str, Any] = {}
+        if self.others is not None and not isinstance(self.others, Mapping):
+            raise ImportDataError(
+                f'options {self.others!r}: give each with its value, '
+                "{'speed_unit': 'kn'} for instance"
+            )
         for key, value in (self.others or {}).items():
             if key == _FORMAT:
                 continue

@@ -8,10 +8,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags import open_runs
 from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.library.record import Record
+from shipdrag_ros.library.windowed import refuse_two_ships
 from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Ship
@@ -98,7 +99,7 @@ def read(
     bags = [each for each in sources if isinstance(each, Path) and is_bag(each)]
     runs = open_runs(bags, remap=remap) if bags else []
     if given is None:
-        _refuse_two_ships(runs)
+        refuse_two_ships((run, None) for run in runs)
     others = [each for each in sources if not (isinstance(each, Path) and is_bag(each))]
     if not others:
         given_for_logs = {'columns': columns, 'time': time, 'rate_hz': rate_hz, 'options': options}
@@ -111,24 +112,6 @@ def read(
     attachments = {} if given is None else {SHIP_FILE: given.to_yaml()}
     imported, notes = read_logs(others, how, attachments)
     return Record([*runs, *imported], given=given, notes=notes)
-
-
-def _refuse_two_ships(runs: Sequence[Run]) -> None:
-    """Refuse bags that name different ships; one without a name may be any."""
-    named: dict[str, str] = {}
-    for run in runs:
-        text = run.attachments.get(SHIP_FILE)
-        name = (
-            '' if text is None else Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}').name
-        )
-        if name:
-            named.setdefault(name, run.name)
-    if len(named) > 1:
-        (one, first), (other, second), *_ = named.items()
-        raise BagError(
-            f'{first!r} is of {one!r} and {second!r} of {other!r}; read the bags of each ship by '
-            'themselves, or say which ship it is with ship='
-        )
 
 
 def _path(source: Any) -> Path:

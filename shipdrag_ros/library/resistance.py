@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shipdrag_ros.display import Table, utc
@@ -18,7 +17,7 @@ from shipdrag_ros.library.coastdown import Coastdown, force_columns
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import replay_run
-from shipdrag_ros.library.shown import ShownResistance
+from shipdrag_ros.library.shown import ShownResistance, writing
 from shipdrag_ros.library.windowed import WindowSpan
 from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.parameters import Parameters
@@ -144,7 +143,8 @@ class Resistance(ShownResistance):
         """
         from shipdrag_ros.replay.page import write_report
 
-        write_report(Path(path), self.runs)
+        with writing(path) as page:
+            write_report(page, self.runs)
 
     def _title(self) -> str:
         name = self.ship.name or 'a ship without a name'

@@ -7,6 +7,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html import escape
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -131,6 +133,22 @@ def html_of(title: str, lines: Sequence[str], table: Table) -> str:
 
 def _row(cells: Sequence[str], tag: str) -> str:
     return f'<tr>{"".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells)}</tr>'
+
+
+@contextmanager
+def writing(path: str | PathLike[str]) -> Iterator[Path]:
+    """
+    Give the path of a page to write; a failure says which and why.
+
+    Raises
+    ------
+    ShipdragError
+        If it cannot be written.
+    """
+    try:
+        yield Path(path)
+    except OSError as error:
+        raise ShipdragError(f'{str(path)!r} cannot be written: {error.strerror}') from error
 
 
 @contextmanager

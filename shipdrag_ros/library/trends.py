@@ -14,7 +14,7 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.resistance import Resistance
-from shipdrag_ros.library.shown import Shown, drawing, time_column
+from shipdrag_ros.library.shown import Shown, drawing, time_column, writing
 from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.library.wording import in_python, says_it_in_python
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
@@ -132,7 +132,8 @@ class Trends(Shown):
         """
         from shipdrag_ros.trend.page import write_trends
 
-        write_trends(Path(path), list(self.ships), list(self.skipped))
+        with writing(path) as page:
+            write_trends(page, list(self.ships), list(self.skipped))
 
     def _title(self) -> str:
         if not self.ships:

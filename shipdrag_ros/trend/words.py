@@ -64,7 +64,7 @@ def lines(trend: ShipTrend) -> list[str]:
             f'{percent(trend.growth_per_year)} % a year.'
         )
     if trend.scatter is not None:
-        found.append(f'Runs scatter by {trend.scatter:.1%} beyond their own error.')
+        found.append(f'Runs scatter by {100.0 * trend.scatter:.1f} % beyond their own error.')
     if trend.costs is not None:
         found.append(
             f'It costs {trend.costs.usd_per_year:,.0f} USD a year as it is now; since the first '

@@ -207,6 +207,8 @@ def test_bags_of_two_ships_are_refused(tmp_path: Path) -> None:
     ]
     with pytest.raises(sd.ShipdragError, match=r"is of 'Coaster' and .* of 'Other'"):
         sd.read(bags)
+    with pytest.raises(sd.ShipdragError, match=r"is of 'Coaster' .* with ship='FILE'"):
+        sd.diagnose([sd.read(bag) for bag in bags])
     assert sd.read(bags, ship=SHIP).ship == SHIP
 
 
@@ -226,6 +228,8 @@ def test_options_of_the_import(tmp_path: Path) -> None:
     ):
         with pytest.raises(sd.ShipdragError, match=why):
             sd.read(path, options={'speed_unit': 'kn', **options})
+    with pytest.raises(sd.ShipdragError, match='give each with its value'):
+        sd.read(path, options=['speed_unit'])  # type: ignore[arg-type]
 
 
 def test_arguments_that_a_bag_has_no_use_for_are_named(bag: Path) -> None:

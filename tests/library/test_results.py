@@ -104,6 +104,8 @@ def test_pages_are_written(found: sd.Resistance, diagnosis: sd.Diagnosis, tmp_pa
     for each in (found, diagnosis):
         each.report(tmp_path / 'page.html')
         assert (tmp_path / 'page.html').read_text(encoding='utf-8').startswith('<!')
+        with pytest.raises(sd.ShipdragError, match='cannot be written: No such file'):
+            each.report(tmp_path / 'nowhere' / 'page.html')
 
 
 def test_several_coastdowns_are_one_curve(record: sd.Record) -> None:

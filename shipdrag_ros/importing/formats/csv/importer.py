@@ -262,6 +262,7 @@ class _RowSamples:
                 ', '.join(repr(name) for name in columns.names),
                 ', '.join(dict.fromkeys(columns.units)),
                 bag.first[columns.channel],
+                geodetic=columns.channel is Channel.POSITION_GEODETIC,
             )
             for columns, _, _ in self._inputs
             if columns.channel in bag.first

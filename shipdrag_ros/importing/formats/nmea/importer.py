@@ -302,7 +302,13 @@ def _result(
 
 def _understood(bag: ImportBag, record: SentenceConverter) -> tuple[Understood, ...]:
     return tuple(
-        Understood(channel.input, str(record.chosen[channel]), '', first)
+        Understood(
+            channel.input,
+            str(record.chosen[channel]),
+            '',
+            first,
+            geodetic=channel is Channel.POSITION_GEODETIC,
+        )
         for channel, first in sorted(bag.first.items())
     )
 
