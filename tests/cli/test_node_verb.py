@@ -26,6 +26,8 @@ def test_without_ros_it_says_how_to_get_it(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    # what is imported anew here is forgotten afterwards, by the package above it too
+    monkeypatch.setattr('shipdrag_ros.node', None, raising=False)
     for name in list(sys.modules):
         if name.startswith('shipdrag_ros.node'):
             monkeypatch.delitem(sys.modules, name)
