@@ -22,15 +22,14 @@ import subprocess
 import sys
 import tempfile
 import time
-import zlib
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import zstandard
 from mcap.writer import CompressionType, Writer
+from read_speed import limit as bytes_alone
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.messages import encode, types
@@ -111,18 +110,6 @@ def of_call(call: Callable[[], object]) -> Cost:
     begun, before = time.monotonic(), time.process_time()
     call()
     return Cost(time.process_time() - before, time.monotonic() - begun)
-
-
-def bytes_alone(path: Path) -> None:
-    """Decompress and check each chunk, and do nothing with it."""
-    (run,) = open_runs([path])
-    data = path.read_bytes()
-    decompressor = zstandard.ZstdDecompressor()
-    for segment in run.parts[0].contents.segments:
-        size = int.from_bytes(data[segment.offset + 25 : segment.offset + 33], 'little')
-        checksum = int.from_bytes(data[segment.offset + 33 : segment.offset + 37], 'little')
-        packed = data[segment.offset + 9 + 40 + 4 : segment.end]
-        assert zlib.crc32(decompressor.decompress(packed, max_output_size=size)) == checksum
 
 
 def replayed(path: Path, coastdowns: int) -> None:

@@ -125,7 +125,7 @@ class SteadyNoise:
             np.searchsorted(times, time),
             rows,
             np.ascontiguousarray(whitener.T),
-            # without a log it is not told from a gust
+            # without a log it is not separated from a gust
             noise.slow.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,
         )
 

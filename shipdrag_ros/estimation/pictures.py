@@ -264,7 +264,7 @@ def curves_picture(
 
 def is_shaded(count: int) -> bool:
     """
-    Tell whether so many curves are told apart by shades, in their order.
+    Say whether so many curves can be separated by shades, in their order.
 
     Parameters
     ----------
