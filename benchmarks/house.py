@@ -198,10 +198,10 @@ def walk(
     done = subprocess.run(
         [sys.executable, '-c', code], capture_output=True, text=True, env=environment, cwd=tree
     )
-    told = [each for each in done.stdout.splitlines() if each.startswith('WALKED ')]
-    if not told:
+    printed = [each for each in done.stdout.splitlines() if each.startswith('WALKED ')]
+    if not printed:
         raise SystemExit(f'{tree}: {" ".join(line)} failed:\n{done.stderr[-2000:]}')
-    calls, modules = json.loads(told[0].removeprefix('WALKED '))
+    calls, modules = json.loads(printed[0].removeprefix('WALKED '))
     return calls, modules
 
 

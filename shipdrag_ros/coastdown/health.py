@@ -63,13 +63,13 @@ class MonitorProgress:
     @property
     def values(self) -> dict[str, str]:
         """The same as texts by key, the unit in the key."""
-        told = {
+        figures = {
             'steady lead [s]': f'{self.steady_s:.0f}',
             'steady lead used at most [s]': f'{self.used_s:.0f}',
         }
         if self.coastdown_since_ns is not None:
-            told['coastdown since [ns]'] = str(self.coastdown_since_ns)
-        return told
+            figures['coastdown since [ns]'] = str(self.coastdown_since_ns)
+        return figures
 
 
 def input_health(tally: InputTally) -> dict[str, InputHealth]:

@@ -162,18 +162,18 @@ def swing_notes(found: Fit, model: CoastModel) -> tuple[str, ...]:
     model
         Of the same runs.
     """
-    told = []
+    notes = []
     for part, place in found.hypothesis.parts:
         if not isinstance(part, SwingTerm):
             continue
         sine, cosine = found.best.z[place : place + 2]
         share = _SD * math.hypot(sine, cosine)
-        told.append(
+        notes.append(
             f'{model.seen[part.run].name}: a force swings over about {part.period_s:.0f} s, by '
             f'{100.0 * share:.0f} % of the resistance at the stop, as none did in the steady '
             'record before: a tow, an anchor, weed or a controller that is not off may do so'
         )
-    return tuple(told)
+    return tuple(notes)
 
 
 def size_m_s2(ship: Ship, speed_m_s: float) -> float:

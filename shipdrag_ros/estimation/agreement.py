@@ -14,7 +14,7 @@ from shipdrag_ros.samples import Float64
 # record makes less. Chosen on 1000 simulated clean coastdowns (four ships, 100 and 500 samples,
 # seeds 0..24; white noise, steady record, run-down, current and outliers, gusts learnt), of which
 # 1 is taken to disagree.
-TOLD = 2.0
+ALLOWED = 2.0
 _POINTS = 65  # evenly in speed, of the comparison
 
 
@@ -33,7 +33,7 @@ def widened(found: Estimate, other: Estimate, below_m_s: float) -> Estimate:
     Returns
     -------
     Estimate
-        With what exceeds `TOLD` joint standard deviations added in quadrature,
+        With what exceeds `ALLOWED` joint standard deviations added in quadrature,
         and a note with both figures; unchanged where nothing does.
     """
     mine, its = found.curve, other.valid_curve
@@ -45,7 +45,7 @@ def widened(found: Estimate, other: Estimate, below_m_s: float) -> Estimate:
     )
     r, sigma = _at(mine, speeds)
     its_r, its_sigma = _at(its, speeds)
-    square = (r - its_r) ** 2 - TOLD**2 * (sigma**2 + its_sigma**2)
+    square = (r - its_r) ** 2 - ALLOWED**2 * (sigma**2 + its_sigma**2)
     worst = int(np.argmax(square))
     if square[worst] <= 0.0:
         return found

@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis import (
     diagnose_fitted,
     diagnose_sailing,
 )
-from shipdrag_ros.diagnosis.result import ToldFact
+from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.result import Estimate
@@ -106,7 +106,7 @@ def _with_log_track(
 
 def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
     """Say of facts that they were stated and not used."""
-    return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
+    return replace(found, facts=tuple(WeighedFact(fact, '', None) for fact in overriding(facts)))
 
 
 def _sailing(

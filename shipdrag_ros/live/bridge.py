@@ -69,7 +69,7 @@ class Bridge:
         self._curve: Curve | None = None
         self._verdict = VerdictView('', '')
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
-        self._told: EventKind | None = None
+        self._noted: EventKind | None = None
         self._unread = 0
 
     # heard
@@ -184,9 +184,9 @@ class Bridge:
 
     def _take_event(self, payload: bytes) -> None:
         note = read_event(payload)
-        if note.kind is EventKind.NO_ESTIMATE is self._told and self._notes:
+        if note.kind is EventKind.NO_ESTIMATE is self._noted and self._notes:
             self._notes.pop()  # the same again at every update; it would hide all the rest
-        self._told = note.kind
+        self._noted = note.kind
         self._notes.append((note.stamp_ns, note.text))
         if note.kind is EventKind.ONSET:
             self._begin(int(note.values['start_ns']))
@@ -303,11 +303,11 @@ class Bridge:
         if self._health is None:
             return []
         silent = silent_s > SILENT_S  # what the node said last is no health of now
-        told_s = silent_s if silent else 0.0
-        told = [status for status in self._health.statuses if status.input]
-        told += [status for status in self._health.statuses if status.part == 'recording']
+        since_s = silent_s if silent else 0.0
+        statuses = [status for status in self._health.statuses if status.input]
+        statuses += [status for status in self._health.statuses if status.part == 'recording']
         rows = []
-        for status in told:
+        for status in statuses:
             age_s = status.number('age')
             rejected = {
                 key.removeprefix('rejected '): int(float(text))
@@ -322,7 +322,7 @@ class Bridge:
                     if silent
                     else status.message,
                     'rate_hz': None if silent else status.number('rate'),
-                    'age_s': None if age_s is None else age_s + told_s,
+                    'age_s': None if age_s is None else age_s + since_s,
                     'rejected': {name: count for name, count in rejected.items() if count},
                 }
             )

@@ -226,7 +226,7 @@ class CoastdownNode(LifecycleNode):
             publish=self._send,
             node=self.get_fully_qualified_name(),
             ended=self._diagnosing.begin,
-            told=self._announcer.event,
+            on_event=self._announcer.event,
             ready=self._compiling.done,
         )
         self._watching = Watching(
