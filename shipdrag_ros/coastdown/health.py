@@ -23,8 +23,8 @@ class InputHealth:
         Samples that came and samples that were accepted.
     rejected
         Samples by reason, lower-case names; reasons without any are left out.
-    last_stamp_ns, last_receive_ns
-        Of the last accepted sample; None before it.
+    last_receive_ns
+        Arrival of the last accepted sample; None before it.
     rate_hz
         By the stamps of the last few accepted samples; None before two.
     clock_offset_s
@@ -35,7 +35,6 @@ class InputHealth:
     messages: int
     used: int
     rejected: dict[str, int]
-    last_stamp_ns: int | None
     last_receive_ns: int | None
     rate_hz: float | None
     clock_offset_s: float | None
@@ -97,7 +96,6 @@ def _health(tally: InputTally, name: str) -> InputHealth:
             for reason in Reason
             if reason is not Reason.ACCEPTED and reasons[reason]
         },
-        last_stamp_ns=int(tally.stamp_ns[last, newest]) if len(stamps) else None,
         last_receive_ns=int(tally.arrival_ns[last, newest]) if len(stamps) else None,
         rate_hz=(len(stamps) - 1) / (span * 1e-9) if span else None,
         clock_offset_s=float(np.median(arrivals - stamps)) * 1e-9 if len(stamps) else None,

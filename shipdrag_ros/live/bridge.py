@@ -13,9 +13,15 @@ from typing import Any
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, verdicts
 from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.figures import PagePart, at_usual_speed, curve_part, past_part, ship_part
+from shipdrag_ros.live.figures import (
+    PagePart,
+    at_usual_speed,
+    curve_part,
+    past_part,
+    ship_part,
+    to_go_s,
+)
 from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
-from shipdrag_ros.live.outlook import to_go_s
 from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
 from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.live.verdicts import VerdictView
