@@ -40,12 +40,15 @@ from shipdrag_ros.ship.facts import overriding
 
 _GLIDED = (
     'she lost her speed about as fast as after an engine stop, though not as water slows a ship; '
-    'no coastdown is taken from it, but all of it is held against the model'
+    'no coastdown is taken from it'
 )
 _BRAKED = (
     'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
-    'from the rest alone, but all of it is held against the model'
+    'from the rest alone'
 )
+_HELD = 'all of each glide is held against the model, such parts with the rest'
+_AGREES = 'all of each glide, held against the model, shows nothing more'
+_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 
 def diagnose_runs(
@@ -96,7 +99,9 @@ def diagnose_runs(
     except DiagnosisError:
         if not seen.whole:
             raise
-    if found is None or (seen.whole and found.verdict is not Verdict.NAMED):
+    if found is not None and seen.whole and found.verdict is Verdict.NAMED:
+        found = replace(found, notes=(*found.notes, *seen.notes, _APART))
+    elif found is None or seen.whole:
         found = _of_whole_glides(found, seen, facts, progress)
     return found, seen.ship
 
@@ -106,8 +111,8 @@ def _of_coastdowns(
 ) -> DiagnosisResult:
     """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
-        why = f'No coastdown was found {"; ".join(seen.without)}.'
-        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts))
+        log_track = _sailing(runs, seen.no_coastdown, progress)
+        return _unused(log_track, (*seen.ship.facts, *facts))
     if seen.ship.baseline is None:
         progress('fitting a form of the resistance', 0, 0)
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
@@ -130,17 +135,17 @@ def _of_whole_glides(
         whole = diagnose(seen.whole, seen.ship, seen.parameters, facts=facts, progress=progress)
     except ShipdragError as error:  # a glide that is like none may not be followed
         if found is None:
-            raise DiagnosisError(f'{"; ".join(seen.notes)}; that failed: {error}') from error
-        return replace(found, notes=(*found.notes, *seen.notes, f'that failed: {error}'))
-    if found is None:
-        return replace(whole, notes=(*whole.notes, *seen.notes), estimates=seen.estimates)
-    if whole.verdict is Verdict.NONE:
-        return replace(found, notes=(*found.notes, *seen.notes))
+            raise DiagnosisError(f'{"; ".join(seen.notes)}; diagnosed whole: {error}') from error
+        why = f'all of each glide could not be held against the model: {error}'
+        return replace(found, notes=(*found.notes, *seen.notes, why))
+    if found is not None and whole.verdict is Verdict.NONE:
+        return replace(found, notes=(*found.notes, *seen.notes, _AGREES))
+    before = () if found is None else found.notes
     return replace(
         whole,
-        notes=(*found.notes, *whole.notes, *seen.notes),
-        no_coastdown=found.no_coastdown,
-        coastdowns_used=found.coastdowns_used,
+        notes=tuple(dict.fromkeys((*before, *whole.notes, *seen.notes, _HELD))),
+        no_coastdown=seen.no_coastdown,
+        coastdowns_used=len(seen.coasts) if found is None else found.coastdowns_used,
         estimates=seen.estimates,
     )
 
@@ -235,6 +240,11 @@ class _Coastdowns:
     parameters: Parameters
     without: tuple[str, ...]
     estimates: tuple[Estimate, ...]
+
+    @property
+    def no_coastdown(self) -> str:
+        """That none was found and why, a sentence; '' where there is one."""
+        return '' if self.coasts else f'No coastdown was found {"; ".join(self.without)}.'
 
 
 def _found(
