@@ -6,6 +6,7 @@ Scoreboard of a diagnosis, on coastdowns in which the effect is hidden.
     python benchmarks/diagnosis_score.py --by command
     python benchmarks/diagnosis_score.py --by MODULE:FUNCTION --as blocks
     python benchmarks/diagnosis_score.py --world b --half odd --count 40
+    python benchmarks/diagnosis_score.py --world b --half odd --count 40 --by oracle
 
 World a is `hidden`; world b, of another hand, is `hidden_b`: its even cases are for choosing
 methods, its odd ones for scoring.
@@ -138,11 +139,8 @@ def diagnosis(
     Return the diagnosis that is asked for; the oracle alone knows of the noise.
     """
     if by == 'oracle':
-        if world != 'a':
-            raise ValueError('the oracle knows world a alone')
-        from hidden.oracle import diagnose
-
-        return lambda seen: _timed(diagnose, seen, cases.known(number))
+        oracle = import_module('hidden.oracle' if world == 'a' else 'hidden_b.oracle')
+        return lambda seen: _timed(oracle.diagnose, seen, WORLDS[world].known(number))
     if by == 'command':
         more: list[str] = []
         if with_facts:
