@@ -84,6 +84,8 @@ class Engine:
                     'distributed.comm.timeouts.connect': f'{_CONNECT_S:g}s',
                     # so long after a death a worker that is not there just then is given up
                     'distributed.deploy.lost-worker-timeout': _GIVEN_UP,
+                    # a worker would keep what it was doing in each of the last 1000 seconds
+                    'distributed.worker.profile.enabled': False,
                 }
             )
         )
