@@ -16,9 +16,9 @@ from shipdrag_ros.diagnosis import (
     diagnose_fitted,
     diagnose_sailing,
 )
-from shipdrag_ros.diagnosis.result import ToldFact
+from shipdrag_ros.diagnosis.result import ToldFact, Verdict
 from shipdrag_ros.diagnosis.together import with_log_track
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_two_ships
@@ -33,9 +33,19 @@ from shipdrag_ros.replay import (
     why_no_coastdown,
 )
 from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import overriding
+
+_GLIDED = (
+    'she lost her speed about as fast as after an engine stop, though not as water slows a ship; '
+    'no coastdown is taken from it, but all of it is held against the model'
+)
+_BRAKED = (
+    'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
+    'from the rest alone, but all of it is held against the model'
+)
 
 
 def diagnose_runs(
@@ -80,9 +90,24 @@ def diagnose_runs(
         why = 'without a ship file none is looked for; give one with --ship FILE'
         return _unused(_sailing(runs, f'No coastdown was found: {why}.', progress), facts), None
     seen = _found(listener, runs, given, progress)
+    found: DiagnosisResult | None = None
+    try:
+        found = _of_coastdowns(runs, seen, facts, progress)
+    except DiagnosisError:
+        if not seen.whole:
+            raise
+    if found is None or (seen.whole and found.verdict is not Verdict.NAMED):
+        found = _of_whole_glides(found, seen, facts, progress)
+    return found, seen.ship
+
+
+def _of_coastdowns(
+    runs: Sequence[WindowedRun], seen: _Coastdowns, facts: Sequence[Fact], progress: Progress
+) -> DiagnosisResult:
+    """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
         why = f'No coastdown was found {"; ".join(seen.without)}.'
-        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts)), seen.ship
+        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts))
     if seen.ship.baseline is None:
         progress('fitting a form of the resistance', 0, 0)
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
@@ -90,7 +115,34 @@ def diagnose_runs(
     else:
         found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
-    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
+    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates)
+
+
+def _of_whole_glides(
+    found: DiagnosisResult | None, seen: _Coastdowns, facts: Sequence[Fact], progress: Progress
+) -> DiagnosisResult:
+    """
+    Diagnose with the parts that are no coastdown though no instrument shows why.
+
+    Where these show nothing either, what the coastdowns show stands.
+    """
+    try:
+        whole = diagnose(seen.whole, seen.ship, seen.parameters, facts=facts, progress=progress)
+    except ShipdragError as error:  # a glide that is like none may not be followed
+        if found is None:
+            raise DiagnosisError(f'{"; ".join(seen.told)}; that failed: {error}') from error
+        return replace(found, notes=(*found.notes, *seen.told, f'that failed: {error}'))
+    if found is None:
+        return replace(whole, notes=(*whole.notes, *seen.told), estimates=seen.estimates)
+    if whole.verdict is Verdict.NONE:
+        return replace(found, notes=(*found.notes, *seen.told))
+    return replace(
+        whole,
+        notes=(*found.notes, *whole.notes, *seen.told),
+        no_coastdown=found.no_coastdown,
+        coastdowns_used=found.coastdowns_used,
+        estimates=seen.estimates,
+    )
 
 
 def _with_log_track(
@@ -169,9 +221,16 @@ def coasts_of(
 
 @dataclass(frozen=True)
 class _Coastdowns:
-    """The coastdowns of all bags, their estimates, and of each bag without one why."""
+    """
+    The coastdowns of all bags, their estimates, and of each bag without one why.
+
+    `whole` are all glides with the parts of them that are no coastdown, though no instrument
+    shows why; empty where there is no such part. `told` says what these are.
+    """
 
     coasts: list[CoastRun]
+    whole: list[CoastRun]
+    told: tuple[str, ...]
     ship: Ship
     parameters: Parameters
     without: tuple[str, ...]
@@ -186,6 +245,8 @@ def _found(
 ) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
+    whole: list[CoastRun] = []
+    told: list[str] = []
     without: list[str] = []
     estimates: list[Estimate] = []
     ship, parameters = given, None
@@ -206,12 +267,28 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-        for place, (_, found) in enumerate(windows, start=1):
+            glide = dismissed_glide(result)
+            if glide is not None:
+                whole.append(CoastRun(each.name, glide, sheet.facts, of_run))
+                told.append(f'{each.name}: {_GLIDED}')
+        for place, (coastdown, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
+            glide = whole_glide(result, coastdown)
+            whole.append(replace(coasts[-1], window=glide or found))
+            if glide is not None:
+                told.append(f'{name}: {_BRAKED}')
     assert ship is not None
     assert parameters is not None
-    return _Coastdowns(coasts, ship, parameters, tuple(without), tuple(estimates))
+    return _Coastdowns(
+        coasts,
+        whole if told else [],
+        tuple(told),
+        ship,
+        parameters,
+        tuple(without),
+        tuple(estimates),
+    )
 
 
 def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:
