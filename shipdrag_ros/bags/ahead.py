@@ -19,13 +19,13 @@ from mcap.opcode import Opcode
 from shipdrag_ros.bags.contents import FileSegment
 from shipdrag_ros.bags.records import DamagedRecord, release, stated_bytes, unpack_chunk, walk
 
-Records = Generator[bytes | DamagedRecord, None, None]
+UnpackedSegments = Generator[bytes | DamagedRecord, None, None]
 _WORTHWHILE = 8  # segments, below which a thread costs more than it saves
 _THREADS = 3
 _AHEAD_BYTES = 1 << 22  # unpacked, so that it is still in the cache of the processor
 
 
-def unpacked(data: mmap, segments: Sequence[FileSegment]) -> Records:
+def unpacked(data: mmap, segments: Sequence[FileSegment]) -> UnpackedSegments:
     """
     Yield the records of each segment, in their order, or what is wrong with it.
 
