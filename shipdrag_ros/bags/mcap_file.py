@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from collections import deque
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -19,17 +19,14 @@ from typing import IO
 
 import numpy as np
 import zstandard
-from mcap.opcode import Opcode
 
+from shipdrag_ros.bags.ahead import unpacked
 from shipdrag_ros.bags.contents import Contents, FileSegment, read_index, scan
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
     MAGIC,
     DamagedRecord,
-    release,
-    unpack_chunk,
-    walk,
 )
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import UInt8
@@ -109,10 +106,10 @@ class McapFile:
         table[list(wanted)] = 1
         found = 0
         waiting: Messages | None = None
-        with self._data() as data:
+        with self._data() as data, closing(unpacked(data, tuple(segments))) as records:
             while segments:
                 # as much again as waits, so that what overlaps is not sorted over and over
-                loaded = self._load(data, segments, table, len(waiting.data) if waiting else 0)
+                loaded = self._load(records, segments, table, len(waiting.data) if waiting else 0)
                 found += len(loaded)
                 if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
                     loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
@@ -137,27 +134,29 @@ class McapFile:
             self._warn(f'{found} messages are there where the index lists {expected}')
 
     def _load(
-        self, data: mmap, segments: deque[FileSegment], wanted: UInt8, least_bytes: int
+        self,
+        records: Iterator[bytes | DamagedRecord],
+        segments: deque[FileSegment],
+        wanted: UInt8,
+        least_bytes: int,
     ) -> Messages:
         """Take segments off the queue, one or as many small ones as are worth it."""
         least_bytes = max(least_bytes, _WORTHWHILE_BYTES)
-        unpacked: list[bytes] = []
+        sound: list[bytes] = []
         offsets: list[int] = []
         size = 0
         while segments and size < least_bytes:
-            segment = segments.popleft()
-            try:
-                records = _records(data, segment)
-            except DamagedRecord as damage:
-                self._warn(f'{damage}: left out')
+            segment, found = segments.popleft(), next(records)
+            if isinstance(found, DamagedRecord):
+                self._warn(f'{found}: left out')
                 continue
-            unpacked.append(records)
+            sound.append(found)
             offsets.append(segment.offset)
-            size += len(records)
-        found = index_messages(unpacked, offsets, wanted)
-        for text in found.damage:
+            size += len(found)
+        indexed = index_messages(sound, offsets, wanted)
+        for text in indexed.damage:
             self._warn(text)
-        return found.messages
+        return indexed.messages
 
     def _read_contents(self, data: mmap) -> Contents:
         head = data[:16]
@@ -196,15 +195,6 @@ class McapFile:
             raise BagError(f'{str(self.path)!r} cannot be read: {error.strerror}') from error
         with data:
             yield data
-
-
-def _records(data: mmap, segment: FileSegment) -> bytes:
-    first = next(walk(data, segment.offset, segment.end))
-    if first.opcode == Opcode.CHUNK:
-        return unpack_chunk(data, first)[1]
-    records = data[segment.offset : segment.end]
-    release(data, segment.offset, segment.end)
-    return records
 
 
 def _unpack(path: Path) -> IO[bytes]:

@@ -186,7 +186,7 @@ def index_messages(
     return Indexed(found[:n], others[:m], notes)
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _uint64(data: Any, place: Any) -> Any:
     at = _U(place)
     return (
@@ -221,7 +221,7 @@ _SIGNATURE: Signature = nb.UniTuple(nb.int64, 2)(
 _PACK: Signature = nb.void(_BYTES_READ, _PLACES_READ, _PLACES_READ, nb.uint8[::1])
 
 
-@compiled(_SIGNATURE)
+@compiled(_SIGNATURE, uncounted=True)
 def _index(
     data: UInt8,
     bounds: Int64,
@@ -278,7 +278,7 @@ def _index(
     return n, m
 
 
-@compiled(_PACK)
+@compiled(_PACK, uncounted=True)
 def _pack(data: UInt8, start: Int64, end: Int64, packed: UInt8) -> None:
     at = 0
     for i in range(len(start)):

@@ -102,7 +102,7 @@ def _show(output: Output, store: Path, report: Report) -> None:
     read = [done for done in report.bags.values() if done.error is None]
     output.say(
         f'{store}: {coastdowns} coastdown(s) of {len(read)} bag(s); {report.new} bag(s) replayed '
-        f'now, {len(report.bags) - report.new} done before'
+        f'now, {len(read) - report.new} done before, {len(report.skipped)} skipped'
     )
     ships = _ships(report)
     if ships:

@@ -183,8 +183,7 @@ class Monitor:
         channel = np.ascontiguousarray(block.channel)
         stamp_ns = np.ascontiguousarray(block.stamp_ns)
         receive_ns = np.ascontiguousarray(block.receive_ns)
-        value = np.ascontiguousarray(block.value)
-        variance = np.ascontiguousarray(block.variance)
+        value, variance = block.value, block.variance
         events: list[Event] = []
         at, stop = 0, int(WalkEvent.FULL)
         while True:

@@ -91,7 +91,7 @@ _TWO_COLUMNS = np.array(
 # own their memory pass as well.
 STAMPS = types.Array(types.int64, 1, 'C', readonly=True)
 CHANNEL_CODES = types.Array(types.uint8, 1, 'C', readonly=True)
-VALUES = types.Array(types.float64, 2, 'C', readonly=True)
+VALUES = types.Array(types.float64, 2, 'A', readonly=True)  # columns of a table, for instance
 
 
 class CheckMemory(NamedTuple):

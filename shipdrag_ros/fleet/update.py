@@ -42,7 +42,7 @@ class Report:
     bags
         All that are below the folders and in the store now, by content hash.
     new
-        Number of bags that were replayed.
+        Number of bags that were replayed now; those that could not be are in `skipped`.
     removed
         Number of bags whose content has changed; their former rows are gone.
     twins
@@ -110,7 +110,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
     changed = sum(before[digest].error is None for digest in stale)
     return Report(
         bags,
-        len(to_do),
+        sum(bags[key].error is None for key in to_do),
         changed,
         tuple(twins),
         tuple(sorted([*skipped, *unread], key=lambda each: (each.root, each.bag))),

@@ -160,15 +160,14 @@ def decode_batch(
         if not reading.stamped:
             stamp_ns[place] = receive_ns[place]
         for by in reading.steps:
-            gather(data, start, end, place, by, stamp_ns, rows, found)
+            unread = gather(data, start, end, place, by, stamp_ns, rows, found)
             if reading.columns is not None:
                 computed = reading.columns(rows[place, _COLUMNS : reading.width])
                 rows[place, :_COLUMNS] = computed
-            bad = found[place] != GatherResult.READ
-            place = place[bad] if bad.any() else place[:0]
-            if not len(place):
+            if not unread:
                 break
-        unreadable.append(_count(found[place]))
+            place = place[found[place] != GatherResult.READ]
+        unreadable.append(_count(found[place]) if unread else Counter())
     kept = np.flatnonzero(found == GatherResult.READ)
     if any(len(joints.message) for joints in more):
         kept, code, rows = _with_more(kept, code, rows, more)

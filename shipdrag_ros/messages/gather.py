@@ -36,7 +36,7 @@ _SECTION = int(Step.SECTION)
 _FLOAT64 = int(Step.FLOAT64)
 _FLOAT32 = int(Step.FLOAT32)
 _UINT8 = int(Step.UINT8)
-_INT8 = int(Step.INT8)
+_STRING = int(Step.STRING)
 _UNSTAMPED = int(Step.UNSTAMPED)
 COLUMNS = 4
 _VARIANCES = 2  # from this column on
@@ -49,7 +49,7 @@ BAD = -1
 _U = np.uint64
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def word(data: Any, place: int, big: bool) -> Any:
     at = _U(place)
     if big:
@@ -67,17 +67,17 @@ def word(data: Any, place: int, big: bool) -> Any:
     )
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _as_float64(bits: Any) -> Any:
     return _U(bits).view(np.float64)
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _as_float32(bits: Any) -> Any:
     return np.uint32(bits).view(np.float32)
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def float64(data: Any, place: int, big: bool) -> Any:
     first = word(data, place, big)
     second = word(data, place + 4, big)
@@ -86,12 +86,12 @@ def float64(data: Any, place: int, big: bool) -> Any:
     return _as_float64(second << _U(32) | first)
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _float32(data: Any, place: int, big: bool) -> Any:
     return np.float64(_as_float32(word(data, place, big)))
 
 
-@compiled
+@compiled(uncounted=True)
 def _is_utf8(data: Any, start: int, end: int) -> bool:
     """Say whether bytes are UTF-8, as Python decodes it."""
     at = start
@@ -117,12 +117,12 @@ def _is_utf8(data: Any, start: int, end: int) -> bool:
     return True
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def aligned(at: int, size: int) -> int:
     return (at + size - 1) & -size
 
 
-@compiled
+@compiled(uncounted=True)
 def string_end(data: Any, body: int, at: int, size: int, big: bool) -> Any:
     """Return the end of the string at a place, `BAD` if there is none."""
     if at + 4 > size:
@@ -134,13 +134,13 @@ def string_end(data: Any, body: int, at: int, size: int, big: bool) -> Any:
     return end if _is_utf8(data, body + at + 4, body + end - 1) else BAD
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def _is_cdr(data: Any, start: int, end: int, least: int) -> bool:
     """Say whether bytes begin as a message does, with so many behind it at least."""
     return end - start - BODY >= least and data[_U(start)] == 0 and data[_U(start + 1)] <= 1
 
 
-@compiled
+@compiled(inline=True, uncounted=True)
 def read_stamp(data: Any, start: int, end: int, i: Any, stamp_ns: Any) -> bool:
     """Read the stamp of a message; False if it is none."""
     body = start + BODY
@@ -152,8 +152,11 @@ def read_stamp(data: Any, start: int, end: int, i: Any, stamp_ns: Any) -> bool:
     return True
 
 
-@compiled
-def _read(data: Any, start: int, end: int, steps: Any, i: Any, stamp_ns: Any, rows: Any) -> int:
+@compiled(uncounted=True)
+def _read(
+    data: Any, start: int, end: int, steps: Any, i: Any, stamp_ns: Any, rows: Any, layout: Any
+) -> int:
+    """Read a message step by step, and note in `layout` where its numbers were."""
     unstamped = steps[0, 0] == _UNSTAMPED
     if unstamped:
         if not _is_cdr(data, start, end, 0):
@@ -166,7 +169,8 @@ def _read(data: Any, start: int, end: int, steps: Any, i: Any, stamp_ns: Any, ro
     at = 0 if unstamped else string_end(data, body, TIME_BYTES, size, big)
     if at == BAD:
         return _MALFORMED
-    base = at
+    base = strings_end = at
+    count = 0
     for k in range(1 if unstamped else 0, len(steps)):
         step, first, second = steps[k, 0], steps[k, 1], steps[k, 2]
         if step == _SECTION:
@@ -175,26 +179,59 @@ def _read(data: Any, start: int, end: int, steps: Any, i: Any, stamp_ns: Any, ro
             if at > size:
                 return _MALFORMED
             base += body
-        elif step == _FLOAT64:
-            rows[i, _U(second)] = float64(data, base + first, big)
-        elif step == _FLOAT32:
-            rows[i, _U(second)] = _float32(data, base + first, big)
-        elif step == _UINT8:
-            rows[i, _U(second)] = np.float64(data[_U(base + first)])
-        elif step == _INT8:
-            rows[i, _U(second)] = np.float64(np.int8(data[_U(base + first)]))
-        else:
-            at = string_end(data, body, aligned(at, 4), size, big)
+        elif step == _STRING:
+            at = strings_end = string_end(data, body, aligned(at, 4), size, big)
             if at == BAD:
                 return _MALFORMED
+        else:
+            _take(data, step, base + first, big, i, second, rows)
+            count += 1
+            layout[count, 0], layout[count, 1] = step, base + first - start
+            layout[count, 2] = second
+    layout[0, 0], layout[0, 1] = count, BODY + strings_end
     return _MALFORMED if size - at > _PADDING else _READ
+
+
+@compiled(inline=True, uncounted=True)
+def _take(data: Any, step: int, at: int, big: bool, i: Any, column: int, rows: Any) -> None:
+    """Read one number."""
+    if step == _FLOAT64:
+        rows[i, _U(column)] = float64(data, at, big)
+    elif step == _FLOAT32:
+        rows[i, _U(column)] = _float32(data, at, big)
+    elif step == _UINT8:
+        rows[i, _U(column)] = np.float64(data[_U(at)])
+    else:
+        rows[i, _U(column)] = np.float64(np.int8(data[_U(at)]))
+
+
+@compiled(inline=True, uncounted=True)
+def _is_alike(data: Any, one: int, other: int, first: int, end: int) -> bool:
+    """Say whether two messages have the same bytes from `first` to `end`."""
+    at = first
+    while at + 8 <= end:
+        if _long(data, one + at) != _long(data, other + at):
+            return False
+        at += 8
+    if at < end and end - first >= 8:  # the last eight, of which some are compared again
+        return bool(_long(data, one + end - 8) == _long(data, other + end - 8))
+    while at < end:
+        if data[_U(one + at)] != data[_U(other + at)]:
+            return False
+        at += 1
+    return True
+
+
+@compiled(inline=True, uncounted=True)
+def _long(data: Any, at: int) -> Any:
+    return word(data, at + 4, False) << _U(32) | word(data, at, False)
 
 
 _BUFFER = nb.Array(nb.uint8, 1, 'C', readonly=True)
 _PLACES = nb.Array(nb.int64, 1, 'C', readonly=True)
 
 
-_SIGNATURE: Signature = nb.void(
+_SIGNATURE: Signature = nb.int64(
     _BUFFER,
     _PLACES,
     _PLACES,
@@ -216,7 +253,7 @@ def gather(
     stamp_ns: Int64,
     rows: Float64,
     found: UInt8,
-) -> None:
+) -> int:
     """
     Read the stamp and the wanted numbers of some messages.
 
@@ -237,13 +274,42 @@ def gather(
         value that the type lacks is 0, a variance that says nothing NaN.
     found : (n,) uint8
         Filled with a `GatherResult` each.
+
+    Returns
+    -------
+    int
+        How many could not be read.
     """
+    unstamped = steps[0, 0] == _UNSTAMPED
+    numbers = BODY if unstamped else BODY + TIME_BYTES  # what stands before them is read already
+    layout = np.zeros((len(steps) + 1, 3), np.int64)
+    before, size, order, big = -1, 0, _U(0), False
+    unread = 0
     for k in range(len(place)):
         i = _U(place[k])
         rows[i, 0] = rows[i, 1] = 0.0
         for column in range(_VARIANCES, rows.shape[1]):
             rows[i, _U(column)] = np.nan
-        found[i] = _read(data, start[i], end[i], steps, i, stamp_ns, rows)
+        at = int(start[i])
+        # of the same size, byte order and strings as the one before: its numbers lie as those do
+        if (
+            before >= 0
+            and end[i] - at == size
+            and word(data, at, False) == order
+            and _is_alike(data, at, before, numbers, layout[0, 1])
+        ):
+            found[i] = _READ
+            if not unstamped:
+                read_stamp(data, at, end[i], i, stamp_ns)
+            for j in range(1, layout[0, 0] + 1):
+                _take(data, layout[j, 0], at + layout[j, 1], big, i, layout[j, 2], rows)
+        else:
+            found[i] = _read(data, at, end[i], steps, i, stamp_ns, rows, layout)
+            before = at if found[i] == _READ else -1
+            unread += before < 0
+            if before >= 0:
+                size, order, big = int(end[i]) - at, word(data, at, False), data[_U(at + 1)] == 0
         for column in range(_VARIANCES, COLUMNS):
             if not 0.0 < rows[i, _U(column)] < np.inf:
                 rows[i, _U(column)] = np.nan
+    return unread

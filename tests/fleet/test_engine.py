@@ -73,7 +73,8 @@ def test_the_verb_from_bags_to_rows_and_again(
         assert f"  'other/{name}': " in said
     found = json.loads(result.read_text())
     assert found['ships'] == [{'name': 'Vitus Bering', 'bags': 3, 'coastdowns': 3}]
-    assert (found['new'], len(found['skipped']), found['notes']) == (5, 5, [])
+    assert (found['new'], len(found['skipped']), found['notes']) == (3, 5, [])
+    assert '3 coastdown(s) of 3 bag(s); 3 bag(s) replayed now, 0 done before, 5 skipped' in said
     rows = read_coastdowns(store).to_pylist()
     assert [row['bag'] for row in rows] == [f'bering/2026/run {n}.mcap' for n in (1, 2, 3)]
     assert [row['error'] for row in rows] == [None] * 3
@@ -86,7 +87,7 @@ def test_the_verb_from_bags_to_rows_and_again(
     bytes_before = contents(store)
     assert main([*line, '--scheduler', engine.address, '--json', str(result)]) == 1
     assert json.loads(result.read_text())['new'] == 0
-    assert '0 bag(s) replayed now, 5 done before' in capsys.readouterr().out
+    assert '0 bag(s) replayed now, 3 done before, 5 skipped' in capsys.readouterr().out
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert contents(store) == bytes_before
 
@@ -127,6 +128,12 @@ def test_a_worker_that_dies_again_while_it_starts_is_waited_for(engine: Engine) 
     """Dask looks 15 s after a death, and gives up the worker that is not there just then."""
     assert engine.address
     assert parse_timedelta(dask.config.get('distributed.deploy.lost-worker-timeout')) > 600.0
+
+
+def test_workers_keep_no_record_of_what_they_were_doing(engine: Engine) -> None:
+    """Dask would keep one of each of the last 1000 seconds, 0.2 MB a bag."""
+    found = engine.on_each(lambda: dask.config.get('distributed.worker.profile.enabled'))
+    assert set(found.values()) == {False}
 
 
 def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import importlib
 import math
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, decode, types
 from shipdrag_ros.messages.decoding import decode_batch
 from shipdrag_ros.messages.layout import steps
+from shipdrag_ros.samples import concatenate
 
 SOURCES = [
     Source(name, type_name)
@@ -211,6 +213,31 @@ def test_a_frame_id_is_utf8_or_the_message_is_malformed(name: bytes) -> None:
         assert decoded.unreadable == {Unreadable.MALFORMED: 1}
     else:
         assert decoded.block.value.tolist() == [[1.0, 2.0]]
+
+
+@pytest.mark.parametrize('source', SOURCES, ids=IDS)
+@settings(max_examples=10, deadline=None)
+@given(data=st.data())
+def test_a_message_reads_the_same_alone_and_behind_others(
+    reference: Any, source: Source, data: st.DataObject
+) -> None:
+    """Numbers are read where those of the message before lay, where they lie there again."""
+    pool = []
+    for frame in ('log', 'gps', 'base', 'ü'):
+        for little in (True, False):
+            message = reference.message(source.type, 7, frame, data.draw(eight))
+            good = reference.serialize(source.type, message, little_endian=little)
+            changed = bytearray(good)
+            changed[data.draw(st.integers(0, 30)) % len(good)] ^= data.draw(st.integers(1, 255))
+            pool += [good, good, bytes(changed), good[:-1], good + b'\0\0\0', good + bytes(4)]
+    payloads = data.draw(st.lists(st.sampled_from(pool), min_size=2, max_size=40))
+    together = decode(source, payloads, np.arange(len(payloads)))
+    alone = [decode(source, [payload], [n]) for n, payload in enumerate(payloads)]
+    assert together.unreadable == sum((each.unreadable for each in alone), Counter())
+    expected = concatenate([each.block for each in alone])
+    for field in ('channel', 'stamp_ns', 'receive_ns', 'value', 'variance'):
+        found, single = getattr(together.block, field), getattr(expected, field)
+        assert found.tobytes() == single.tobytes(), field
 
 
 def test_a_giant_length_is_malformed_and_nothing_is_read_beyond(reference: Any) -> None:
