@@ -16,8 +16,10 @@ from shipdrag_ros.diagnosis import (
     diagnose_fitted,
     diagnose_sailing,
 )
+from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.result import ToldFact
 from shipdrag_ros.diagnosis.together import with_log_track
+from shipdrag_ros.diagnosis.told import SeenRun, ToldEarlier
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
@@ -43,6 +45,8 @@ def diagnose_runs(
     runs: Sequence[WindowedRun],
     given: Ship | None,
     facts: Sequence[Fact],
+    *,
+    earlier: Sequence[EarlierDiagnosis] = (),
     progress: Progress = silent,
 ) -> tuple[DiagnosisResult, Ship | None]:
     """
@@ -58,6 +62,8 @@ def diagnose_runs(
         The ship; None: the one attached to the first run that has one.
     facts
         Of all runs.
+    earlier
+        Diagnoses of earlier runs of the ship.
     progress
         Called with each stage, how much of it is done, and of how much.
 
@@ -71,24 +77,37 @@ def diagnose_runs(
     BagError
         If no ship is given, and the runs are of several.
     DiagnosisError
-        If neither a coastdown nor the log and the track can be examined.
+        If neither a coastdown nor the log and the track can be examined, or an earlier
+        diagnosis is of another ship, of later runs or of one of these.
     """
     if given is None:
         refuse_two_ships((run, None) for run, _ in runs)
     windowed = any(window is not None for _, window in runs)
     if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        return _unused(_sailing(runs, f'No coastdown was found: {why}.', progress), facts), None
+        found = _sailing(runs, f'No coastdown was found: {why}.', progress)
+        return _unused(found, facts, earlier), None
     seen = _found(listener, runs, given, progress)
     if not seen.coasts:
         why = f'No coastdown was found {"; ".join(seen.without)}.'
-        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts)), seen.ship
+        found = _sailing(runs, why, progress)
+        return _unused(found, (*seen.ship.facts, *facts), earlier), seen.ship
     if seen.ship.baseline is None:
         progress('fitting a form of the resistance', 0, 0)
-        found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
+        found = diagnose_fitted(seen.coasts, seen.ship)
         found = _with_log_track(found, runs, progress)
+        found = _unused(found, (*seen.ship.facts, *facts), earlier)
+        at = tuple(SeenRun(coast.name, coast.window.start_ns) for coast in seen.coasts)
+        found = replace(found, runs=at)
     else:
-        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress)
+        found = diagnose(
+            seen.coasts,
+            seen.ship,
+            seen.parameters,
+            facts=facts,
+            earlier=earlier,
+            progress=progress,
+        )
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
 
@@ -104,9 +123,15 @@ def _with_log_track(
         return replace(found, notes=(*found.notes, why))
 
 
-def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
-    """Say of facts that they were stated and not used."""
-    return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
+def _unused(
+    found: DiagnosisResult, facts: Sequence[Fact], earlier: Sequence[EarlierDiagnosis]
+) -> DiagnosisResult:
+    """Say of facts and of earlier diagnoses that they were given and not used."""
+    return replace(
+        found,
+        facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)),
+        earlier=tuple(ToldEarlier(each.name, each.runs, used=False) for each in earlier),
+    )
 
 
 def _sailing(
@@ -119,8 +144,10 @@ def _sailing(
         read.append((run.name, *accepted_samples(run, zeros=True)))
     progress('holding the log against the way over ground', 0, 0)
     records = [SailingRecord(name, block) for name, block, _ in read]
+    at = tuple(SeenRun(run.name, run.span_ns[0]) for run, _ in runs if run.span_ns)
     try:
-        return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
+        found = diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
+        return replace(found, runs=at)
     except DiagnosisError as error:
         said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)
         raise DiagnosisError(said) from error
