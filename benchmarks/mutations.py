@@ -167,8 +167,8 @@ def _tried(
         if line[:3] not in ('---', '+++')
     ]
     changed = [line[1:].strip() for line in difference if line.startswith('-')]
-    # frozen or not, by keyword or not: no run of the program differs
-    if all(line.startswith(('@', 'def ')) for line in changed):
+    # frozen or not, by keyword or not: no run of the program differs, or there is none
+    if all(line.startswith(('@', 'def ', '*,')) for line in changed):
         path.write_text(source)
         return _told(module, name, 'declaration', difference)
     outcome = 'survived'

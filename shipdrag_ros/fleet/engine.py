@@ -84,6 +84,8 @@ class Engine:
                     'distributed.comm.timeouts.connect': f'{_CONNECT_S:g}s',
                     # so long after a death a worker that is not there just then is given up
                     'distributed.deploy.lost-worker-timeout': _GIVEN_UP,
+                    # what it samples of a worker's stacks grows by half a megabyte a bag
+                    'distributed.worker.profile.enabled': False,
                 }
             )
         )

@@ -17,10 +17,10 @@ from shipdrag_ros.diagnosis import (
     diagnose_sailing,
 )
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
-from shipdrag_ros.diagnosis.result import ToldFact
+from shipdrag_ros.diagnosis.result import ToldFact, Verdict
 from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.diagnosis.told import SeenRun, ToldEarlier
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_two_ships
@@ -35,9 +35,19 @@ from shipdrag_ros.replay import (
     why_no_coastdown,
 )
 from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import overriding
+
+_GLIDED = (
+    'she lost her speed about as fast as after an engine stop, though not as water slows a ship; '
+    'no coastdown is taken from it, but all of it is held against the model'
+)
+_BRAKED = (
+    'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
+    'from the rest alone, but all of it is held against the model'
+)
 
 
 def diagnose_runs(
@@ -85,13 +95,31 @@ def diagnose_runs(
     windowed = any(window is not None for _, window in runs)
     if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        found = _sailing(runs, f'No coastdown was found: {why}.', progress)
-        return _unused(found, facts, earlier), None
+        sailing = _sailing(runs, f'No coastdown was found: {why}.', progress)
+        return _unused(sailing, facts, earlier), None
     seen = _found(listener, runs, given, progress)
+    found: DiagnosisResult | None = None
+    try:
+        found = _of_coastdowns(runs, seen, facts, earlier, progress)
+    except DiagnosisError:
+        if not seen.whole:
+            raise
+    if found is None or (seen.whole and found.verdict is not Verdict.NAMED):
+        found = _of_whole_glides(found, seen, facts, earlier, progress)
+    return found, seen.ship
+
+
+def _of_coastdowns(
+    runs: Sequence[WindowedRun],
+    seen: _Coastdowns,
+    facts: Sequence[Fact],
+    earlier: Sequence[EarlierDiagnosis],
+    progress: Progress,
+) -> DiagnosisResult:
+    """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
         why = f'No coastdown was found {"; ".join(seen.without)}.'
-        found = _sailing(runs, why, progress)
-        return _unused(found, (*seen.ship.facts, *facts), earlier), seen.ship
+        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts), earlier)
     if seen.ship.baseline is None:
         progress('fitting a form of the resistance', 0, 0)
         found = diagnose_fitted(seen.coasts, seen.ship)
@@ -109,7 +137,45 @@ def diagnose_runs(
             progress=progress,
         )
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
-    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
+    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates)
+
+
+def _of_whole_glides(
+    found: DiagnosisResult | None,
+    seen: _Coastdowns,
+    facts: Sequence[Fact],
+    earlier: Sequence[EarlierDiagnosis],
+    progress: Progress,
+) -> DiagnosisResult:
+    """
+    Diagnose with the parts that are no coastdown though no instrument shows why.
+
+    Where these show nothing either, what the coastdowns show stands.
+    """
+    try:
+        whole = diagnose(
+            seen.whole,
+            seen.ship,
+            seen.parameters,
+            facts=facts,
+            earlier=earlier,
+            progress=progress,
+        )
+    except ShipdragError as error:  # a glide that is like none may not be followed
+        if found is None:
+            raise DiagnosisError(f'{"; ".join(seen.told)}; that failed: {error}') from error
+        return replace(found, notes=(*found.notes, *seen.told, f'that failed: {error}'))
+    if found is None:
+        return replace(whole, notes=(*whole.notes, *seen.told), estimates=seen.estimates)
+    if whole.verdict is Verdict.NONE:
+        return replace(found, notes=(*found.notes, *seen.told))
+    return replace(
+        whole,
+        notes=(*found.notes, *whole.notes, *seen.told),
+        no_coastdown=found.no_coastdown,
+        coastdowns_used=found.coastdowns_used,
+        estimates=seen.estimates,
+    )
 
 
 def _with_log_track(
@@ -196,9 +262,16 @@ def coasts_of(
 
 @dataclass(frozen=True)
 class _Coastdowns:
-    """The coastdowns of all bags, their estimates, and of each bag without one why."""
+    """
+    The coastdowns of all bags, their estimates, and of each bag without one why.
+
+    `whole` are all glides with the parts of them that are no coastdown, though no instrument
+    shows why; empty where there is no such part. `told` says what these are.
+    """
 
     coasts: list[CoastRun]
+    whole: list[CoastRun]
+    told: tuple[str, ...]
     ship: Ship
     parameters: Parameters
     without: tuple[str, ...]
@@ -213,6 +286,8 @@ def _found(
 ) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
+    whole: list[CoastRun] = []
+    told: list[str] = []
     without: list[str] = []
     estimates: list[Estimate] = []
     ship, parameters = given, None
@@ -233,12 +308,28 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-        for place, (_, found) in enumerate(windows, start=1):
+            glide = dismissed_glide(result)
+            if glide is not None:
+                whole.append(CoastRun(each.name, glide, sheet.facts, of_run))
+                told.append(f'{each.name}: {_GLIDED}')
+        for place, (coastdown, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
+            glide = whole_glide(result, coastdown)
+            whole.append(replace(coasts[-1], window=glide or found))
+            if glide is not None:
+                told.append(f'{name}: {_BRAKED}')
     assert ship is not None
     assert parameters is not None
-    return _Coastdowns(coasts, ship, parameters, tuple(without), tuple(estimates))
+    return _Coastdowns(
+        coasts,
+        whole if told else [],
+        tuple(told),
+        ship,
+        parameters,
+        tuple(without),
+        tuple(estimates),
+    )
 
 
 def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:

@@ -15,6 +15,7 @@ import cloudpickle
 import dask
 import pytest
 from dask.utils import parse_timedelta
+from distributed import get_worker
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import FleetError
@@ -110,6 +111,16 @@ def test_only_what_kills_its_worker_by_itself_is_given_up(engine: Engine) -> Non
     assert isinstance(lost, Lost)
     assert 'its worker died' in lost.reason
     assert found == {'a': 'A', 'b': 'B', 'c': 'C', 'd': 'D'}
+
+
+def stacks_kept(wait_s: float) -> int:
+    """Return how many samples of its stacks the worker that runs this holds."""
+    time.sleep(wait_s)
+    return len(get_worker().profile_history)
+
+
+def test_a_worker_holds_nothing_of_the_bags_that_it_has_done(engine: Engine) -> None:
+    assert dict(engine.map(stacks_kept, {'one': 1.5})) == {'one': 0}  # Dask keeps one a second
 
 
 def test_a_worker_that_dies_again_while_it_starts_is_waited_for(engine: Engine) -> None:
