@@ -35,8 +35,8 @@ from shipdrag_ros.diagnosis.carried import carried
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.model import Hypothesis
+from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.diagnosis.told import SeenRun
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship

@@ -142,8 +142,8 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     output.say(diagnosis_words.examined(found))
     if found.where is not None:
         output.say(f'Model and data disagree {diagnosis_words.place(found)}.')
-    told = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))
-    for line in (*told, *found.notes):
+    weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))
+    for line in (*weighed, *found.notes):
         output.say(line)
     output.heading('How probable')
     output.table(diagnosis_cells.probabilities(found))

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, Verdict
-from shipdrag_ros.diagnosis.told import SeenRun, ToldEarlier
+from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.ship import Ship
 
 
@@ -84,13 +84,13 @@ def _runs(runs: Sequence[SeenRun]) -> list[dict[str, Any]]:
     return [{'bag': run.name, 'time_ns': run.time_ns} for run in runs]
 
 
-def _earlier(told: ToldEarlier) -> dict[str, Any]:
+def _earlier(given: WeighedEarlier) -> dict[str, Any]:
     return {
-        'file': told.name,
-        'used': told.used,
-        'runs': _runs((*told.runs, *told.before)),
-        'effects': [{**asdict(each), 'contradicted': each.contradicted} for each in told.effects],
-        'unused': list(told.unused),
+        'file': given.name,
+        'used': given.used,
+        'runs': _runs((*given.runs, *given.before)),
+        'effects': [{**asdict(each), 'contradicted': each.contradicted} for each in given.effects],
+        'unused': list(given.unused),
     }
 
 

@@ -21,8 +21,8 @@ from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis, check
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.posterior import Posterior
+from shipdrag_ros.diagnosis.seen_runs import CarriedEffect, SeenRun, WeighedEarlier
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.diagnosis.told import CarriedEffect, SeenRun, ToldEarlier
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Scope
@@ -174,7 +174,7 @@ class Carried:
                 found[name] = self._sizes(find(name), source)
         return {name: priors for name, priors in found.items() if priors}
 
-    def told(self, posterior: Posterior) -> tuple[ToldEarlier, ...]:
+    def judged(self, posterior: Posterior) -> tuple[WeighedEarlier, ...]:
         """
         Return what of each diagnosis counts, and what has become of it.
 
@@ -185,7 +185,7 @@ class Carried:
 
         Returns
         -------
-        tuple of ToldEarlier
+        tuple of WeighedEarlier
             The latest first.
         """
         now: dict[str, float] = {}
@@ -193,7 +193,7 @@ class Carried:
             for name in names:
                 now[name] = now.get(name, 0.0) + probability
         return tuple(
-            ToldEarlier(
+            WeighedEarlier(
                 each.diagnosis.name,
                 each.diagnosis.runs,
                 tuple(
@@ -318,9 +318,9 @@ def _stays(effect: Effect, earlier: EarlierDiagnosis, now_ns: int, facts: Facts)
     """Return how probable it is that an effect that was found is still there as it was."""
     passed_s = (now_ns - earlier.last_ns) * 1e-9
     stays = (1.0 - ERRS) * math.exp(-passed_s / effect.lasts_s)
-    for told in facts.told:
-        since_ns = told.fact.time_ns
+    for stated in facts.stated:
+        since_ns = stated.fact.time_ns
         ended = since_ns is not None and earlier.last_ns <= since_ns <= now_ns
-        if ended and told.fact.name in effect.facts:
-            stays *= told.fact.rate
+        if ended and stated.fact.name in effect.facts:
+            stays *= stated.fact.rate
     return stays

@@ -107,9 +107,9 @@ class CoastModel(CoastSimulation):
         ]
         log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES) + _SWINGING))
         found = Hypothesis((), (baseline, *given), places, log_prior=log_prior)
-        return replace(found, log_prior=log_prior + self._log_told(found))
+        return replace(found, log_prior=log_prior + self._log_evidence(found))
 
-    def _log_told(self, hypothesis: Hypothesis) -> float:
+    def _log_evidence(self, hypothesis: Hypothesis) -> float:
         """Return the log evidence of facts and of earlier diagnoses; it is no prior."""
         facts = 0.0 if self.facts is None else self.facts.log_likelihood(hypothesis)
         return facts + (0.0 if self.earlier is None else self.earlier.log_weight(hypothesis))
@@ -170,8 +170,8 @@ class CoastModel(CoastSimulation):
             ways=ways,
             model_errors=(ModelErrorTerm(term, sd),) if sd > 0.0 else (),
         )
-        told = self._log_told(more) - self._log_told(base)
-        return replace(more, log_prior=more.log_prior + told)
+        gained = self._log_evidence(more) - self._log_evidence(base)
+        return replace(more, log_prior=more.log_prior + gained)
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """

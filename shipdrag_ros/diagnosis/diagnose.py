@@ -11,7 +11,7 @@ from shipdrag_ros.diagnosis.carried import carried
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
-from shipdrag_ros.diagnosis.facts import Facts, told_of
+from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
@@ -24,9 +24,9 @@ from shipdrag_ros.diagnosis.result import (
     Where,
 )
 from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
+from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.swinging import swing_notes, swinging, with_swinging
-from shipdrag_ros.diagnosis.told import SeenRun
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
@@ -113,7 +113,7 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    model, found, told, notes = _searched(runs, ship, parameters, facts, earlier, progress)
+    model, found, stated, notes = _searched(runs, ship, parameters, facts, earlier, progress)
     seen = model.seen
     found = with_swinging(found, model)
     found = with_pairs(with_differing(found, model), progress=progress)
@@ -150,10 +150,10 @@ def diagnose(
         traces=traces(model, as_stated.best, explained.best),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
-        facts=told.weighed(judged.posterior, [run.name for run in seen]),
+        facts=stated.weighed(judged.posterior, [run.name for run in seen]),
         runs_differ=differ,
         runs=_seen_runs(seen),
-        earlier=() if model.earlier is None else model.earlier.told(judged.posterior),
+        earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
     )
 
 
@@ -169,23 +169,23 @@ def _searched(
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):
         seen, notes = _observed(runs, ship, parameters, moved_s, progress)
-        told = _told(runs, seen, ship, facts)
-        before = carried(earlier, ship, _seen_runs(seen), told)
-        model = CoastModel(ship, seen, seen[0].heading_rad, told, before)
+        stated = _stated(runs, seen, ship, facts)
+        before = carried(earlier, ship, _seen_runs(seen), stated)
+        model = CoastModel(ship, seen, seen[0].heading_rad, stated, before)
         found = search(model, progress=progress)
         more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
             break
         moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
-    return model, found, told, notes
+    return model, found, stated, notes
 
 
-def _told(
+def _stated(
     runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
 ) -> Facts:
     """Gather what is stated of the runs that are diagnosed."""
     own = {run.name: run.facts for run in runs}
-    return told_of(ship, [(own[run.name], run.time_ns) for run in _seen_runs(seen)], facts)
+    return stated_facts(ship, [(own[run.name], run.time_ns) for run in _seen_runs(seen)], facts)
 
 
 def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:

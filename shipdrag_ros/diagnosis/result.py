@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from shipdrag_ros.diagnosis.told import DOUBTED, SeenRun, ToldEarlier
+from shipdrag_ros.diagnosis.seen_runs import DOUBTED, SeenRun, WeighedEarlier
 from shipdrag_ros.display import Table
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameter import Parameter
@@ -107,7 +107,7 @@ class RunSize:
 
 
 @dataclass(frozen=True)
-class ToldFact:
+class WeighedFact:
     """
     A fact of the log book, and what the data say of it.
 
@@ -295,11 +295,11 @@ class DiagnosisResult:
     coastdowns_used: int = 0
     examined: tuple[str, ...] = ()
     no_coastdown: str = ''
-    facts: tuple[ToldFact, ...] = ()
+    facts: tuple[WeighedFact, ...] = ()
     runs_differ: tuple[RunSize, ...] = ()
     estimates: tuple[Estimate, ...] = ()
     runs: tuple[SeenRun, ...] = ()
-    earlier: tuple[ToldEarlier, ...] = ()
+    earlier: tuple[WeighedEarlier, ...] = ()
 
     def summary(self) -> tuple[str, ...]:
         """
@@ -314,9 +314,9 @@ class DiagnosisResult:
 
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
         first = (self.no_coastdown, words.sentence(self), words.differing(self))
-        told = (*first, words.examined(self), where)
+        lines = (*first, words.examined(self), where)
         more = (*words.facts(self), *words.earlier(self), *self.notes)
-        return (*filter(None, told), *more)
+        return (*filter(None, lines), *more)
 
     def table(self) -> Table:
         """

@@ -16,8 +16,8 @@ from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.posterior import Posterior
+from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.diagnosis.told import SeenRun
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameter import Parameter
@@ -98,7 +98,7 @@ def test_water_and_weather_of_another_day_say_nothing() -> None:
     found = known(earlier(1.0, current=0.99))
     assert weight(found, 'current') == pytest.approx(weight(found))
     assert found.kept('current') == ()
-    (told,) = found.told(NOTHING)
+    (told,) = found.judged(NOTHING)
     assert told.effects == ()
     assert told.unused[0].startswith('current: water, weather')
 
@@ -153,7 +153,7 @@ def test_of_the_hull_the_latest_diagnosis_counts_alone() -> None:
     found = known(replace(old, name='old.json'), new)
     assert [each.diagnosis.name for each in found.weighed] == ['then.json', 'old.json']
     assert 'fouling' not in found.weighed[1].stays
-    assert found.told(NOTHING)[1].unused[0].endswith('and then.json is later')
+    assert found.judged(NOTHING)[1].unused[0].endswith('and then.json is later')
     # one without a baseline speaks of the instruments alone
     sailing = replace(earlier(5.0, log_scale=0.9), of_force=False)
     assert 'fouling' in known(sailing, replace(old, name='old.json')).weighed[1].stays

@@ -54,7 +54,7 @@ class CarriedEffect:
 
 
 @dataclass(frozen=True)
-class ToldEarlier:
+class WeighedEarlier:
     """
     An earlier diagnosis, and what of it counts.
 
