@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Score of r(v) and its band, on coastdowns of world B.
+Score of r(v) and its band, on coastdowns of world A or B.
 
+    python benchmarks/band_score.py --world a --first 539 --count 40
     python benchmarks/band_score.py --world b --half odd --count 40 --seed 5
 
 Runs `shipdrag replay` on each run by itself, in this process, and holds the curve against the
 true one. By default only cases in which r(v) is what a coastdown shows: nothing hidden, or
-something that belongs to the hull. Even cases are for choosing methods, odd ones for scoring.
+something that belongs to the hull. Of world A the cases before 539 are for choosing methods, of
+world B the even ones; the others are for scoring.
 """
 
 from __future__ import annotations
@@ -18,8 +20,9 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,7 +32,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
 from diagnosis_score import HALVES, write_bags
-from hidden_b import cases
+from hidden import cases as cases_a
+from hidden_b import cases as cases_b
 from hidden_b.plans import plans_of
 
 from shipdrag_ros import cli
@@ -45,6 +49,65 @@ OWN = (
 """What is part of r(v), and nothing else beside it."""
 NINE_TENTHS = 0.9
 WIDE = 1.96
+
+
+@dataclass(frozen=True)
+class World:
+    """
+    The cases of a world; each attribute but the first is a function of the number of a case.
+
+    Attributes
+    ----------
+    count
+        How many there are.
+    names
+        What is hidden.
+    condition, observe, stops_ns
+    first_speed
+        And of the run.
+    true_r
+        And of speeds and the run.
+    """
+
+    count: int
+    names: Callable[[int], tuple[str, ...]]
+    condition: Callable[[int], object]
+    observe: Callable[[int], Any]
+    stops_ns: Callable[[int], tuple[int, ...]]
+    first_speed: Callable[[int, int], float]
+    true_r: Callable[[int, np.ndarray, int], np.ndarray]
+
+    @classmethod
+    def a(cls) -> World:
+        """
+        Return the first world.
+        """
+        of = cases_a
+        return cls(
+            of.count(),
+            lambda number: of.reveal(number).names,
+            of.condition,
+            of.observe,
+            of.stops_ns,
+            of.first_speed,
+            of.true_r,
+        )
+
+    @classmethod
+    def b(cls, seed: int = cases_b.SEED) -> World:
+        """
+        Return the world of another hand.
+        """
+        of, plans = cases_b, plans_of(seed)
+        return cls(
+            len(plans),
+            lambda number: tuple(sorted(plans[number][0])),
+            partial(of.condition, seed=seed),
+            partial(of.observe, seed=seed),
+            partial(of.stops_ns, seed=seed),
+            partial(of.first_speed, seed=seed),
+            partial(of.true_r, seed=seed),
+        )
 
 
 @dataclass(frozen=True)
@@ -106,16 +169,18 @@ def replay(ship: Path, bag: Path, window: tuple[float, float] | None) -> dict[st
     return found
 
 
-def score(number: int, run: int, found: dict[str, Any], seed: int, cpu_s: float) -> Score | None:
+def score(
+    world: World, number: int, run: int, found: dict[str, Any], cpu_s: float
+) -> Score | None:
     """
     Return the score of a run, None where no coastdown was found after its stop.
     """
-    stop = cases.stops_ns(number, seed)[run]
+    stop = world.stops_ns(number)[run]
     later = [each for each in found['coastdowns'] if each['end_ns'] > stop]
     if not later:
         return None
     best = max(later, key=lambda each: each['end_ns'] - max(stop, each['start_ns']))
-    first = cases.first_speed(number, run, seed)
+    first = world.first_speed(number, run)
     speed, r, sigma = (
         np.array(best[name], np.float64) for name in ('speed_m_s', 'resistance_m_s2', 'sigma_m_s2')
     )
@@ -123,15 +188,15 @@ def score(number: int, run: int, found: dict[str, Any], seed: int, cpu_s: float)
     speed, r, sigma = speed[use], r[use], sigma[use]
     if len(speed) < 3:
         return None
-    true = cases.true_r(number, speed, run, seed)
+    true = world.true_r(number, speed, run)
     largest = float(true.max())
     error = r - true
     below = speed < NINE_TENTHS * first
     return Score(
         number,
         run,
-        ' + '.join(cases.reveal(number, seed).what) or 'nothing',
-        str(cases.condition(number, seed)),
+        ' + '.join(world.names(number)) or 'nothing',
+        str(world.condition(number)),
         float(np.sqrt(np.mean(error**2))) / largest,
         float(np.sqrt(np.mean(error[below] ** 2))) / largest if below.any() else float('nan'),
         float(np.mean(np.abs(error) <= WIDE * sigma)),
@@ -142,43 +207,45 @@ def score(number: int, run: int, found: dict[str, Any], seed: int, cpu_s: float)
     )
 
 
-def chosen(half: str, hidden: str, first: int, count: int, seed: int) -> list[int]:
+def chosen(world: World, half: str, hidden: str, first: int, count: int) -> list[int]:
     """
     Return numbers of cases: of a half, and of those with what is wanted hidden.
     """
     remainder, divisor = HALVES[half]
-    numbers = []
-    for number, (names, _) in enumerate(plans_of(seed)):
+    numbers: list[int] = []
+    for number in range(first, world.count):
+        if len(numbers) == count:
+            break
+        if number % divisor != remainder:
+            continue
+        names = world.names(number)
         own = not names or (len(names) == 1 and names[0] in OWN)
-        wanted = {'own': own, 'nothing': not names, 'all': True}[hidden]
-        if number >= first and number % divisor == remainder and wanted:
+        if {'own': own, 'nothing': not names, 'all': True}[hidden]:
             numbers.append(number)
-    return numbers[:count]
+    return numbers
 
 
 def scored(
-    numbers: Sequence[int], seed: int, given: bool
+    world: World, numbers: Sequence[int], given: bool
 ) -> Iterator[tuple[int, int, Score | None, str]]:
     """
     Yield case, run, score, and the error where the command failed.
     """
     for number in numbers:
-        seen = cases.observe(number, seed=seed)
+        seen = world.observe(number)
         with TemporaryDirectory() as folder:
             ship, bags = write_bags(seen, Path(folder))
             for run, bag in enumerate(bags):
                 series = seen.runs[run].values()
                 begins = min(int(each.receive_ns[0]) for each in series)
                 ends = max(int(each.stamp_ns[-1]) for each in series)
-                window = (
-                    (cases.stops_ns(number, seed)[run] - begins) * 1e-9,
-                    (ends - begins) * 1e-9,
-                )
+                stop = world.stops_ns(number)[run]
+                window = ((stop - begins) * 1e-9, (ends - begins) * 1e-9)
                 start = time.process_time()
                 try:
                     found = replay(ship, bag, window if given else None)
                     cpu_s = time.process_time() - start
-                    yield number, run, score(number, run, found, seed, cpu_s), ''
+                    yield number, run, score(world, number, run, found, cpu_s), ''
                 except RuntimeError as error:
                     yield number, run, None, str(error)
 
@@ -212,7 +279,7 @@ def summary(scores: Sequence[Score], runs: int) -> dict[str, float]:
     }
 
 
-def table(rows: Sequence[tuple[int, int, Score | None, str]], seed: int) -> Iterator[str]:
+def table(rows: Sequence[tuple[int, int, Score | None, str]]) -> Iterator[str]:
     """
     Yield the lines of the report: all runs, and apart those with and without anything hidden.
     """
@@ -240,19 +307,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Replay, score and print.
     """
     parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
-    parser.add_argument('--world', choices=('b',), default='b')
+    parser.add_argument('--world', choices=('a', 'b'), default='b')
     parser.add_argument('--half', choices=tuple(HALVES), default='all', help='by number')
     parser.add_argument('--hidden', choices=('own', 'nothing', 'all'), default='own')
     parser.add_argument('--first', type=int, default=0)
     parser.add_argument('--count', type=int, default=40, help='how many cases')
-    parser.add_argument('--seed', type=int, default=cases.SEED)
+    parser.add_argument('--seed', type=int, default=cases_b.SEED, help='of world b')
     parser.add_argument('--given', action='store_true', help='the time of the stop is given')
     parser.add_argument('--each', action='store_true', help='print each run')
     parser.add_argument('--out', type=Path, help='one line of JSON a run')
     options = parser.parse_args(arguments)
-    numbers = chosen(options.half, options.hidden, options.first, options.count, options.seed)
+    world = World.a() if options.world == 'a' else World.b(options.seed)
+    numbers = chosen(world, options.half, options.hidden, options.first, options.count)
     rows = []
-    for row in scored(numbers, options.seed, options.given):
+    for row in scored(world, numbers, options.given):
         rows.append(row)
         number, run, found, error = row
         if options.each:
@@ -261,10 +329,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
             with options.out.open('a', encoding='utf-8') as file:
                 line = asdict(found) if found else {'case': number, 'run': run, 'error': error}
                 file.write(json.dumps(line) + '\n')
-    print(f'{len(numbers)} cases of world b, seed {options.seed}, half {options.half}')
+    seed = cases_a.SEED if options.world == 'a' else options.seed
+    print(
+        f'{len(numbers)} cases of world {options.world} from {options.first} on, seed {seed}, '
+        f'half {options.half}'
+    )
     for error in sorted({error for *_, error in rows if error})[:5]:
         print(error)
-    for line in table(rows, options.seed):
+    for line in table(rows):
         print(line)
 
 

@@ -14,20 +14,22 @@ from functools import cache, lru_cache
 import numpy as np
 
 from hidden.effect import Effect, Leg
-from hidden.hull import SHAPE_TERMS, Hull, draw_hull
+from hidden.hull import SHAPE_TERMS, Array, Hull, draw_hull
 from hidden.library import FIRST_SHELF, SECOND_SHELF
 from hidden.outside import OUTSIDE
 from hidden.recording import (
+    BETWEEN_RUNS_NS,
     CONTEXT,
     INPUTS,
     MOTION,
+    START_NS,
     Noise,
     Recording,
     disturb,
     draw_noise,
     record,
 )
-from hidden.sailing import World, sail
+from hidden.sailing import LEAD_IN_S, World, coasting_m_s2, sail
 
 SEED = 20260601
 SHAPE_RMS = 0.01
@@ -106,7 +108,7 @@ class Observation:
 @dataclass(frozen=True)
 class Known:
     """
-    What an oracle is told besides.
+    What an oracle knows besides.
 
     Attributes
     ----------
@@ -231,7 +233,7 @@ def observe_hiding(number: int, kinds: tuple[type[Effect], ...]) -> Observation:
 
 def known(number: int) -> Known:
     """
-    Return what the oracle alone is told.
+    Return what the oracle alone knows.
     """
     case = _case(number)
     return Known(case.hull, case.noise, case.voyages[0].leg.duration_s)
@@ -255,6 +257,42 @@ def reveal(number: int) -> Truth:
         tuple(sorted(effect.name for effect in case.effects)),
         {effect.name: effect.parameters() for effect in case.effects},
         plan.condition,
+    )
+
+
+def condition(number: int) -> Condition:
+    """
+    Return what is given of a case.
+    """
+    return _plans()[number].condition
+
+
+def stops_ns(number: int) -> tuple[int, ...]:
+    """
+    Return when the engine was stopped, of each run.
+    """
+    first = START_NS + round(LEAD_IN_S * 1e9)
+    return tuple(first + which * BETWEEN_RUNS_NS for which in range(condition(number).runs))
+
+
+def first_speed(number: int, run: int = 0) -> float:
+    """
+    Return the steady speed of a run.
+    """
+    return _case(number).voyages[run].leg.speed_m_s
+
+
+def true_r(number: int, speed_m_s: Array, run: int = 0) -> Array:
+    """
+    Return the true r at speeds [m/s^2]: of hull, stopped propeller and what else goes with speed.
+    """
+    case = _case(number)
+    return coasting_m_s2(
+        case.voyages[run].leg,
+        _acting(case, run),
+        np.asarray(speed_m_s, np.float64),
+        first_heading_rad=case.voyages[0].heading_rad,
+        world=case.world,
     )
 
 
@@ -287,7 +325,7 @@ def _case(number: int, kinds: tuple[type[Effect], ...] | None = None) -> _Case:
 
 def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recording:
     leg, heading = case.voyages[which].leg, case.voyages[which].heading_rad
-    effects = tuple(effect for effect in case.effects if which == 0 or not effect.single_run)
+    effects = _acting(case, which)
     motion = sail(
         leg,
         effects,
@@ -307,6 +345,11 @@ def _run(number: int, case: _Case, which: int, inputs: tuple[str, ...]) -> Recor
         heading_rad=heading,
         streams=streams,
     )
+
+
+def _acting(case: _Case, which: int) -> tuple[Effect, ...]:
+    """Return the effects that act in a run."""
+    return tuple(effect for effect in case.effects if which == 0 or not effect.single_run)
 
 
 def _stream(*key: int) -> np.random.Generator:

@@ -148,6 +148,23 @@ def sail(
     )
 
 
+def coasting_m_s2(
+    leg: Leg,
+    effects: tuple[Effect, ...],
+    speed: Array,
+    *,
+    first_heading_rad: float,
+    world: World,
+) -> Array:
+    """
+    Return the true r [m/s^2] at speeds: of hull, stopped propeller and what else goes with speed.
+
+    Helm, gusts and a current that changes are no part of it.
+    """
+    drive = _drive(leg, effects, times(leg), world, first_heading_rad)
+    return np.interp(speed, _speeds(leg.hull), drive.coasting_m_s2)
+
+
 def _drive(
     leg: Leg, effects: tuple[Effect, ...], time: Array, world: World, first_heading_rad: float
 ) -> Drive:

@@ -54,6 +54,14 @@ class Coasting:
         grown = 1.0 + (p - 1.0) * self.deceleration_m_s2 * time_s / speed_m_s
         return float(speed_m_s * (1.0 - grown ** (-1.0 / (p - 1.0))))
 
+    def time_s(self, speed_m_s: float, *, left: float) -> float:
+        """
+        Return the expected time [s] after which this part of a speed is left.
+        """
+        p = max(self.exponent, 1.01)
+        grown = left ** (1.0 - p)
+        return float((grown - 1.0) / (p - 1.0) * speed_m_s / self.deceleration_m_s2)
+
 
 def expect(ship: Ship, speed_m_s: float) -> Coasting:
     """

@@ -16,9 +16,9 @@ from shipdrag_ros.diagnosis import (
     diagnose_fitted,
     diagnose_sailing,
 )
-from shipdrag_ros.diagnosis.result import ToldFact
+from shipdrag_ros.diagnosis.result import Verdict, WeighedFact
 from shipdrag_ros.diagnosis.together import with_log_track
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_two_ships
@@ -33,9 +33,22 @@ from shipdrag_ros.replay import (
     why_no_coastdown,
 )
 from shipdrag_ros.replay.cuts import cut_lines
+from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import overriding
+
+_GLIDED = (
+    'she lost her speed about as fast as after an engine stop, though not as water slows a ship; '
+    'no coastdown is taken from it'
+)
+_BRAKED = (
+    'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
+    'from the rest alone'
+)
+_HELD = 'all of each glide is held against the model, such parts with the rest'
+_AGREES = 'all of each glide, held against the model, shows nothing more'
+_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 
 def diagnose_runs(
@@ -80,9 +93,26 @@ def diagnose_runs(
         why = 'without a ship file none is looked for; give one with --ship FILE'
         return _unused(_sailing(runs, f'No coastdown was found: {why}.', progress), facts), None
     seen = _found(listener, runs, given, progress)
+    found: DiagnosisResult | None = None
+    try:
+        found = _of_coastdowns(runs, seen, facts, progress)
+    except DiagnosisError:
+        if not seen.whole:
+            raise
+    if found is not None and seen.whole and found.verdict is Verdict.NAMED:
+        found = replace(found, notes=(*found.notes, *seen.notes, _APART))
+    elif found is None or seen.whole:
+        found = _of_whole_glides(found, seen, facts, progress)
+    return found, seen.ship
+
+
+def _of_coastdowns(
+    runs: Sequence[WindowedRun], seen: _Coastdowns, facts: Sequence[Fact], progress: Progress
+) -> DiagnosisResult:
+    """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
-        why = f'No coastdown was found {"; ".join(seen.without)}.'
-        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts)), seen.ship
+        log_track = _sailing(runs, seen.no_coastdown, progress)
+        return _unused(log_track, (*seen.ship.facts, *facts))
     if seen.ship.baseline is None:
         progress('fitting a form of the resistance', 0, 0)
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
@@ -90,7 +120,34 @@ def diagnose_runs(
     else:
         found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
-    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates), seen.ship
+    return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates)
+
+
+def _of_whole_glides(
+    found: DiagnosisResult | None, seen: _Coastdowns, facts: Sequence[Fact], progress: Progress
+) -> DiagnosisResult:
+    """
+    Diagnose with the parts that are no coastdown though no instrument shows why.
+
+    Where these show nothing either, what the coastdowns show stands.
+    """
+    try:
+        whole = diagnose(seen.whole, seen.ship, seen.parameters, facts=facts, progress=progress)
+    except ShipdragError as error:  # a glide that is like none may not be followed
+        if found is None:
+            raise DiagnosisError(f'{"; ".join(seen.notes)}; diagnosed whole: {error}') from error
+        why = f'all of each glide could not be held against the model: {error}'
+        return replace(found, notes=(*found.notes, *seen.notes, why))
+    if found is not None and whole.verdict is Verdict.NONE:
+        return replace(found, notes=(*found.notes, *seen.notes, _AGREES))
+    before = () if found is None else found.notes
+    return replace(
+        whole,
+        notes=tuple(dict.fromkeys((*before, *whole.notes, *seen.notes, _HELD))),
+        no_coastdown=seen.no_coastdown,
+        coastdowns_used=len(seen.coasts) if found is None else found.coastdowns_used,
+        estimates=seen.estimates,
+    )
 
 
 def _with_log_track(
@@ -106,7 +163,7 @@ def _with_log_track(
 
 def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
     """Say of facts that they were stated and not used."""
-    return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
+    return replace(found, facts=tuple(WeighedFact(fact, '', None) for fact in overriding(facts)))
 
 
 def _sailing(
@@ -169,13 +226,25 @@ def coasts_of(
 
 @dataclass(frozen=True)
 class _Coastdowns:
-    """The coastdowns of all bags, their estimates, and of each bag without one why."""
+    """
+    The coastdowns of all bags, their estimates, and of each bag without one why.
+
+    `whole` are all glides with the parts of them that are no coastdown, though no instrument
+    shows why; empty where there is no such part. `notes` says what these are.
+    """
 
     coasts: list[CoastRun]
+    whole: list[CoastRun]
+    notes: tuple[str, ...]
     ship: Ship
     parameters: Parameters
     without: tuple[str, ...]
     estimates: tuple[Estimate, ...]
+
+    @property
+    def no_coastdown(self) -> str:
+        """That none was found and why, a sentence; '' where there is one."""
+        return '' if self.coasts else f'No coastdown was found {"; ".join(self.without)}.'
 
 
 def _found(
@@ -186,6 +255,8 @@ def _found(
 ) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
+    whole: list[CoastRun] = []
+    notes: list[str] = []
     without: list[str] = []
     estimates: list[Estimate] = []
     ship, parameters = given, None
@@ -206,12 +277,28 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-        for place, (_, found) in enumerate(windows, start=1):
+            glide = dismissed_glide(result)
+            if glide is not None:
+                whole.append(CoastRun(each.name, glide, sheet.facts, of_run))
+                notes.append(f'{each.name}: {_GLIDED}')
+        for place, (coastdown, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
+            glide = whole_glide(result, coastdown)
+            whole.append(replace(coasts[-1], window=glide or found))
+            if glide is not None:
+                notes.append(f'{name}: {_BRAKED}')
     assert ship is not None
     assert parameters is not None
-    return _Coastdowns(coasts, ship, parameters, tuple(without), tuple(estimates))
+    return _Coastdowns(
+        coasts,
+        whole if notes else [],
+        tuple(notes),
+        ship,
+        parameters,
+        tuple(without),
+        tuple(estimates),
+    )
 
 
 def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:

@@ -66,11 +66,13 @@ def coast_windows(result: ReplayResult) -> list[tuple[EndedCoastdown, Window]]:
     apart = bool(clocks_apart(result))
     if apart and not any(each.ended_by is EndedBy.GIVEN for each in coastdowns):
         coastdowns = _look_anew(result) or coastdowns
-    return [
-        (coastdown, _window(result, coastdown, apart))
-        for coastdown in coastdowns
-        if not coastdown.withdrawn
-    ]
+    found = []
+    for coastdown in coastdowns:
+        if not coastdown.withdrawn:
+            start_ns, steady = start_of(coastdown, result.ship)
+            window = window_between(result, start_ns, coastdown.end_ns, steady=steady, apart=apart)
+            found.append((coastdown, window))
+    return found
 
 
 def _look_anew(result: ReplayResult) -> tuple[EndedCoastdown, ...]:
@@ -100,30 +102,55 @@ def _arrived_later(block: Block) -> Block:
     return replace(block, receive_ns=block.receive_ns + round(_CLOCKS_APART_S * SECOND_NS))
 
 
-def _window(result: ReplayResult, coastdown: EndedCoastdown, apart: bool) -> Window:
+def window_between(
+    result: ReplayResult, start_ns: int, end_ns: int, *, steady: bool, apart: bool = False
+) -> Window:
+    """
+    Read the samples of a part of a replay again.
+
+    Parameters
+    ----------
+    result
+        From `replay`.
+    start_ns, end_ns
+        Stamps [ns].
+    steady
+        The record before may be steady sailing, and is read too.
+    apart
+        The clocks of the inputs are apart.
+
+    Returns
+    -------
+    Window
+        What was accepted.
+    """
     parameters = replace(result.parameters, late_s=_CLOCKS_APART_S)
     before_ns = round(parameters.steady_s * SECOND_NS)
     # the validation looks back; stamps may differ from times of arrival
     margin_s = parameters.frozen_s + parameters.late_s + _SET_CLOCK_S
     margin_ns = round(margin_s * SECOND_NS)
-    start_ns, after_steady = _start(coastdown, result.ship)
     first_ns = max(start_ns - before_ns - margin_ns, 0)
-    inputs = result.run.inputs(start_ns=first_ns, end_ns=coastdown.end_ns + margin_ns)
+    inputs = result.run.inputs(start_ns=first_ns, end_ns=end_ns + margin_ns)
     block = concatenate([item for item in inputs if isinstance(item, Block)])
     reasons = validate(_arrived_later(block) if apart else block, parameters)
     accepted = block[np.flatnonzero(reasons == Reason.ACCEPTED)]
-    return Window.from_block(
-        accepted,
-        start_ns,
-        coastdown.end_ns,
-        before_ns=start_ns - before_ns if after_steady else None,
-    )
+    before = start_ns - before_ns if steady else None
+    return Window.from_block(accepted, start_ns, end_ns, before_ns=before)
 
 
-def _start(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
+def start_of(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
     """
     Return the start of a coastdown, and whether what comes before it may be steady sailing.
 
+    Parameters
+    ----------
+    coastdown
+        That has ended.
+    ship
+        For how long the thrust runs down.
+
+    Notes
+    -----
     The run-down of the thrust is cut, but it follows the stop: with it, the record before is as
     good as before any other. What was cut before that, the engine drove: it may be steady.
     """

@@ -109,3 +109,24 @@ def test_a_case_is_made_quickly(cases) -> None:
     for number in range(1, 11):
         cases.observe(number)
     assert time.process_time() - start < 10 * 0.2
+
+
+def test_the_true_r_is_what_slows_the_ship_at_last(cases) -> None:
+    from hidden.effect import Leg
+    from hidden.sailing import Disturbance, World, coasting_m_s2, sail
+
+    hull = cases.known(7).hull
+    leg, world = Leg(hull, 1.0, 1500.0, hull.speed_m_s), World(friction=0.02, shape=(0.01,) * 4)
+    motion = sail(
+        leg,
+        (),
+        heading_rad=0.0,
+        first_heading_rad=0.0,
+        world=world,
+        disturbance=Disturbance.none(leg, step_s=1.0),
+    )
+    late = motion.time_s > 20.0 * hull.run_down_s  # of the thrust 2e-9 are left
+    speed = motion.surge_m_s[late]
+    slowing = -np.gradient(speed, motion.time_s[late]) * (1.0 + hull.added_mass(speed))
+    r = coasting_m_s2(leg, (), speed, first_heading_rad=0.0, world=world)
+    np.testing.assert_allclose(slowing[1:-1], r[1:-1], rtol=1e-3)

@@ -27,15 +27,16 @@ def test_the_scoreboard_asks_and_reveals_world_b(monkeypatch) -> None:
     assert np.all(np.diff(block.receive_ns) >= 0)
 
 
+@pytest.mark.parametrize('name', ['a', 'b'])
 @pytest.mark.parametrize(('off', 'cover', 'chi2'), [(0.0, 1.0, 0.0), (3.0, 0.0, 9.0)])
-def test_the_band_is_held_against_the_true_curve(off, cover, chi2) -> None:
+def test_the_band_is_held_against_the_true_curve(off, cover, chi2, name) -> None:
     import band_score
-    from hidden_b import cases
 
-    number = band_score.chosen('odd', 'own', 0, 1, cases.SEED)[0]
-    first, stop = cases.first_speed(number), cases.stops_ns(number)[0]
+    world = getattr(band_score.World, name)()
+    number = band_score.chosen(world, 'odd', 'own', 0, 1)[0]
+    first, stop = world.first_speed(number, 0), world.stops_ns(number)[0]
     speed = np.linspace(0.3, 1.0, 50) * first
-    true = cases.true_r(number, speed)
+    true = world.true_r(number, speed, 0)
     sigma = np.full(50, 0.01 * true.max())
     found = {
         'coastdowns': [
@@ -48,20 +49,20 @@ def test_the_band_is_held_against_the_true_curve(off, cover, chi2) -> None:
             }
         ]
     }
-    score = band_score.score(number, 0, found, cases.SEED, 0.1)
+    score = band_score.score(world, number, 0, found, 0.1)
     assert (score.cover, score.chi2) == (cover, pytest.approx(chi2))
     assert (score.rmse, score.rmse_below) == pytest.approx((0.01 * off, 0.01 * off))
     figures = band_score.summary([score], 2)
     assert figures['with an estimate, %'] == 50.0
     assert figures['runs with cover below 50 %, %'] == 100.0 * (cover < 0.5)
-    assert band_score.score(number, 0, {'coastdowns': []}, cases.SEED, 0.1) is None
+    assert band_score.score(world, number, 0, {'coastdowns': []}, 0.1) is None
 
 
 def test_odd_cases_are_odd() -> None:
     import band_score
     from hidden_b import cases
 
-    numbers = band_score.chosen('odd', 'nothing', 0, 20, cases.SEED)
+    numbers = band_score.chosen(band_score.World.b(), 'odd', 'nothing', 0, 20)
     assert len(numbers) == 20
     assert all(number % 2 for number in numbers)
     assert not any(cases.reveal(number).what for number in numbers[:3])

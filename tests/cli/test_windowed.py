@@ -13,6 +13,8 @@ import pytest
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.library.windowed import WindowedRun, refuse_overlaps
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -91,6 +93,14 @@ def test_a_part_that_is_given_twice_is_no_second_run(
     assert main([verb, *words]) == 1
     told = ' '.join(capsys.readouterr().err.split())
     assert 'given twice, 430 to 900 s and 500 to 1200 s: they share a part' in told
+
+
+def test_a_bag_beside_a_part_of_it_is_given_twice(coastdown_bag: Path) -> None:
+    ((run, _),) = open_windowed([WindowedBag(coastdown_bag, None)], remap={})
+    part = WindowedRun(run, (430.0, 900.0))
+    with pytest.raises(BagError, match='given twice'):
+        refuse_overlaps([WindowedRun(run, None), part])
+    refuse_overlaps([WindowedRun(run, (0.0, 430.0)), part])
 
 
 def test_overlapping_windows_are_shown_and_not_combined(

@@ -241,6 +241,19 @@ def test_the_checklist_says_what_holds(check: acceptance.Check, held: Held) -> N
     assert check.text
 
 
+@pytest.mark.parametrize(
+    ('check', 'text'),
+    [
+        (acceptance.wind_check((-8.0, 0.0), 8.0), '0 kn true, at most 10 kn'),
+        (acceptance.wind_check((-8.0, 6.0), 8.0), '12 kn true, over 10 kn'),
+        (acceptance.depth_check(40.0, 5.0, Ship.load(SHIP)), '40 m, less than 41 m'),
+        (acceptance.lead_check(599.0, 1800.0), '9:59 of 30 min'),
+    ],
+)
+def test_the_checklist_shows_what_it_compares(check: acceptance.Check, text: str) -> None:
+    assert check.text == text
+
+
 def test_a_folder_without_recorded_coastdowns_says_so_for_each_bag(
     bags: list[Path], tmp_path: Path
 ) -> None:

@@ -80,6 +80,8 @@ def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) ->
     updates = [event for event in recording[1] if isinstance(event, Update)]
     last = updates[3].estimate.last_resistance_m_s2
     curve = updates[3].estimate.curve
+    speed_sigma = updates[3].estimate.last_speed_sigma_m_s
+    sigma = updates[3].estimate.last_sigma_m_s2
     for changed, difference in (
         (replace(updates[3].estimate, last_resistance_m_s2=last * (1.0 - 1e-13)), 1e-13),
         (
@@ -89,6 +91,11 @@ def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) ->
             ),
             0.01 / 1.01,
         ),
+        (
+            replace(updates[3].estimate, last_speed_sigma_m_s=speed_sigma * (1.0 + 1e-6)),
+            2e-6,  # of the variance
+        ),
+        (replace(updates[3].estimate, last_sigma_m_s2=sigma * (1.0 + 1e-6)), 2e-6),
     ):
         comparison = Comparison(iter(outputs(updates[3])))
         for each in outputs(replace(updates[3], estimate=changed)):

@@ -73,7 +73,9 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     plain = first.plainly(guess.lowest)
     if record.steady_s < LEAST_S:
         record = alone
-    problem = Problem.of(record, run_down, ship, guess).damped(plain)
+    # after a stop a log's filter begins to fall behind: without it, that passes for a current
+    stopped = window.before is not None
+    problem = Problem.of(record, run_down, ship, guess, stopped=stopped).damped(plain)
     problem = problem.disturbed(_at_first(record, problem, run_down, guess).typical)
     problem = weigh_disturbed(problem, first)
     full = problem

@@ -88,9 +88,24 @@ class Problem:
     extras: tuple[int, ...]
 
     @classmethod
-    def of(cls, record: RunRows, run_down: RunDown, ship: Ship, guess: InitialGuess) -> Problem:
+    def of(
+        cls,
+        record: RunRows,
+        run_down: RunDown,
+        ship: Ship,
+        guess: InitialGuess,
+        *,
+        stopped: bool = False,
+    ) -> Problem:
         """
         Set up the fit of a record that nothing but sensor noise disturbs.
+
+        Parameters
+        ----------
+        record, run_down, ship, guess
+        stopped
+            The coastdown begins with a stop after steady sailing, whether or not the record
+            holds that: a log lags behind from there on.
         """
         steady, coast = record.steady, record.coast
         rows = Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast)))
@@ -111,7 +126,7 @@ class Problem:
             extras.append(X0)
         if LOG in kinds and len(kinds) > 1:
             extras.append(CURRENT)
-            if len(steady.time_s):
+            if len(steady.time_s) or stopped:
                 extras.append(LOG_LAG)
         end = float(coast.time_s[-1]) + 3.0 * run_down.stop_sd_s
         typical = max(float(coast.time_s[-1]), 1e-3) / 25.0

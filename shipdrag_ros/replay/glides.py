@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+All of a glide, with the parts in which something but the water slows or drives the ship.
+
+An estimate of r(v) leaves such parts out. A diagnosis asks what that was, and so needs them
+where no instrument shows the cause.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipdrag_ros.coastdown.driving import gone_s, thrust
+from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.expectation import expect
+from shipdrag_ros.coastdown.instruments import astern, length_s, turns
+from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.replay.coasts import start_of, window_between
+from shipdrag_ros.replay.playback import ReplayResult
+from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.ship import Ship
+
+_BIN_S = 10.0
+_RISE = 0.05  # of the first speed: a ship that gains so much no longer glides
+_LEFT = 0.6  # of the speed, which a glide reaches ...
+_EARLIEST, _LATEST = 0.5, 2.5  # ... after so many times the time that the ship file expects
+_LONGEST_S = 7200.0  # no glide is longer
+# for these a candidate is dismissed by its speed alone; a turn, a gap and bad readings are causes
+_BY_SPEED = (
+    Dismissal.BRAKE,
+    Dismissal.LEAD_IN,
+    Dismissal.PLATEAU,
+    Dismissal.SETTLED,
+    Dismissal.THRUST,
+)
+
+
+def whole_glide(result: ReplayResult, coastdown: EndedCoastdown) -> Window | None:
+    """
+    Return the window of a coastdown with what was cut as the work of something but the water.
+
+    Parameters
+    ----------
+    result
+        From `replay`.
+    coastdown
+        Of the same.
+
+    Returns
+    -------
+    Window or None
+        None where nothing was cut for that, or an instrument shows the cause.
+    """
+    braked = [cut for cut in coastdown.cuts if cut.reason is Dismissal.BRAKE]
+    if coastdown.ended_by is not EndedBy.BRAKE and not braked:
+        return None
+    start_ns, steady = start_of(coastdown, result.ship)
+    if any(cut.start_ns < coastdown.start_ns for cut in braked):
+        start_ns, steady = min(cut.start_ns for cut in coastdown.cuts), True
+    if coastdown.ended_by is EndedBy.GIVEN:
+        end_ns = max(coastdown.end_ns, *(cut.end_ns for cut in braked))
+        return window_between(result, start_ns, end_ns, steady=steady)
+    found = _glide(result, start_ns, steady=steady)
+    if found is None or (found.start_ns, found.end_ns) == (start_ns, coastdown.end_ns):
+        return None
+    return found
+
+
+def dismissed_glide(result: ReplayResult) -> Window | None:
+    """
+    Return a glide that was taken for none by its speed alone.
+
+    Parameters
+    ----------
+    result
+        From `replay`.
+
+    Returns
+    -------
+    Window or None
+        None where a coastdown was found, or where the ship lost no such part of her speed in
+        about such a time as after an engine stop: then power was reduced.
+    """
+    if result.coastdowns:
+        return None
+    for one in result.not_coastdowns:
+        if one.reason in _BY_SPEED:
+            found = _glide(result, one.start_ns, steady=True)
+            if found is not None and _as_after_a_stop(found, result.ship):
+                return found
+    return None
+
+
+def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window | None:
+    """Read on from a start to where she is slow, gains speed, or an instrument ends it."""
+    if result.run.span_ns is None:
+        return None
+    last_ns = min(result.run.span_ns[1], start_ns + round(_LONGEST_S * SECOND_NS))
+    if last_ns <= start_ns:
+        return None
+    window = window_between(result, start_ns, last_ns, steady=steady)
+    time_s, speed = readings(window)
+    if len(speed) < LEAST_READINGS:
+        return None
+    time_s, speed = binned(time_s, speed, max(int(length_s(window) / _BIN_S), LEAST_READINGS))
+    slow_m_s = float(result.ship.speed(result.parameters.froude_min))
+    rises = speed > np.minimum.accumulate(speed) + _RISE * float(speed[0])
+    over = np.flatnonzero((speed < slow_m_s) | rises)
+    ends_s = [float(time_s[int(np.argmin(speed[: over[0] + 1]))])] if len(over) else []
+    for cut in (
+        *thrust(window, result.ship, steady=steady),
+        *astern(window, result.parameters),
+        *turns(window, result.parameters),
+    ):
+        ends_s.append((cut.start_ns - start_ns) * 1e-9)
+    if not ends_s:
+        return window
+    end_s = min(ends_s)
+    if end_s < gone_s(result.ship):
+        return None
+    return window.part(start_ns, start_ns + round(end_s * SECOND_NS))
+
+
+def _as_after_a_stop(window: Window, ship: Ship) -> bool:
+    """Say whether the speed falls about as fast as the ship file has it after a stop."""
+    if window.before is None:
+        return False
+    _, before = readings(window.before)
+    time_s, speed = readings(window)
+    if len(before) < LEAST_READINGS or len(speed) < LEAST_READINGS:
+        return False
+    first = float(np.median(before))
+    time_s, speed = binned(time_s, speed)
+    low = np.flatnonzero(speed < _LEFT * first)
+    if not len(low):
+        return False
+    usual_s = expect(ship, first).time_s(first, left=_LEFT)
+    return _EARLIEST * usual_s <= float(time_s[low[0]]) <= _LATEST * usual_s

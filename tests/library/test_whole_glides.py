@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A glide in which something but the water acts is not called free of what is missing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.bags import BagWriter, open_runs
+from shipdrag_ros.cli import main
+from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.replay import replay
+from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import START_NS
+
+SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
+SHIP = Ship.load(SHIP_FILE)
+FIRST_M_S = 8.0
+LEAD_IN_S, COAST_S = 900, 1500
+Force = Callable[[float], float]
+
+
+def nothing(_: float) -> float:
+    return 0.0
+
+
+def belt_of_ice(time_s: float) -> float:
+    """Hold her back for a while."""
+    return -0.5 if 300.0 < time_s < 700.0 else 0.0
+
+
+def ice_at_the_stop(time_s: float) -> float:
+    """Hold her back from the stop on, and let go."""
+    return -1.5 if 0.0 < time_s < 110.0 else 0.0
+
+
+def tug(time_s: float) -> float:
+    """Pull her, then hold her back."""
+    return 0.6 * float(np.sin(2.0 * np.pi * time_s / 900.0))
+
+
+def half_power(time_s: float) -> float:
+    """Go on at half the thrust."""
+    return 0.5
+
+
+def sailed(path: Path, force: Force) -> Path:
+    """Write a bag of a ship under a force besides, in parts of the resistance at the stop."""
+    rng = np.random.default_rng(4)
+    first_n = float(SHIP.resistance_n(np.array([FIRST_M_S]))[0])
+    time = np.arange(-LEAD_IN_S, COAST_S)
+    speed = np.full(len(time), FIRST_M_S)
+    for i in range(LEAD_IN_S, len(time) - 1):
+        v = speed[i : i + 1]
+        thrust = np.exp(-time[i] / 8.0) + force(float(time[i]))
+        inertia = SHIP.mass_kg * (1.0 + float(SHIP.n_r(v[0])))
+        speed[i + 1] = v[0] + (thrust * first_n - float(SHIP.resistance_n(v)[0])) / inertia
+    stamps = START_NS + (time + LEAD_IN_S) * 10**9
+    way = np.cumsum(speed)
+    fixes = np.column_stack([way, np.zeros(len(way))]) + rng.normal(0.0, 3.0, (len(way), 2))
+
+    def block(channel: Channel, value: np.ndarray) -> Block:
+        return Block.of(channel, stamps, value, receive_ns=stamps + 10**7)
+
+    with BagWriter(path) as writer:
+        writer.attach('ship.yaml', SHIP_FILE.read_text(encoding='utf-8'))
+        writer.write_samples(
+            in_arrival_order(
+                [
+                    block(Channel.SPEED_THROUGH_WATER, speed + rng.normal(0.0, 0.03, len(speed))),
+                    block(Channel.POSITION, fixes),
+                ]
+            )
+        )
+    return path
+
+
+def diagnosed(path: Path, force: Force, window: str = '') -> dict[str, Any]:
+    bag, answer = sailed(path / 'run.mcap', force), path / 'answer.json'
+    assert main(['diagnose', f'{bag}{window}', '--json', str(answer)]) == 0
+    found: dict[str, Any] = json.loads(answer.read_text(encoding='utf-8'))
+    return found
+
+
+def test_a_brake_from_the_stop_on_leaves_no_lead_and_is_diagnosed(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, ice_at_the_stop, f'@{LEAD_IN_S}:{LEAD_IN_S + COAST_S}')
+    assert found['verdict'] == 'unknown'
+    assert found['coastdowns_used'] == 1
+
+
+def test_a_glide_that_was_dismissed_is_something(tmp_path: Path) -> None:
+    found = diagnosed(tmp_path, tug)
+    assert found['verdict'] == 'unknown'
+    assert found['coastdowns_used'] == 0
+    assert found['no_coastdown']
+    assert 'about as fast as after an engine stop' in ' '.join(found['notes'])
+
+
+@pytest.mark.parametrize('force', [nothing, half_power])
+def test_a_sound_coastdown_and_less_power_hide_no_glide(tmp_path: Path, force: Force) -> None:
+    (run,) = open_runs([sailed(tmp_path / 'run.mcap', force)])
+    result = replay(run, compare=False)
+    assert len(result.coastdowns) == (force is nothing)
+    assert dismissed_glide(result) is None
+    assert [whole_glide(result, each) for each in result.coastdowns] == [None] * (force is nothing)
+
+
+def test_the_whole_glide_goes_on_where_the_coastdown_ends(tmp_path: Path) -> None:
+    (run,) = open_runs([sailed(tmp_path / 'run.mcap', belt_of_ice)])
+    result = replay(run, compare=False)
+    (coastdown,) = result.coastdowns
+    assert coastdown.ended_by is EndedBy.BRAKE
+    glide = whole_glide(result, coastdown)
+    assert glide is not None
+    assert glide.before is not None
+    assert glide.start_ns == coastdown.start_ns
+    assert glide.end_ns > coastdown.end_ns + 200 * 10**9

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiling in a thread, while the node hears and answers."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from shipdrag_ros.node.compiling import NAME, Compiling, leave_if_compiling
+from shipdrag_ros.parameters import Parameters
+
+
+def test_compiling_is_never_waited_for_and_ends() -> None:
+    compiling = Compiling(Parameters())
+    assert not compiling.done()
+    assert compiling.seconds == 0.0
+    compiling.begin()
+    compiling.begin()  # once only
+    running = [thread for thread in threading.enumerate() if thread.name == NAME]
+    assert [thread.daemon for thread in running] == [True]  # or the process could not end
+    until = time.monotonic() + 240.0
+    while not compiling.done() and time.monotonic() < until:
+        time.sleep(0.01)
+    assert compiling.done()
+    assert compiling.failure == ''
+    assert compiling.seconds > 0.0
+    running[0].join(10.0)
+    leave_if_compiling(1)  # and goes on, as nothing compiles
