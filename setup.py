@@ -72,6 +72,7 @@ setup(
         'numba',  # compiled per-sample kernels: validation, onset
         'ruamel.yaml',  # ship, parameter and run files: YAML 1.2
         'mcap',  # bags in and out
+        'isal',  # checksums of bags, ten times as fast as zlib's
         'rosbags',  # message definitions and CDR without ROS; rosbag2 directories
         'pynmeagps',  # NMEA 0183 sentences, checksums
         'rich',  # tables and progress bars in the terminal

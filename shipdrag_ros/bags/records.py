@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import lz4.frame
 import zstandard
+from isal.isal_zlib import crc32
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
@@ -35,11 +36,6 @@ from mcap.records import (
     Statistics,
     SummaryOffset,
 )
-
-try:  # ten times as fast, where it is installed
-    from isal.isal_zlib import crc32
-except ImportError:
-    from zlib import crc32
 
 MAGIC = b'\x89MCAP0\r\n'
 Buffer = bytes | mmap

@@ -130,12 +130,6 @@ def test_a_worker_that_dies_again_while_it_starts_is_waited_for(engine: Engine) 
     assert parse_timedelta(dask.config.get('distributed.deploy.lost-worker-timeout')) > 600.0
 
 
-def test_workers_keep_no_record_of_what_they_were_doing(engine: Engine) -> None:
-    """Dask would keep one of each of the last 1000 seconds, 0.2 MB a bag."""
-    found = engine.on_each(lambda: dask.config.get('distributed.worker.profile.enabled'))
-    assert set(found.values()) == {False}
-
-
 def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(
     bags: list[Path], tmp_path: Path, engine: Engine
 ) -> None:
