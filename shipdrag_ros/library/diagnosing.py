@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis import (
     diagnose_fitted,
     diagnose_sailing,
 )
-from shipdrag_ros.diagnosis.result import ToldFact, Verdict
+from shipdrag_ros.diagnosis.result import Verdict, WeighedFact
 from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.errors import DiagnosisError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
@@ -100,7 +100,7 @@ def diagnose_runs(
         if not seen.whole:
             raise
     if found is not None and seen.whole and found.verdict is Verdict.NAMED:
-        found = replace(found, notes=(*found.notes, *seen.told, _APART))
+        found = replace(found, notes=(*found.notes, *seen.notes, _APART))
     elif found is None or seen.whole:
         found = _of_whole_glides(found, seen, facts, progress)
     return found, seen.ship
@@ -135,15 +135,15 @@ def _of_whole_glides(
         whole = diagnose(seen.whole, seen.ship, seen.parameters, facts=facts, progress=progress)
     except ShipdragError as error:  # a glide that is like none may not be followed
         if found is None:
-            raise DiagnosisError(f'{"; ".join(seen.told)}; diagnosed whole: {error}') from error
+            raise DiagnosisError(f'{"; ".join(seen.notes)}; diagnosed whole: {error}') from error
         why = f'all of each glide could not be held against the model: {error}'
-        return replace(found, notes=(*found.notes, *seen.told, why))
+        return replace(found, notes=(*found.notes, *seen.notes, why))
     if found is not None and whole.verdict is Verdict.NONE:
-        return replace(found, notes=(*found.notes, *seen.told, _AGREES))
+        return replace(found, notes=(*found.notes, *seen.notes, _AGREES))
     before = () if found is None else found.notes
     return replace(
         whole,
-        notes=tuple(dict.fromkeys((*before, *whole.notes, *seen.told, _HELD))),
+        notes=tuple(dict.fromkeys((*before, *whole.notes, *seen.notes, _HELD))),
         no_coastdown=seen.no_coastdown,
         coastdowns_used=len(seen.coasts) if found is None else found.coastdowns_used,
         estimates=seen.estimates,
@@ -163,7 +163,7 @@ def _with_log_track(
 
 def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
     """Say of facts that they were stated and not used."""
-    return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
+    return replace(found, facts=tuple(WeighedFact(fact, '', None) for fact in overriding(facts)))
 
 
 def _sailing(
@@ -230,12 +230,12 @@ class _Coastdowns:
     The coastdowns of all bags, their estimates, and of each bag without one why.
 
     `whole` are all glides with the parts of them that are no coastdown, though no instrument
-    shows why; empty where there is no such part. `told` says what these are.
+    shows why; empty where there is no such part. `notes` says what these are.
     """
 
     coasts: list[CoastRun]
     whole: list[CoastRun]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
     ship: Ship
     parameters: Parameters
     without: tuple[str, ...]
@@ -256,7 +256,7 @@ def _found(
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
     whole: list[CoastRun] = []
-    told: list[str] = []
+    notes: list[str] = []
     without: list[str] = []
     estimates: list[Estimate] = []
     ship, parameters = given, None
@@ -280,20 +280,20 @@ def _found(
             glide = dismissed_glide(result) if ship.baseline is not None else None
             if glide is not None:
                 whole.append(CoastRun(each.name, glide, sheet.facts, of_run))
-                told.append(f'{each.name}: {_GLIDED}')
+                notes.append(f'{each.name}: {_GLIDED}')
         for place, (coastdown, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
             glide = whole_glide(result, coastdown) if ship.baseline is not None else None
             whole.append(replace(coasts[-1], window=glide or found))
             if glide is not None:
-                told.append(f'{name}: {_BRAKED}')
+                notes.append(f'{name}: {_BRAKED}')
     assert ship is not None
     assert parameters is not None
     return _Coastdowns(
         coasts,
-        whole if told else [],
-        tuple(told),
+        whole if notes else [],
+        tuple(notes),
         ship,
         parameters,
         tuple(without),
