@@ -318,14 +318,14 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-            glide = dismissed_glide(result)
+            glide = dismissed_glide(result) if ship.baseline is not None else None
             if glide is not None:
                 whole.append(CoastRun(each.name, glide, sheet.facts, of_run))
                 notes.append(f'{each.name}: {_GLIDED}')
         for place, (coastdown, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
-            glide = whole_glide(result, coastdown)
+            glide = whole_glide(result, coastdown) if ship.baseline is not None else None
             whole.append(replace(coasts[-1], window=glide or found))
             if glide is not None:
                 notes.append(f'{name}: {_BRAKED}')

@@ -16,12 +16,14 @@ from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.instruments import astern, length_s, turns
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.replay.coasts import start_of, window_between
+from shipdrag_ros.replay.coasts import clocks_apart, start_of, window_between
 from shipdrag_ros.replay.playback import ReplayResult
-from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.replay.sailing import accepted_samples
+from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
 _BIN_S = 10.0
+_BEFORE_S = 300.0  # that show the speed before a stop
 _RISE = 0.05  # of the first speed: a ship that gains so much no longer glides
 _LEFT = 0.6  # of the speed, which a glide reaches ...
 _EARLIEST, _LATEST = 0.5, 2.5  # ... after so many times the time that the ship file expects
@@ -82,12 +84,23 @@ def dismissed_glide(result: ReplayResult) -> Window | None:
         None where a coastdown was found, or where the ship lost no such part of her speed in
         about such a time as after an engine stop: then power was reduced.
     """
-    if result.coastdowns:
+    dismissed = [one for one in result.not_coastdowns if one.reason in _BY_SPEED]
+    if result.coastdowns or not dismissed:
         return None
-    for one in result.not_coastdowns:
-        if one.reason in _BY_SPEED:
+    block, _ = accepted_samples(result.run)
+    if not len(block):
+        return None
+    try:
+        record = Window.from_block(block, int(block.stamp_ns.min()), int(block.stamp_ns.max()))
+    except ValueError:  # a clock was set within the record
+        return None
+    time_s, speed = readings(record)
+    time_s, speed = binned(time_s, speed, max(int(length_s(record) / _BIN_S), LEAST_READINGS))
+    for one in dismissed:
+        since_s = time_s - (one.start_ns - record.start_ns) * 1e-9
+        if _as_after_a_stop(since_s, speed, result.ship):
             found = _glide(result, one.start_ns, steady=True)
-            if found is not None and _as_after_a_stop(found, result.ship):
+            if found is not None:
                 return found
     return None
 
@@ -99,7 +112,11 @@ def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window | Non
     last_ns = min(result.run.span_ns[1], start_ns + round(_LONGEST_S * SECOND_NS))
     if last_ns <= start_ns:
         return None
-    window = window_between(result, start_ns, last_ns, steady=steady)
+    apart = bool(clocks_apart(result))
+    try:
+        window = window_between(result, start_ns, last_ns, steady=steady, apart=apart)
+    except ValueError:  # a clock was set after the coastdown
+        return None
     time_s, speed = readings(window)
     if len(speed) < LEAST_READINGS:
         return None
@@ -122,18 +139,14 @@ def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window | Non
     return window.part(start_ns, start_ns + round(end_s * SECOND_NS))
 
 
-def _as_after_a_stop(window: Window, ship: Ship) -> bool:
-    """Say whether the speed falls about as fast as the ship file has it after a stop."""
-    if window.before is None:
-        return False
-    _, before = readings(window.before)
-    time_s, speed = readings(window)
-    if len(before) < LEAST_READINGS or len(speed) < LEAST_READINGS:
+def _as_after_a_stop(since_s: Float64, speed: Float64, ship: Ship) -> bool:
+    """Say whether a speed falls about as fast as the ship file has it after a stop at 0 s."""
+    before = speed[(since_s > -_BEFORE_S) & (since_s < 0.0)]
+    if not len(before) or not np.median(before) > 0.0:
         return False
     first = float(np.median(before))
-    time_s, speed = binned(time_s, speed)
-    low = np.flatnonzero(speed < _LEFT * first)
+    low = np.flatnonzero((since_s >= 0.0) & (speed < _LEFT * first))
     if not len(low):
         return False
     usual_s = expect(ship, first).time_s(first, left=_LEFT)
-    return _EARLIEST * usual_s <= float(time_s[low[0]]) <= _LATEST * usual_s
+    return _EARLIEST * usual_s <= float(since_s[low[0]]) <= _LATEST * usual_s

@@ -103,6 +103,17 @@ def test_a_glide_that_was_dismissed_is_something(tmp_path: Path) -> None:
     assert 'about as fast as after an engine stop' in ' '.join(found['notes'])
 
 
+def test_without_a_baseline_no_glide_is_held_against_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag, ship = sailed(tmp_path / 'run.mcap', tug), tmp_path / 'bare.yaml'
+    ship.write_text('name: bare\nlength_m: 150.0\ndisplaced_volume_m3: 20200.0\n')
+    assert main(['diagnose', str(bag), '--ship', str(ship)]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith('No coastdown was found')
+    assert 'glide' not in said
+
+
 @pytest.mark.parametrize('force', [nothing, half_power])
 def test_a_sound_coastdown_and_less_power_hide_no_glide(tmp_path: Path, force: Force) -> None:
     (run,) = open_runs([sailed(tmp_path / 'run.mcap', force)])
