@@ -45,7 +45,7 @@ class Case:
     status
         Exit code that is right.
     says
-        What the user must be told, to the letter.
+        What the user must read, to the letter.
     process
         Run in a process of its own, as the node is; else in this one.
     """

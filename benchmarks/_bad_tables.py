@@ -92,7 +92,7 @@ CASES = (
     ),
     _case('as many coefficients as rows', _residual(*_HULLS[:3]), 1, 'leave no scatter'),
     _case(
-        'nine hulls, of which others cannot be foretold',
+        'nine hulls, of which others cannot be predicted',
         _residual(*_HULLS[: 1 + 9 * 8]),
         0,
         'NOTE: 9 hulls determine 14 of 15 coefficients',

@@ -130,10 +130,10 @@ def _opened_ms(page: Any) -> float:
 
 
 def _metric(tools: Any, name: str) -> float:
-    told = {
+    values = {
         each['name']: each['value'] for each in tools.send('Performance.getMetrics')['metrics']
     }
-    return float(told[name])
+    return float(values[name])
 
 
 def heap_mb(hours: int, speed: float) -> list[float]:

@@ -22,7 +22,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from shipdrag_ros.node.player import Player
+from shipdrag_ros.node.rehearsal import Player
 
 SHIP_FILE = Path(__file__).parents[1] / 'config' / 'vitus_bering.yaml'
 

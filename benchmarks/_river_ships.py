@@ -16,7 +16,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 NAMES = ('L_B', 'B_T', 'C_B', 'lcb', 'Fr')
-PROTOTYPE = (8.18, 4.0, 0.851, 0.005)  # the ship of project 507; its lcb is not told
+PROTOTYPE = (8.18, 4.0, 0.851, 0.005)  # the ship of project 507; its lcb is not stated
 LOW = np.array([6.0, 2.8, 0.80, -0.01])
 HIGH = np.array([9.5, 5.5, 0.87, 0.02])
 FROUDE = (0.08, 0.20)

@@ -196,9 +196,9 @@ def _of(answers: Sequence[Answer], hidden: str) -> list[Answer]:
     return [answer for answer in answers if answer.hidden == hidden]
 
 
-def _share(answers: Sequence[Answer], told: object) -> str:
-    assert callable(told)
-    hits, of = sum(map(told, answers)), len(answers)
+def _share(answers: Sequence[Answer], holds: object) -> str:
+    assert callable(holds)
+    hits, of = sum(map(holds, answers)), len(answers)
     return f'{hits / of:.0%} ({hits} of {of})'
 
 

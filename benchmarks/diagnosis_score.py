@@ -6,6 +6,7 @@ Scoreboard of a diagnosis, on coastdowns in which the effect is hidden.
     python benchmarks/diagnosis_score.py --by command
     python benchmarks/diagnosis_score.py --by MODULE:FUNCTION --as blocks
     python benchmarks/diagnosis_score.py --world b --half odd --count 40
+    python benchmarks/diagnosis_score.py --world b --half odd --count 40 --by oracle
 
 World a is `hidden`; world b, of another hand, is `hidden_b`: its even cases are for choosing
 methods, its odd ones for scoring.
@@ -109,20 +110,20 @@ def _timed(diagnose: Callable[..., Found], *arguments: Any) -> tuple[Found, floa
     return found, time.process_time() - start
 
 
-def command(ship: Path, bags: list[Path], told: Sequence[str] = ()) -> Found:
+def command(ship: Path, bags: list[Path], more: Sequence[str] = ()) -> Found:
     """
     Diagnose with the verb `shipdrag diagnose`, in this process.
 
     Parameters
     ----------
     ship, bags
-    told
+    more
         Further arguments: the facts that a crew knows.
     """
     written = io.StringIO()
     with contextlib.redirect_stdout(written), contextlib.redirect_stderr(io.StringIO()) as said:
         try:
-            status = cli.main(['diagnose', *map(str, bags), '--ship', str(ship), '--json', *told])
+            status = cli.main(['diagnose', *map(str, bags), '--ship', str(ship), '--json', *more])
         except SystemExit as ended:  # wrong usage
             status = ended.code
     if status:
@@ -135,19 +136,16 @@ def diagnosis(
     by: str, form: str, number: int, world: str = 'a', with_facts: bool = False
 ) -> Diagnose:
     """
-    Return the diagnosis that is asked for; the oracle alone is told of the noise.
+    Return the diagnosis that is asked for; the oracle alone knows of the noise.
     """
     if by == 'oracle':
-        if world != 'a':
-            raise ValueError('the oracle knows world a alone')
-        from hidden.oracle import diagnose
-
-        return lambda seen: _timed(diagnose, seen, cases.known(number))
+        oracle = import_module('hidden.oracle' if world == 'a' else 'hidden_b.oracle')
+        return lambda seen: _timed(oracle.diagnose, seen, WORLDS[world].known(number))
     if by == 'command':
-        told: list[str] = []
+        more: list[str] = []
         if with_facts:
-            told = facts_b.arguments(WORLDS[world].reveal(number).facts)
-        return by_bags(lambda ship, bags: command(ship, bags, told))
+            more = facts_b.arguments(WORLDS[world].reveal(number).facts)
+        return by_bags(lambda ship, bags: command(ship, bags, more))
     module, _, function = by.partition(':')
     found = getattr(import_module(module), function)
     return by_blocks(found) if form == 'blocks' else by_bags(found)

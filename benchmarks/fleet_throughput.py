@@ -138,8 +138,10 @@ def show(workers: int, measured: dict[str, Any], store: Path) -> tuple[float, fl
     )
     found = measured['memory']
     picked = found[:: max(len(found) // SAMPLES, 1)]
-    told = ', '.join(f'{bags}: {worker:.0f} and {own:.0f}' for bags, worker, own in picked)
-    print(f'  memory after so many bags, largest worker and this process [MB]: {told}', flush=True)
+    figures = ', '.join(f'{bags}: {worker:.0f} and {own:.0f}' for bags, worker, own in picked)
+    print(
+        f'  memory after so many bags, largest worker and this process [MB]: {figures}', flush=True
+    )
     return hourly, each_s, alone_s
 
 

@@ -95,6 +95,7 @@ class Long(NamedTuple):
 class Count:
     """What a tree holds."""
 
+    raw: int
     lines: int
     core: int
     modules: int
@@ -163,10 +164,11 @@ def count(tree: Path) -> Count:
     Count the package of a tree.
     """
     package = tree / PACKAGE
-    found = Count(0, 0, 0, 0, [], [])
+    found = Count(0, 0, 0, 0, 0, [], [])
     for path in sorted(package.rglob('*.py')):
         held = code_lines(path)
         core = not is_study(path, package)
+        found.raw += len(path.read_text(encoding='utf-8').splitlines())
         found.lines += len(held)
         found.modules += 1
         found.core += len(held) * core
@@ -198,10 +200,10 @@ def walk(
     done = subprocess.run(
         [sys.executable, '-c', code], capture_output=True, text=True, env=environment, cwd=tree
     )
-    told = [each for each in done.stdout.splitlines() if each.startswith('WALKED ')]
-    if not told:
+    printed = [each for each in done.stdout.splitlines() if each.startswith('WALKED ')]
+    if not printed:
         raise SystemExit(f'{tree}: {" ".join(line)} failed:\n{done.stderr[-2000:]}')
-    calls, modules = json.loads(told[0].removeprefix('WALKED '))
+    calls, modules = json.loads(printed[0].removeprefix('WALKED '))
     return calls, modules
 
 
@@ -219,6 +221,7 @@ def figures(tree: Path, folder: Path) -> dict[str, str]:
     calls, _ = walk(tree, ['replay', str(bag)], 'playback.py', 'replay')
     _, modules = walk(tree, ['diagnose', str(bag)], 'diagnosis/diagnose.py', 'diagnose')
     return {
+        'lines, with docstrings, comments and blanks': f'{held.raw}',
         'lines of code': f'{held.lines}',
         'lines of code, core': f'{held.core}',
         'modules': f'{held.modules}',

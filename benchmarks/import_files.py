@@ -48,12 +48,12 @@ MOTION = ('speed_through_water', 'speed_over_ground', 'position')
 def attempt(path: Path, option: str) -> tuple[list[str], str]:
     """Import a file; return the inputs understood, or why there are none."""
     with tempfile.TemporaryDirectory() as folder:
-        said, told = io.StringIO(), io.StringIO()
+        said, errors = io.StringIO(), io.StringIO()
         line = ['import', str(path), '-o', f'{folder}/out.mcap', '--json', *shlex.split(option)]
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(told):
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(errors):
             status = shipdrag(line)
         if status != 0:
-            return [], told.getvalue().strip().splitlines()[-1]
+            return [], errors.getvalue().strip().splitlines()[-1]
         return list(json.loads(said.getvalue())['written']), ''
 
 

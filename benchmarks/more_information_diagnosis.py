@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Does a diagnosis that is told more know more? Paired, on the same hidden ships.
+Does a diagnosis that is given more know more? Paired, on the same hidden ships.
 
     python benchmarks/more_information_diagnosis.py --count 20
     python benchmarks/more_information_diagnosis.py --world b --count 20

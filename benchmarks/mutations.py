@@ -170,7 +170,7 @@ def _tried(
     # frozen or not, by keyword or not: no run of the program differs, or there is none
     if all(line.startswith(('@', 'def ', '*,')) for line in changed):
         path.write_text(source)
-        return _told(module, name, 'declaration', difference)
+        return _row(module, name, 'declaration', difference)
     outcome = 'survived'
     try:
         for tests in _tests(copy, module, options.whole):
@@ -180,10 +180,10 @@ def _tried(
                 break
     finally:
         path.write_text(source)
-    return _told(module, name, outcome, difference)
+    return _row(module, name, outcome, difference)
 
 
-def _told(module: str, name: str, outcome: str, difference: list[str]) -> dict[str, object]:
+def _row(module: str, name: str, outcome: str, difference: list[str]) -> dict[str, object]:
     return {'module': module, 'operator': name, 'outcome': outcome, 'difference': difference}
 
 

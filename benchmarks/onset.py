@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-How soon a coastdown is noticed, how surely it is told from others, how often in vain.
+How soon a coastdown is noticed, how surely it is known from others, how often in vain.
 
     python benchmarks/onset.py [RUNS] [DAYS]
 

@@ -106,8 +106,8 @@ def replayed(coast: KnownCoast, out: Path, start_ns: int, *, window: bool) -> Sa
         str(out / word) if word.endswith('.mcap') else word for word in shlex.split(line)[1:]
     ]
     said = io.StringIO()
-    told_to = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
-    with contextlib.chdir(ROOT), told_to[0], told_to[1]:
+    to = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
+    with contextlib.chdir(ROOT), to[0], to[1]:
         status = shipdrag(arguments)
     if status != 0:
         error = said.getvalue().strip().rpartition('ERROR: ')[2].replace(f'{out}/', '')
@@ -196,7 +196,7 @@ def _speed(known: Known) -> str:
     return f'{known.from_m_s:g} to {known.to_m_s:g}'
 
 
-def told(coast: KnownCoast, said: Said) -> str:
+def judged_words(coast: KnownCoast, said: Said) -> str:
     """
     Return what a replay says, as a cell.
     """
@@ -244,8 +244,8 @@ def row(coast: KnownCoast, out: Path) -> str:
     cells = (
         coast.record.name,
         coast.fact,
-        told(coast, itself),
-        told(coast, window),
+        judged_words(coast, itself),
+        judged_words(coast, window),
         '<br>'.join(known) or '-',
         judged(coast, itself, window),
     )

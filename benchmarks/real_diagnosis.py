@@ -78,8 +78,8 @@ def block(found: dict[str, Any]) -> str:
 
 def _gap(when: str, gap: dict[str, Any]) -> str:
     chi2 = gap['chi2_per_sample']
-    told = f'{when} {1000.0 * gap["rms_speed_m_s"]:.1f} mm/s rms'
-    return told if chi2 is None else f'{told}, chi2 {chi2:.2f}'
+    text = f'{when} {1000.0 * gap["rms_speed_m_s"]:.1f} mm/s rms'
+    return text if chi2 is None else f'{text}, chi2 {chi2:.2f}'
 
 
 def main() -> None:

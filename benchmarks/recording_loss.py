@@ -190,7 +190,7 @@ def _kill_node(folder: Path, block: Block, after_s: float, number: int) -> float
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
 
-    from shipdrag_ros.node.player import Player
+    from shipdrag_ros.node.rehearsal import Player
 
     domain = 1 + number % 9  # the tests and the demonstration are above
     given = ('-p', f'ship_file:={SHIP_FILE}', '-p', f'output_directory:={folder}')

@@ -7,8 +7,8 @@ A message is whole if no byte of the record it lies in was touched: the chunk, o
 chunks the message itself. It is saved if it comes out as it was written; of the whole ones
 those count apart that are in the quarantine bag, because a damage beside them made their
 topic, or their own bounds, uncertain. What is saved besides, of chunks that were hit, is
-told as `partly`. `false` are messages in the sound bag that nobody wrote: without a
-checksum a flipped payload cannot be told. Seed 1.
+counted as `partly`. `false` are messages in the sound bag that nobody wrote: without a
+checksum a flipped payload cannot be noticed. Seed 1.
 
 Then bags of 50 000 to 400 000 messages: process CPU time, best of two, and the growth of
 the memory in a process of its own; the same time, in that of reading, for files as a finished

@@ -316,10 +316,10 @@ def _count(
         'leverage': ('leverage',),
         'trend against physics': ('against physics',),
     }
-    for told, is_bad in zip(reasons, bad.tolist()):
+    for given, is_bad in zip(reasons, bad.tolist()):
         totals[is_bad] += 1
         for rule, (word,) in words.items():
-            rules[rule, is_bad] += any(word in reason for reason in told)
+            rules[rule, is_bad] += any(word in reason for reason in given)
 
 
 def main() -> None:

@@ -309,7 +309,7 @@ def cache_root() -> Path | None:
     """
     Return the folder that compiled code is kept in; None if none can be written.
     """
-    told = []
+    refused = []
     for path, own in _places():
         try:
             os.makedirs(path, mode=0o700, exist_ok=True)
@@ -320,12 +320,12 @@ def cache_root() -> Path | None:
                 path.chmod(0o700)
             tempfile.TemporaryFile(dir=path).close()
         except OSError as error:
-            told.append(f'{path}: {error.strerror}')
+            refused.append(f'{path}: {error.strerror}')
         else:
-            if told and CACHE_DIR in os.environ:
-                _log.warning('shipdrag: %s is not used (%s) but %s', CACHE_DIR, told[0], path)
+            if refused and CACHE_DIR in os.environ:
+                _log.warning('shipdrag: %s is not used (%s) but %s', CACHE_DIR, refused[0], path)
             return path
-    _say_not_kept('; '.join(told))
+    _say_not_kept('; '.join(refused))
     return None
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 M_S_PER_KNOT = 1852.0 / 3600.0
-UNIT_RATIOS = {
+_UNIT_RATIOS = {
     3600.0 / 1852.0: 'knots over m/s',
     1852.0 / 3600.0: 'm/s over knots',
     3.6: 'km/h over m/s',
@@ -18,7 +18,7 @@ UNIT_RATIOS = {
     1.852: 'km/h over knots',
     1.0 / 1.852: 'knots over km/h',
 }
-"""What a speed is off by whose unit was mistaken."""
+_UNITS_NEAR = 0.1  # relative; a current and the error of a log are in a ratio too
 # what `float` takes besides, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
@@ -204,6 +204,27 @@ def ship_speed(speed_m_s: float, mass_kg: float) -> str:
     """
     unit, name = speed_unit(mass_kg)
     return f'{speed_m_s / unit:.{1 if unit != 1.0 else 3}f} {name}'
+
+
+def mistaken_units(ratio: float) -> str:
+    """
+    Say which two units may have been mistaken for each other, by two readings of one speed.
+
+    Parameters
+    ----------
+    ratio
+        Of one reading over the other.
+
+    Returns
+    -------
+    str
+        The units whose ratio is within 10 %, each with it; '' where there are none.
+    """
+    return ' and '.join(
+        f'{words} ({each:.2f})'
+        for each, words in _UNIT_RATIOS.items()
+        if abs(ratio / each - 1.0) < _UNITS_NEAR
+    )
 
 
 def speed_text(speed_m_s: float, *, highest_m_s: float) -> str:

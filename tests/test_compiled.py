@@ -239,9 +239,8 @@ def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) ->
     whiten = 'from shipdrag_ros.inference.noise import whiten\n'
     spread = 'from shipdrag_ros.inference.gaussian import root\n'
     snippet.write_text(f"{whiten}{spread}whiten(1, 2, 3, 'wrong')\nroot('wrong')\nroot()\n")
-    told, _, status = api.run(
-        ['--config-file', str(ROOT / 'pyproject.toml'), '--follow-imports=silent', str(snippet)]
-    )
+    # with the options of `make types`, whose cache it takes; others would empty it
+    told, _, status = api.run(['--config-file', str(ROOT / 'pyproject.toml'), str(snippet)])
     assert status == 1
     assert 'Too many arguments for "whiten"' in told
     assert 'Argument 1 to "root" has incompatible type "str"' in told
@@ -282,6 +281,7 @@ noise = Noise(np.full(n, 0.01), slow, np.full(n, 2e-3), np.full(n, 1.05))
 whiten(Rows(time_s, kind, speed), table, noise)
 print(table.tobytes().hex())
 """
+LIVE = ESTIMATES.replace('(estimate, estimate_final)', '(estimate,)')
 # functions that call those of other files, and what they call
 CALLERS = (
     'estimation.ode_fit.solve',
@@ -330,6 +330,20 @@ def test_the_bits_of_an_estimate_do_not_depend_on_what_was_kept(
     assert all(path.exists() for path in callers)
 
 
+@pytest.fixture(scope='module')
+def elsewhere(estimates: tuple[Path, str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the package and all that is kept of it."""
+    full, before = estimates
+    folder = tmp_path_factory.mktemp('elsewhere')
+    shutil.copytree(full, folder / 'cache')
+    shutil.copytree(PACKAGE, folder / 'shipdrag_ros', ignore=shutil.ignore_patterns('__pycache__'))
+    same, _ = run(folder, LIVE, timeout=800.0, SHIPDRAG_CACHE_DIR=str(folder / 'cache'))
+    assert same.split('\n')[0] == before.split('\n')[0]
+    # nothing was compiled: the place says nothing
+    assert len(kept(folder / 'cache')) == len(kept(full))
+    return folder
+
+
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
     ('module', 'old', 'new'),
@@ -339,20 +353,11 @@ def test_the_bits_of_an_estimate_do_not_depend_on_what_was_kept(
     ],
 )
 def test_an_edit_of_this_package_acts_at_once(
-    estimates: tuple[Path, str], tmp_path: Path, module: str, old: str, new: str
+    estimates: tuple[Path, str], elsewhere: Path, module: str, old: str, new: str
 ) -> None:
     """The live estimate differs, whose last step is in another file than what was edited."""
-    full, before = estimates
-    cache = tmp_path / 'cache'
-    shutil.copytree(full, cache)
-    shutil.copytree(
-        PACKAGE, tmp_path / 'shipdrag_ros', ignore=shutil.ignore_patterns('__pycache__')
-    )
-    live = ESTIMATES.replace('(estimate, estimate_final)', '(estimate,)')
-    settings = {'SHIPDRAG_CACHE_DIR': str(cache)}
-    same, _ = run(tmp_path, live, timeout=800.0, **settings)
-    assert same.split('\n')[0] == before.split('\n')[0]
-    assert len(kept(cache)) == len(kept(full))  # nothing was compiled: the place says nothing
-    edit(tmp_path / 'shipdrag_ros' / module, old, new)
-    after, _ = run(tmp_path, live, timeout=800.0, **settings)
-    assert after.split('\n')[0] != before.split('\n')[0]
+    edit(elsewhere / 'shipdrag_ros' / module, old, new)
+    cache = str(elsewhere / 'cache')
+    after, _ = run(elsewhere, LIVE, timeout=800.0, SHIPDRAG_CACHE_DIR=cache)
+    edit(elsewhere / 'shipdrag_ros' / module, new, old)
+    assert after.split('\n')[0] != estimates[1].split('\n')[0]

@@ -44,3 +44,20 @@ def test_no_text_is_a_formula(first: str) -> None:
     assert display.spreadsheet_text(f'{first}1+1') == f"'{first}1+1"
     assert display.spreadsheet_text(f'run {first}1') == f'run {first}1'
     assert display.spreadsheet_text('') == ''
+
+
+@pytest.mark.parametrize(
+    ('ratio', 'named'),
+    [
+        (1.9438, 'knots over m/s (1.94) and km/h over knots (1.85)'),
+        (3.3, 'km/h over m/s (3.60)'),
+        (0.28, 'm/s over km/h (0.28)'),
+        (3.2, ''),
+        (0.45, ''),
+        (1.0, ''),
+        (-1.94, ''),
+        (float('nan'), ''),
+    ],
+)
+def test_units_are_mistaken_within_a_tenth_of_their_ratio(ratio: float, named: str) -> None:
+    assert display.mistaken_units(ratio) == named

@@ -44,7 +44,7 @@ def test_docstrings_comments_and_blanks_are_no_code(house: ModuleType, tmp_path:
     (tmp_path / 'shipdrag_ros' / 'a.py').write_text('\n'.join(body))
     (tmp_path / 'shipdrag_ros' / 'studies' / 'b.py').write_text('TEXT = """two\nlines"""\n')
     found = house.count(tmp_path)
-    assert (found.lines, found.core) == (8, 6)
+    assert (found.raw, found.lines, found.core) == (15, 8, 6)
     assert (found.modules, found.core_modules) == (2, 1)
     assert found.wide == [('a.py:wide', 9)]
     assert found.long == []

@@ -108,7 +108,7 @@ class Observation:
 @dataclass(frozen=True)
 class Known:
     """
-    What an oracle is told besides.
+    What an oracle knows besides.
 
     Attributes
     ----------
@@ -233,7 +233,7 @@ def observe_hiding(number: int, kinds: tuple[type[Effect], ...]) -> Observation:
 
 def known(number: int) -> Known:
     """
-    Return what the oracle alone is told.
+    Return what the oracle alone knows.
     """
     case = _case(number)
     return Known(case.hull, case.noise, case.voyages[0].leg.duration_s)

@@ -26,7 +26,7 @@ from hidden_b.kit import Kit, draw_kit
 from hidden_b.library import FREE, LIBRARY, SECOND
 from hidden_b.measure import moved, run_down_s
 from hidden_b.plans import Condition, plans_of
-from hidden_b.screws import draw_screw
+from hidden_b.screws import Screw, draw_screw
 from hidden_b.setting import Faults, Setting
 from hidden_b.shipfile import Stated, draw_stated, ship_file
 from hidden_b.strangers import OUTSIDE
@@ -86,8 +86,37 @@ class Truth:
 
 
 @dataclass(frozen=True)
+class Known:
+    """
+    What an oracle is told of a case beside what is seen; nothing of what is hidden.
+
+    Attributes
+    ----------
+    hull
+        Her lines; resistance and added mass are empty: the ship file states them.
+    screw
+        Propeller and engine as they usually are.
+    kit
+        Her instruments as their manuals have them: no scale and no offset of the log.
+    lead_s, coast_s, step_s
+        Length of the steady part and of the rest, and the time step of the simulation.
+    clock_s
+        Time of day at the stop, of each run.
+    """
+
+    hull: Hull
+    screw: Screw
+    kit: Kit
+    lead_s: float
+    coast_s: float
+    step_s: float
+    clock_s: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class _Case:
     hull: Hull
+    screw: Screw
     stated: Stated
     kit: Kit
     ship: str
@@ -141,6 +170,23 @@ def stops_ns(number: int, seed: int = SEED) -> tuple[int, ...]:
     Return when the engine was stopped, of each run.
     """
     return tuple(EPOCH_NS + round(s.clock_s * 1e9) for s in _case(number, seed).settings)
+
+
+def known(number: int, seed: int = SEED) -> Known:
+    """
+    Return what an oracle is told of a case.
+    """
+    case = _case(number, seed)
+    runs = case.settings
+    return Known(
+        hull=replace(case.hull, still_n=np.zeros_like(case.hull.still_n), n_r=0.0),
+        screw=case.screw,
+        kit=replace(case.kit, log_scale=0.0, log_offset_m_s=0.0),
+        lead_s=runs[0].lead_s,
+        coast_s=runs[0].coast_s,
+        step_s=runs[0].step_s,
+        clock_s=tuple(run.clock_s for run in runs),
+    )
 
 
 def reveal(number: int, seed: int = SEED) -> Truth:
@@ -238,7 +284,8 @@ def _case(number: int, seed: int) -> _Case:
             if effect.scope != 'run' or run == 0:
                 effect.apply(setting)
         settings.append(setting)
-    return _Case(hull, stated, kit, text, tuple(hidden), tuple(sizes), tuple(settings), moves)
+    found = tuple(hidden), tuple(sizes), tuple(settings)
+    return _Case(hull, screw, stated, kit, text, *found, moves)
 
 
 def _fresh(base: Setting) -> Setting:

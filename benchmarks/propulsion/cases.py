@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ways to stop, and manoeuvres that are no coastdown: what is told to the ship and when."""
+"""Ways to stop, and manoeuvres that are no coastdown: what the ship is ordered and when."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from propulsion.propeller import thrust_and_torque
 
 
 class Mode(IntEnum):
-    """What a shaft is told to do."""
+    """What a shaft is ordered to do."""
 
     OFF = 0  # fuel cut, and declutched where there is a clutch
     AHEAD = 1  # the engine drives, at a level of the steady revs

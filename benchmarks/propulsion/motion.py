@@ -25,7 +25,7 @@ Float64 = NDArray[np.float64]
 @dataclass(frozen=True)
 class Orders:
     """
-    What is told to the ship, each second.
+    What the ship is ordered, each second.
 
     Attributes
     ----------

@@ -177,13 +177,13 @@ def index_messages(
         others,
         damage,
     )
-    told = [
+    notes = [
         f'{_DAMAGE[kind]} at byte {place} of the chunk at byte {offset}: '
         'only what lies before it is used'
         for (kind, place), offset in zip(damage.tolist(), offsets, strict=True)
         if kind != _WHOLE
     ]
-    return Indexed(found[:n], others[:m], told)
+    return Indexed(found[:n], others[:m], notes)
 
 
 @compiled(inline=True, uncounted=True)

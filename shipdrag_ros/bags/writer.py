@@ -116,7 +116,7 @@ class BagWriter:
         """
         Write a text file into the bag, before the first message if it is to survive a crash.
         """
-        with self._errors_told():
+        with self._errors_named():
             self._writer.add_attachment(
                 create_time=0,
                 log_time=0,
@@ -134,7 +134,7 @@ class BagWriter:
         BagError
             If the definition of the type is not known.
         """
-        with self._errors_told():
+        with self._errors_named():
             self._channel(topic, type_name)
 
     def write(
@@ -159,7 +159,7 @@ class BagWriter:
         BagError
             If the type is not known or the file cannot be written.
         """
-        with self._errors_told():
+        with self._errors_named():
             self._writer.add_message(
                 self._channel(topic, type_name),
                 log_time=log_ns,
@@ -198,7 +198,7 @@ class BagWriter:
         if self._file.closed:
             return
         try:
-            with self._errors_told():
+            with self._errors_named():
                 self._writer.finish()
                 self._file.flush()
                 os.fsync(self._file.fileno())
@@ -218,7 +218,7 @@ class BagWriter:
         self.close()
 
     @contextmanager
-    def _errors_told(self) -> Iterator[None]:
+    def _errors_named(self) -> Iterator[None]:
         try:
             yield
         except OSError as error:

@@ -115,11 +115,11 @@ def _run(line: list[str]) -> int:
     except BrokenPipeError:
         raise
     except OSError as error:
-        print(f'ERROR: {_told(error)}', file=sys.stderr)
+        print(f'ERROR: {_error_text(error)}', file=sys.stderr)
     return USER_ERROR
 
 
-def _told(error: OSError) -> str:
+def _error_text(error: OSError) -> str:
     if error.errno is None:  # raised by a library for a reason of its own
         raise error
     if error.filename is None:  # as when a disk is full

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`shipdrag check`: is a bag sound."""
+"""`shipdrag check`: is a bag sound; damages as a table, for all verbs that find them."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any
 
-from shipdrag_ros.bags.salvage import FileCheck, check
+from shipdrag_ros.bags.salvage import Damage, FileCheck, check
 from shipdrag_ros.cli.arguments import add_json, bag
-from shipdrag_ros.cli.damage import damage_table
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import Table
 
 NOT_SOUND = 1
+_SHOWN = 40
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,3 +70,25 @@ def _document(about: FileCheck) -> dict[str, Any]:
             for each in about.damage
         ],
     }
+
+
+def damage_table(output: Output, damages: Sequence[Damage], count: int) -> None:
+    """
+    Print the first damages, and how many more there are.
+    """
+    output.table(
+        Table(
+            ('offset', 'record', 'kind', 'what'),
+            tuple(
+                (
+                    f'{each.offset}',
+                    each.record,
+                    each.kind.value,
+                    ': '.join(filter(None, (each.file, each.detail))) or '-',
+                )
+                for each in damages[:_SHOWN]
+            ),
+        )
+    )
+    if count > _SHOWN:
+        output.say(f'and {count - min(_SHOWN, len(damages))} more; --json lists them')

@@ -165,11 +165,11 @@ def _is_there(name: str) -> bool:
 
 
 def _discovery() -> CheckResult:
-    told = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
+    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', '')
     domain = os.environ.get('ROS_DOMAIN_ID', '0')
-    if told:
+    if reach:
         return CheckResult(
-            'ROS discovery', CheckState.FINE, f'{told}, domain {domain}, by the environment'
+            'ROS discovery', CheckState.FINE, f'{reach}, domain {domain}, by the environment'
         )
     return CheckResult(
         'ROS discovery',

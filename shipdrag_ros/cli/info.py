@@ -10,7 +10,7 @@ from shipdrag_ros import display
 from shipdrag_ros.bags import BagInfo, info
 from shipdrag_ros.cli.arguments import add_json, add_remap, bag
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.sources import open_sources
+from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.display import Table
 
 

@@ -57,7 +57,7 @@ class ProgressLines:
         self._log = log
         self._every_s = every_s
         self._text = ''
-        self._begun_s = self._told_s = time.monotonic()
+        self._begun_s = self._said_s = time.monotonic()
         self._waits = not at_once
 
     def tell(self, text: str, done: int, total: int) -> None:
@@ -67,9 +67,9 @@ class ProgressLines:
         now_s = time.monotonic()
         if text != self._text:
             self._text, self._begun_s = text, now_s
-        if self._waits and (not done or now_s - self._told_s < self._every_s):
+        if self._waits and (not done or now_s - self._said_s < self._every_s):
             return
-        self._waits, self._told_s = True, now_s
+        self._waits, self._said_s = True, now_s
         if not done:
             self._log(text if total < 2 else f'{text}: 0 of {total}')
             return

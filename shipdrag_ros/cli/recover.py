@@ -9,7 +9,7 @@ from typing import Any
 
 from shipdrag_ros.bags.salvage import Recovery, recover
 from shipdrag_ros.cli.arguments import add_json, bag, new_file
-from shipdrag_ros.cli.damage import damage_table
+from shipdrag_ros.cli.check import damage_table
 from shipdrag_ros.cli.output import Output
 
 

@@ -119,7 +119,7 @@ def write_results(
     Write the page, the JSON and the curves into a directory.
     """
     from shipdrag_ros.replay.page import write_report  # pictures take long to import
-    from shipdrag_ros.replay.spreadsheet import write_curves
+    from shipdrag_ros.replay.tables import write_curves
 
     write_report(directory / REPORT, results, ranking=ranking)
     document: dict[str, Any] = replay_json.document(results, ranking=ranking)

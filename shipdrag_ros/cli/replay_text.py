@@ -43,15 +43,15 @@ def _show_coastdown(output: Output, coastdown: EndedCoastdown, run: RunResult) -
     """Print one coastdown: knots and kN first, m/s and m/s² below."""
     for line in cut_lines(coastdown, run.span_ns):
         output.say(line)
-    told = words.summary(coastdown, run.ship)
-    for line in told[:-1]:
+    lines = words.summary(coastdown, run.ship)
+    for line in lines[:-1]:
         output.say(line)
     estimate = coastdown.estimate
     curve = None if estimate is None else estimate.valid_curve
     if curve is not None and len(curve):
         output.table(estimate_tables.force_table(curve, run.ship))
         output.say('')
-    output.say(told[-1])
+    output.say(lines[-1])
     if curve is not None and len(curve):
         truth = None if run.truth is None else run.truth.at
         output.table(estimate_tables.curve_table(curve, truth=truth))

@@ -14,12 +14,11 @@ from pathlib import Path
 from shipdrag_ros.cli.arguments import add_remap, bag, number
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.sources import open_sources
+from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.library.trending import trends_of
-from shipdrag_ros.live.app import LivePage
+from shipdrag_ros.live.app import FLEET, FleetPages, LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
-from shipdrag_ros.live.fleet_pages import FLEET, FleetPages
 from shipdrag_ros.live.serve import listen, serve
 from shipdrag_ros.live.source import FASTEST, BagSource, NodeSource, PictureFeed
 from shipdrag_ros.ship import Ship

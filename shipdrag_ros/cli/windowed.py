@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bags with a window each: `BAG@START:END`."""
+"""Bags, and logs that are made bags, as a verb takes them; with a window each: `BAG@START:END`."""
 
 from __future__ import annotations
 
@@ -9,12 +9,42 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from shipdrag_ros.bags import Run, open_runs
+from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.sources import open_sources
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan
 
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
+
+
+def open_sources(paths: Sequence[Path], output: Output, *, remap: Mapping[str, str]) -> list[Run]:
+    """
+    Open bags and logs; what was understood of a log is printed on stderr.
+
+    Parameters
+    ----------
+    paths
+    output
+    remap
+        Recorded topic -> input.
+
+    Raises
+    ------
+    BagError
+        If a bag cannot be read.
+    ImportDataError
+        If nothing in a log can be used.
+    """
+    if all(is_bag(path) for path in paths):
+        return open_runs(paths, remap=remap)
+    from shipdrag_ros.importing.reading import Understanding, read_any  # a bag needs no importer
+
+    def tell(found: Understanding) -> None:
+        for line in found.lines():
+            output.log(line)
+
+    return read_any(paths, remap=remap, tell=tell)
 
 
 class WindowedBag(NamedTuple):

@@ -33,7 +33,7 @@ class Dismissals:
 
     def __init__(self, span_ns: int) -> None:
         self._span_ns = span_ns
-        self._told: dict[Dismissal, int] = {}
+        self._said: dict[Dismissal, int] = {}
         self._more: dict[Dismissal, _More] = {}
 
     def take(self, dismissed: NotCoastdown) -> list[Event]:
@@ -41,8 +41,8 @@ class Dismissals:
         Take a dismissal and return what is to be said now.
         """
         span = dismissed.end_ns // self._span_ns
-        if self._told.get(dismissed.reason) != span:
-            self._told[dismissed.reason] = span
+        if self._said.get(dismissed.reason) != span:
+            self._said[dismissed.reason] = span
             return [*self._flush(dismissed.reason), dismissed]
         more = self._more.get(dismissed.reason)
         count, start_ns = 1, dismissed.start_ns
@@ -57,7 +57,7 @@ class Dismissals:
         Return what was counted and not said, and forget everything.
         """
         events = [event for reason in list(self._more) for event in self._flush(reason)]
-        self._told.clear()
+        self._said.clear()
         return events
 
     def _flush(self, reason: Dismissal) -> list[Event]:

@@ -24,7 +24,7 @@ from shipdrag_ros.ship import Ship
 _IDLE = 0.1  # of the fastest shaft or the largest pitch: a hundredth of the thrust
 _DRIVING = 0.9  # of the turns a metre that drive the ship: the water alone turns it by less
 _STEADY = 0.97  # of its speed a ship keeps that is driven evenly
-_TOLD = 1.1  # the speed falls by so much: then a shaft can be seen to follow it
+_SHOWN = 1.1  # the speed falls by so much: then a shaft can be seen to follow it
 _FOLLOWS = 0.5  # power of the ship's speed by which a shaft falls at least, if not driven
 _OFTENER = 1.15  # what turns with the water does not turn more often a metre by this
 _PARTS = 24  # of a run
@@ -241,7 +241,7 @@ def _is_driven(
     some = max(1, len(size) // 5)
     fell = _fall(speed, some)
     slowed = _fall(size, some)
-    if fell > _TOLD:
+    if fell > _SHOWN:
         power = math.log(max(slowed, 1e-9)) / math.log(fell)
         follows = power >= _FOLLOWS and (steady or power < _RUNS_DOWN)
         follows = follows and not (by_log and least and _pushes_again(size, speed, least))

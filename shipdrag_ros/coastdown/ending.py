@@ -21,7 +21,7 @@ from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate
 from shipdrag_ros.coastdown.settling import ConstantForce, constant_force
 from shipdrag_ros.coastdown.shafts import SpeedEvidence, Thrust, all_stand, engaged_at, propulsion
-from shipdrag_ros.coastdown.tracking import heading_is_told, turned_at
+from shipdrag_ros.coastdown.tracking import heading_is_known, turned_at
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
@@ -110,7 +110,7 @@ def _departed(
 ) -> End | None:
     """Say whether the speed has ceased to fall as it did; None where it falls on."""
     width, start, source = tuning.slopes.width, coasting.start, coasting.source
-    told = heading_is_told(bins, start)
+    known = heading_is_known(bins, start)
     excess, first, before = math.nan, start, math.nan
     earlier = number - width
     span = min(_EARLIER_WINDOWS * width, earlier - start)
@@ -133,7 +133,7 @@ def _departed(
         return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
     if -excess > coasting.limits[0]:
         # where nothing gives the heading, this is how a turn shows, unless it is too much for one
-        braked = told or slope < _TURN_MOST * min(before, 0.0)
+        braked = known or slope < _TURN_MOST * min(before, 0.0)
         cause = EndedBy.BRAKE if braked else EndedBy.TURN
         return End(cause, _bend(bins, coasting, tuning, first, number, sign=1))
     return None
@@ -248,8 +248,8 @@ def _forced(
     # where the shafts are seen to do nothing, what drives her is the wind
     seen = SpeedEvidence(coasted.source, coasted.start, coasted.slope_sd)
     stands = 0.5 * parameters.shaft_stopped_fraction
-    told = propulsion(bins, coasted.drive, seen, end.last, width=width, stands=stands).thrust
-    if told in (Thrust.STANDS, Thrust.WINDMILLS):
+    thrust = propulsion(bins, coasted.drive, seen, end.last, width=width, stands=stands).thrust
+    if thrust in (Thrust.STANDS, Thrust.WINDMILLS):
         return None
     if within is not None and within.low > _THRUST_MIN:
         return _driven(within)

@@ -23,8 +23,8 @@ class InputHealth:
         Samples that came and samples that were accepted.
     rejected
         Samples by reason, lower-case names; reasons without any are left out.
-    last_stamp_ns, last_receive_ns
-        Of the last accepted sample; None before it.
+    last_receive_ns
+        Arrival of the last accepted sample; None before it.
     rate_hz
         By the stamps of the last few accepted samples; None before two.
     clock_offset_s
@@ -35,7 +35,6 @@ class InputHealth:
     messages: int
     used: int
     rejected: dict[str, int]
-    last_stamp_ns: int | None
     last_receive_ns: int | None
     rate_hz: float | None
     clock_offset_s: float | None
@@ -63,13 +62,13 @@ class MonitorProgress:
     @property
     def values(self) -> dict[str, str]:
         """The same as texts by key, the unit in the key."""
-        told = {
+        figures = {
             'steady lead [s]': f'{self.steady_s:.0f}',
             'steady lead used at most [s]': f'{self.used_s:.0f}',
         }
         if self.coastdown_since_ns is not None:
-            told['coastdown since [ns]'] = str(self.coastdown_since_ns)
-        return told
+            figures['coastdown since [ns]'] = str(self.coastdown_since_ns)
+        return figures
 
 
 def input_health(tally: InputTally) -> dict[str, InputHealth]:
@@ -97,7 +96,6 @@ def _health(tally: InputTally, name: str) -> InputHealth:
             for reason in Reason
             if reason is not Reason.ACCEPTED and reasons[reason]
         },
-        last_stamp_ns=int(tally.stamp_ns[last, newest]) if len(stamps) else None,
         last_receive_ns=int(tally.arrival_ns[last, newest]) if len(stamps) else None,
         rate_hz=(len(stamps) - 1) / (span * 1e-9) if span else None,
         clock_offset_s=float(np.median(arrivals - stamps)) * 1e-9 if len(stamps) else None,

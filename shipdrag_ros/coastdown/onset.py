@@ -26,7 +26,7 @@ from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.memory import Tuning
 from shipdrag_ros.coastdown.shafts import (
     SHAFT_S,
-    UNTOLD,
+    UNKNOWN_THRUST,
     Drive,
     ShaftEvidence,
     SpeedEvidence,
@@ -187,22 +187,22 @@ def judge(
     pending = OnsetJudgement(OnsetDecision.PENDING, candidate)
     if number < candidate.judged_from:  # the clock of the speed may be slower than the shaft's
         return pending
-    told = _propulsion(candidate, bins, tuning, parameters, number)
-    doubt = _spoiled(candidate, told, bins, tuning, parameters, number)
+    evidence = _propulsion(candidate, bins, tuning, parameters, number)
+    doubt = _spoiled(candidate, evidence, bins, tuning, parameters, number)
     if doubt is not None:
         return OnsetJudgement(OnsetDecision.DISMISSED, candidate, doubt)
-    if told.stop is not None:
-        candidate = replace(candidate, start=told.stop)
+    if evidence.stop is not None:
+        candidate = replace(candidate, start=evidence.stop)
     falls = candidate.falls(bins, number, width)
     age = number - candidate.start
-    off = told.thrust in (Thrust.STANDS, Thrust.WINDMILLS)
+    off = evidence.thrust in (Thrust.STANDS, Thrust.WINDMILLS)
     if off and falls:
         return OnsetJudgement(OnsetDecision.CONFIRMED, candidate)
     if not candidate.noticed:
-        if told is UNTOLD:  # it turns on as before
+        if evidence is UNKNOWN_THRUST:  # it turns on as before
             return OnsetJudgement(OnsetDecision.DISMISSED, candidate)
         if age > _PATIENCE * confirm:
-            return OnsetJudgement(OnsetDecision.DISMISSED, candidate, _no_fall(told, age))
+            return OnsetJudgement(OnsetDecision.DISMISSED, candidate, _no_fall(evidence, age))
     if not falls:
         if off or not candidate.noticed:
             return OnsetJudgement(OnsetDecision.PENDING, candidate)
@@ -211,12 +211,12 @@ def judge(
         )
     if age < confirm * (candidate.trials + 1):
         return OnsetJudgement(OnsetDecision.PENDING, candidate)
-    return _tried(candidate, told, bins, ship, tuning, parameters, number)
+    return _tried(candidate, evidence, bins, ship, tuning, parameters, number)
 
 
 def _tried(
     candidate: OnsetCandidate,
-    told: ShaftEvidence,
+    evidence: ShaftEvidence,
     bins: Bins,
     ship: Ship,
     tuning: Tuning,
@@ -225,7 +225,7 @@ def _tried(
 ) -> OnsetJudgement:
     """Judge the deceleration once more."""
     width, confirm = tuning.slopes.width, round(parameters.confirm_s)
-    if told.stop is None:
+    if evidence.stop is None:
         start = begin_of_fall(
             bins, candidate.source, candidate.start - 2 * width, number, tuning.speed_min
         )
@@ -235,12 +235,12 @@ def _tried(
         return OnsetJudgement(OnsetDecision.PENDING, candidate)
     candidate = replace(candidate, trials=candidate.trials + 1)
     # a governor, or a controllable propeller at zero pitch that holds its speed: ask for more
-    strict = told.thrust is Thrust.REDUCED and candidate.trials < _TRIALS
+    strict = evidence.thrust is Thrust.REDUCED and candidate.trials < _TRIALS
     doubt = _unlike_a_coastdown(candidate, bins, ship, tuning, parameters, number, strict=strict)
-    if told.thrust is Thrust.ON:
-        doubt = Doubt(Dismissal.THRUST, f'a propeller drove on, {told.text}')
-    elif told.thrust is Thrust.REDUCED and doubt is not None:
-        doubt = Doubt(Dismissal.THRUST, f'{doubt.text}; the shaft held its speed, {told.text}')
+    if evidence.thrust is Thrust.ON:
+        doubt = Doubt(Dismissal.THRUST, f'a propeller drove on, {evidence.text}')
+    elif evidence.thrust is Thrust.REDUCED and doubt is not None:
+        doubt = Doubt(Dismissal.THRUST, f'{doubt.text}; the shaft held its speed, {evidence.text}')
     candidate = replace(candidate, doubt=doubt)
     if doubt is None:
         return OnsetJudgement(OnsetDecision.CONFIRMED, candidate)
@@ -254,7 +254,7 @@ def _propulsion(
 ) -> ShaftEvidence:
     """Say what the propellers do, where that goes with what the speed does."""
     width = tuning.slopes.width
-    told = propulsion(
+    evidence = propulsion(
         bins,
         candidate.drive,
         SpeedEvidence(candidate.source, candidate.start, candidate.slope_sd),
@@ -262,19 +262,19 @@ def _propulsion(
         width=width,
         stands=0.5 * parameters.shaft_stopped_fraction,
     )
-    if told.stop is None or not candidate.noticed:
-        return told
+    if evidence.stop is None or not candidate.noticed:
+        return evidence
     # a shaft that stopped long before the ship slowed down, or after, is a sign of something else;
     # of several, others have stopped before
-    late = told.stop - candidate.start
+    late = evidence.stop - candidate.start
     if late < -_APART * width or (late > _APART * width and candidate.drive.known == 1):
-        return UNTOLD
-    return told
+        return UNKNOWN_THRUST
+    return evidence
 
 
 def _spoiled(
     candidate: OnsetCandidate,
-    told: ShaftEvidence,
+    evidence: ShaftEvidence,
     bins: Bins,
     tuning: Tuning,
     parameters: Parameters,
@@ -282,10 +282,10 @@ def _spoiled(
 ) -> Doubt | None:
     """Say what makes a candidate no coastdown whatever its speed does."""
     width = tuning.slopes.width
-    if told.thrust is Thrust.ASTERN:
+    if evidence.thrust is Thrust.ASTERN:
         return Doubt(
             Dismissal.ASTERN,
-            f'a propeller was reversed, {told.text}',
+            f'a propeller was reversed, {evidence.text}',
         )
     level = line(bins, candidate.source, number, width)[1]
     if level < tuning.speed_min:
@@ -301,13 +301,13 @@ def _spoiled(
     return None
 
 
-def _no_fall(told: ShaftEvidence, age: int) -> Doubt:
+def _no_fall(evidence: ShaftEvidence, age: int) -> Doubt:
     """Say that the propeller slowed down, the ship did not."""
-    if told.thrust is Thrust.ON:
-        return Doubt(Dismissal.THRUST, f'a propeller drove on for {age} s, {told.text}')
+    if evidence.thrust is Thrust.ON:
+        return Doubt(Dismissal.THRUST, f'a propeller drove on for {age} s, {evidence.text}')
     return Doubt(
         Dismissal.OTHER,
-        f'the shaft slowed down, {told.text}, yet for {age} s the speed did not fall by more '
+        f'the shaft slowed down, {evidence.text}, yet for {age} s the speed did not fall by more '
         'than chance explains',
     )
 

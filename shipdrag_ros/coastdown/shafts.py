@@ -126,7 +126,7 @@ class ShaftEvidence:
         return f'at {self.drive:.0%} of its steady drive'
 
 
-UNTOLD = ShaftEvidence(Thrust.UNKNOWN)
+UNKNOWN_THRUST = ShaftEvidence(Thrust.UNKNOWN)
 
 
 def steady_drive(bins: Bins, last: int, width: int) -> Drive:
@@ -205,7 +205,7 @@ def propulsion(
         Fraction of the steady drive below which a propeller counts as standing.
     """
     if not steady.known or not _heard(bins, number):
-        return UNTOLD
+        return UNKNOWN_THRUST
     first = seen.start - 3 * width
     rows = drives(bins, steady, first, number)
     rows = rows[~np.isnan(rows[:, -1])]
@@ -222,7 +222,7 @@ def propulsion(
         )
         if pitched and moves.any():
             return ShaftEvidence(Thrust.ON, None, float(now.max()))
-        return UNTOLD
+        return UNKNOWN_THRUST
     if np.any(~fell & moves):
         return ShaftEvidence(Thrust.ON, None, float(now.max()))
     stops = [first + _knee(row) for row in rows[fell]]

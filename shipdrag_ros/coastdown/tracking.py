@@ -108,7 +108,7 @@ def turned_at(bins: Bins, start: int, number: int, width: int, turn_rad: float) 
     return last
 
 
-def heading_is_told(bins: Bins, start: int) -> bool:
+def heading_is_known(bins: Bins, start: int) -> bool:
     """
     Say whether a heading or a course has come since bin `start`.
     """

@@ -12,13 +12,12 @@ import math
 from collections.abc import Iterator
 
 from shipdrag_ros.coastdown.bins import FIRST_TRACK, SOURCES, Bins, line, newest_bin
-from shipdrag_ros.display import UNIT_RATIOS
+from shipdrag_ros.display import mistaken_units
 from shipdrag_ros.samples import Channel
 
 _LOG, _GROUND = int(Channel.SPEED_THROUGH_WATER), int(Channel.SPEED_OVER_GROUND)
 _SPAN_S = 60  # speeds are means over so long
 _LOOKS = 4  # one after the other, all of which must say the same
-_NEAR = 0.1  # relative; a current and the log's own error are in the ratio too
 _SAME = 0.05  # relative: the looks differ by less
 _STEADY = 0.1  # relative change within a look
 _SPEED_M_S = 1.0
@@ -63,18 +62,14 @@ def _doubt(bins: Bins, source: int, other: int, last: int) -> str:
     apart = min(abs(one - two) for one, two in pairs)
     if max(ratios) > (1.0 + _SAME) * min(ratios) or apart < _APART_M_S:
         return ''
-    units = [
-        f'{words} ({each:.2f})'
-        for each, words in UNIT_RATIOS.items()
-        if abs(ratio / each - 1.0) < _NEAR
-    ]
+    units = mistaken_units(ratio)
     if not units:
         return ''
     minutes = _LOOKS * _SPAN_S // 60
     against = 'the speed of the position' if other >= FIRST_TRACK else f'the {measure}'
     text = (
         f'it reads {ratio:.2f} times {against} over {minutes} minutes of steady sailing, near '
-        f'{" and ".join(units)}: look at the unit that its driver converts from, m/s is expected'
+        f'{units}: look at the unit that its driver converts from, m/s is expected'
     )
     if source != _LOG:
         return text

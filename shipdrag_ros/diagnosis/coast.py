@@ -152,8 +152,8 @@ class CoastModel(CoastSimulation):
             more = base.with_effect(
                 effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
             )
-            told = self._log_facts(more) - self._log_facts(base)
-            found.append(replace(more, log_prior=more.log_prior + told))
+            by_facts = self._log_facts(more) - self._log_facts(base)
+            found.append(replace(more, log_prior=more.log_prior + by_facts))
         return found
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:

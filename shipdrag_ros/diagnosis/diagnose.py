@@ -9,7 +9,7 @@ from dataclasses import replace
 from shipdrag_ros.diagnosis.advice import advice
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
-from shipdrag_ros.diagnosis.facts import Facts, told_of
+from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
@@ -106,7 +106,7 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    model, found, told, notes = _searched(runs, ship, parameters, facts, progress)
+    model, found, stated, notes = _searched(runs, ship, parameters, facts, progress)
     seen = model.seen
     found = with_swinging(found, model)
     found = with_pairs(with_differing(found, model), progress=progress)
@@ -143,7 +143,7 @@ def diagnose(
         traces=traces(model, as_stated.best, explained.best),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
-        facts=told.weighed(judged.posterior, [run.name for run in seen]),
+        facts=stated.weighed(judged.posterior, [run.name for run in seen]),
         runs_differ=differ,
     )
 
@@ -159,24 +159,24 @@ def _searched(
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):
         seen, notes = _observed(runs, ship, parameters, moved_s, progress)
-        told = _told(runs, seen, ship, facts)
-        model = CoastModel(ship, seen, seen[0].heading_rad, told)
+        stated = _stated(runs, seen, ship, facts)
+        model = CoastModel(ship, seen, seen[0].heading_rad, stated)
         found = search(model, progress=progress)
         more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
             break
         moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
-    return model, found, told, notes
+    return model, found, stated, notes
 
 
-def _told(
+def _stated(
     runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, facts: Sequence[Fact]
 ) -> Facts:
     """Gather what is stated of the runs that are diagnosed."""
     own = {run.name: run.facts for run in runs}
     stops = [run.context.stop for run in seen]
     at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
-    return told_of(ship, [(own[run.name], ns) for run, ns in zip(seen, at_ns)], facts)
+    return stated_facts(ship, [(own[run.name], ns) for run, ns in zip(seen, at_ns)], facts)
 
 
 def _has_both(run: Observation) -> bool:

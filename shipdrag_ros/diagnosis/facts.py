@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.posterior import UNNAMED, Posterior
-from shipdrag_ros.diagnosis.result import ToldFact
+from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
@@ -57,11 +57,11 @@ class Facts:
     ----------
     ship
         For the propeller in the baseline.
-    told
+    stated
     """
 
     ship: Ship
-    told: tuple[StatedFact, ...] = ()
+    stated: tuple[StatedFact, ...] = ()
 
     def log_likelihood(self, hypothesis: Hypothesis) -> float:
         """
@@ -77,9 +77,11 @@ class Facts:
         float
             0 without facts.
         """
-        return math.fsum(math.log(_likelihood(*self._so(each, hypothesis))) for each in self.told)
+        return math.fsum(
+            math.log(_likelihood(*self._so(each, hypothesis))) for each in self.stated
+        )
 
-    def weighed(self, posterior: Posterior, runs: Sequence[str]) -> tuple[ToldFact, ...]:
+    def weighed(self, posterior: Posterior, runs: Sequence[str]) -> tuple[WeighedFact, ...]:
         """
         Return how probable it is that each fact is wrong.
 
@@ -92,19 +94,19 @@ class Facts:
 
         Returns
         -------
-        tuple of ToldFact
+        tuple of WeighedFact
             In the order in which they were stated.
         """
         found = []
-        for each in self.told:
+        for each in self.stated:
             shares = {}
             for names, probability in posterior.probability.items():
                 so, fact = self._so(each, posterior.best[names].hypothesis)
-                wrong = (1.0 - so) * _told_wrongly(fact)
+                wrong = (1.0 - so) * _stated_wrongly(fact)
                 shares[names] = probability * wrong / _likelihood(so, fact)
             against = max(shares, key=lambda names: shares[names])
             found.append(
-                ToldFact(
+                WeighedFact(
                     each.fact,
                     '' if each.run is None else runs[each.run],
                     math.fsum(shares.values()),
@@ -132,7 +134,7 @@ class Facts:
             By the name of each fact that is not stated yet and has no date; a fact that is
             not so counts as what the effects say that it denies.
         """
-        known = {each.fact.name for each in self.told}
+        known = {each.fact.name for each in self.stated}
         found = {}
         for name, kind in KNOWN.items():
             if name in known or kind.values == (DATE,):
@@ -150,18 +152,18 @@ class Facts:
             found[name] = math.fsum(_decided(posterior, each, decides) for each in so)
         return found
 
-    def _so(self, told: StatedFact, hypothesis: Hypothesis) -> tuple[float, Fact]:
+    def _so(self, stated: StatedFact, hypothesis: Hypothesis) -> tuple[float, Fact]:
         """Return how probable it is that a fact is so under a hypothesis, and the fact."""
-        name = told.fact.name
+        name = stated.fact.name
         effects = [
             term.effect
             for term in hypothesis.terms
             if isinstance(term, EffectTerm) and not term.stated and name in term.effect.facts
-            if told.run is None or term.acts_in(told.run)
+            if stated.run is None or term.acts_in(stated.run)
         ]
         if effects:
-            return min(_goes_with(effect, told) for effect in effects), told.fact
-        return self._usual(told.fact), told.fact
+            return min(_goes_with(effect, stated) for effect in effects), stated.fact
+        return self._usual(stated.fact), stated.fact
 
     def _usual(self, fact: Fact) -> float:
         """Return how probable a fact is where no effect speaks about it."""
@@ -175,7 +177,7 @@ class Facts:
         return _SHAFT[state].get(fact.value, 0.0)
 
 
-def told_of(
+def stated_facts(
     ship: Ship,
     runs: Sequence[tuple[Sequence[Fact], int]],
     everywhere: Sequence[Fact] = (),
@@ -198,37 +200,37 @@ def told_of(
     """
     first_ns = runs[0][1] if runs else 0
     above = {fact.name for fact in everywhere}
-    told = [StatedFact(fact, None, first_ns) for fact in everywhere]
+    stated = [StatedFact(fact, None, first_ns) for fact in everywhere]
     own = {fact.name for facts, _ in runs for fact in facts}
     for fact in ship.facts:
         if fact.name not in above | own:
-            told.append(StatedFact(fact, None, first_ns))
+            stated.append(StatedFact(fact, None, first_ns))
     for j, (facts, time_ns) in enumerate(runs):
         of_ship = [fact for fact in ship.facts if fact.name in own]
         for fact in overriding(of_ship, facts):
             if fact.name not in above:
-                told.append(StatedFact(fact, j, time_ns))
-    return Facts(ship, tuple(told))
+                stated.append(StatedFact(fact, j, time_ns))
+    return Facts(ship, tuple(stated))
 
 
-def _goes_with(effect: Effect, told: StatedFact) -> float:
+def _goes_with(effect: Effect, stated: StatedFact) -> float:
     """Return how probable a fact is where an effect is there that it speaks about."""
-    said, since_ns = effect.facts[told.fact.name], told.fact.time_ns
+    said, since_ns = effect.facts[stated.fact.name], stated.fact.time_ns
     if since_ns is None:
-        return float(told.fact.value in said.values and bool(said.values))
-    if told.time_ns < since_ns:  # what was done later says nothing of the run
+        return float(stated.fact.value in said.values and bool(said.values))
+    if stated.time_ns < since_ns:  # what was done later says nothing of the run
         return 1.0
-    return -math.expm1(-(((told.time_ns - since_ns) * 1e-9 / said.fades_s) ** 2))
+    return -math.expm1(-(((stated.time_ns - since_ns) * 1e-9 / said.fades_s) ** 2))
 
 
-def _told_wrongly(fact: Fact) -> float:
+def _stated_wrongly(fact: Fact) -> float:
     """Return how probable it is that it is stated although it is not so."""
     return fact.rate / max(len(KNOWN[fact.name].values) - 1, 1)
 
 
 def _likelihood(so: float, fact: Fact) -> float:
     """Return how probable it is that a fact is stated."""
-    return so * (1.0 - fact.rate) + (1.0 - so) * _told_wrongly(fact)
+    return so * (1.0 - fact.rate) + (1.0 - so) * _stated_wrongly(fact)
 
 
 def _decided(

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Linearised
+from shipdrag_ros.inference.factored import Factored
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
@@ -207,18 +208,15 @@ class _FitState:
     ) -> tuple[Float64, float]:
         """Return covariance and log evidence of what is as good as normal."""
         assert self.best is not None
-        size = np.sqrt(np.diag(matrix))
-        if not (size > 0.0).all():
+        try:
+            factored = Factored.of(matrix)
+        except np.linalg.LinAlgError:
             return matrix, -math.inf
-        scaled = matrix / np.outer(size, size)
-        sign, log_det = np.linalg.slogdet(scaled)
-        if sign <= 0.0:
-            return matrix, -math.inf
-        covariance = np.linalg.inv(scaled) / np.outer(size, size)
+        covariance = factored.inverse
         # where the fit is held at the end of a parameter, the best is beyond
         step = covariance @ negative_gradient
         log_evidence = -0.5 * (cost - float(negative_gradient @ step))
-        log_evidence -= 0.5 * float(log_det) + float(np.log(size).sum())
+        log_evidence -= 0.5 * factored.log_det
         for i in np.flatnonzero(self._half):
             beyond = (self.best.z[i] + step[i]) / math.sqrt(covariance[i, i])
             log_evidence += math.log(2.0) + float(log_ndtr(beyond))

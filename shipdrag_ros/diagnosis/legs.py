@@ -146,7 +146,7 @@ class Legs:
         if len(moving) < LEAST_LEGS:
             names = ', '.join(repr(record.name) for record in records)
             raise DiagnosisError(
-                f'{names}: {len(moving)} stretches of even sailing (left out: {told(left)}), '
+                f'{names}: {len(moving)} stretches of even sailing (left out: {left_text(left)}), '
                 f'at least {LEAST_LEGS} of {_LEG_S:.0f} s are needed to hold the log against '
                 'the way over ground: give a longer record'
             )
@@ -196,7 +196,7 @@ class Legs:
         return np.sqrt(np.maximum(self.ground_m_s**2 - to_port**2, 0.0)) - ahead
 
 
-def told(left_out: Mapping[Left, int]) -> str:
+def left_text(left_out: Mapping[Left, int]) -> str:
     """
     Return what is left out, in words.
 

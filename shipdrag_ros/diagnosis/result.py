@@ -107,7 +107,7 @@ class RunSize:
 
 
 @dataclass(frozen=True)
-class ToldFact:
+class WeighedFact:
     """
     A fact of the log book, and what the data say of it.
 
@@ -291,7 +291,7 @@ class DiagnosisResult:
     coastdowns_used: int = 0
     examined: tuple[str, ...] = ()
     no_coastdown: str = ''
-    facts: tuple[ToldFact, ...] = ()
+    facts: tuple[WeighedFact, ...] = ()
     runs_differ: tuple[RunSize, ...] = ()
     estimates: tuple[Estimate, ...] = ()
 
@@ -308,8 +308,8 @@ class DiagnosisResult:
 
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
         first = (self.no_coastdown, words.sentence(self), words.differing(self))
-        told = (*first, words.examined(self), where)
-        return (*filter(None, told), *words.facts(self), *self.notes)
+        lines = (*first, words.examined(self), where)
+        return (*filter(None, lines), *words.facts(self), *self.notes)
 
     def table(self) -> Table:
         """

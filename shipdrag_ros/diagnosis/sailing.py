@@ -16,7 +16,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.direct import diagnosis_of_speeds
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, told
+from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, left_text
 from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
 from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
@@ -114,7 +114,7 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
     found = [
         f'log and way over ground are compared on {len(legs)} legs of {legs.length_s:.0f} s, '
         f'whose direction is by {legs.direction}; left out: '
-        f'{told(legs.left_out)}' + (f', outlier {outliers}' if outliers else '')
+        f'{left_text(legs.left_out)}' + (f', outlier {outliers}' if outliers else '')
     ]
     if legs.direction is Direction.UNKNOWN:
         found.append(
@@ -133,26 +133,26 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
 def _why(model: SailingModel, found: SearchResult) -> list[str]:
     """Say why it is this and none of the others."""
     legs, best, names = model.legs, found.best, found.best.hypothesis.names
-    told = [f'log over ground: {_by_speed(legs)}']
+    lines = [f'log over ground: {_by_speed(legs)}']
     action = model.action(best.hypothesis, best.best.z)
     if any(action.current_m_s):
         east, north = action.current_m_s
-        told.append(f'the water moves by {east:+.3f} m/s to the east, {north:+.3f} to the north')
+        lines.append(f'the water moves by {east:+.3f} m/s to the east, {north:+.3f} to the north')
     if legs.direction is not Direction.UNKNOWN:
-        told.append(f'log over ground by course: {_by_course(legs)}')
+        lines.append(f'log over ground by course: {_by_course(legs)}')
     for effect in model.together:
         alike = [sets for sets in model.inseparable if effect.name in sets and sets & set(names)]
         probability = found.posterior.probability.get((effect.name,), 0.0)
         if effect.name in names or alike or probability > _POSSIBLE:
             continue
         alone = found.posterior.best[(effect.name,)]
-        told.append(
+        lines.append(
             f'why not {effect.name}: {effect.without_baseline[WithoutBaseline.LOG_TRACK]}; alone '
             f'it leaves chi2 {alone.chi2_per_row:.2f} a leg, {" and ".join(names)} '
             f'{best.chi2_per_row:.2f}, and is less probable by '
             f'{best.log_likelihood - alone.log_likelihood:.0f} nats'
         )
-    return told
+    return lines
 
 
 def _by_course(legs: Legs) -> str:

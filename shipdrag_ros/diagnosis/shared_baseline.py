@@ -23,6 +23,7 @@ from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.inference.factored import Factored
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -66,8 +67,8 @@ class Normal:
             Their Schur complement.
         """
         own = matrix[kept:, kept:]
-        across = np.linalg.solve(
-            own, np.column_stack([matrix[kept:, :kept], negative_gradient[kept:]])
+        across = Factored.of(own).solve(
+            np.column_stack([matrix[kept:, :kept], negative_gradient[kept:]])
         )
         return cls(
             matrix[:kept, :kept] - matrix[:kept, kept:] @ across[:, :kept],
@@ -168,9 +169,10 @@ def share(
             matrix += run.matrix - np.outer(pull, pull) / freedom
             negative_gradient += run.negative_gradient - pull * push / freedom
             log += 0.5 * (push**2 / freedom - np.log(scatter**2 * freedom))
-        covariance = np.linalg.inv(matrix)
+        factored = Factored.of(matrix)
+        covariance = factored.inverse
         step = covariance @ negative_gradient
-        log_weight[i] = log + 0.5 * (negative_gradient @ step - np.linalg.slogdet(matrix)[1])
+        log_weight[i] = log + 0.5 * (negative_gradient @ step - factored.log_det)
         steps.append(step)
         covariances.append(covariance)
     weight = np.exp(log_weight - log_weight.max())
@@ -203,10 +205,11 @@ def factor(run: Normal, others: Shared, along: Float64) -> Factor:
     Factor
         Of the run over the others, - 1.
     """
-    known = np.linalg.inv(others.covariance)
+    known = Factored.of(others.covariance).inverse
     run = run.at(others.step)
     pull = run.matrix @ along
-    through = np.linalg.solve(known + run.matrix, np.column_stack([pull, run.negative_gradient]))
+    both = np.column_stack([pull, run.negative_gradient])
+    through = Factored.of(known + run.matrix).solve(both)
     information = float(along @ pull - pull @ through[:, 0])
     value = float(along @ run.negative_gradient - pull @ through[:, 1]) / information
     variance = 1.0 / information

@@ -25,6 +25,7 @@ from shipdrag_ros.diagnosis.measured import damping_of
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.search import SearchResult
+from shipdrag_ros.inference.factored import Factored
 from shipdrag_ros.inference.noise import apply
 from shipdrag_ros.inference.rows import POSITION
 from shipdrag_ros.parameter import Parameter, free, normal
@@ -162,18 +163,18 @@ def swing_notes(found: Fit, model: CoastModel) -> tuple[str, ...]:
     model
         Of the same runs.
     """
-    told = []
+    notes = []
     for part, place in found.hypothesis.parts:
         if not isinstance(part, SwingTerm):
             continue
         sine, cosine = found.best.z[place : place + 2]
         share = _SD * math.hypot(sine, cosine)
-        told.append(
+        notes.append(
             f'{model.seen[part.run].name}: a force swings over about {part.period_s:.0f} s, by '
             f'{100.0 * share:.0f} % of the resistance at the stop, as none did in the steady '
             'record before: a tow, an anchor, weed or a controller that is not off may do so'
         )
-    return tuple(told)
+    return tuple(notes)
 
 
 def size_m_s2(ship: Ship, speed_m_s: float) -> float:
@@ -276,9 +277,8 @@ def _gains(
     for way, chosen in enumerate(runs):
         for i in range(len(periods_s)):
             at = [(2 * j + k) * len(periods_s) + i for j in chosen for k in range(2)]
-            matrix, pull = precision[np.ix_(at, at)], gradient[at]
-            log_det = float(np.linalg.slogdet(matrix)[1])
-            gain[way, i] = 0.5 * (pull @ np.linalg.solve(matrix, pull) - log_det)
+            factored, pull = Factored.of(precision[np.ix_(at, at)]), gradient[at, np.newaxis]
+            gain[way, i] = 0.5 * (float((pull * factored.solve(pull)).sum()) - factored.log_det)
     return gain, runs
 
 

@@ -6,10 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.display import UNIT_RATIOS
+from shipdrag_ros.display import mistaken_units
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
-
-_NEAR = 0.03  # relative
 
 
 def asked(ratio: float) -> str:
@@ -26,14 +24,12 @@ def asked(ratio: float) -> str:
     str
         For the reader.
     """
-    if not ratio > 0.0:
-        return ''
-    near = min(UNIT_RATIOS, key=lambda each: abs(np.log(ratio / each)))
-    if abs(ratio / near - 1.0) > _NEAR:
+    units = mistaken_units(ratio)
+    if not units:
         return ''
     return (
-        f'the log reads {ratio:.2f} times the way over ground, which is {UNIT_RATIOS[near]}: is '
-        'the unit of one of them wrong? Import it again with its unit, as in '
+        f'the log reads {ratio:.2f} times the way over ground, near {units}: is the unit of '
+        'one of them wrong? Import it again with its unit, as in '
         '--map speed_through_water=COLUMN:kn'
     )
 

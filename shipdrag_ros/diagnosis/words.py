@@ -121,21 +121,21 @@ def facts(found: DiagnosisResult) -> list[str]:
     """
     Say which facts the data contradict, and which say nothing here, a line each.
     """
-    told = []
+    lines = []
     for each in found.facts:
         where = f' ({each.run})' if each.run else ''
         if each.contradicted and each.wrong is not None:
             instead = f', most probably {names_text(each.against)}' if each.against else ''
-            told.append(
+            lines.append(
                 f'The data contradict the fact `{each.fact}`{where}: {each.fact.words}. It is '
                 f'wrong with probability {probability(each.wrong)}{instead}; look at it again.'
             )
         elif each.wrong is None:
-            told.append(
+            lines.append(
                 f'The fact `{each.fact}`{where} is not used: it says nothing of the log against '
                 'the way over ground.'
             )
-    return told
+    return lines
 
 
 def advice(found: DiagnosisResult) -> list[str]:
@@ -222,15 +222,15 @@ def answers(found: DiagnosisResult) -> tuple[Answer, ...]:
     Return the candidates, then nothing and something unnamed, and what is left.
     """
     nothing = NOTHING if found.baseline != 'none' else NOTHING_BETWEEN
-    told = [
+    listed = [
         Answer(names_text(each.names) if each.names else nothing, each.probability)
         for each in found.candidates
     ]
     if all(each.names for each in found.candidates):
-        told.append(Answer(nothing, found.nothing))
-    told.append(Answer(UNNAMED, found.unnamed))
-    others = 1.0 - sum(each.probability for each in told)
-    return (*told, Answer(OTHERS, others)) if others >= _LEAST else tuple(told)
+        listed.append(Answer(nothing, found.nothing))
+    listed.append(Answer(UNNAMED, found.unnamed))
+    others = 1.0 - sum(each.probability for each in listed)
+    return (*listed, Answer(OTHERS, others)) if others >= _LEAST else tuple(listed)
 
 
 def names_text(names: Sequence[str]) -> str:
@@ -299,15 +299,15 @@ def _sized(effect: EffectEstimate) -> str:
 
 def _on_board(quantity: Parameter, found: Parameter) -> str:
     """Return a size as it is read on board: speeds in knots, large forces in kN."""
-    told = size(quantity, found)
+    text = size(quantity, found)
     if found.sd == 0.0:
-        return told
+        return text
     if quantity.unit == 'm/s':
         knots = plus_minus(found.value / M_S_PER_KNOT, 2.0 * found.sd / M_S_PER_KNOT)
-        return f'({knots}) knots = {told}'
+        return f'({knots}) knots = {text}'
     if quantity.unit == 'N' and abs(found.value) >= _LARGE_N:
         return f'({plus_minus(1e-3 * found.value, 2e-3 * found.sd)}) kN'
-    return told
+    return text
 
 
 def _listed(candidates: Sequence[Candidate]) -> str:

@@ -97,9 +97,9 @@ def _result(job: BagJob, runs: Sequence[Run]) -> BagResult:
         result = replay(run, ship=hull.ship, compare=False)
         messages += sum(topic.messages for topic in run.topics)
         warnings += [*hull.warnings, *hull.ship.warnings, *run_warnings(result)]
-        found, told = _coastdowns(job, hull, result)
+        found, notes = _coastdowns(job, hull, result)
         rows += found
-        warnings += told
+        warnings += notes
     assert hull is not None  # a bag without a run is an error
     return BagResult(
         _bag_row(job)
@@ -128,12 +128,12 @@ def _coastdowns(
     shared = ['clocks_apart'] if clocks_apart(result) else []
     if result.run.warnings:
         shared.append('damaged')
-    rows, told = [], []
+    rows, notes = [], []
     windows = coast_windows(result)
     for coastdown, window in windows:
         diagnosis, why = _diagnosis(result, hull, window)
         if why:
-            told.append(f'the coastdown at {coastdown.start_ns} ns is not diagnosed: {why}')
+            notes.append(f'the coastdown at {coastdown.start_ns} ns is not diagnosed: {why}')
         rows.append(
             coastdown_row(coastdown, hull.ship, diagnosis=diagnosis, context=context, flags=shared)
         )
@@ -143,8 +143,8 @@ def _coastdowns(
                 coastdown_row(event, hull.ship, diagnosis=None, context=context, flags=shared)
             )
     if not windows:
-        told.append(f'no coastdown was found: {why_no_coastdown(result)}')
-    return sorted(rows, key=lambda row: int(row['time_ns'])), told
+        notes.append(f'no coastdown was found: {why_no_coastdown(result)}')
+    return sorted(rows, key=lambda row: int(row['time_ns'])), notes
 
 
 def _diagnosis(

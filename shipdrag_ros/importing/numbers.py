@@ -95,6 +95,6 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
         problems.append('no row below the header, expected a line a measurement')
     if problems:
         more = len(problems) - _SHOWN
-        told = [*problems[:_SHOWN], f'and {more} more'] if more > 0 else problems
-        raise DataError(str(path), told)
+        shown = [*problems[:_SHOWN], f'and {more} more'] if more > 0 else problems
+        raise DataError(str(path), shown)
     return Numbers(wanted, np.array(rows, np.float64).reshape(len(rows), len(wanted)))

@@ -46,8 +46,8 @@ class Understanding:
         """
         Return what is to be said: what each input was taken from, and what was left out.
         """
-        told = [f'{self.path}: {self.kind}', *(f'  {each}' for each in self.result.understood)]
-        return [*told, *self.result.summary(self.path)[1:], *self.result.details()]
+        lines = [f'{self.path}: {self.kind}', *(f'  {each}' for each in self.result.understood)]
+        return [*lines, *self.result.summary(self.path)[1:], *self.result.details()]
 
 
 class ImportedRun(Run):

@@ -177,13 +177,13 @@ class StreamResult:
         """
         Say what was not used, and why.
         """
-        told = not_taken_words(self.not_taken) + rejected_words(self.rejected)
+        lines = not_taken_words(self.not_taken) + rejected_words(self.rejected)
         if self.not_used:
             shown = sorted(self.not_used.items(), key=lambda each: -each[1])
             others = ', '.join(f'{name} {count}' for name, count in shown[:20])
             more = f' and {len(shown) - 20} more kinds' if len(shown) > 20 else ''
-            told.append(f'Not used: {others}{more}')
-        return told
+            lines.append(f'Not used: {others}{more}')
+        return lines
 
 
 def import_stream(
@@ -231,8 +231,8 @@ def import_stream(
                     bag.write_samples(record.pop())
         bag.write_samples(record.pop())
         result = _result(name, tally, record, _understood(bag, chosen), counts, chosen)
-        told = {'source': job.source.name, **(about or {}), **asdict(result)}
-        bag.attach(ATTACHMENT, strict_yaml.dump(told))
+        about_bag = {'source': job.source.name, **(about or {}), **asdict(result)}
+        bag.attach(ATTACHMENT, strict_yaml.dump(about_bag))
     return result
 
 

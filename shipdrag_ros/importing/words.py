@@ -13,18 +13,18 @@ def backward_and_repeated(backward: int, repeated: int) -> list[str]:
     """
     Say how many samples a replay will reject for their stamps.
     """
-    told = []
+    lines = []
     if backward:
-        told.append(
+        lines.append(
             f'{backward} messages are stamped before an earlier one of their input; a replay '
             'rejects those.'
         )
     if repeated:
-        told.append(
+        lines.append(
             f'{repeated} messages have the stamp of an earlier one of their input; a replay '
             'rejects those.'
         )
-    return told
+    return lines
 
 
 def table_of_messages(written: Mapping[str, int], sources: Mapping[str, str]) -> Table:

@@ -301,28 +301,3 @@ def sample(seen: Seen, prior: SizePrior, points: Float64) -> tuple[Float64, Floa
             square += points[k, a] ** 2
         log_weight[k] = _log_posterior(found[k], seen, prior) + 0.5 * square
     return found, log_weight
-
-
-@compiled
-def evidence(z: Float64, seen: Seen, prior: SizePrior) -> Float64:
-    """
-    Return the logarithm of the evidence of settings, less a constant.
-
-    Parameters
-    ----------
-    z : (s, SIZE)
-        In standard deviations of the prior, from its medians.
-    seen, prior
-
-    Returns
-    -------
-    (s,)
-        -inf of a setting that fails.
-    """
-    found = np.empty(len(z))
-    for k in range(len(z)):
-        square = 0.0
-        for i in prior.which:
-            square += z[k, i] * z[k, i]
-        found[k] = _log_posterior(z[k], seen, prior) + 0.5 * square
-    return found

@@ -16,7 +16,7 @@ from shipdrag_ros.diagnosis import (
     diagnose_fitted,
     diagnose_sailing,
 )
-from shipdrag_ros.diagnosis.result import ToldFact, Verdict
+from shipdrag_ros.diagnosis.result import Verdict, WeighedFact
 from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.errors import DiagnosisError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
@@ -40,12 +40,15 @@ from shipdrag_ros.ship.facts import overriding
 
 _GLIDED = (
     'she lost her speed about as fast as after an engine stop, though not as water slows a ship; '
-    'no coastdown is taken from it, but all of it is held against the model'
+    'no coastdown is taken from it'
 )
 _BRAKED = (
     'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
-    'from the rest alone, but all of it is held against the model'
+    'from the rest alone'
 )
+_HELD = 'all of each glide is held against the model, such parts with the rest'
+_AGREES = 'all of each glide, held against the model, shows nothing more'
+_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 
 def diagnose_runs(
@@ -96,7 +99,9 @@ def diagnose_runs(
     except DiagnosisError:
         if not seen.whole:
             raise
-    if found is None or (seen.whole and found.verdict is not Verdict.NAMED):
+    if found is not None and seen.whole and found.verdict is Verdict.NAMED:
+        found = replace(found, notes=(*found.notes, *seen.notes, _APART))
+    elif found is None or seen.whole:
         found = _of_whole_glides(found, seen, facts, progress)
     return found, seen.ship
 
@@ -106,8 +111,8 @@ def _of_coastdowns(
 ) -> DiagnosisResult:
     """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
-        why = f'No coastdown was found {"; ".join(seen.without)}.'
-        return _unused(_sailing(runs, why, progress), (*seen.ship.facts, *facts))
+        log_track = _sailing(runs, seen.no_coastdown, progress)
+        return _unused(log_track, (*seen.ship.facts, *facts))
     if seen.ship.baseline is None:
         progress('fitting a form of the resistance', 0, 0)
         found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
@@ -130,17 +135,17 @@ def _of_whole_glides(
         whole = diagnose(seen.whole, seen.ship, seen.parameters, facts=facts, progress=progress)
     except ShipdragError as error:  # a glide that is like none may not be followed
         if found is None:
-            raise DiagnosisError(f'{"; ".join(seen.told)}; that failed: {error}') from error
-        return replace(found, notes=(*found.notes, *seen.told, f'that failed: {error}'))
-    if found is None:
-        return replace(whole, notes=(*whole.notes, *seen.told), estimates=seen.estimates)
-    if whole.verdict is Verdict.NONE:
-        return replace(found, notes=(*found.notes, *seen.told))
+            raise DiagnosisError(f'{"; ".join(seen.notes)}; diagnosed whole: {error}') from error
+        why = f'all of each glide could not be held against the model: {error}'
+        return replace(found, notes=(*found.notes, *seen.notes, why))
+    if found is not None and whole.verdict is Verdict.NONE:
+        return replace(found, notes=(*found.notes, *seen.notes, _AGREES))
+    before = () if found is None else found.notes
     return replace(
         whole,
-        notes=(*found.notes, *whole.notes, *seen.told),
-        no_coastdown=found.no_coastdown,
-        coastdowns_used=found.coastdowns_used,
+        notes=tuple(dict.fromkeys((*before, *whole.notes, *seen.notes, _HELD))),
+        no_coastdown=seen.no_coastdown,
+        coastdowns_used=len(seen.coasts) if found is None else found.coastdowns_used,
         estimates=seen.estimates,
     )
 
@@ -158,7 +163,7 @@ def _with_log_track(
 
 def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
     """Say of facts that they were stated and not used."""
-    return replace(found, facts=tuple(ToldFact(fact, '', None) for fact in overriding(facts)))
+    return replace(found, facts=tuple(WeighedFact(fact, '', None) for fact in overriding(facts)))
 
 
 def _sailing(
@@ -225,16 +230,21 @@ class _Coastdowns:
     The coastdowns of all bags, their estimates, and of each bag without one why.
 
     `whole` are all glides with the parts of them that are no coastdown, though no instrument
-    shows why; empty where there is no such part. `told` says what these are.
+    shows why; empty where there is no such part. `notes` says what these are.
     """
 
     coasts: list[CoastRun]
     whole: list[CoastRun]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
     ship: Ship
     parameters: Parameters
     without: tuple[str, ...]
     estimates: tuple[Estimate, ...]
+
+    @property
+    def no_coastdown(self) -> str:
+        """That none was found and why, a sentence; '' where there is one."""
+        return '' if self.coasts else f'No coastdown was found {"; ".join(self.without)}.'
 
 
 def _found(
@@ -246,7 +256,7 @@ def _found(
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     coasts: list[CoastRun] = []
     whole: list[CoastRun] = []
-    told: list[str] = []
+    notes: list[str] = []
     without: list[str] = []
     estimates: list[Estimate] = []
     ship, parameters = given, None
@@ -270,20 +280,20 @@ def _found(
             glide = dismissed_glide(result)
             if glide is not None:
                 whole.append(CoastRun(each.name, glide, sheet.facts, of_run))
-                told.append(f'{each.name}: {_GLIDED}')
+                notes.append(f'{each.name}: {_GLIDED}')
         for place, (coastdown, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
             glide = whole_glide(result, coastdown)
             whole.append(replace(coasts[-1], window=glide or found))
             if glide is not None:
-                told.append(f'{name}: {_BRAKED}')
+                notes.append(f'{name}: {_BRAKED}')
     assert ship is not None
     assert parameters is not None
     return _Coastdowns(
         coasts,
-        whole if told else [],
-        tuple(told),
+        whole if notes else [],
+        tuple(notes),
         ship,
         parameters,
         tuple(without),

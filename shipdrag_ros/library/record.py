@@ -139,8 +139,8 @@ class Record(Shown):
         """
         ship = self.ship
         known = 'no ship is known: give one with ship=' if ship is None else ship.summary()
-        told = [f'{run.name}: {_when(run)}' for run in self.runs]
-        return (known, *told, *self.notes)
+        runs = [f'{run.name}: {_when(run)}' for run in self.runs]
+        return (known, *runs, *self.notes)
 
     def table(self) -> Table:
         """

@@ -101,16 +101,16 @@ class Resistance(ShownResistance):
         """
         Say what each coastdown gave, or why there is none, and what all gave together.
         """
-        told = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]
+        lines = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]
         whole = together(self.runs)
         if whole.why_not:
-            told.append(f'Not combined: {whole.why_not}.')
+            lines.append(f'Not combined: {whole.why_not}.')
         if whole.combined is not None:
             force = Force.of(whole.combined, self.ship)
             place = force.near(tables.common_speed_m_s(self.runs))
-            told.append(f'{whole.combined.runs} coastdowns together. {force.at(place)}')
-            told += words.combined_notes(whole.combined)
-        return tuple(map(in_python, told))
+            lines.append(f'{whole.combined.runs} coastdowns together. {force.at(place)}')
+            lines += words.combined_notes(whole.combined)
+        return tuple(map(in_python, lines))
 
     def table(self) -> Table:
         """

@@ -81,11 +81,11 @@ class Trends(Shown):
         """
         Say what is known of each ship, and what could not be used.
         """
-        told = [
+        lines = [
             f'{trend.series.name}: {line}' for trend in self.ships for line in words.lines(trend)
         ]
-        told += [f'{bag} could not be used: {reason}' for bag, reason in self.skipped]
-        said = (*(told or ['No coastdown was given: no trend.']), *self.notes)
+        lines += [f'{bag} could not be used: {reason}' for bag, reason in self.skipped]
+        said = (*(lines or ['No coastdown was given: no trend.']), *self.notes)
         return tuple(map(in_python, said))
 
     def table(self) -> Table:

@@ -38,7 +38,7 @@ def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:
             first, second = (each.window or (0.0, math.inf) for each in (other, one))
             if first[0] < second[1] and second[0] < first[1]:
                 raise BagError(
-                    f'{one.run.name!r} is given twice, {_told(first)} and {_told(second)}: they '
+                    f'{one.run.name!r} is given twice, {_text(first)} and {_text(second)}: they '
                     'share a part, which is one run and not two; give windows that do not overlap'
                 )
 
@@ -72,5 +72,5 @@ def refuse_two_ships(runs: Iterable[tuple[Run, Ship | None]]) -> None:
         )
 
 
-def _told(window: WindowSpan) -> str:
+def _text(window: WindowSpan) -> str:
     return 'whole' if math.isinf(window[1]) else f'{window[0]:g} to {window[1]:g} s'

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Routes of the page: itself, its stream, the player's buttons, Signal K."""
+"""Routes of the page: itself, its stream, the player's buttons, the fleet, Signal K."""
 
 from __future__ import annotations
 
 import asyncio
 import json
+import threading
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs
@@ -29,7 +31,6 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from shipdrag_ros import __version__
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import signal_k
-from shipdrag_ros.live.fleet_pages import FleetPages
 from shipdrag_ros.live.frames import Frames
 from shipdrag_ros.live.guard import COOKIE, Guard, pass_of, same
 from shipdrag_ros.live.source import PictureFeed
@@ -43,6 +44,47 @@ _ON_PAPER = (
     "form-action 'none'; frame-ancestors 'none'"
 )
 _KEEP_S = 30 * 86400
+_KEPT = 32
+FLEET = '/fleet'
+
+
+class FleetPages:
+    """
+    Pages of a store, as it was when they were begun.
+
+    Parameters
+    ----------
+    page
+        That of the fleet (HTML).
+    rows
+        Of the store's `coastdowns`.
+
+    Attributes
+    ----------
+    page
+    """
+
+    def __init__(self, page: str, rows: Sequence[Mapping[str, Any]]) -> None:
+        from shipdrag_ros.trend.coastdown_page import page_name  # pictures take long to import
+
+        self.page = page
+        self._rows = {page_name(row): row for row in rows}
+        self._drawing = threading.Lock()
+        self._made = lru_cache(_KEPT)(self._make)
+
+    def coastdown(self, name: str) -> str | None:
+        """
+        Return the page of a coastdown (HTML) by its name; None where there is none.
+        """
+        if name not in self._rows:
+            return None
+        with self._drawing:
+            return self._made(name)
+
+    def _make(self, name: str) -> str:
+        from shipdrag_ros.trend.coastdown_page import coastdown_page
+
+        return coastdown_page(self._rows[name], fleet=FLEET)
 
 
 class LivePage:

@@ -13,9 +13,15 @@ from typing import Any
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, verdicts
 from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.figures import PagePart, at_usual_speed, curve_part, past_part, ship_part
+from shipdrag_ros.live.figures import (
+    PagePart,
+    at_usual_speed,
+    curve_part,
+    past_part,
+    ship_part,
+    to_go_s,
+)
 from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
-from shipdrag_ros.live.outlook import to_go_s
 from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
 from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.live.verdicts import VerdictView
@@ -69,7 +75,7 @@ class Bridge:
         self._curve: Curve | None = None
         self._verdict = VerdictView('', '')
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
-        self._told: EventKind | None = None
+        self._noted: EventKind | None = None
         self._unread = 0
 
     # heard
@@ -184,9 +190,9 @@ class Bridge:
 
     def _take_event(self, payload: bytes) -> None:
         note = read_event(payload)
-        if note.kind is EventKind.NO_ESTIMATE is self._told and self._notes:
+        if note.kind is EventKind.NO_ESTIMATE is self._noted and self._notes:
             self._notes.pop()  # the same again at every update; it would hide all the rest
-        self._told = note.kind
+        self._noted = note.kind
         self._notes.append((note.stamp_ns, note.text))
         if note.kind is EventKind.ONSET:
             self._begin(int(note.values['start_ns']))
@@ -303,11 +309,11 @@ class Bridge:
         if self._health is None:
             return []
         silent = silent_s > SILENT_S  # what the node said last is no health of now
-        told_s = silent_s if silent else 0.0
-        told = [status for status in self._health.statuses if status.input]
-        told += [status for status in self._health.statuses if status.part == 'recording']
+        since_s = silent_s if silent else 0.0
+        statuses = [status for status in self._health.statuses if status.input]
+        statuses += [status for status in self._health.statuses if status.part == 'recording']
         rows = []
-        for status in told:
+        for status in statuses:
             age_s = status.number('age')
             rejected = {
                 key.removeprefix('rejected '): int(float(text))
@@ -322,7 +328,7 @@ class Bridge:
                     if silent
                     else status.message,
                     'rate_hz': None if silent else status.number('rate'),
-                    'age_s': None if age_s is None else age_s + told_s,
+                    'age_s': None if age_s is None else age_s + since_s,
                     'rejected': {name: count for name, count in rejected.items() if count},
                 }
             )

@@ -63,8 +63,8 @@ class Frames:
         anew
             Everybody must forget what was: the picture jumps.
         """
-        told = {name: encode(part) for name, part in parts.items()}
-        changed = {name: text for name, text in told.items() if self._parts.get(name) != text}
+        texts = {name: encode(part) for name, part in parts.items()}
+        changed = {name: text for name, text in texts.items() if self._parts.get(name) != text}
         if not changed and not rows and not anew:
             return
         self._parts |= changed

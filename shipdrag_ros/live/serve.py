@@ -1,27 +1,78 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The process of the page: a socket, a server, an orderly end."""
+"""The process of the page: a socket, a server, an orderly end; Signal K over TCP beside it."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import resource
 import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import uvicorn
 
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live.app import LivePage
 from shipdrag_ros.live.guard import Connection
-from shipdrag_ros.live.signal_k_stream import serve_deltas
+from shipdrag_ros.live.signal_k import hello, units
 
 _FILES = 4096
 _BACKLOG = 4096
 _GOODBYE_S = 0  # a stream has no end to wait for
 _LOOK_S = 0.05
+LISTENERS = 20
+EVERY_S = 1.0
+_BEHIND_BYTES = 65536  # a listener who is further behind is let go
+
+
+async def serve_deltas(
+    latest: Callable[[], list[dict[str, Any]]], listening: socket.socket
+) -> None:
+    """
+    Send deltas to whoever connects, until cancelled.
+
+    Parameters
+    ----------
+    latest
+        Returns the latest figures, none before there are any.
+    listening
+        A socket that listens.
+    """
+    listeners: set[asyncio.StreamWriter] = set()
+
+    async def welcome(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if len(listeners) >= LISTENERS:
+            writer.close()
+            return
+        writer.write(_line(hello()) + _line(units()))
+        listeners.add(writer)
+
+    server = await asyncio.start_server(welcome, sock=listening)
+    try:
+        while True:
+            await asyncio.sleep(EVERY_S)
+            found = b''.join(_line(each) for each in latest())
+            if not found:
+                continue
+            for writer in list(listeners):
+                transport = writer.transport
+                if transport.is_closing() or transport.get_write_buffer_size() > _BEHIND_BYTES:
+                    transport.abort()
+                    listeners.discard(writer)
+                else:
+                    writer.write(found)
+    finally:
+        server.close()
+        for writer in listeners:
+            writer.transport.abort()
+
+
+def _line(message: dict[str, Any]) -> bytes:
+    return json.dumps(message, allow_nan=False).encode() + b'\n'
 
 
 def listen(address: str, port: int) -> socket.socket:

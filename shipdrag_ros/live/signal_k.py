@@ -72,13 +72,13 @@ def deltas(bridge: Bridge, now_s: float) -> list[dict[str, Any]]:
     }
     time = _time(bridge.now_ns * 1e-9)
     # apart: signalk-server names itself as the source of all that stands beside a notification
-    told = (_values(values), _values({'notifications.performance.shipdrag': notice}))
+    groups = (_values(values), _values({'notifications.performance.shipdrag': notice}))
     return [
         {
             'context': 'vessels.self',
             'updates': [{'source': SOURCE, 'timestamp': time, 'values': each}],
         }
-        for each in told
+        for each in groups
         if each
     ]
 

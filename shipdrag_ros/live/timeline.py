@@ -118,12 +118,12 @@ class Timeline:
                 heard.append(Samples(piece))
             else:
                 at_ns = piece.receive_ns
-            heard += self._told(monitor, feed(monitor, piece))
+            heard += self._heard(monitor, feed(monitor, piece))
             if at_ns - health_ns >= _HEALTH_NS or len(heard) > 1:
                 health_ns = at_ns
                 heard.append(_health(monitor, at_ns))
             self._add(at_ns, heard)
-        last = self._told(monitor, monitor.finish())
+        last = self._heard(monitor, monitor.finish())
         self._add(self.end_ns, [*last, _health(monitor, self.end_ns)])
         self.done = True
 
@@ -143,7 +143,7 @@ class Timeline:
         self._moments.append(Moment(at_ns, tuple(heard)))
         self._times.append(at_ns)  # last: whoever looks finds the moment there
 
-    def _told(self, monitor: Monitor, events: list[Event]) -> list[Heard]:
+    def _heard(self, monitor: Monitor, events: list[Event]) -> list[Heard]:
         heard: list[Heard] = []
         for event in events:
             for message in outputs(event):

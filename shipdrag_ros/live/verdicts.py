@@ -80,9 +80,9 @@ def of_diagnosis(found: DiagnosisResult) -> VerdictView:
     from shipdrag_ros.diagnosis import words
     from shipdrag_ros.simulation.effects import LIBRARY
 
-    told = [(effect.name, effect) for effect in found.effects]
-    if not told:
-        told = [
+    sized = [(effect.name, effect) for effect in found.effects]
+    if not sized:
+        sized = [
             (
                 f'if {" + ".join(each.names)}' + (f', {effect.name}' if each.names[1:] else ''),
                 effect,
@@ -95,7 +95,7 @@ def of_diagnosis(found: DiagnosisResult) -> VerdictView:
             f'{before}, {words.quantity_text(quantity)}'.replace('_', ' '),
             words.size(quantity, effect.parameters[quantity.name]),
         )
-        for before, effect in told
+        for before, effect in sized
         for quantity in LIBRARY[effect.name].parameters
     ]
     return VerdictView(

@@ -144,11 +144,11 @@ class Interpreter:
         """
         Return by input the sources that are used.
         """
-        told: dict[str, dict[str, None]] = {}
+        by_input: dict[str, dict[str, None]] = {}
         for channel, choice in sorted(self._choices.items()):
             if choice.held is not None:
-                told.setdefault(channel.input, {})[str(choice.held[0])] = None
-        return {name: ', '.join(sources) for name, sources in told.items()}
+                by_input.setdefault(channel.input, {})[str(choice.held[0])] = None
+        return {name: ', '.join(sources) for name, sources in by_input.items()}
 
     def _of_sentence(
         self, sentence: Sentence, address: str, stamp_ns: int

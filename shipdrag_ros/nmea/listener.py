@@ -3,12 +3,13 @@
 One source of NMEA 0183, heard in a thread of its own until it is closed.
 
 A line that drops is opened again and again, and said. What comes in is bounded:
-bytes of a line, lines a second, lines that wait.
+bytes of a line, lines a second, lines that wait. Nobody outside can fill the memory.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import socket
 import stat
 import struct
@@ -21,7 +22,6 @@ from time import monotonic
 import serial
 
 from shipdrag_ros.nmea.address import Address, Way
-from shipdrag_ros.nmea.lines import LineSplitter
 
 LINES_A_SECOND = 1000.0  # a serial line of 38400 baud brings about 60
 BURST_LINES = 2000.0
@@ -36,6 +36,65 @@ _SO_RXQ_OVFL = 40  # Linux: the kernel says how many datagrams it dropped
 # lines that arrived together
 Deliver = Callable[[Address, list[str]], None]
 Read = Callable[[], bytes | None]
+LINE_BYTES = 512
+"""A sentence has 82 characters; one with a TAG block, or of a careless maker, has more."""
+
+_ENDS = re.compile(rb'[\r\n]+')
+_PLAIN = re.compile(rb'[\x20-\x7e]+')
+
+
+class LineSplitter:
+    """
+    Cuts a stream of bytes into lines.
+
+    Attributes
+    ----------
+    too_long
+        Lines longer than `LINE_BYTES`; all of such a line is dropped.
+    binary
+        Lines with anything but printable ASCII.
+    """
+
+    def __init__(self) -> None:
+        self.too_long = 0
+        self.binary = 0
+        self._open = b''
+        self._skipping = False
+
+    def feed(self, data: bytes) -> list[str]:
+        """
+        Return the lines that have ended, without their ends; blank ones are left out.
+        """
+        *ended, rest = _ENDS.split(data)
+        lines = []
+        for piece in ended:
+            line, self._open = self._open + piece, b''
+            skipping, self._skipping = self._skipping, False
+            if not skipping:
+                lines += self._line(line)
+        if not self._skipping:
+            self._open += rest
+            if len(self._open) > LINE_BYTES:
+                self.too_long += 1
+                self._open, self._skipping = b'', True
+        return lines
+
+    def end(self) -> list[str]:
+        """
+        Take what is open as a line: the datagram, or the connection, has ended.
+        """
+        line, self._open = self._open, b''
+        skipping, self._skipping = self._skipping, False
+        return [] if skipping else self._line(line)
+
+    def _line(self, line: bytes) -> list[str]:
+        if len(line) > LINE_BYTES:
+            self.too_long += 1
+        elif line and not _PLAIN.fullmatch(line):
+            self.binary += 1
+        elif text := line.decode('ascii').strip():
+            return [text]
+        return []
 
 
 @dataclass

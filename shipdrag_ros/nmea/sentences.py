@@ -31,7 +31,7 @@ MAGNETIC = 'magnetic'
 _GLL_OF_OLD = 4  # fields
 OWN_OFFSET = 'with its own offset'
 STATED_DEPTH = 'with the stated depth of the transducer'
-NOT_TOLD = 'depth of the transducer not stated'
+NOT_STATED = 'depth of the transducer not stated'
 
 
 class NoValue(Exception):
@@ -269,7 +269,7 @@ def _depth_dbt(fields: Fields, mounting: Mounting) -> MeasuredValue:
 
 def _transducer(mounting: Mounting) -> float:
     if mounting.transducer_m is None:
-        raise NoValue(NOT_TOLD)
+        raise NoValue(NOT_STATED)
     return mounting.transducer_m
 
 

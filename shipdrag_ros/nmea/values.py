@@ -10,7 +10,7 @@ from shipdrag_ros.nmea.framing import Sentence
 from shipdrag_ros.nmea.sentences import READERS, Fields, MeasuredValue, Mounting, NoValue
 from shipdrag_ros.samples import Channel
 
-Told = TypeVar('Told', 'SentenceSource', 'tuple[SentenceSource, str]')
+AnySource = TypeVar('AnySource', 'SentenceSource', 'tuple[SentenceSource, str]')
 
 _RANK = {kind: place for place, kind in enumerate(READERS)}
 
@@ -36,8 +36,8 @@ def read_values(
     found: list[tuple[Channel, SentenceSource | None, MeasuredValue | NoValue]] = []
     kind = sentence.kind or sentence.talker  # a proprietary one is all talker
     fields = Fields(kind, sentence.fields)
-    for told, read in READERS.get(kind, ()):
-        channel = told
+    for listed, read in READERS.get(kind, ()):
+        channel = listed
         try:
             value = read(fields, mounting)
         except NoValue as reason:
@@ -53,7 +53,7 @@ def read_values(
     return found
 
 
-def best(counts: Counter[Told]) -> Told:
+def best(counts: Counter[AnySource]) -> AnySource:
     """
     Return the one source of an input, by the number of values of each.
 

@@ -33,7 +33,7 @@ OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
 STALE = DiagnosticStatus.STALE
-_SETS_SIZED = 3  # candidates of a set whose sizes are told
+_SETS_SIZED = 3  # candidates of a set whose sizes are shown
 
 
 def label(
@@ -288,9 +288,9 @@ def _figures(found: DiagnosisResult) -> dict[str, object]:
     for candidate in found.candidates:
         if candidate.names:
             values[f'probability of {" + ".join(candidate.names)} [1]'] = candidate.probability
-    told = [(effect.name, effect) for effect in found.effects]
-    if not told:  # a set: what each would have
-        told = [
+    sized = [(effect.name, effect) for effect in found.effects]
+    if not sized:  # a set: what each would have
+        sized = [
             (
                 f'if {" + ".join(each.names)}' + (f', {effect.name}' if each.names[1:] else ''),
                 effect,
@@ -298,7 +298,7 @@ def _figures(found: DiagnosisResult) -> dict[str, object]:
             for each in found.candidates[:_SETS_SIZED]
             for effect in each.effects
         ]
-    for before, effect in told:
+    for before, effect in sized:
         for quantity in LIBRARY[effect.name].parameters:
             size, unit = effect.parameters[quantity.name], quantity.unit or '1'
             name = f'{before}, {quantity.name} [{unit}]'

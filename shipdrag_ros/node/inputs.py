@@ -196,7 +196,7 @@ class InputTopic:
     @property
     def lost(self) -> int:
         """Messages that were sent and not heard, or had no place."""
-        of_middleware = self._sequences.lost if self._sequences.told else self.reported_lost
+        of_middleware = self._sequences.lost if self._sequences.numbered else self.reported_lost
         return of_middleware + self.dropped
 
     @property

@@ -26,7 +26,7 @@ class Sequences:
     ----------
     lost
         Messages that were sent and not heard.
-    told
+    numbered
         Whether the middleware gives numbers at all.
 
     Notes
@@ -38,7 +38,7 @@ class Sequences:
 
     def __init__(self, publishers: Publishers) -> None:
         self.lost = 0
-        self.told = False
+        self.numbered = False
         self._publishers = publishers
         self._known: frozenset[str] = frozenset()
         self._last: list[int] = []  # of each stream, the one heard longest ago first
@@ -49,7 +49,7 @@ class Sequences:
         """
         if number is None:
             return
-        self.told = True
+        self.numbered = True
         if not self._known:
             self.look()
         before = max((last for last in self._last if last < number), default=None)

@@ -4,7 +4,7 @@ The process around the node: start, spin, end cleanly on a signal.
 
 rclpy's own signal handlers shut ROS down under the node's feet. Here a signal
 only asks for the end, so that the last estimate is still published and the bag
-is closed.
+is closed. In a terminal one live line shows state, speed, last figure and inputs.
 """
 
 from __future__ import annotations
@@ -12,16 +12,71 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, TextIO
 
+from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected
+from shipdrag_ros.messages.heard import OK, Health, health_of
+
+_CLEAR = '\x1b[K'
+
+
+def terminal_line(stream: TextIO) -> Callable[[Any], None] | None:
+    """
+    Return what shows each message of /diagnostics on a terminal; None where there is none.
+
+    Parameters
+    ----------
+    stream
+        Of the log; the line is left of the cursor, so that a log line writes over it.
+    """
+    if not stream.isatty():
+        return None
+
+    def show(message: Any) -> None:
+        for health in health_of(message.status):
+            width = shutil.get_terminal_size().columns
+            text = line(health)
+            stream.write(f'{text[: width - 1]}{_CLEAR}\r')
+            stream.flush()
+
+    return show
+
+
+def line(health: Health) -> str:
+    """
+    Return a node's health in a line.
+    """
+    state, estimate = health.of('state'), health.of('estimate')
+    monitor = '' if state is None else state.values.get('monitor', '')
+    said = [monitor or 'not active']
+    if state is not None and monitor == 'steady':
+        lead_s, used_s = state.number('steady lead'), state.number('steady lead used at most')
+        if lead_s is not None and used_s is not None:
+            said[0] = f'steady {lead_s / 60.0:.0f} of {used_s / 60.0:.0f} min'
+    if state is not None and state.level != OK and not state.message.startswith(f'{monitor};'):
+        said[0] = state.message  # inputs that are not well are named behind it
+    if estimate is not None:
+        speed = estimate.number('speed through water')
+        r = estimate.number('specific resistance')
+        sigma = estimate.number('standard deviation of it')
+        if speed is not None and r is not None and sigma is not None:
+            band = f' ± {200.0 * sigma / r:.0f} %' if r > 0.0 else ''
+            said.append(f'last at {speed / M_S_PER_KNOT:.1f} kn: r {r:.4f} m/s²{band}')
+    heard = [status for status in health.inputs if status.number('messages')]
+    bad = [status.input for status in heard if status.level != OK]
+    said.append(f'{len(heard)} inputs' + (f', not well: {", ".join(bad)}' if bad else ''))
+    return ' | '.join(said)
+
 
 with uncollected():
     import rclpy
@@ -30,7 +85,7 @@ with uncollected():
     from rclpy.utilities import remove_ros_args
 
     from shipdrag_ros.node.compiling import leave_if_compiling
-    from shipdrag_ros.node.console import terminal_line
+    from shipdrag_ros.node.main import terminal_line
     from shipdrag_ros.node.node import CoastdownNode
 
 USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'

@@ -22,7 +22,7 @@ from shipdrag_ros.nmea.address import Address, parse_addresses
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.listener import SourceCounts
 from shipdrag_ros.nmea.live import LiveNmea
-from shipdrag_ros.nmea.sentences import NOT_TOLD, READERS, Mounting
+from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
 from shipdrag_ros.node.diagnostics import ERROR, OK, STALE, WARN, nmea_status
 from shipdrag_ros.node.inputs import InputTopic
 from shipdrag_ros.node.judging import SILENT_S
@@ -233,8 +233,8 @@ class NmeaFeed:
             return WARN, f'{names}: also published as a topic, which is not used; NMEA was first'
         feeding = found.feeding()
         used = [f'{name} from {source}' for name, source in feeding.items()]
-        untold = any(each.endswith(NOT_TOLD) for each in found.no_value)
-        if untold and 'depth' not in feeding:
+        unstated = any(each.endswith(NOT_STATED) for each in found.no_value)
+        if unstated and 'depth' not in feeding:
             used.append(
                 'depth is not used: set nmea_transducer_m, as the sentences state no offset'
             )

@@ -36,8 +36,7 @@ from shipdrag_ros.node.mailbox import Mailbox
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
 from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.service_guard import guard_services
-from shipdrag_ros.node.services import add_services
+from shipdrag_ros.node.service_guard import add_services, guard_services
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
 from shipdrag_ros.node.watching import Watching
@@ -226,7 +225,7 @@ class CoastdownNode(LifecycleNode):
             publish=self._send,
             node=self.get_fully_qualified_name(),
             ended=self._diagnosing.begin,
-            told=self._announcer.event,
+            on_event=self._announcer.event,
             ready=self._compiling.done,
         )
         self._watching = Watching(

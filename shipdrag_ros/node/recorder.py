@@ -3,11 +3,16 @@
 Recording while the node runs: what came in, what went out, in that order.
 
 A thread writes; here nothing waits for a disk, so that one that is slow, full
-or gone stops no estimate. What was not written is counted.
+or gone stops no estimate. What was not written is counted. Another thread removes
+old recordings.
 """
 
 from __future__ import annotations
 
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import Enum
@@ -15,9 +20,8 @@ from pathlib import Path
 from time import monotonic
 
 from shipdrag_ros.bags.durable import DurableRecording, PartLimits, RecordingProgress
-from shipdrag_ros.bags.retention import Keep, Removed
+from shipdrag_ros.bags.retention import Keep, Removed, Retention
 from shipdrag_ros.messages import EncodedMessage, OutputMessage
-from shipdrag_ros.node.housekeeping import Housekeeping
 from shipdrag_ros.node.ring import RawMessage, RawRing
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -29,6 +33,50 @@ CLOSE_S = 5.0
 SLOW_S = 2.0
 DEFAULT_LIMITS = PartLimits()
 EVERYTHING = Keep()
+EVERY_S = 60.0
+
+
+class Housekeeping:
+    """
+    Tidies a directory now and then, from its making to `close`.
+
+    Parameters
+    ----------
+    directory
+        Of the recordings.
+    keep
+        The limits; without any no thread is started.
+    busy
+        Returns the files that are still written.
+    """
+
+    def __init__(self, directory: Path, keep: Keep, busy: Callable[[], Collection[Path]]) -> None:
+        self._retention = Retention(directory, keep)
+        self._busy = busy
+        self._removed: deque[Removed] = deque(maxlen=1000)
+        self._ending = threading.Event()
+        # a disk that hangs must not keep the process
+        self._thread = threading.Thread(target=self._run, name='housekeeping', daemon=True)
+        if not keep.everything:
+            self._thread.start()
+
+    def removed(self) -> list[Removed]:
+        """
+        Return what was removed since the last time.
+        """
+        return [self._removed.popleft() for _ in range(len(self._removed))]
+
+    def close(self) -> None:
+        """
+        End; returns at once.
+        """
+        self._ending.set()
+
+    def _run(self) -> None:
+        while True:
+            self._removed += self._retention.tidy(busy=self._busy(), now_s=time.time())
+            if self._ending.wait(EVERY_S):
+                return
 
 
 class RecordingState(Enum):

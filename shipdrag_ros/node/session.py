@@ -64,7 +64,7 @@ class Session:
     ended
         Called after each coastdown with all of its samples; not after one that
         was withdrawn, or that a reset ended, which has dropped them.
-    told
+    on_event
         Called with every event of the monitor.
     ready
         Says whether compiled code is there. What comes before that is recorded as it comes, and
@@ -86,7 +86,7 @@ class Session:
         publish: Publish,
         node: str,
         ended: OnCoastdown | None = None,
-        told: OnEvent | None = None,
+        on_event: OnEvent | None = None,
         ready: Callable[[], bool] = lambda: True,
     ) -> None:
         self.monitor = monitor
@@ -96,7 +96,7 @@ class Session:
         self._publish = publish
         self._node = node
         self._ended = ended
-        self._told = told
+        self._on_event = on_event
         self.why_none = ''
         self._ready = ready
         self._waiting: deque[tuple[int, int, Callable[[], None]]] = deque()
@@ -279,8 +279,8 @@ class Session:
             if isinstance(event, Update | EndedCoastdown) and event.estimate is not None:
                 self.latest = event.estimate
             self.why_none = event.reason if isinstance(event, NoEstimate) else ''
-            if self._told is not None:
-                self._told(event)
+            if self._on_event is not None:
+                self._on_event(event)
             for message in outputs(event, node=self._node):
                 self._send(message)
             if self._ended is not None and isinstance(event, EndedCoastdown) and event.stands:

@@ -2,11 +2,10 @@
 """Least squares: polynomials in time, surfaces, any columns, and the order they should have."""
 
 from shipdrag_ros.regression.domain import Domain, Prediction
-from shipdrag_ros.regression.least_squares import LinearFit, least_squares
+from shipdrag_ros.regression.least_squares import LinearFit, inverse, least_squares, triangle
 from shipdrag_ros.regression.order import OrderTable, fit_orders
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
 from shipdrag_ros.regression.surface import Surface, fit_surface
-from shipdrag_ros.regression.triangle import inverse, triangle
 
 __all__ = [
     'Domain',

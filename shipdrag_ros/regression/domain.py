@@ -127,17 +127,17 @@ class Domain:
         slack = _ROUNDING * (self.upper - self.lower)
         result = []
         for at, away in zip(points, self.distance(points)):
-            told = [
+            outside = [
                 f'{name} {value:g} is outside {low:g}..{high:g} of the data'
                 for name, value, low, high, near in zip(
                     self.names, at, self.lower, self.upper, slack
                 )
                 if not low - near <= value <= high + near
             ]
-            if away > 0.0 and not told:
-                told = [
+            if away > 0.0 and not outside:
+                outside = [
                     f'no data around this combination of {", ".join(self.names)}: outside their '
                     f'convex hull by {away:.2g} of their range'
                 ]
-            result.append(told)
+            result.append(outside)
         return result

@@ -18,7 +18,7 @@ _GLIDE_S = 600.0  # within which a ship that glides has slowed
 _SLOWED = 0.1  # of the speed; what falls less is the sea
 _STILL_S = 300.0  # a reading that does not change for so long, to the last bit, ...
 _STILL_READINGS = 60  # ... so often, is none
-_TOLD = 3  # of the stretches that were dismissed
+_SHOWN = 3  # of the stretches that were dismissed
 _LEAD_WINDOWS = 2.0  # lengths of the slope test that a steady lead has at least
 
 
@@ -108,21 +108,21 @@ def _stood_still(result: ReplayResult) -> str:
                     f'{channel.input} stood still at {value[first]:.3g} m/s for '
                     f'{lasts_s / 60.0:.0f} min, from {since_s:.0f} s of it on'
                 )
-    return '; '.join(said[:_TOLD])
+    return '; '.join(said[:_SHOWN])
 
 
 def _dismissed(result: ReplayResult) -> str:
     """Say what was nearly a coastdown, and why it is none."""
     first_ns = result.run.span_ns[0] if result.run.span_ns else 0
-    told = [
+    parts = [
         f'from {(one.start_ns - first_ns) * 1e-9:.0f} to {(one.end_ns - first_ns) * 1e-9:.0f} s '
         f'it was none ({one.reason.value}): {one.text}'
-        for one in result.not_coastdowns[:_TOLD]
+        for one in result.not_coastdowns[:_SHOWN]
     ]
-    more = len(result.not_coastdowns) - _TOLD
+    more = len(result.not_coastdowns) - _SHOWN
     if more > 0:
-        told.append(f'and {more} more, which `shipdrag replay` lists')
-    return '; '.join(told)
+        parts.append(f'and {more} more, which `shipdrag replay` lists')
+    return '; '.join(parts)
 
 
 def _largest_fall(block: Block) -> tuple[str, _SpeedLoss | None]:

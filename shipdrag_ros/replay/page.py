@@ -114,12 +114,12 @@ def _coastdown(
             )
     found.append(('How it was found', tables.facts(coastdown)))
     cuts = cut_lines(coastdown, run.span_ns)
-    told = words.summary(coastdown, run.ship)
+    lines = words.summary(coastdown, run.ship)
     return Section(
         f'Coastdown {number}: {display.utc(coastdown.start_ns)}',
         level=3,
-        lead=(*cuts[:1], told[0]),
-        text=told[1:],
+        lead=(*cuts[:1], lines[0]),
+        text=lines[1:],
         lines=cuts[1:],
         pictures=tuple(_pictures(coastdown, run)),
         tables=found,
@@ -135,8 +135,8 @@ def _line(coastdown: EndedCoastdown, run: RunResult, speed_m_s: float) -> str:
         return words.summary(coastdown)[0]
     force = Force.of(estimate.valid_curve, run.ship)
     speed, resistance, power, over = force.cells(force.near(speed_m_s))
-    told = ', '.join(filter(None, (resistance, power, over.partition(' (')[0])))
-    return f'{told} at {speed}'
+    figures = ', '.join(filter(None, (resistance, power, over.partition(' (')[0])))
+    return f'{figures} at {speed}'
 
 
 def _pictures(coastdown: EndedCoastdown, run: RunResult) -> Iterator[Picture]:

@@ -64,8 +64,8 @@ class RunResult:
     @property
     def dismissed(self) -> tuple[NotCoastdown, ...]:
         """What is no coastdown, without what is named as cut off one."""
-        told = [cut for coastdown in self.coastdowns for cut in coastdown.cuts]
-        return tuple(one for one in self.not_coastdowns if one not in told)
+        cuts = [cut for coastdown in self.coastdowns for cut in coastdown.cuts]
+        return tuple(one for one in self.not_coastdowns if one not in cuts)
 
     def summary(self) -> tuple[str, ...]:
         """

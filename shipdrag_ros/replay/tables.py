@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of a result as text, the same in the terminal and on the page."""
+"""Tables of a result as text, the same in the terminal and on the page; its curves as CSV."""
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from shipdrag_ros import display
 from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, spreadsheet_text
 from shipdrag_ros.estimation import tables
 from shipdrag_ros.estimation.force import Force, usual_speed_m_s
 from shipdrag_ros.estimation.result import FroudeMax
@@ -15,6 +17,14 @@ from shipdrag_ros.estimation.words import FROUDE_MAX_BY
 from shipdrag_ros.replay import InputCounts, words
 from shipdrag_ros.replay.hulls import Ranking
 from shipdrag_ros.replay.run_result import RunResult
+
+COLUMNS = (
+    'speed_m_s',
+    'resistance_m_s2',
+    'sigma_m_s2',
+    'sigma_repeatable_m_s2',
+    'froude',
+)
 
 
 def facts(coastdown: EndedCoastdown) -> Table:
@@ -121,3 +131,21 @@ def ranking_table(ranking: Ranking) -> Table:
             )
         )
     return Table(('hull', 'Fr_max', 'other coastdowns', 'found as'), tuple(rows))
+
+
+def write_curves(path: Path, runs: Sequence[RunResult]) -> None:
+    """
+    Write every r(v) inside its valid range, one row a speed.
+
+    The first columns show the bag and the number of the coastdown in it.
+    """
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file)
+        writer.writerow(('bag', 'coastdown', *COLUMNS))
+        for run in runs:
+            for number, coastdown in enumerate(run.coastdowns, start=1):
+                if coastdown.estimate is None:
+                    continue
+                curve = coastdown.estimate.valid_curve
+                for values in zip(*(getattr(curve, name).tolist() for name in COLUMNS)):
+                    writer.writerow((spreadsheet_text(run.bag), number, *values))

@@ -19,7 +19,7 @@ from shipdrag_ros.ship import Ship
 
 _CAMPAIGN_NS = 2 * 86_400 * 1_000_000_000  # runs closer than that show one state of the hull
 _DIFFER_SD = 3.0
-_ALL_TOLD = 3  # dates that a sentence has room for
+_ALL_SHOWN = 3  # dates that a sentence has room for
 _RUN_TO_RUN = 0.02  # of r: wind and sea that the band of a run does not hold
 
 
@@ -100,22 +100,22 @@ def _differ(estimates: Sequence[Estimate], ship: Ship) -> str:
     )
     if far <= _DIFFER_SD:
         return ''
-    told = []
+    parts = []
     shown, of_many = campaigns, ''
-    if len(campaigns) > _ALL_TOLD:  # the table has all of them
+    if len(campaigns) > _ALL_SHOWN:  # the table has all of them
         r = [mean[0] for mean in means]
         shown = [campaigns[int(np.argmin(r))], campaigns[int(np.argmax(r))]]
         of_many = f'of {len(campaigns)} dates the least and the most: '
     for campaign in shown:
         force = Force.of(campaign[0].valid_curve, ship)
         _, resistance, _, over = force.cells(force.near(speed))
-        told.append(
+        parts.append(
             f'{utc(campaign[0].start_ns)[:10]}: {", ".join(filter(None, (resistance, over)))}'
         )
     return (
-        f'these runs differ at {ship_speed(speed, ship.mass_kg)} ({of_many}{"; ".join(told)}), by '
-        f'{far:.1f} standard deviations: one state of the hull does not fit all. Give the runs of '
-        'one state at a time to combine them'
+        f'these runs differ at {ship_speed(speed, ship.mass_kg)} ({of_many}{"; ".join(parts)}), '
+        f'by {far:.1f} standard deviations: one state of the hull does not fit all. Give the runs '
+        'of one state at a time to combine them'
     )
 
 

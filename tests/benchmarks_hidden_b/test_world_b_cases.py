@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import count, islice
 
 import numpy as np
 import pytest
@@ -95,8 +96,7 @@ def test_true_r_is_what_the_ship_does(cases) -> None:
 
     from hidden_b.voyage import sail
 
-    numbers = [n for n in range(60) if not cases.reveal(n).what][:6]
-    for number in numbers:
+    for number in islice((n for n in count() if not cases.reveal(n).what), 6):
         setting = cases._case(number, cases.SEED).settings[0]
         none = replace(setting.weather, wind=(0.0, 0.0), flow=(0.0, 0.0), tide=(0.0, 0.0, 0.0))
         track = sail(replace(setting, quiet=True, weather=none))

@@ -180,4 +180,4 @@ def test_a_log_in_knots_is_asked_about_its_unit(
     path = bag(tmp_path / 'knots.mcap', time, speed_through_water=log, position=place)
     assert main(['diagnose', str(path)]) == 0
     said = capsys.readouterr().out
-    assert 'the log reads 1.94 times the way over ground, which is knots over m/s' in said
+    assert 'the log reads 1.94 times the way over ground, near knots over m/s' in said

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
-from shipdrag_ros.diagnosis.facts import Facts, StatedFact, told_of
+from shipdrag_ros.diagnosis.facts import Facts, StatedFact, stated_facts
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.estimation import Window
@@ -30,8 +30,8 @@ def hypothesis(*names: str, only_run: int | None = None) -> Hypothesis:
 
 
 def chance(fact: Fact, found: Hypothesis, *, ship: Ship = SHIP, run: int | None = None) -> float:
-    told = StatedFact(fact, run, YEAR_NS)
-    return math.exp(Facts(ship, (told,)).log_likelihood(found))
+    stated = StatedFact(fact, run, YEAR_NS)
+    return math.exp(Facts(ship, (stated,)).log_likelihood(found))
 
 
 def test_a_fact_is_seldom_told_where_it_is_not_so() -> None:
@@ -77,7 +77,7 @@ def test_a_hull_cleaned_long_ago_may_be_fouled_again() -> None:
 def test_a_run_overrides_the_ship_file_and_the_diagnosis_both() -> None:
     ship = replace(SHIP, facts=(CABLE, Fact('shaft', 'free')))
     runs = [((Fact('shaft', 'locked'), RUDDER), 1), ((), 2)]
-    found = told_of(ship, runs, [replace(RUDDER, rate=0.1)]).told
+    found = stated_facts(ship, runs, [replace(RUDDER, rate=0.1)]).stated
     assert {(str(each.fact), each.run) for each in found} == {
         ('helm_amidships,rate=0.1', None),
         ('no_towed_cable', None),

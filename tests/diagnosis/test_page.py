@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis import (
 )
 from shipdrag_ros.diagnosis import words as diagnosis_words
 from shipdrag_ros.diagnosis.page import write_diagnosis
-from shipdrag_ros.diagnosis.result import ToldFact
+from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.estimation import Window, estimate_final
@@ -132,8 +132,8 @@ def test_a_fact_that_the_data_contradict_stands_on_the_page(
     found: DiagnosisResult, written: Callable[..., Any]
 ) -> None:
     told = (
-        ToldFact(Fact('deep_water'), '', 0.97, ('shallow_water',)),
-        ToldFact(Fact('shaft', 'free'), 'out', 0.01),
+        WeighedFact(Fact('deep_water'), '', 0.97, ('shallow_water',)),
+        WeighedFact(Fact('shaft', 'free'), 'out', 0.01),
     )
     page = written(replace(found, facts=told))
     assert 'The data contradict the fact `deep_water`' in page.text

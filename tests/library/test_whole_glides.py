@@ -89,14 +89,6 @@ def diagnosed(path: Path, force: Force, window: str = '') -> dict[str, Any]:
     return found
 
 
-def test_a_belt_of_ice_ends_the_coastdown_and_is_something(tmp_path: Path) -> None:
-    found = diagnosed(tmp_path, belt_of_ice)
-    assert found['verdict'] == 'unknown'
-    assert found['coastdowns_used'] == 1
-    assert found['where']['time_s'][1] > 300.0  # the coastdown itself ends there
-    assert 'no instrument shows what' in ' '.join(found['notes'])
-
-
 def test_a_brake_from_the_stop_on_leaves_no_lead_and_is_diagnosed(tmp_path: Path) -> None:
     found = diagnosed(tmp_path, ice_at_the_stop, f'@{LEAD_IN_S}:{LEAD_IN_S + COAST_S}')
     assert found['verdict'] == 'unknown'

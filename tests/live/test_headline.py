@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.live.figures import to_go_s
 from shipdrag_ros.live.headline import Ended, Situation, Tone, headline
-from shipdrag_ros.live.outlook import to_go_s
 
 STEADY = Situation(
     silent_s=0.5, lifecycle='active', monitor='steady', lead_s=1440.0, lead_full_s=1800.0

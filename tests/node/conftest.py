@@ -103,7 +103,7 @@ class Peer:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
-        from shipdrag_ros.node.player import Player
+        from shipdrag_ros.node.rehearsal import Player
 
         self._rclpy = rclpy
         self._context = rclpy.Context()
@@ -162,7 +162,7 @@ class Peer:
         """
         Return once the next message of a publisher is heard.
         """
-        from shipdrag_ros.node.player import DISCOVERY_S
+        from shipdrag_ros.node.rehearsal import DISCOVERY_S
 
         self.spin_until(publisher.get_subscription_count)
         self.spin_for(DISCOVERY_S)
@@ -171,7 +171,7 @@ class Peer:
         """
         Return the answer of a service.
         """
-        from shipdrag_ros.node.player import DISCOVERY_S
+        from shipdrag_ros.node.rehearsal import DISCOVERY_S
 
         client = self.node.create_client(kind, service)
         self.spin_until(client.service_is_ready)

@@ -55,7 +55,7 @@ def test_a_publisher_that_starts_again_is_no_hole() -> None:
 def test_a_middleware_without_numbers_tells_nothing() -> None:
     sequences = Sequences(Graph('a'))
     sequences.take(None)
-    assert not sequences.told
+    assert not sequences.numbered
 
 
 @pytest.mark.parametrize('seed', range(8))

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import signal
 import subprocess
@@ -14,7 +15,22 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 
+from shipdrag_ros.messages.heard import Health, Status
+from shipdrag_ros.node.main import line, terminal_line
+
 rclpy = pytest.importorskip('rclpy')
+STATE = {
+    'lifecycle': 'active',
+    'monitor': 'steady',
+    'steady lead [s]': '600',
+    'steady lead used at most [s]': '1800',
+}
+FIGURES = {
+    'speed through water [m/s]': '5.144444',
+    'specific resistance [m/s^2]': '0.02',
+    'standard deviation of it [m/s^2]': '0.0005',
+}
+
 
 from shipdrag_ros.node.main import main  # noqa: E402
 from shipdrag_ros.node.node import CoastdownNode  # noqa: E402
@@ -200,3 +216,31 @@ def test_the_bag_is_closed_also_when_ros_is_gone(tmp_path: Path, ship_file: Path
     rclpy.shutdown(context=context)
     node.close()
     assert list(tmp_path.glob('*.mcap')) == []
+
+
+def test_it_holds_state_figure_and_inputs() -> None:
+    health = Health(
+        (
+            Status('n', 'state', 0, 'steady', STATE),
+            Status('n', 'input heading', 1, 'frozen', {'messages': '5'}),
+            Status('n', 'input depth', 0, 'no publisher', {'messages': '0'}),
+            Status('n', 'estimate', 0, '', FIGURES),
+        )
+    )
+    assert line(health) == (
+        'steady 10 of 30 min | last at 10.0 kn: r 0.0200 m/s² ± 5 % | 1 inputs, not well: heading'
+    )
+
+
+def test_what_keeps_it_from_estimating_comes_first() -> None:
+    health = Health((Status('n', 'state', 2, 'no data: nothing on any of a', STATE),))
+    assert line(health).startswith('no data: nothing on any of a |')
+
+
+def test_an_input_that_is_not_well_hides_no_state() -> None:
+    state = Status('n', 'state', 1, 'steady; not well, heading: stuck', STATE)
+    assert line(Health((state,))).startswith('steady 10 of 30 min |')
+
+
+def test_without_a_terminal_there_is_no_line() -> None:
+    assert terminal_line(io.StringIO()) is None

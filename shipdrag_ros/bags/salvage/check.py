@@ -134,7 +134,7 @@ class _FilePass:
         self._chunk: ChunkFacts | None = None
         self._in_chunk: _InChunk = {}
         self._indexed: set[int] = set()
-        self._told: set[str] = set()
+        self._said: set[str] = set()
 
     def run(self, progress: PartDone) -> None:
         """Gather what is there."""
@@ -196,9 +196,9 @@ class _FilePass:
 
     def _once(self, found: ScannedRecord) -> None:
         kind = name(found.opcode)
-        if kind in self._told:
+        if kind in self._said:
             self._damages.add(found.offset, kind, DamageKind.DUPLICATE)
-        self._told.add(kind)
+        self._said.add(kind)
 
     def _messages(self, channel: int, log_ns: list[int], offset: int) -> None:
         self.facts.count(channel, log_ns)
@@ -214,8 +214,8 @@ class _FilePass:
 
     def _reference(self, offset: int, record: str, target: str) -> None:
         """Say once what is not there; a thousand messages may refer to it."""
-        if target not in self._told:
-            self._told.add(target)
+        if target not in self._said:
+            self._said.add(target)
             self._damages.add(offset, record, DamageKind.REFERENCE, f'{target} is not declared')
 
     def _open_chunk(self, found: ScannedRecord) -> None:

@@ -73,7 +73,7 @@ class SalvagedBag:
         """
         Write the channels of the file at hand that have no message.
         """
-        with self._errors_told():
+        with self._errors_named():
             for number, channel in self._learnt.channels.items():
                 if number not in self._channels:
                     self._register(number, channel)
@@ -86,7 +86,7 @@ class SalvagedBag:
 
         A channel that is not known is called `/unknown_channel_NUMBER`.
         """
-        with self._errors_told():
+        with self._errors_named():
             self._open().write(
                 self._number(number),
                 payload,
@@ -99,7 +99,7 @@ class SalvagedBag:
         """
         Write all messages of an unpacked chunk, as they lie there.
         """
-        with self._errors_told():
+        with self._errors_named():
             # in order of their first messages, as one after the other would be
             numbers = whole.channel[np.sort(np.unique(whole.channel, return_index=True)[1])]
             here = np.zeros(CHANNELS, np.uint16)
@@ -118,14 +118,14 @@ class SalvagedBag:
         """
         Write an attachment.
         """
-        with self._errors_told():
+        with self._errors_named():
             self._open().attach(attachment)
 
     def describe(self, metadata: Metadata) -> None:
         """
         Write a metadata record.
         """
-        with self._errors_told():
+        with self._errors_named():
             self._open().describe(metadata)
 
     def publish(self) -> None:
@@ -137,7 +137,7 @@ class SalvagedBag:
         BagError
             If the name is taken meanwhile, or the disk does not take the file.
         """
-        with self._errors_told():
+        with self._errors_named():
             writer = self._open()
             assert self._file is not None
             writer.finish()
@@ -204,7 +204,7 @@ class SalvagedBag:
         return self._last[kind]
 
     @contextmanager
-    def _errors_told(self) -> Iterator[None]:
+    def _errors_named(self) -> Iterator[None]:
         try:
             yield
         except FileExistsError:

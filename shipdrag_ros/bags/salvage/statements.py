@@ -241,7 +241,7 @@ class _Statements:
         }
         counts = Counter({k: n for k, n in stated.channel_message_counts.items() if n})
         wrong = [
-            f'{what} {told}, are {true}' for what, (told, true) in pairs.items() if told != true
+            f'{what} {said}, are {true}' for what, (said, true) in pairs.items() if said != true
         ]
         if counts and counts != facts.counts:
             wrong.append('messages of the channels')

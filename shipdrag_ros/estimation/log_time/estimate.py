@@ -195,10 +195,10 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
         white = slow.whitened(rows, residual, weight, inputs, ship)
         products = condense(*white, np.ones(len(residual)))
     of_columns = deviations(products, start, columns, mean, sd)[polynomials:]
-    told, notes = _told(of_columns, inputs)
+    known, notes = _known(of_columns, inputs)
     if slow is not None:
         notes.append(slow.note)
-    families = _families(polynomials, *told, stated > 0.0)
+    families = _families(polynomials, *known, stated > 0.0)
     # what is free is so about where it is, so that nothing cancels; the priors hold the others
     mean[:FREE], mean[FREE:polynomials], sd[FREE:polynomials] = start[:FREE], 0.0, 0.0
     priors = coast_priors(length, speed, tc, float(ship.froude(speed)), mean, sd)
@@ -238,7 +238,7 @@ def _loose(polynomials: int, distance: float, deceleration: float) -> tuple[Floa
     return mean, sd
 
 
-def _told(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
+def _known(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
     """Say whether the data show current and factor of the log, and why not."""
     if not inputs.tells_water_from_ground:
         return (False, False), []

@@ -15,9 +15,9 @@ import numpy as np
 
 from shipdrag_ros.estimation.motion import PolynomialMotion
 from shipdrag_ros.estimation.result import OrderTrial
+from shipdrag_ros.regression.least_squares import inverse, triangle
 from shipdrag_ros.regression.order import OrderTable, fit_orders, rounding
 from shipdrag_ros.regression.orthogonal import OrthogonalBasis, TimeScale
-from shipdrag_ros.regression.triangle import inverse, triangle
 from shipdrag_ros.samples import Float64, Int64
 
 

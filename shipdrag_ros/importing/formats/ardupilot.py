@@ -67,30 +67,30 @@ def _readings(log: Any, tally: Tally) -> Iterator[Reading]:
         if stamp_ns < _DATE_S * 1e9:
             stamp_ns += _BASE_NS
             tally.note('The log has no fix that gives the date; its times count from 2000-01-01.')
-        told = message.to_dict()
-        for channel, rank, name, a, b in _values(told):
+        fields = message.to_dict()
+        for channel, rank, name, a, b in _values(fields):
             if isfinite(a) and isfinite(b):
                 yield Reading(channel, Origin(rank, name), stamp_ns, a, b)
 
 
-def _values(told: dict[str, Any]) -> Iterator[tuple[Channel, int, str, float, float]]:
-    kind = told['mavpackettype']
-    number = int(told.get('I', told.get('Instance', 0)) or 0)
+def _values(fields: dict[str, Any]) -> Iterator[tuple[Channel, int, str, float, float]]:
+    kind = fields['mavpackettype']
+    number = int(fields.get('I', fields.get('Instance', 0)) or 0)
     name = f'{kind} {number}' if number else kind
-    if kind == 'GPS' and told.get('Status', 0) >= _FIX:
-        yield Channel.POSITION_GEODETIC, number, name, float(told['Lat']), float(told['Lng'])
-        yield Channel.SPEED_OVER_GROUND, number, name, float(told['Spd']), 0.0
+    if kind == 'GPS' and fields.get('Status', 0) >= _FIX:
+        yield Channel.POSITION_GEODETIC, number, name, float(fields['Lat']), float(fields['Lng'])
+        yield Channel.SPEED_OVER_GROUND, number, name, float(fields['Spd']), 0.0
     elif kind == 'POS':
-        yield Channel.POSITION_GEODETIC, 10, name, float(told['Lat']), float(told['Lng'])
+        yield Channel.POSITION_GEODETIC, 10, name, float(fields['Lat']), float(fields['Lng'])
     elif kind == 'ATT':
-        yaw = remainder(pi / 2.0 - radians(float(told['Yaw'])), 2.0 * pi)
+        yaw = remainder(pi / 2.0 - radians(float(fields['Yaw'])), 2.0 * pi)
         yield Channel.HEADING, 0, name, yaw, 0.0
     elif kind == 'ESC' and number < len(SHAFTS):
-        yield SHAFTS[number], 0, name, float(told['RPM']) * pi / 30.0, 0.0
+        yield SHAFTS[number], 0, name, float(fields['RPM']) * pi / 30.0, 0.0
     elif kind == 'RPM':
         for place, key in enumerate(('rpm1', 'rpm2')):
-            if key in told:
-                yield SHAFTS[place], 1, f'{name} {key}', float(told[key]) * pi / 30.0, 0.0
+            if key in fields:
+                yield SHAFTS[place], 1, f'{name} {key}', float(fields[key]) * pi / 30.0, 0.0
 
 
 FORMAT = Format(

@@ -73,7 +73,7 @@ class _Points:
         self._parser.StartDoctypeDeclHandler = self._refuse
         self._depth = 0
         self._where: dict[str, str] | None = None
-        self._told: dict[str, str] = {}
+        self._texts: dict[str, str] = {}
         self._name = ''
         self._found: list[Reading] = []
 
@@ -97,16 +97,16 @@ class _Points:
         self._name = name.rpartition(' ')[2]
         if self._name == 'trkpt':
             self._where = attributes
-            self._told = {}
+            self._texts = {}
         elif self._name in ('wpt', 'rtept'):
             self._tally.not_used[self._name] += 1
 
     def _text(self, text: str) -> None:
         if self._where is None or self._name not in ('time', 'speed'):
             return
-        have = self._told.get(self._name, '')
+        have = self._texts.get(self._name, '')
         if len(have) <= _LONGEST:
-            self._told[self._name] = have + text
+            self._texts[self._name] = have + text
 
     def _end(self, name: str) -> None:
         self._depth -= 1
@@ -117,7 +117,7 @@ class _Points:
             self._point(where)
 
     def _point(self, where: dict[str, str]) -> None:
-        text = self._told.get('time', '').strip()
+        text = self._texts.get('time', '').strip()
         stamp_ns = iso_ns(text, UTC)
         if stamp_ns is None:
             self._tally.reject('time', 'no time of the point' if not text else 'no time', text)
@@ -135,7 +135,7 @@ class _Points:
             )
         else:
             self._tally.reject('position', 'no latitude and longitude', f'{latitude},{longitude}')
-        if speed := self._told.get('speed', '').strip():
+        if speed := self._texts.get('speed', '').strip():
             if _NUMBER.fullmatch(speed):
                 self._found.append(
                     Reading(Channel.SPEED_OVER_GROUND, _SPEED, stamp_ns, float(speed))

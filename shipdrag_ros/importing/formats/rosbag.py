@@ -77,10 +77,10 @@ class CopyResult:
         """
         Say how much was copied.
         """
-        told = [f'{bag}: {sum(self.written.values())} messages of a bag of {self.kind}']
+        lines = [f'{bag}: {sum(self.written.values())} messages of a bag of {self.kind}']
         if not self.inputs:
-            told.append('No topic has the name of an input: give replay --remap TOPIC:=INPUT.')
-        return [*told, *self.notes]
+            lines.append('No topic has the name of an input: give replay --remap TOPIC:=INPUT.')
+        return [*lines, *self.notes]
 
     def table(self) -> Table:
         """
@@ -96,11 +96,11 @@ class CopyResult:
         """
         Say what was not copied, and why.
         """
-        told = rejected_words(self.rejected)
+        lines = rejected_words(self.rejected)
         if self.not_used:
             others = ', '.join(f'{topic} {n}' for topic, n in list(self.not_used.items())[:20])
-            told.append(f'Of types that carry no input: {others}')
-        return told
+            lines.append(f'Of types that carry no input: {others}')
+        return lines
 
 
 def _score(head: Head) -> float:

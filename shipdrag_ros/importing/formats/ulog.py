@@ -94,9 +94,9 @@ def _epoch_us(log: Any) -> int | None:
     for data in log.data_list:
         utc = data.data.get('time_utc_usec')
         if data.name in _GPS and utc is not None:
-            told = np.flatnonzero(np.asarray(utc) > 10**15)
-            if len(told):
-                return int(utc[told[0]]) - int(data.data['timestamp'][told[0]])
+            known = np.flatnonzero(np.asarray(utc) > 10**15)
+            if len(known):
+                return int(utc[known[0]]) - int(data.data['timestamp'][known[0]])
     return None
 
 

@@ -163,13 +163,13 @@ def meaning(name: str) -> str:
     """
     force, motions = _FORCES[name[0]], name[1:].removeprefix('0')
     powers = {letter: motions.count(letter) for letter in dict.fromkeys(motions)}
-    told = ' x '.join(
+    product = ' x '.join(
         _MOTIONS[letter] + {1: '', 2: '²', 3: '³'}[power] for letter, power in powers.items()
     )
     if name[1:2] != '0':
-        return f'{force} by {told}'
+        return f'{force} by {product}'
     straight = f'{force} with the rudder amidships, sailing straight'
-    return f'{straight}, by {told}' if told else straight
+    return f'{straight}, by {product}' if product else straight
 
 
 @cache

@@ -113,22 +113,22 @@ class ResidualFit:
         sd[is_open] = np.inf
         reasons = self.domain.reasons(self.form.place(hulls))
         most = float(self.fit.leverages.max())
-        for i, told in enumerate(reasons):
+        for i, why in enumerate(reasons):
             if is_open[i]:
-                told.append(
+                why.append(
                     f'the data determine {self.fit.rank} of {len(self.fit.coefficients)} '
                     'combinations of coefficients, and this hull needs another'
                 )
             elif leverage[i] > most * (1.0 + OPEN):
-                told.append(f'leverage {leverage[i]:.2g}, {most:.2g} at most among the data')
+                why.append(f'leverage {leverage[i]:.2g}, {most:.2g} at most among the data')
             if value[i] < 0.0:
-                told.append('against physics: below 0')
+                why.append('against physics: below 0')
         for text, wrong in self._wrong_trends(hulls):
             for i in np.flatnonzero(wrong).tolist():
                 reasons[i].append(f'against physics: resistance {text}, here it does not')
         return [
-            Prediction(float(each), float(spread), tuple(told))
-            for each, spread, told in zip(value, sd, reasons)
+            Prediction(float(each), float(spread), tuple(why))
+            for each, spread, why in zip(value, sd, reasons)
         ]
 
     def _wrong_trends(self, hulls: Hulls) -> Iterator[tuple[str, NDArray[np.bool_]]]:
@@ -147,7 +147,7 @@ def fit_residual(hulls: Hulls, values: Float64, *, form: str) -> ResidualFit:
     """
     Fit a form, or the one that predicts left-out hulls best.
 
-    Where no hull can be foretold from the others, the smaller residual
+    Where no hull can be predicted from the others, the smaller residual
     variance decides.
 
     Parameters
@@ -238,7 +238,7 @@ def fit_form(form: RegressionForm, hulls: Hulls, values: Float64) -> ResidualFit
         left_out = float(np.mean(error[known] ** 2))
     else:
         notes.append(
-            'How far a new hull is off is not known: too few hulls can be foretold from the '
+            'How far a new hull is off is not known: too few hulls can be predicted from the '
             'others. The sd holds the scatter of these hulls alone.'
         )
     if hulls.Fr.max() > form.froude_max:

@@ -40,9 +40,9 @@ def notes(found: CoastStudy) -> tuple[str, ...]:
     Say what was done and what it means.
     """
     scenario, check = found.coast.scenario, found.check
-    told = [mimic for mimic in found.mimics if mimic.left < _LOOKS_ALIKE]
+    near = [mimic for mimic in found.mimics if mimic.left < _LOOKS_ALIKE]
     alike = '; '.join(
-        f'{mimic.effect.name} like {mimic.particular.key} {mimic.error:+.0%}' for mimic in told
+        f'{mimic.effect.name} like {mimic.particular.key} {mimic.error:+.0%}' for mimic in near
     )
     said = [
         f'A coastdown of {scenario.duration_s:.0f} s from {scenario.speed_m_s:.2f} m/s, one '

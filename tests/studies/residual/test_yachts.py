@@ -20,7 +20,7 @@ FOLDER = os.environ.get('SHIPDRAG_DATA')
 @pytest.mark.parametrize('form', list(FORMS))
 def test_what_passes_is_better_than_what_is_refused(form: str) -> None:
     """
-    22 hulls up to Fr 0.3, each foretold from the others: the worst errors are refused, and what
+    22 hulls up to Fr 0.3, each predicted from the others: the worst errors are refused, and what
     passes lies within 3 sd.
     """
     data = np.loadtxt(Path(str(FOLDER)) / 'yacht_hydrodynamics.data', delimiter='\t', skiprows=1)

@@ -67,28 +67,28 @@ class TableResult:
         Say how much was read, and what is to be known of it.
         """
         length_s = (self.end_ns - self.start_ns) * 1e-9
-        told = [
+        lines = [
             f'{bag}: {sum(self.written.values())} messages of {self.rows - self.left_out} rows, '
             f'{display.duration(length_s)}, from {display.utc(self.start_ns)}'
         ]
         if self.base_ns is not None:
-            told.append(
+            lines.append(
                 f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
             )
-        told += self.notes
+        lines += self.notes
         if self.left_out:
-            told.append(f'{self.left_out} rows were not chosen by --where.')
+            lines.append(f'{self.left_out} rows were not chosen by --where.')
         if self.backward:
-            told.append(
+            lines.append(
                 f'In {self.backward} rows the time is before that of an earlier row; a replay '
                 'rejects those.'
             )
         if self.repeated:
-            told.append(
+            lines.append(
                 f'In {self.repeated} rows the time is that of an earlier row; a replay rejects '
                 'those.'
             )
-        return told
+        return lines
 
     def table(self) -> display.Table:
         """
@@ -102,11 +102,11 @@ class TableResult:
         """
         Say what was not used, and why.
         """
-        told = [
+        lines = [
             f'{name}: {rejected.count} cell(s) rejected, {reason}: {", ".join(rejected.first)}'
             for name, reasons in self.rejected.items()
             for reason, rejected in reasons.items()
         ]
         if self.not_used:
-            told.append(f'Columns not used: {", ".join(map(repr, self.not_used))}')
-        return told
+            lines.append(f'Columns not used: {", ".join(map(repr, self.not_used))}')
+        return lines

@@ -113,8 +113,8 @@ class RowClock:
             words = {'d': 'day', 'm': 'month', 'y': 'year'}
             written = '/'.join(words[each] for each in order)
             self.notes.append(f'Dates are {written}, as {known_by} show.')
-        told = 'utc' in ' '.join(time.names).lower() or any(map(_tells_zone, texts[:1]))
-        if time.zone is UTC and not told:
+        stated = 'utc' in ' '.join(time.names).lower() or any(map(_tells_zone, texts[:1]))
+        if time.zone is UTC and not stated:
             self.notes.append('The times state no zone and are taken as UTC (--zone).')
 
     def _read_counts(self, time: TimeColumn, texts: Sequence[str]) -> None:

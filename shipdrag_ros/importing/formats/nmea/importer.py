@@ -114,36 +114,36 @@ class NmeaResult:
         Say how much was read, and what is to be known of it.
         """
         length_s = (self.end_ns - self.start_ns) * 1e-9
-        told = [
+        lines = [
             f'{bag}: {sum(self.written.values())} messages of {self.sentences} sentences in '
             f'{self.lines} lines, {display.duration(length_s)}, from {display.utc(self.start_ns)}'
         ]
         if not self.checksums:
-            told.append('The sentences have no checksums: a damaged digit is not noticed.')
+            lines.append('The sentences have no checksums: a damaged digit is not noticed.')
         if self.damage:
-            told.append(
+            lines.append(
                 f'The log could not be read to its end, {self.damage}; this is what is left.'
             )
         if self.shift_days:
-            told.append(
+            lines.append(
                 f'All dates were shifted by {self.shift_days} days, whole cycles of the GPS week.'
             )
         if self.dates_put_right:
-            told.append(
+            lines.append(
                 f'{self.dates_put_right} date(s) were a day off at midnight and put right.'
             )
         if self.magnetic_heading:
-            told.append(
+            lines.append(
                 'The heading is MAGNETIC, as the log states no variation: good for finding turns, '
                 'not for directions over ground.'
             )
-        told += backward_and_repeated(self.backward, self.repeated)
-        told.append(
+        lines += backward_and_repeated(self.backward, self.repeated)
+        lines.append(
             'The log is attached to the bag.'
             if self.log_attached
             else 'The log is NOT attached to the bag (too long, damaged or no UTF-8): keep it.'
         )
-        return told
+        return lines
 
     def table(self) -> Table:
         """
@@ -155,14 +155,14 @@ class NmeaResult:
         """
         Say what was not used, and why.
         """
-        told = not_taken_words(self.not_taken) + rejected_words(self.rejected)
+        lines = not_taken_words(self.not_taken) + rejected_words(self.rejected)
         if self.not_used:
             others = ', '.join(f'{address} {count}' for address, count in self.not_used.items())
-            told.append(f'Sentences not used: {others}')
+            lines.append(f'Sentences not used: {others}')
         if self.unknown_talkers:
             names = ', '.join(f'{name} {count}' for name, count in self.unknown_talkers.items())
-            told.append(f'Talkers that NMEA 0183 does not know: {names}')
-        return told
+            lines.append(f'Talkers that NMEA 0183 does not know: {names}')
+        return lines
 
 
 def import_nmea(
@@ -315,10 +315,10 @@ def _understood(bag: ImportBag, record: SentenceConverter) -> tuple[Understood, 
 
 def _sources(record: SentenceConverter) -> dict[str, str]:
     """Say what each input is taken from; of several shafts and pitches, each once."""
-    told: dict[str, dict[str, None]] = {}
+    by_input: dict[str, dict[str, None]] = {}
     for channel, source in sorted(record.chosen.items()):
-        told.setdefault(channel.input, {})[str(source)] = None
-    return {name: ', '.join(sources) for name, sources in told.items()}
+        by_input.setdefault(channel.input, {})[str(source)] = None
+    return {name: ', '.join(sources) for name, sources in by_input.items()}
 
 
 def _not_taken(survey: Survey, record: SentenceConverter) -> dict[str, dict[str, int]]:

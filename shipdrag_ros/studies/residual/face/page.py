@@ -71,7 +71,7 @@ def write_residual(
         pictures.append(
             picture(
                 fit_pictures.left_out_picture(error, leverage, target),
-                'Each hull foretold from the others, so the error to expect of a new one. To the '
+                'Each hull predicted from the others, so the error to expect of a new one. To the '
                 'right of 1 a hull is more unusual (leverage) than any of the others: there the '
                 'form goes beyond its data, and its predictions are marked as not to be used.',
             )

@@ -74,7 +74,7 @@ def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
     error, leverage : (n,)
         Of hulls left out, the leverage over the largest of the others.
     target
-        What is foretold.
+        What is predicted.
     """
     inside = leverage <= 1.0
     with matplotlib.rc_context(STYLE):
@@ -89,6 +89,6 @@ def left_out_picture(error: Float64, leverage: Float64, target: str) -> Figure:
         axis.set_xlabel('leverage over the largest of the other hulls [1]')
         axis.xaxis.set_major_formatter(ScalarFormatter())
         axis.xaxis.set_minor_formatter(NullFormatter())
-        axis.set_ylabel(f'{target}, foretold - measured')
+        axis.set_ylabel(f'{target}, predicted - measured')
         axis.legend()
     return figure

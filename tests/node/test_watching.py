@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.node.clocks import OwnClock, SensorClock, both_ns, set_by
+from shipdrag_ros.node.watching import OwnClock, SensorClock, both_ns, set_by
 from shipdrag_ros.samples import Float64
 
 SECOND_NS = 10**9

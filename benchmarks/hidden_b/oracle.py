@@ -1,0 +1,399 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+What can be had in world B: a diagnosis that knows its physics.
+
+Each hypothesis is sailed by the generator's own laws and weighed by its Laplace evidence, under
+the covariance of all that is random and with the true shares of the kinds of cases. Of the ship
+it knows the lines, the propeller and the kind of instruments; her resistance and added mass as
+the ship file states them, with the stated errors. Sizes of effects have priors as wide as
+manuals would have them, not those that are drawn from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag, solve_triangular
+
+from hidden_b.cases import Known, Observation
+from hidden_b.effects import Hidden
+from hidden_b.hulls import Array, Hull
+from hidden_b.oracle_noise import EDDIES, HELM, Scatter, Weather, evidence, summed
+from hidden_b.oracle_priors import SIZES, Names, drawn, free, possible, shares, would_decide
+from hidden_b.oracle_rows import Run
+from hidden_b.oracle_sail import made, run_of, sailed, stated
+from hidden_b.plans import PAIRS
+from hidden_b.setting import Setting
+from hidden_b.voyage import steady_point
+
+ALARM_BELOW = 0.1  # probability that nothing is hidden
+NAME_FROM = 0.9
+HELD = 0.99  # by the set of candidates
+LACK_NATS = 5.0  # by which a smooth discrepancy may beat the name alone
+_STEPS = 7
+_STARTS = 3  # where the first point may be on the wrong slope
+_WORTH_NATS = 15.0  # below the best: not looked at closely
+_SPEED_SD, _COURSE_SD = 0.3, 0.2  # relative; [rad]
+_DEEP = (0.0625, 0.0125)  # draught over depth where the water does not matter
+
+
+@dataclass(frozen=True)
+class Fit:
+    """
+    A hypothesis at its best.
+
+    Attributes
+    ----------
+    names, signs
+    z
+        Speeds and courses of the runs, then the sizes: standard normal numbers.
+    cost
+        Chi^2 with the prior.
+    evidence
+        Its logarithm, with the share of its kind.
+    """
+
+    names: Names
+    signs: tuple[float, ...]
+    z: Array
+    cost: float
+    evidence: float = -np.inf
+
+
+def diagnose(seen: Observation, known: Known) -> dict[str, Any]:
+    """
+    Answer in the form of `diagnose --json`.
+    """
+    return _Oracle(seen, known).answer()
+
+
+class _Oracle:
+    def __init__(self, seen: Observation, known: Known) -> None:
+        self.known, self.inputs = known, set(seen.runs[0])
+        self.stated = stated(seen.ship_file, known)
+        hull = self.stated.hull
+        self.runs = [Run(run, number, known, hull) for number, run in enumerate(seen.runs)]
+        self.scatters = [Scatter(run) for run in self.runs]
+        need = float(np.interp(hull.speed_m_s, hull.grid_m_s, hull.still_n))
+        first = run_of(known, hull, 0, hull.speed_m_s, 0.0)
+        self.steady = steady_point(first, need)[1:]
+        self.common = 2 * len(self.runs)
+        self.shared = self._shared()
+        nothing = np.zeros(self.common)
+        self.factor = np.linalg.cholesky(
+            summed(self._scatter(Fit((), (), nothing, np.inf))[0], (EDDIES[1], HELM[1]))
+        )
+        self.slopes = self._slopes((), (), nothing, range(self.common))
+
+    # what would be seen
+
+    def _settings(
+        self, names: Names, signs: Sequence[float], z: Array, hull: Hull | None = None
+    ) -> list[Setting]:
+        hull = hull or self.stated.hull
+        effects = self._effects(names, signs, z)
+        settings: list[Setting] = []
+        for k, run in enumerate(self.runs):
+            speed = run.speed_m_s * float(np.clip(1.0 + _SPEED_SD * z[2 * k], 0.2, 3.0))
+            heading = run.heading_rad + _COURSE_SD * float(z[2 * k + 1])
+            setting = run_of(self.known, hull, k, speed, heading)
+            setting.first_rad = settings[0].heading_rad if k else heading
+            for effect in effects:
+                if effect.scope != 'run' or k == 0:
+                    effect.apply(setting)
+            settings.append(setting)
+        return settings
+
+    def _effects(self, names: Names, signs: Sequence[float], z: Array) -> list[Hidden]:
+        found, at = [], self.common
+        left = list(signs)
+        for name in names:
+            x = []
+            for size in SIZES[name]:
+                x.append(size.at(float(z[at]) if at < len(z) else 0.0, left.pop(0)))
+                at += 1
+            given = drawn(name, x)
+            found.append(made(name, given, self.stated.hull, self.known, self.steady))
+        return found
+
+    def _row(self, settings: list[Setting]) -> Array:
+        sail = [sailed(setting, self.known) for setting in settings]
+        return np.concatenate([run.predicted(each) for run, each in zip(self.runs, sail)])
+
+    def _shared(self) -> Array:
+        """Return what is wrong alike in all runs, a column each."""
+        nothing = np.zeros(self.common)
+        plain = self._row(self._settings((), (), nothing))
+        hull, first = self.stated.hull, self.stated.hull.speed_m_s
+        columns = []
+        hulls = [replace(hull, still_n=hull.still_n + miss) for miss in self.stated.misses]
+        hulls.append(replace(hull, n_r=hull.n_r + self.stated.added_sd))
+        for each in hulls:
+            columns.append(self._row(self._settings((), (), nothing, each)) - plain)
+        late = 1.0 + self.stated.run_down_sd
+        screw = self.known.screw
+        late_screw = replace(screw, inertia_s=screw.inertia_s * late, ramp_s=screw.ramp_s * late)
+        weather = [
+            ('wind', (0.65, 0.0)), ('wind', (0.0, 0.65)),
+            ('flow', (1.6e-3 * first, 0.0)), ('flow', (0.0, 1.6e-3 * first)),
+            ('tide', (6e-3, 0.0, 0.0)), ('tide', (0.0, 6e-3, 0.0)),
+            ('tide', (6e-3, 0.0, -np.pi / 2)), ('tide', (0.0, 6e-3, -np.pi / 2)),
+        ]  # fmt: skip
+        faults = [('scale', 1.7e-3), ('offset_m_s', 7e-4 * first)]
+
+        def changed(**fields: Any) -> Array:
+            settings = self._settings((), (), nothing)
+            return self._row([replace(each, **fields) for each in settings]) - plain
+
+        columns.append(changed(screw=late_screw))
+        setting = self._settings((), (), nothing)[0]
+        for name, value in weather:
+            columns.append(changed(weather=replace(setting.weather, **{name: value})))
+        for name, size in faults:
+            columns.append(changed(faults=replace(setting.faults, **{name: size})))
+        return np.stack(columns, axis=1)
+
+    def _scatter(self, fit: Fit) -> tuple[list[Array], dict[str, Array]]:
+        """Return covariances, apart, of eddies and of helm, and columns of smooth unknowns."""
+        settings = self._settings(fit.names, fit.signs, fit.z)
+        parts = [
+            scatter.about(setting, sailed(setting, self.known))
+            for scatter, setting in zip(self.scatters, settings)
+        ]
+        found = [block_diag(*(part[k] for part in parts)) for k in range(3)]
+        found[0] += self.shared @ self.shared.T
+        smooth = {}
+        for kind in parts[0][3]:
+            # forces and air under the log are of one run, a gyro of all
+            blocks = [part[3][kind] * (k == 0 or kind == 'gyro') for k, part in enumerate(parts)]
+            smooth[kind] = np.concatenate(blocks)
+        return found, smooth
+
+    def _shoals(self, names: Names, settings: list[Setting]) -> Iterator[tuple[float, float]]:
+        """Yield by how much each echo sounder is off, in sd, and the sd."""
+        for run, setting in zip(self.runs, settings):
+            if run.shoal is not None:
+                shallow = 'shallow_water' in names
+                wanted = self.known.hull.draught_m / setting.depth_m if shallow else _DEEP[0]
+                sd = 0.03 * wanted if shallow else _DEEP[1]
+                yield (run.shoal - wanted) / sd, sd
+
+    # fits
+
+    def _residual(
+        self, names: Names, signs: Sequence[float], z: Array
+    ) -> tuple[Array, list[tuple[float, float]]]:
+        settings = self._settings(names, signs, z)
+        measured = np.concatenate([run.measured for run in self.runs])
+        return measured - self._row(settings), list(self._shoals(names, settings))
+
+    def _whitened(self, names: Names, signs: Sequence[float], z: Array) -> Array:
+        return self._white(self._whole(names, signs, z))
+
+    def _slopes(
+        self, names: Names, signs: Sequence[float], z: Array, which: Sequence[int]
+    ) -> Array:
+        """Return minus the slope of the residual (not whitened), echo sounders with it."""
+        columns, here = [], self._whole(names, signs, z)
+        for k in which:
+            step = np.zeros(len(z))
+            step[k] = 3e-4 if k < self.common else 0.01
+            columns.append((here - self._whole(names, signs, z + step)) / step[k])
+        return np.stack(columns, axis=1) if columns else np.zeros((len(here), 0))
+
+    def _whole(self, names: Names, signs: Sequence[float], z: Array) -> Array:
+        off, shoals = self._residual(names, signs, z)
+        return np.concatenate([off, [each for each, _ in shoals]])
+
+    def _white(self, columns: Array) -> Array:
+        n = len(self.factor)
+        white = solve_triangular(self.factor, columns[:n], lower=True, check_finite=False)
+        return np.concatenate([white, columns[n:]])
+
+    def _begun(self, names: Names, starts: Mapping[str, Fit]) -> list[Fit]:
+        """Return where to begin with a hypothesis: the best of a few points for each sign."""
+        sizes = [size for name in names for size in SIZES[name]]
+        varied = free(names)
+        if len(names) == 1:
+            points = {0: 1, 1: 5, 2: 4}.get(len(varied), 0)
+            grid = np.array(list(product(*[np.linspace(-1.3, 1.3, points)] * len(varied))))
+            if not points:
+                grid = np.random.default_rng(0).uniform(-1.4, 1.4, (40, len(varied)))
+        else:
+            bests = np.concatenate([starts[name].z[self.common :] for name in names])
+            spread = np.random.default_rng(0).uniform(-1.4, 1.4, (8, len(sizes)))
+            grid = np.concatenate([[bests], spread])[:, varied]
+        nuisance = self._white(self.slopes)
+        precision = nuisance.T @ nuisance + np.eye(self.common)
+        begun = []
+        for signs in product(*[(1.0, -1.0) if size.sign else (1.0,) for size in sizes]):
+            tried = []
+            for point in grid:
+                z = np.zeros(self.common + len(sizes))
+                z[self.common + np.array(varied, int)] = point
+                white = self._whitened(names, signs, z)
+                z[: self.common] = np.linalg.solve(precision, nuisance.T @ white)
+                white = white - nuisance @ z[: self.common]
+                tried.append(Fit(names, signs, z, float(white @ white + z @ z)))
+            tried.sort(key=lambda fit: fit.cost)
+            begun += tried[: _STARTS if len(varied) > 2 else 1]
+        return begun
+
+    def _climbed(self, fit: Fit, floor: float = np.inf) -> Fit:
+        """
+        Climb by Levenberg-Marquardt; what stays far above the floor is left.
+
+        The slopes of speed and course stay those of the plain run.
+        """
+        names, signs, z = fit.names, fit.signs, fit.z
+        which = [self.common + k for k in free(names)]
+        used = [*range(self.common), *which]
+        white = self._whitened(names, signs, z)
+        cost, damping = float(white @ white + z @ z), 1e-3
+        plain = self._white(self.slopes)
+        slopes = np.concatenate([plain, self._white(self._slopes(names, signs, z, which))], 1)
+        for _ in range(_STEPS):
+            precision = slopes.T @ slopes + np.eye(len(used))
+            turn = precision + damping * np.diag(np.diag(precision))
+            step = np.linalg.solve(turn, slopes.T @ white - z[used])
+            after = z.copy()
+            after[used] += np.clip(step, -1.5, 1.5)
+            after_white = self._whitened(names, signs, after)
+            after_cost = float(after_white @ after_white + after @ after)
+            if not after_cost < cost:
+                damping = max(10.0 * damping, 0.01)
+                if damping > 1e2:
+                    break
+                continue
+            gained, cost, z, white = cost - after_cost, after_cost, after, after_white
+            damping *= 0.1
+            if gained < 0.3 or (cost > floor + 4.0 * _WORTH_NATS and gained < 0.4 * cost):
+                break
+            slopes[:, self.common :] = self._white(self._slopes(names, signs, z, which))
+        return Fit(names, signs, z, cost)
+
+    # evidence
+
+    def _linear(self, fit: Fit) -> tuple[Array, Array, float]:
+        """Return what is off at the middle of the prior, its slopes, and what evidence lacks."""
+        off, shoals = self._residual(fit.names, fit.signs, fit.z)
+        sizes = range(self.common, len(fit.z))
+        slopes = self._slopes(fit.names, fit.signs, fit.z, sizes)
+        slopes = np.concatenate([self.slopes, slopes], axis=1)
+        whole = np.concatenate([off, [each for each, _ in shoals]]) + slopes @ fit.z
+        halves = sum(size.sign for name in fit.names for size in SIZES[name])
+        less = float(np.sum(np.log([sd for _, sd in shoals] or [1.0])))
+        return whole, slopes, less + halves * np.log(2.0) - np.log(shares()[fit.names])
+
+    def _weighed(self, fit: Fit, weather: Weather) -> tuple[Fit, dict[str, float]]:
+        """Return a fit with its evidence, and the evidences with a smooth unknown beside it."""
+        parts, smooth = self._scatter(fit)
+        whole, slopes, less = self._linear(fit)
+        n, size = len(parts[0]), len(whole)
+        covariance = np.eye(size)
+        covariance[:n, :n] = summed(parts, weather)
+        covariance += slopes @ slopes.T
+        beside = {}
+        for kind, columns in smooth.items():
+            more = covariance.copy()
+            more[:n, :n] += columns @ columns.T
+            beside[kind] = evidence(more, whole) - less
+        return replace(fit, evidence=evidence(covariance, whole) - less), beside
+
+    def _weather(self, fit: Fit) -> Weather:
+        """Return how large eddies and helm are, by what explains most; unknowns are let in."""
+
+        def best(weather: Weather) -> float:
+            found, beside = self._weighed(fit, weather)
+            return max(found.evidence, *beside.values())
+
+        return max(product(EDDIES, HELM), key=best)
+
+    def answer(self) -> dict[str, Any]:
+        """Weigh all, and say what they come to."""
+        nothing = self._climbed(Fit((), (), np.zeros(self.common), np.inf))
+        begun = [fit for name in possible(self.known) for fit in self._begun((name,), {})]
+        fits = [nothing, *self._all_climbed(begun, nothing.cost)]
+        weather = self._weather(min(fits, key=lambda fit: fit.cost))
+        weighed = self._worth(fits, weather)
+        best, beside = max(weighed, key=lambda each: each[0].evidence)
+        if max(beside.values()) > best.evidence:  # no name alone will do
+            starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
+            pairs = [tuple(sorted(pair)) for pair in PAIRS if set(pair) <= starts.keys()]
+            begun = [fit for pair in pairs for fit in self._begun(pair, starts)]
+            fits += self._all_climbed(begun, min(fit.cost for fit in fits))
+            weather = self._weather(min(fits, key=lambda fit: fit.cost))
+            weighed = self._worth(fits, weather)
+        return self._verdict([fit for fit, _ in weighed], {id(f): more for f, more in weighed})
+
+    def _all_climbed(self, begun: Sequence[Fit], floor: float) -> list[Fit]:
+        """Climb from the best on, so that the hopeless are known; one fit of each sign."""
+        found: dict[tuple[Names, tuple[float, ...]], Fit] = {}
+        for each in sorted(begun, key=lambda fit: fit.cost):
+            fit = self._climbed(each, floor)
+            kind = fit.names, fit.signs
+            found[kind] = min(found.get(kind, fit), fit, key=lambda fit: fit.cost)
+            floor = min(floor, fit.cost)
+        return list(found.values())
+
+    def _worth(self, fits: Sequence[Fit], weather: Weather) -> list[tuple[Fit, dict[str, float]]]:
+        """Weigh what is near the best, and nothing hidden in any case."""
+        least = min(fit.cost for fit in fits) + 2.0 * _WORTH_NATS
+        return [self._weighed(fit, weather) for fit in fits if not fit.names or fit.cost < least]
+
+    def _verdict(
+        self, weighed: Sequence[Fit], beside: dict[int, dict[str, float]]
+    ) -> dict[str, Any]:
+        by_names: dict[Names, list[Fit]] = {}
+        for fit in weighed:
+            by_names.setdefault(fit.names, []).append(fit)
+        logs = {
+            names: float(np.logaddexp.reduce([fit.evidence for fit in fits]))
+            for names, fits in by_names.items()
+        }
+        nothing = by_names[()][0]
+        odds = np.log(shares()[('unknown',)] / shares()[()])
+        kinds = beside[id(nothing)]
+        logs[('unknown',)] = odds + float(
+            np.logaddexp.reduce(list(kinds.values())) - np.log(len(kinds))
+        )
+        top = np.logaddexp.reduce(list(logs.values()))
+        chances = {names: float(np.exp(log - top)) for names, log in logs.items()}
+        listed = sorted(((p, names) for names, p in chances.items()), reverse=True)
+        held = np.cumsum([p for p, _ in listed])
+        listed = listed[: int(np.searchsorted(held, HELD)) + 1]
+        names = (each for each in by_names if each)
+        named = max(((chances[each], each) for each in names), default=(0.0, ()))
+        best = max(by_names[named[1]], key=lambda fit: fit.evidence)
+        lacks = max(beside[id(best)].values()) > best.evidence + LACK_NATS
+        verdict, effects = 'one_of', []
+        if chances[()] >= ALARM_BELOW:
+            verdict = 'none'
+        elif chances[('unknown',)] > 0.5 or lacks:
+            verdict = 'unknown'
+            if listed[0][1] != ('unknown',):
+                listed = [(NAME_FROM, ('unknown',)), (1.0 - NAME_FROM, listed[0][1])]
+        elif named[0] >= NAME_FROM:
+            verdict, effects = 'named', self._stated(named[0], best)
+        return {
+            'verdict': verdict,
+            'effects': effects,
+            'candidates': [{'names': list(names), 'probability': p} for p, names in listed],
+            'would_decide': would_decide(
+                [set(names) for _, names in listed], len(self.runs), self.inputs
+            ),
+        }
+
+    def _stated(self, chance: float, fit: Fit) -> list[dict[str, Any]]:
+        return [
+            {
+                'name': effect.name,
+                'probability': chance,
+                'parameters': {name: {'value': v} for name, v in effect.parameters.items()},
+            }
+            for effect in self._effects(fit.names, fit.signs, fit.z)
+        ]

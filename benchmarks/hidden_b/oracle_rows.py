@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the oracle compares: means of the readings over short times, and of what it sails."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hidden_b.cases import EPOCH_NS, Known
+from hidden_b.hulls import Array, Hull
+from hidden_b.instruments import EARTH_M, Recording, Series
+from hidden_b.oracle_sail import Sailed
+
+_LEAD_BINS, _COAST_BINS = 10, 40
+_ROWS = ('speed_through_water', 'position', 'heading', 'shaft', 'wind_apparent')
+
+
+@dataclass(frozen=True)
+class Means:
+    """
+    Means of an input over bins: starts, ends, values (n, k) and numbers of readings.
+    """
+
+    start: Array
+    end: Array
+    value: Array
+    n: Array
+
+    @property
+    def t(self) -> Array:
+        """Middles."""
+        return 0.5 * (self.start + self.end)
+
+    def of(self, t: Array, value: Array) -> Array:
+        """
+        Return the means of curves (times, k): (bins, k); straight on before they begin.
+        """
+        steps = 0.5 * (value[1:] + value[:-1]) * np.diff(t)[:, None]
+        total = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+        width = (self.end - self.start)[:, None]
+        found = (_at(self.end, t, total) - _at(self.start, t, total)) / width
+        early = self.start < t[0]
+        slope = (value[1] - value[0]) / (t[1] - t[0])
+        found[early] = value[0] + (self.t[early, None] - t[0]) * slope
+        return found
+
+
+def _at(when: Array, t: Array, total: Array) -> Array:
+    i = np.clip(np.searchsorted(t, when) - 1, 0, len(t) - 2)
+    part = ((when - t[i]) / (t[i + 1] - t[i]))[:, None]
+    return total[i] * (1.0 - part) + total[i + 1] * part
+
+
+def _means(series: Series, start_ns: int, edges: Array) -> Means:
+    t = (series.stamp_ns - start_ns) / 1e9
+    value = series.value.reshape(len(t), -1)
+    zero = np.all(value == 0.0, axis=1)
+    # a zero among others is a dead band, one alone a lost reading
+    keep = ~zero | (np.convolve(zero, np.ones(9), 'same') > 4.5)
+    t, value = t[keep], value[keep]
+    every = float(np.median(np.diff(t)))
+    place = np.searchsorted(edges, t) - 1
+    inside = (place >= 0) & (place < len(edges) - 1)
+    place, t, value = place[inside], t[inside], value[inside]
+    n = np.bincount(place, minlength=len(edges) - 1)
+    enough = n >= np.maximum(0.6 * np.diff(edges) / every, 1)
+    sums = np.stack([np.bincount(place, column, len(n)) for column in value.T], axis=1)
+    # where readings are missing the mean is of another moment
+    middle = np.bincount(place, t, len(n))[enough] / n[enough]
+    half = 0.5 * np.diff(edges)[enough]
+    return Means(middle - half, middle + half, sums[enough] / n[enough, None], n[enough])
+
+
+class Run:
+    """
+    One run as the oracle sees it.
+
+    Attributes
+    ----------
+    speed_m_s, heading_rad
+        First guesses, from the steady part.
+    quick_sd, gust_sd
+        Scatter of the log within some seconds; of the wind, None where it is not read [m/s].
+    shoal
+        Draught over depth by the echo sounder, None where it is not read.
+    measured
+        All means in one row.
+    """
+
+    def __init__(self, seen: Recording, number: int, known: Known, hull: Hull) -> None:
+        self.known, self.hull = known, hull
+        start = EPOCH_NS + round(known.clock_s[number] * 1e9)
+        seen = dict(seen)
+        if 'position_geodetic' in seen:
+            seen['position'] = _metres(seen['position_geodetic'], known)
+        lead = np.linspace(5.0 - known.lead_s, -0.01 * hull.time_s, _LEAD_BINS + 1)
+        edges = np.concatenate([lead, np.linspace(0.0, known.coast_s - 1.0, _COAST_BINS + 1)])
+        self.means = {name: _means(seen[name], start, edges) for name in _ROWS if name in seen}
+        log, place = self.means['speed_through_water'], self.means['position']
+        self.speed_m_s = float(np.mean(log.value[log.t < 0.0]))
+        before = place.value[place.t < 0.0]
+        self.heading_rad = float(np.arctan2(*(before[-1] - before[0])[::-1]))
+        self.shoal = None
+        if 'depth' in seen:
+            self.shoal = known.hull.draught_m / float(np.median(seen['depth'].value))
+        self.measured = self._row({name: means.value for name, means in self.means.items()})
+        t, readings = self._steady(seen['speed_through_water'], start)
+        step = max(1, round(5.0 / float(np.median(np.diff(t)))))
+        kept = readings[readings > 0.0]
+        around = np.convolve(np.pad(kept, step, 'edge'), np.ones(2 * step + 1), 'valid')
+        self.quick_sd = float(np.std(kept - around / (2 * step + 1)))
+        self.gust_sd = None
+        if 'wind_apparent' in seen:
+            _, wind = self._steady(seen['wind_apparent'], start)
+            self.gust_sd = float(np.sqrt(max(np.mean(np.var(wind, axis=0)) - 0.04, 0.01)))
+
+    def _steady(self, series: Series, start_ns: int) -> tuple[Array, Array]:
+        t = (series.stamp_ns - start_ns) / 1e9
+        before = t < -0.01 * self.hull.time_s
+        return t[before], series.value[before]
+
+    def predicted(self, run: Sailed) -> Array:
+        """
+        Return the row that a run would give.
+        """
+        t, track = run.t, run.track
+        curves = {
+            'speed_through_water': (t, run.log[:, None]),
+            'position': (t, run.place),
+            'heading': (track.t, track.heading_rad[:, None]),
+            'shaft': (track.t, track.shafts_rad_s[:, :1] / (2 * np.pi * track.steady[0])),
+            'wind_apparent': (track.t, track.wind_m_s),
+        }
+        found = {}
+        for name, means in self.means.items():
+            found[name] = means.of(*curves[name])
+            if name in ('shaft', 'wind_apparent'):
+                found[name][means.t < 0.0] = curves[name][1][0]
+        return self._row(found, measured=False)
+
+    def _row(self, values: dict[str, Array], measured: bool = True) -> Array:
+        parts = []
+        for name, value in values.items():
+            if name == 'position':
+                value = value @ self.frame.T
+            elif name == 'heading':
+                value = (value - self.heading_rad + np.pi) % (2 * np.pi) - np.pi
+            elif name == 'shaft' and measured:
+                value = value / np.mean(value[self.means[name].t < 0.0])
+            parts.append(value.T.ravel())
+        return np.concatenate(parts)
+
+    @cached_property
+    def frame(self) -> Array:
+        c, s = np.cos(self.heading_rad), np.sin(self.heading_rad)
+        return np.array([[c, s], [-s, c]])
+
+
+def _metres(series: Series, known: Known) -> Series:
+    latitude, longitude = known.kit.origin_deg
+    north = np.radians(series.value[:, 0] - latitude) * EARTH_M
+    east = np.radians(series.value[:, 1] - longitude) * EARTH_M * np.cos(np.radians(latitude))
+    return Series(series.stamp_ns, np.stack([east, north], axis=1), series.receive_ns)

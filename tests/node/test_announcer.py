@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the log keeps of the health: each change, once."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rclpy.logging import get_logger
+
+from shipdrag_ros.node.announcer import Announcer
+from shipdrag_ros.node.judging import Finding, Level
+
+
+def seen(name: str, level: Level, text: str, *, age_s: float | None = 0.1) -> Any:
+    """Return an input as the announcer looks at it."""
+    return SimpleNamespace(
+        topic=SimpleNamespace(name=name, age_s=age_s), finding=Finding(level, text)
+    )
+
+
+def test_an_input_that_is_worse_is_logged_once(capfd: pytest.CaptureFixture[str]) -> None:
+    announcer = Announcer(get_logger('announcer_of_a_test'))
+    well = seen('speed_through_water', Level.OK, 'receiving')
+    stuck = seen('position', Level.ERROR, 'it is stuck')
+    never = seen('depth', Level.WARN, 'no publisher', age_s=None)
+    for _ in range(3):
+        announcer.inputs([well, stuck, never])
+    lines = [line for line in capfd.readouterr().err.splitlines() if 'announcer_of_a_test' in line]
+    assert len(lines) == 1  # what was never heard, and what is well, are not said
+    assert lines[0].startswith('[WARN]')
+    assert lines[0].endswith(': position: it is stuck')
