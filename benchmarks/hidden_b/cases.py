@@ -88,7 +88,7 @@ class Truth:
 @dataclass(frozen=True)
 class Known:
     """
-    What an oracle is told of a case beside what is seen; nothing of what is hidden.
+    What an oracle knows of a case beside what is seen; nothing of what is hidden.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ def stops_ns(number: int, seed: int = SEED) -> tuple[int, ...]:
 
 def known(number: int, seed: int = SEED) -> Known:
     """
-    Return what an oracle is told of a case.
+    Return what an oracle knows of a case.
     """
     case = _case(number, seed)
     runs = case.settings

@@ -22,7 +22,8 @@ from scipy.linalg import block_diag, solve_triangular
 from hidden_b.cases import Known, Observation
 from hidden_b.effects import Hidden
 from hidden_b.hulls import Array, Hull
-from hidden_b.oracle_noise import EDDIES, HELM, Scatter, Weather, evidence, summed
+from hidden_b.oracle_evidence import EDDIES, HELM, Terms, summed
+from hidden_b.oracle_noise import Scatter
 from hidden_b.oracle_priors import SIZES, Names, drawn, free, possible, shares, would_decide
 from hidden_b.oracle_rows import Run
 from hidden_b.oracle_sail import made, run_of, sailed, stated
@@ -38,6 +39,8 @@ _STEPS = 7
 _STARTS = 3  # where the first point may be on the wrong slope
 _WORTH_NATS = 15.0  # below the best: not looked at closely
 _SPEED_SD, _COURSE_SD = 0.3, 0.2  # relative; [rad]
+_GUSTY = {'wind', 'waves'}  # what scatters more itself
+_HOPELESS = 3.0  # chi^2 over the best; more gusts will not mend that
 _DEEP = (0.0625, 0.0125)  # draught over depth where the water does not matter
 
 
@@ -278,86 +281,78 @@ class _Oracle:
 
     # evidence
 
-    def _linear(self, fit: Fit) -> tuple[Array, Array, float]:
-        """Return what is off at the middle of the prior, its slopes, and what evidence lacks."""
+    def _terms(self, fit: Fit) -> Terms:
+        """Return what the evidence of a fit is made of."""
+        around = self._scatter(fit) if set(fit.names) & _GUSTY else self.around
         off, shoals = self._residual(fit.names, fit.signs, fit.z)
         sizes = range(self.common, len(fit.z))
         slopes = self._slopes(fit.names, fit.signs, fit.z, sizes)
         slopes = np.concatenate([self.slopes, slopes], axis=1)
         whole = np.concatenate([off, [each for each, _ in shoals]]) + slopes @ fit.z
         halves = sum(size.sign for name in fit.names for size in SIZES[name])
-        less = float(np.sum(np.log([sd for _, sd in shoals] or [1.0])))
-        return whole, slopes, less + halves * np.log(2.0) - np.log(shares()[fit.names])
-
-    def _weighed(self, fit: Fit, weather: Weather) -> tuple[Fit, dict[str, float]]:
-        """Return a fit with its evidence, and the evidences with a smooth unknown beside it."""
-        parts, smooth = self._scatter(fit)
-        whole, slopes, less = self._linear(fit)
-        n, size = len(parts[0]), len(whole)
-        covariance = np.eye(size)
-        covariance[:n, :n] = summed(parts, weather)
-        covariance += slopes @ slopes.T
-        beside = {}
-        for kind, columns in smooth.items():
-            more = covariance.copy()
-            more[:n, :n] += columns @ columns.T
-            beside[kind] = evidence(more, whole) - less
-        return replace(fit, evidence=evidence(covariance, whole) - less), beside
-
-    def _weather(self, fit: Fit) -> Weather:
-        """Return how large eddies and helm are, by what explains most; unknowns are let in."""
-
-        def best(weather: Weather) -> float:
-            found, beside = self._weighed(fit, weather)
-            return max(found.evidence, *beside.values())
-
-        return max(product(EDDIES, HELM), key=best)
+        less = float(np.sum(np.log([sd for _, sd in shoals] or [1.0]))) + halves * np.log(2.0)
+        return Terms(*around, whole, slopes, less - float(np.log(shares()[fit.names])))
 
     def answer(self) -> dict[str, Any]:
         """Weigh all, and say what they come to."""
         nothing = self._climbed(Fit((), (), np.zeros(self.common), np.inf))
         begun = [fit for name in possible(self.known) for fit in self._begun((name,), {})]
         fits = [nothing, *self._all_climbed(begun, nothing.cost)]
-        weather = self._weather(min(fits, key=lambda fit: fit.cost))
-        weighed = self._worth(fits, weather)
-        best, beside = max(weighed, key=lambda each: each[0].evidence)
-        if max(beside.values()) > best.evidence:  # no name alone will do
+        weighed = self._worth(fits)
+        best, terms = max(weighed, key=lambda each: each[0].evidence)
+        if max(terms.beside(self.weather).values()) > best.evidence:  # no name alone will do
             starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
             pairs = [tuple(sorted(pair)) for pair in PAIRS if set(pair) <= starts.keys()]
             begun = [fit for pair in pairs for fit in self._begun(pair, starts)]
             fits += self._all_climbed(begun, min(fit.cost for fit in fits))
-            weather = self._weather(min(fits, key=lambda fit: fit.cost))
-            weighed = self._worth(fits, weather)
-        return self._verdict([fit for fit, _ in weighed], {id(f): more for f, more in weighed})
+            weighed = self._worth(fits)
+        return self._verdict(weighed)
 
     def _all_climbed(self, begun: Sequence[Fit], floor: float) -> list[Fit]:
         """Climb from the best on, so that the hopeless are known; one fit of each sign."""
         found: dict[tuple[Names, tuple[float, ...]], Fit] = {}
         for each in sorted(begun, key=lambda fit: fit.cost):
             fit = self._climbed(each, floor)
+            if set(fit.names) & _GUSTY and fit.cost < _HOPELESS * floor:
+                fit = self._in_its_own_weather(fit)
             kind = fit.names, fit.signs
             found[kind] = min(found.get(kind, fit), fit, key=lambda fit: fit.cost)
             floor = min(floor, fit.cost)
         return list(found.values())
 
-    def _worth(self, fits: Sequence[Fit], weather: Weather) -> list[tuple[Fit, dict[str, float]]]:
-        """Weigh what is near the best, and nothing hidden in any case."""
-        least = min(fit.cost for fit in fits) + 2.0 * _WORTH_NATS
-        return [self._weighed(fit, weather) for fit in fits if not fit.names or fit.cost < least]
+    def _in_its_own_weather(self, fit: Fit) -> Fit:
+        """Climb again, under the scatter that goes with what was found."""
+        plain = self.factor
+        self.factor = np.linalg.cholesky(summed(self._scatter(fit)[0], (EDDIES[1], HELM[1])))
+        fit = self._climbed(fit)
+        wider = float(np.sum(np.log(np.diag(self.factor) / np.diag(plain))))
+        self.factor = plain
+        return replace(fit, cost=fit.cost + 2.0 * wider)
 
-    def _verdict(
-        self, weighed: Sequence[Fit], beside: dict[int, dict[str, float]]
-    ) -> dict[str, Any]:
+    def _worth(self, fits: Sequence[Fit]) -> list[tuple[Fit, Terms]]:
+        """Weigh what is near the best, and nothing hidden in any case."""
+        near = min(fits, key=lambda fit: fit.cost)
+        calm = [fit for fit in fits if not set(fit.names) & _GUSTY]
+        self.around = self._scatter(min(calm, key=lambda fit: fit.cost))
+        self.weather = self._terms(near).weather()
+        least, found = near.cost + 2.0 * _WORTH_NATS, []
+        for fit in fits:
+            if not fit.names or fit.cost < least:
+                terms = self._terms(fit)
+                found.append((replace(fit, evidence=terms.evidence(self.weather)), terms))
+        return found
+
+    def _verdict(self, weighed: Sequence[tuple[Fit, Terms]]) -> dict[str, Any]:
         by_names: dict[Names, list[Fit]] = {}
-        for fit in weighed:
+        for fit, _ in weighed:
             by_names.setdefault(fit.names, []).append(fit)
         logs = {
             names: float(np.logaddexp.reduce([fit.evidence for fit in fits]))
             for names, fits in by_names.items()
         }
-        nothing = by_names[()][0]
+        terms = {id(fit): each for fit, each in weighed}
         odds = np.log(shares()[('unknown',)] / shares()[()])
-        kinds = beside[id(nothing)]
+        kinds = terms[id(by_names[()][0])].beside(self.weather)
         logs[('unknown',)] = odds + float(
             np.logaddexp.reduce(list(kinds.values())) - np.log(len(kinds))
         )
@@ -369,7 +364,8 @@ class _Oracle:
         names = (each for each in by_names if each)
         named = max(((chances[each], each) for each in names), default=(0.0, ()))
         best = max(by_names[named[1]], key=lambda fit: fit.evidence)
-        lacks = max(beside[id(best)].values()) > best.evidence + LACK_NATS
+        beside = terms[id(best)].beside(self.weather)
+        lacks = max(beside.values()) > best.evidence + LACK_NATS
         verdict, effects = 'one_of', []
         if chances[()] >= ALARM_BELOW:
             verdict = 'none'

@@ -9,11 +9,9 @@ means. Its sizes are those that the generator draws from, of the instruments tho
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from hidden_b.hulls import AIR, GRAVITY, Array
 from hidden_b.kit import Kit
@@ -27,12 +25,7 @@ _SHAFT_SD = 0.01  # of the revs over those before the stop
 _GUST_LEAST = 0.26  # [m/s], root mean square of what is drawn, gusts of light air in it
 _GUST_SHARE = 0.19  # of the wind
 _SIDES = 0.88  # of a gust along the wind and one across, root mean square
-EDDIES = (0.055, 0.1, 0.185)  # percent of the speed: middles of thirds of what is drawn
-HELM = (0.35, 0.65)  # degrees: of halves
 OUTSIDE = ('force, quick', 'force, slow', 'force and helm', 'log', 'gyro')
-
-
-Weather = tuple[float, float]  # sizes of eddies and of helm
 
 
 class Scatter:
@@ -373,19 +366,3 @@ def _fixes(place: Array, kit: Kit) -> tuple[Array, Array]:
         right += -(across * away)[:, None] * side
     scatter = np.linalg.inv(normal)
     return np.einsum('nij,nj->ni', scatter, right), scatter
-
-
-def summed(parts: Sequence[Array], weather: Weather) -> Array:
-    """
-    Return the covariance of a row in a weather, of its parts.
-    """
-    return parts[0] + weather[0] ** 2 * parts[1] + weather[1] ** 2 * parts[2]
-
-
-def evidence(covariance: Array, off: Array) -> float:
-    """
-    Return the logarithm of the evidence, but for a constant.
-    """
-    factor = np.linalg.cholesky(covariance)
-    white = solve_triangular(factor, off, lower=True, check_finite=False)
-    return -0.5 * float(white @ white) - float(np.sum(np.log(np.diag(factor))))

@@ -13,7 +13,8 @@ from hidden_b.hulls import Array, Hull
 from hidden_b.instruments import EARTH_M, Recording, Series
 from hidden_b.oracle_sail import Sailed
 
-_LEAD_BINS, _COAST_BINS = 10, 40
+_BINS = (10, 40)  # of the steady part and of the rest
+_COARSE = (4, 16)  # of what is measured beside the motion
 _ROWS = ('speed_through_water', 'position', 'heading', 'shaft', 'wind_apparent')
 
 
@@ -95,9 +96,12 @@ class Run:
         seen = dict(seen)
         if 'position_geodetic' in seen:
             seen['position'] = _metres(seen['position_geodetic'], known)
-        lead = np.linspace(5.0 - known.lead_s, -0.01 * hull.time_s, _LEAD_BINS + 1)
-        edges = np.concatenate([lead, np.linspace(0.0, known.coast_s - 1.0, _COAST_BINS + 1)])
-        self.means = {name: _means(seen[name], start, edges) for name in _ROWS if name in seen}
+        self.means = {}
+        for name in (name for name in _ROWS if name in seen):
+            before, after = _BINS if name in _ROWS[:2] else _COARSE
+            lead = np.linspace(5.0 - known.lead_s, -0.01 * hull.time_s, before + 1)
+            edges = np.concatenate([lead, np.linspace(0.0, known.coast_s - 1.0, after + 1)])
+            self.means[name] = _means(seen[name], start, edges)
         log, place = self.means['speed_through_water'], self.means['position']
         self.speed_m_s = float(np.mean(log.value[log.t < 0.0]))
         before = place.value[place.t < 0.0]

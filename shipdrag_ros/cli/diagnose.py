@@ -15,6 +15,7 @@ from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis import DiagnosisResult, Verdict, with_effects
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.earlier_file import read_earlier
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import words as estimate_words
@@ -71,6 +72,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f'{usage()}; evidence that is wrong with probability RATE (default {RATE:g}). What is '
         'known of one run stands in run.yaml beside its bag, or in BAG.run.yaml',
     )
+    parser.add_argument(
+        '--earlier',
+        type=Path,
+        action='append',
+        default=[],
+        metavar='FILE',
+        help='what `diagnose --json FILE` wrote of earlier runs of the ship, again for each: '
+        'what was found of hull and instruments counts, less the longer ago it was; water and '
+        'weather do not',
+    )
     add_remap(parser)
     add_json(parser)
 
@@ -85,8 +96,9 @@ def run(options: argparse.Namespace) -> int:
     runs = open_windowed(options.bags, remap=dict(options.remap), window=window, output=output)
     refuse_overlaps(runs)
     facts = _facts(options.fact)
+    earlier = [read_earlier(path) for path in options.earlier]
     with stages(output) as progress:
-        found, ship = diagnose_runs(output, runs, given, facts, progress)
+        found, ship = diagnose_runs(output, runs, given, facts, earlier=earlier, progress=progress)
     if ship is None and options.write is not None:
         raise DiagnosisError(
             f'no ship file is attached to {runs[0].run.name!r}, and --write needs one; give it '
@@ -104,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'ship file with the effect in {options.write}')
     elif options.write is not None:
         output.log(f'nothing is named, so {options.write} is not written')
-    output.json(diagnose_json.document(found))
+    output.json(diagnose_json.document(found, ship))
     return 0
 
 
@@ -130,7 +142,8 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     output.say(diagnosis_words.examined(found))
     if found.where is not None:
         output.say(f'Model and data disagree {diagnosis_words.place(found)}.')
-    for line in (*diagnosis_words.facts(found), *found.notes):
+    weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))
+    for line in (*weighed, *found.notes):
         output.say(line)
     output.heading('How probable')
     output.table(diagnosis_cells.probabilities(found))

@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
+from shipdrag_ros.ship import Ship
 
 
-def document(found: DiagnosisResult) -> dict[str, Any]:
+def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
     """
     Return the document of a diagnosis.
 
@@ -65,6 +68,29 @@ def document(found: DiagnosisResult) -> dict[str, Any]:
             }
             for each in found.facts
         ],
+        'ship': None
+        if ship is None
+        else {
+            'name': ship.name,
+            'length_m': ship.length_m,
+            'effects': [effect.name for effect in ship.effects],
+        },
+        'runs': _runs(found.runs),
+        'earlier': [_earlier(each) for each in found.earlier],
+    }
+
+
+def _runs(runs: Sequence[SeenRun]) -> list[dict[str, Any]]:
+    return [{'bag': run.name, 'time_ns': run.time_ns} for run in runs]
+
+
+def _earlier(given: WeighedEarlier) -> dict[str, Any]:
+    return {
+        'file': given.name,
+        'used': given.used,
+        'runs': _runs((*given.runs, *given.before)),
+        'effects': [{**asdict(each), 'contradicted': each.contradicted} for each in given.effects],
+        'unused': list(given.unused),
     }
 
 

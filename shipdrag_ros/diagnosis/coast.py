@@ -16,6 +16,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from shipdrag_ros.diagnosis.carried import Carried
 from shipdrag_ros.diagnosis.coast_terms import (
     BaselineTerm,
     ForceTerm,
@@ -32,7 +33,7 @@ from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.rows import LOG
-from shipdrag_ros.parameter import Parameter, Shape
+from shipdrag_ros.parameter import Parameter, Shape, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
@@ -52,9 +53,12 @@ class CoastModel(CoastSimulation):
     ----------
     facts
         Of the log book; None: none are stated.
+    earlier
+        Diagnoses of the ship; None: none are known.
     """
 
     facts: Facts | None = None
+    earlier: Carried | None = None
 
     # each iteration is a simulation
     iterations: ClassVar[int] = 16
@@ -91,10 +95,10 @@ class CoastModel(CoastSimulation):
             EffectTerm(
                 find(effect.name),
                 ship,
-                gaussian=tuple(
-                    (effect.parameters[q.name].value, effect.parameters[q.name].sd)
+                given=tuple(
+                    normal(effect.parameters[q.name].sd, mean=effect.parameters[q.name].value)
                     if q.name in effect.parameters
-                    else (np.nan_to_num(q.of(ship).value), 0.0)
+                    else normal(0.0, mean=float(np.nan_to_num(q.of(ship).value)))
                     for q in find(effect.name).parameters
                 ),
                 stated=True,
@@ -103,18 +107,20 @@ class CoastModel(CoastSimulation):
         ]
         log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES) + _SWINGING))
         found = Hypothesis((), (baseline, *given), places, log_prior=log_prior)
-        return replace(found, log_prior=log_prior + self._log_facts(found))
+        return replace(found, log_prior=log_prior + self._log_evidence(found))
 
-    def _log_facts(self, hypothesis: Hypothesis) -> float:
-        """Return the log probability that the facts are stated; they are evidence, no prior."""
-        return 0.0 if self.facts is None else self.facts.log_likelihood(hypothesis)
+    def _log_evidence(self, hypothesis: Hypothesis) -> float:
+        """Return the log evidence of facts and of earlier diagnoses; it is no prior."""
+        facts = 0.0 if self.facts is None else self.facts.log_likelihood(hypothesis)
+        return facts + (0.0 if self.earlier is None else self.earlier.log_weight(hypothesis))
 
     def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
         """
         Return a hypothesis with one effect more, in the ways that it may be there.
 
-        They differ in where a fit begins, in what is a choice, in signs, and in which run
-        an effect of a single run was.
+        They differ in where a fit begins, in what is a choice, in signs, in which run
+        an effect of a single run was, and in whether it is as an earlier diagnosis found it,
+        which comes last.
 
         Parameters
         ----------
@@ -136,9 +142,8 @@ class CoastModel(CoastSimulation):
         words = list(product(*((q.prior.first, q.prior.second) for q in choices)))
         runs = scope_runs(effect, len(self.seen))
         ways = len(words) * len(signs) * len(runs)
-        found = []
-        for start, word, sign, run in product(starts, words, signs, runs):
-            term = EffectTerm(
+        terms = [
+            EffectTerm(
                 effect,
                 self.bare,
                 start,
@@ -146,15 +151,27 @@ class CoastModel(CoastSimulation):
                 signs=_named(signed, sign),
                 only_run=run,
             )
-            sd = effect.formula_sd
-            errors = (ModelErrorTerm(term, sd),) if sd > 0.0 else ()
-            log_odds = math.log(effect.odds)
-            more = base.with_effect(
-                effect.name, term, log_odds=log_odds, ways=ways, model_errors=errors
-            )
-            by_facts = self._log_facts(more) - self._log_facts(base)
-            found.append(replace(more, log_prior=more.log_prior + by_facts))
+            for start, word, sign, run in product(starts, words, signs, runs)
+        ]
+        found = [self._with_term(base, term, ways) for term in terms]
+        kept = () if self.earlier is None else self.earlier.kept(effect.name)
+        if kept:
+            term = EffectTerm(effect, self.bare, given=kept, kept=True)
+            found.append(self._with_term(base, term, 1))
         return found
+
+    def _with_term(self, base: Hypothesis, term: EffectTerm, ways: int) -> Hypothesis:
+        """Return a hypothesis with one effect more, in one of so many ways."""
+        sd = term.effect.formula_sd
+        more = base.with_effect(
+            term.effect.name,
+            term,
+            log_odds=math.log(term.effect.odds),
+            ways=ways,
+            model_errors=(ModelErrorTerm(term, sd),) if sd > 0.0 else (),
+        )
+        gained = self._log_evidence(more) - self._log_evidence(base)
+        return replace(more, log_prior=more.log_prior + gained)
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """

@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from shipdrag_ros.diagnosis.advice import advice
+from shipdrag_ros.diagnosis.carried import carried
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
+from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
@@ -22,6 +24,7 @@ from shipdrag_ros.diagnosis.result import (
     Where,
 )
 from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
+from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.swinging import swing_notes, swinging, with_swinging
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
@@ -44,6 +47,7 @@ def diagnose(
     parameters: Parameters,
     *,
     facts: Sequence[Fact] = (),
+    earlier: Sequence[EarlierDiagnosis] = (),
     advise: bool = True,
     progress: Progress = silent,
 ) -> DiagnosisResult:
@@ -60,6 +64,8 @@ def diagnose(
         For the noise of the sensors and the convention of the heading.
     facts
         That a log book knows of all runs, whatever the ship file and the runs say.
+    earlier
+        Diagnoses of runs of before; what they found of hull and instruments counts.
     advise
         Whether to work out what would decide, which takes as long as all the rest.
     progress
@@ -73,7 +79,8 @@ def diagnose(
     Raises
     ------
     DiagnosisError
-        If the ship has no baseline, or no run enough steady record.
+        If the ship has no baseline, or no run enough steady record, or an earlier
+        diagnosis is of another ship, of later runs or of one of these.
     EstimationError
         If no run has enough samples.
 
@@ -106,7 +113,7 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    model, found, stated, notes = _searched(runs, ship, parameters, facts, progress)
+    model, found, stated, notes = _searched(runs, ship, parameters, facts, earlier, progress)
     seen = model.seen
     found = with_swinging(found, model)
     found = with_pairs(with_differing(found, model), progress=progress)
@@ -145,6 +152,8 @@ def diagnose(
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
         facts=stated.weighed(judged.posterior, [run.name for run in seen]),
         runs_differ=differ,
+        runs=_seen_runs(seen),
+        earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
     )
 
 
@@ -153,6 +162,7 @@ def _searched(
     ship: Ship,
     parameters: Parameters,
     facts: Sequence[Fact],
+    earlier: Sequence[EarlierDiagnosis],
     progress: Progress,
 ) -> tuple[CoastModel, SearchResult, Facts, tuple[str, ...]]:
     """Search, and see the runs anew where that moves their stops; notes on them besides."""
@@ -160,7 +170,8 @@ def _searched(
     for _ in range(_LOOKS):
         seen, notes = _observed(runs, ship, parameters, moved_s, progress)
         stated = _stated(runs, seen, ship, facts)
-        model = CoastModel(ship, seen, seen[0].heading_rad, stated)
+        before = carried(earlier, ship, _seen_runs(seen), stated)
+        model = CoastModel(ship, seen, seen[0].heading_rad, stated, before)
         found = search(model, progress=progress)
         more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
@@ -174,9 +185,14 @@ def _stated(
 ) -> Facts:
     """Gather what is stated of the runs that are diagnosed."""
     own = {run.name: run.facts for run in runs}
+    return stated_facts(ship, [(own[run.name], run.time_ns) for run in _seen_runs(seen)], facts)
+
+
+def _seen_runs(seen: Sequence[Observation]) -> tuple[SeenRun, ...]:
+    """Return names and stops of the runs that are diagnosed."""
     stops = [run.context.stop for run in seen]
     at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
-    return stated_facts(ship, [(own[run.name], ns) for run, ns in zip(seen, at_ns)], facts)
+    return tuple(SeenRun(run.name, ns) for run, ns in zip(seen, at_ns))
 
 
 def _has_both(run: Observation) -> bool:

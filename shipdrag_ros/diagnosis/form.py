@@ -172,8 +172,7 @@ class FormModel(DirectModel):
             return []
         term: Part = self._force
         if not self._is_force(effect):
-            gaussian = ((0.0, _OFFSET_SD * self._top_m_s),)
-            term = EffectTerm(effect, self.ship, gaussian=gaussian)
+            term = EffectTerm(effect, self.ship, given=(normal(_OFFSET_SD * self._top_m_s),))
         log_odds = math.log(_ONE / len(self.effects) / _NOTHING)
         return [base.with_effect(effect.name, term, log_odds=log_odds)]
 

@@ -161,7 +161,7 @@ def mode_of(hypothesis: Hypothesis) -> tuple[object, ...]:
         To be compared; where a fit begins is no part of it.
     """
     ways = [
-        (term.effect.name, term.fixed, term.signs, str(term.only_run), term.sizes)
+        (term.effect.name, term.fixed, term.signs, str(term.only_run), term.sizes, term.kept)
         for term in hypothesis.terms
         if isinstance(term, EffectTerm)
     ]

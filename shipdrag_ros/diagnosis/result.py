@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+from shipdrag_ros.diagnosis.seen_runs import DOUBTED, SeenRun, WeighedEarlier
 from shipdrag_ros.display import Table
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameter import Parameter
@@ -15,7 +16,6 @@ from shipdrag_ros.ship.facts import Fact
 
 FORCE = 'force'  # on the ship, against her baseline
 LOG_TRACK = 'log_track'  # the log against the way over ground
-DOUBTED = 0.5  # probability that a fact is wrong, from which the data contradict it
 
 
 class Verdict(StrEnum):
@@ -271,6 +271,10 @@ class DiagnosisResult:
     runs_differ
         Where one state of the hull does not fit all runs: the size in each. The
         effects above have that of the last run.
+    runs
+        That it rests on.
+    earlier
+        Diagnoses of before that were given, with what of each counts.
     """
 
     verdict: Verdict
@@ -294,6 +298,8 @@ class DiagnosisResult:
     facts: tuple[WeighedFact, ...] = ()
     runs_differ: tuple[RunSize, ...] = ()
     estimates: tuple[Estimate, ...] = ()
+    runs: tuple[SeenRun, ...] = ()
+    earlier: tuple[WeighedEarlier, ...] = ()
 
     def summary(self) -> tuple[str, ...]:
         """
@@ -309,7 +315,8 @@ class DiagnosisResult:
         where = '' if self.where is None else f'Model and data disagree {words.place(self)}.'
         first = (self.no_coastdown, words.sentence(self), words.differing(self))
         lines = (*first, words.examined(self), where)
-        return (*filter(None, lines), *words.facts(self), *self.notes)
+        more = (*words.facts(self), *words.earlier(self), *self.notes)
+        return (*filter(None, lines), *more)
 
     def table(self) -> Table:
         """

@@ -19,8 +19,8 @@ import numpy as np
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
 from shipdrag_ros.diagnosis.posterior import QUIET, Posterior, mode_of, posterior_of
-from shipdrag_ros.diagnosis.terms import trial_z
-from shipdrag_ros.parameter import Parameter, Shape
+from shipdrag_ros.diagnosis.terms import EffectTerm, trial_z
+from shipdrag_ros.parameter import Shape
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effects import find
@@ -146,8 +146,7 @@ def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -
     (hypotheses,)
         With the prior, less the constant that `Fit.log_evidence` leaves out.
     """
-    first = [hypothesis.terms[-1].unknowns[0] for hypothesis in hypotheses]
-    mean, precision = np.array([_amount(unknown) for unknown in first]).T
+    mean, precision = np.array([_amount(hypothesis.terms[-1]) for hypothesis in hypotheses]).T
     responses = model.responses(base.best, hypotheses)
     tables = np.hstack(base.best.tables)
     matrix, _ = base.best.normal_equations
@@ -163,8 +162,12 @@ def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -
     return found
 
 
-def _amount(first: Parameter) -> tuple[float, float]:
+def _amount(term: EffectTerm) -> tuple[float, float]:
     """Return mean and precision of the size, in parts of that which is tried."""
+    first = term.unknowns[0]
+    if term.kept:
+        tried = first.prior.at(trial_z(first))
+        return first.prior.at(0.0) / tried, (tried / first.prior.slope(0.0)) ** 2
     if first.prior.shape is Shape.HALF_NORMAL or first.start == 0.0:
         return 0.0, trial_z(first) ** 2
     return 1.0, 1.0 / _AMOUNT_SD**2

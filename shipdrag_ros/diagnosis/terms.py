@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import BSpline
 
-from shipdrag_ros.parameter import Parameter, Prior, Shape, half_normal, normal
+from shipdrag_ros.parameter import Parameter, Prior, Shape, half_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action
@@ -60,12 +60,14 @@ class EffectTerm:
         Of parameters that have either, by name.
     only_run
         Where an effect of a single run is looked for; None: in all runs.
-    gaussian
-        Mean and sd of each parameter [SI], in place of the priors of the effect.
+    given
+        Priors of its parameters [SI], in place of those of the effect.
     stated
         Whether it is part of the model as its file states it, and no hypothesis.
     sizes
         Number of runs, of which each has a size of its own; 1: one for all.
+    kept
+        Whether the sizes that are given are those of an earlier diagnosis.
     """
 
     effect: Effect
@@ -74,18 +76,19 @@ class EffectTerm:
     fixed: tuple[tuple[str, float], ...] = ()
     signs: tuple[tuple[str, float], ...] = ()
     only_run: int | None = None
-    gaussian: tuple[tuple[float, float], ...] = ()
+    given: tuple[Prior, ...] = ()
     stated: bool = False
     sizes: int = 1
+    kept: bool = False
 
     @cached_property
     def unknowns(self) -> tuple[Parameter, ...]:
         """Its parameters, without those that are fixed."""
         parameters = self.effect.parameters_of(self.ship)
-        if self.gaussian:
+        if self.given:
             return tuple(
-                replace(one, prior=normal(sd, mean=mean))
-                for one, (mean, sd) in zip(parameters, self.gaussian, strict=True)
+                replace(one, prior=prior)
+                for one, prior in zip(parameters, self.given, strict=True)
             )
         free = [one for one in parameters if one.name not in dict(self.fixed)]
         starts = self.starts or (0.0,) * len(free)
@@ -109,7 +112,8 @@ class EffectTerm:
         """Places of components, which may have either sign: where one is small, so are all."""
         free = [q for q in self.effect.parameters if q.name not in dict(self.fixed)]
         found = [i for i, q in enumerate(free) if q.prior.shape is Shape.NORMAL]
-        return () if self.stated or self.sizes > 1 or len(found) < 2 else found
+        single = self.stated or self.kept or self.sizes > 1 or len(found) < 2
+        return () if single else found
 
     def acts_in(self, run: int) -> bool:
         """Say whether it does anything in a run."""

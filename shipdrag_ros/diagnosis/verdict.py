@@ -199,7 +199,7 @@ def outside_prior(fit: Fit) -> bool:
     return any(
         abs(float(fit.best.z[place + i])) > _SHAPE_SD
         for part, place in fit.hypothesis.parts
-        if isinstance(part, EffectTerm) and not part.stated
+        if isinstance(part, EffectTerm) and not part.stated and not part.kept
         for i, unknown in enumerate(part.unknowns)
         if unknown.name != part.effect.parameters[0].name and i not in part.one_size
     )

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from shipdrag_ros.diagnosis import (
@@ -14,7 +14,8 @@ from shipdrag_ros.diagnosis import (
     EffectEstimate,
     Verdict,
 )
-from shipdrag_ros.display import M_S_PER_KNOT, plus_minus
+from shipdrag_ros.diagnosis.seen_runs import WeighedEarlier
+from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -136,6 +137,40 @@ def facts(found: DiagnosisResult) -> list[str]:
                 'the way over ground.'
             )
     return lines
+
+
+def earlier(found: DiagnosisResult) -> list[str]:
+    """
+    Say what earlier diagnoses count for, and what these runs make of it, a line each.
+    """
+    return [line for each in found.earlier for line in _earlier(each)]
+
+
+def _earlier(given: WeighedEarlier) -> Iterator[str]:
+    first, last = (utc(f(run.time_ns for run in given.runs)) for f in (min, max))
+    when = f'{first} to {last}' if first != last else first
+    if not given.used:
+        yield (
+            f'The earlier diagnosis {given.name} ({when}) is not used: it counts for coastdowns '
+            'that are held against a stated baseline.'
+        )
+        return
+    counts = '; '.join(
+        f'{names_text([each.name])} was {probability(each.probability)} probable, lasts until now '
+        f'with {probability(each.stays)}, and is {probability(each.now)} probable with these runs'
+        for each in given.effects
+    )
+    nothing = 'it found nothing of hull or instruments, which speaks a little against any'
+    yield f'The earlier diagnosis {given.name} ({when}) counts: {counts or nothing}.'
+    for each in given.effects:
+        if each.contradicted:
+            yield (
+                f'These runs contradict the earlier diagnosis {given.name}: '
+                f'{names_text([each.name])} is {probability(each.now)} probable now. It was '
+                'repaired, cleaned or set anew since, or one of the two is wrong; look which.'
+            )
+    for line in given.unused:
+        yield f'Not used of the earlier diagnosis {given.name}: {line}.'
 
 
 def advice(found: DiagnosisResult) -> list[str]:

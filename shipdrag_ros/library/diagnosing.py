@@ -16,7 +16,9 @@ from shipdrag_ros.diagnosis import (
     diagnose_fitted,
     diagnose_sailing,
 )
+from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.result import Verdict, WeighedFact
+from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.errors import DiagnosisError, ShipdragError
 from shipdrag_ros.estimation.result import Estimate
@@ -56,6 +58,8 @@ def diagnose_runs(
     runs: Sequence[WindowedRun],
     given: Ship | None,
     facts: Sequence[Fact],
+    *,
+    earlier: Sequence[EarlierDiagnosis] = (),
     progress: Progress = silent,
 ) -> tuple[DiagnosisResult, Ship | None]:
     """
@@ -71,6 +75,8 @@ def diagnose_runs(
         The ship; None: the one attached to the first run that has one.
     facts
         Of all runs.
+    earlier
+        Diagnoses of earlier runs of the ship.
     progress
         Called with each stage, how much of it is done, and of how much.
 
@@ -84,47 +90,67 @@ def diagnose_runs(
     BagError
         If no ship is given, and the runs are of several.
     DiagnosisError
-        If neither a coastdown nor the log and the track can be examined.
+        If neither a coastdown nor the log and the track can be examined, or an earlier
+        diagnosis is of another ship, of later runs or of one of these.
     """
     if given is None:
         refuse_two_ships((run, None) for run, _ in runs)
     windowed = any(window is not None for _, window in runs)
     if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
         why = 'without a ship file none is looked for; give one with --ship FILE'
-        return _unused(_sailing(runs, f'No coastdown was found: {why}.', progress), facts), None
+        sailing = _sailing(runs, f'No coastdown was found: {why}.', progress)
+        return _unused(sailing, facts, earlier), None
     seen = _found(listener, runs, given, progress)
     found: DiagnosisResult | None = None
     try:
-        found = _of_coastdowns(runs, seen, facts, progress)
+        found = _of_coastdowns(runs, seen, facts, earlier, progress)
     except DiagnosisError:
         if not seen.whole:
             raise
     if found is not None and seen.whole and found.verdict is Verdict.NAMED:
         found = replace(found, notes=(*found.notes, *seen.notes, _APART))
     elif found is None or seen.whole:
-        found = _of_whole_glides(found, seen, facts, progress)
+        found = _of_whole_glides(found, seen, facts, earlier, progress)
     return found, seen.ship
 
 
 def _of_coastdowns(
-    runs: Sequence[WindowedRun], seen: _Coastdowns, facts: Sequence[Fact], progress: Progress
+    runs: Sequence[WindowedRun],
+    seen: _Coastdowns,
+    facts: Sequence[Fact],
+    earlier: Sequence[EarlierDiagnosis],
+    progress: Progress,
 ) -> DiagnosisResult:
     """Diagnose the coastdowns, or log and track alone where there is none."""
     if not seen.coasts:
         log_track = _sailing(runs, seen.no_coastdown, progress)
-        return _unused(log_track, (*seen.ship.facts, *facts))
+        return _unused(log_track, (*seen.ship.facts, *facts), earlier)
     if seen.ship.baseline is None:
         progress('fitting a form of the resistance', 0, 0)
-        found = _unused(diagnose_fitted(seen.coasts, seen.ship), (*seen.ship.facts, *facts))
+        found = diagnose_fitted(seen.coasts, seen.ship)
         found = _with_log_track(found, runs, progress)
+        found = _unused(found, (*seen.ship.facts, *facts), earlier)
+        at = tuple(SeenRun(coast.name, coast.window.start_ns) for coast in seen.coasts)
+        found = replace(found, runs=at)
     else:
-        found = diagnose(seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress)
+        found = diagnose(
+            seen.coasts,
+            seen.ship,
+            seen.parameters,
+            facts=facts,
+            earlier=earlier,
+            progress=progress,
+        )
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates)
 
 
 def _of_whole_glides(
-    found: DiagnosisResult | None, seen: _Coastdowns, facts: Sequence[Fact], progress: Progress
+    found: DiagnosisResult | None,
+    seen: _Coastdowns,
+    facts: Sequence[Fact],
+    earlier: Sequence[EarlierDiagnosis],
+    progress: Progress,
 ) -> DiagnosisResult:
     """
     Diagnose with the parts that are no coastdown though no instrument shows why.
@@ -132,7 +158,14 @@ def _of_whole_glides(
     Where these show nothing either, what the coastdowns show stands.
     """
     try:
-        whole = diagnose(seen.whole, seen.ship, seen.parameters, facts=facts, progress=progress)
+        whole = diagnose(
+            seen.whole,
+            seen.ship,
+            seen.parameters,
+            facts=facts,
+            earlier=earlier,
+            progress=progress,
+        )
     except ShipdragError as error:  # a glide that is like none may not be followed
         if found is None:
             raise DiagnosisError(f'{"; ".join(seen.notes)}; diagnosed whole: {error}') from error
@@ -161,9 +194,15 @@ def _with_log_track(
         return replace(found, notes=(*found.notes, why))
 
 
-def _unused(found: DiagnosisResult, facts: Sequence[Fact]) -> DiagnosisResult:
-    """Say of facts that they were stated and not used."""
-    return replace(found, facts=tuple(WeighedFact(fact, '', None) for fact in overriding(facts)))
+def _unused(
+    found: DiagnosisResult, facts: Sequence[Fact], earlier: Sequence[EarlierDiagnosis]
+) -> DiagnosisResult:
+    """Say of facts and of earlier diagnoses that they were given and not used."""
+    return replace(
+        found,
+        facts=tuple(WeighedFact(fact, '', None) for fact in overriding(facts)),
+        earlier=tuple(WeighedEarlier(each.name, each.runs, used=False) for each in earlier),
+    )
 
 
 def _sailing(
@@ -176,8 +215,10 @@ def _sailing(
         read.append((run.name, *accepted_samples(run, zeros=True)))
     progress('holding the log against the way over ground', 0, 0)
     records = [SailingRecord(name, block) for name, block, _ in read]
+    at = tuple(SeenRun(run.name, run.span_ns[0]) for run, _ in runs if run.span_ns)
     try:
-        return diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
+        found = diagnose_sailing(records, read[0][2], no_coastdown=no_coastdown)
+        return replace(found, runs=at)
     except DiagnosisError as error:
         said = f'{no_coastdown} Log and track: {error}' if no_coastdown else str(error)
         raise DiagnosisError(said) from error

@@ -18,6 +18,8 @@ from shipdrag_ros.diagnosis import (
     with_effects,
 )
 from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
+from shipdrag_ros.diagnosis.earlier_file import read_earlier
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.library.diagnosing import diagnose_runs
@@ -224,12 +226,20 @@ def _first(found: DiagnosisResult) -> str:
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 
 
+def _earlier(given: str | PathLike[str] | Diagnosis, place: int) -> EarlierDiagnosis:
+    """Take a diagnosis of before, or read one."""
+    if isinstance(given, Diagnosis):
+        return EarlierDiagnosis.of(given.found, given.ship, name=f'earlier diagnosis {place}')
+    return read_earlier(given)
+
+
 @says_it_in_python
 def diagnose(
     records: Record | Sequence[Record],
     *,
     ship: Ship | None = None,
     facts: Sequence[str] = (),
+    earlier: Sequence[str | PathLike[str] | Diagnosis] | str | PathLike[str] | Diagnosis = (),
     window: WindowSpan | None = None,
 ) -> Diagnosis:
     """
@@ -244,6 +254,10 @@ def diagnose(
         To hold them against; None: that of the records.
     facts
         What a log book knows of all runs: `no_towed_cable`, `shaft=locked`.
+    earlier
+        Diagnoses of earlier runs of the ship: what this function returned, or JSON files
+        that `shipdrag diagnose` wrote. What they found of hull and instruments counts,
+        less the longer ago it was; water and weather do not.
     window
         Begin and end of the coastdown [s from the start of each run], instead of
         looking for one.
@@ -258,7 +272,8 @@ def diagnose(
     BagError
         If the same part of a recording is given twice, or the runs are of two ships.
     DiagnosisError
-        If neither a coastdown nor the log and the track can be examined.
+        If neither a coastdown nor the log and the track can be examined, or an earlier
+        diagnosis is of another ship, of later runs or of one of these.
     ShipFileError
         If a fact or an attached ship file cannot be used.
 
@@ -284,5 +299,7 @@ def diagnose(
     given: Sequence[Fact] = [
         parse_fact(text) for text in ([facts] if isinstance(facts, str) else facts)
     ]
-    found, used = diagnose_runs(listener, runs, ship or parts[0].given, given)
+    before = [earlier] if isinstance(earlier, str | PathLike | Diagnosis) else earlier
+    known = [_earlier(each, place) for place, each in enumerate(before, start=1)]
+    found, used = diagnose_runs(listener, runs, ship or parts[0].given, given, earlier=known)
     return Diagnosis(found, used, tuple(listener.lines))

@@ -20,7 +20,7 @@ from shipdrag_ros.importing import formats
 P = ParamSpec('P')
 R = TypeVar('R')
 
-_ARGUMENTS = {'window', 'remap', 'ship', 'fact', 'map', 'time', 'rate'}
+_ARGUMENTS = {'window', 'remap', 'ship', 'fact', 'earlier', 'map', 'time', 'rate'}
 """Options that the functions take as arguments of their own."""
 _PLAIN = {'and', 'or', 'where', 'with', 'otherwise', 'chooses'}  # no value of an option
 _VALUE = r"((?:'[^']*'|,(?=\S)|[^\s;()'\"`,])+)"

@@ -119,6 +119,7 @@ class Said:
 
 
 DENIES = Said()
+DAY_S = 86400.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,6 +159,9 @@ class Effect:
         Whether it can be where positions are latitude and longitude.
     facts
         What facts of the log book say of it, by name of the fact.
+    lasts_s
+        Time in which it goes unseen, to 1 - 1/e: repaired, cleaned, set anew [s]. 0:
+        of its run or its day, so that it says nothing of another.
     """
 
     name: str
@@ -176,6 +180,7 @@ class Effect:
     without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)
     in_geodetic: bool = True
     facts: Mapping[str, Said] = field(default_factory=dict)
+    lasts_s: float = 0.0
 
     def goes_with(self, other: Effect) -> bool:
         """

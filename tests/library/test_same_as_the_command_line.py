@@ -12,6 +12,15 @@ import shipdrag_ros as sd
 from shipdrag_ros.cli import diagnose_json, main, replay_json
 from shipdrag_ros.cli.output import json_text
 
+SCALE = {'name': 'log_scale', 'parameters': {'factor': {'value': -0.14, 'sd': 0.02}}}
+THEN = {
+    'candidates': [{'names': ['log_scale'], 'probability': 0.95, 'effects': [SCALE]}],
+    'baseline': 'stated',
+    'ship': {'name': 'Vitus Bering', 'length_m': 150.0, 'effects': []},
+    'runs': [{'bag': 'then.mcap', 'time_ns': 1_777_600_000_000_000_000}],
+    'earlier': [],
+}
+
 
 def test_simulated_readings_and_truth(record: sd.Record, tmp_path: Path) -> None:
     ship, out = tmp_path / 'ship.yaml', tmp_path / 'cli.mcap'
@@ -45,10 +54,25 @@ def test_estimates_of_a_window(bag: Path, tmp_path: Path) -> None:
 
 def test_a_diagnosis(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / 'diagnose.json'
-    line = ['diagnose', str(bag), '--fact', 'no_towed_cable', f'--json={out}']
-    assert main(line) == 0
-    found = sd.diagnose(sd.read(bag), facts=['no_towed_cable'])
-    assert json_text(diagnose_json.document(found.found)) == out.read_text()
+    then = tmp_path / 'then.json'
+    then.write_text(json.dumps(THEN))
+    line = ['diagnose', str(bag), '--fact', 'no_towed_cable', '--earlier', str(then)]
+    assert main([*line, f'--json={out}']) == 0
+    found = sd.diagnose(sd.read(bag), facts=['no_towed_cable'], earlier=then)
+    assert json_text(diagnose_json.document(found.found, found.ship)) == out.read_text()
     printed = capsys.readouterr().out
     assert found.summary()[0] in printed
-    assert json.loads(out.read_text())['verdict'] == found.verdict
+    answer = json.loads(out.read_text())
+    assert answer['verdict'] == found.verdict
+    # what is needed to be given to the next one
+    assert answer['ship'] == {'name': 'Vitus Bering', 'length_m': 150.0, 'effects': []}
+    assert [run['bag'] for run in answer['runs']] == [str(bag)]
+    (counted,) = answer['earlier']
+    assert (counted['file'], counted['used']) == (str(then), True)
+    assert [each['name'] for each in counted['effects']] == ['log_scale']
+    assert f'The earlier diagnosis {then} (2026-05-01' in printed
+    with pytest.raises(sd.ShipdragError, match='counts here already'):
+        sd.diagnose(sd.read(bag), earlier=[found])
+    then.write_text('[')
+    assert main(line) == 1
+    assert f'ERROR: {then}: not JSON' in capsys.readouterr().err

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, half_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Scope
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Scope
 
 
 def _act(frame: Frame, n_r_change: float) -> Action:
@@ -32,4 +32,5 @@ EFFECT = Effect(
     odds=0.01,
     act=_act,
     confounders={'displacement': ()},
+    lasts_s=90.0 * DAY_S,
 )

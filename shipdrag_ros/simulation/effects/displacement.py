@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import DENIES, Effect, Frame, Scope
+from shipdrag_ros.simulation.effect import DAY_S, DENIES, Effect, Frame, Scope
 
 
 def _act(frame: Frame, fraction: float) -> Action:
@@ -31,4 +31,5 @@ EFFECT = Effect(
     odds=0.01,
     act=_act,
     facts={'draughts_read': DENIES},
+    lasts_s=90.0 * DAY_S,
 )

@@ -6,7 +6,7 @@ from __future__ import annotations
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Said, Scope
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Measure, Said, Scope
 from shipdrag_ros.simulation.hydrodynamics import friction_n
 
 _FOULS_S = 2.0 * 365.25 * 86400.0  # until a clean hull is fouled, mostly
@@ -44,4 +44,5 @@ EFFECT = Effect(
         'displacement': (Measure.DRAUGHT, Measure.CLEAN_HULL),
     },
     facts={'hull_cleaned': Said(fades_s=_FOULS_S)},
+    lasts_s=365.0 * DAY_S,
 )

@@ -8,7 +8,7 @@ from math import inf
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Said, Scope
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Measure, Said, Scope
 from shipdrag_ros.simulation.hydrodynamics import disc_area_m2, drag_n
 
 
@@ -48,4 +48,5 @@ EFFECT = Effect(
     },
     needs=('propeller',),
     facts={'shaft': Said(('locked',))},
+    lasts_s=90.0 * DAY_S,
 )

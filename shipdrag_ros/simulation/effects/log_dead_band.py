@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, speed_m_s: float) -> Action:
@@ -35,4 +35,5 @@ EFFECT = Effect(
     },
     errs_in=('speed_through_water',),
     without_baseline={WithoutBaseline.ZEROS: 'a wheel stands still below some speed'},
+    lasts_s=365.0 * DAY_S,
 )

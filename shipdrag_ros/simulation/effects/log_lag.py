@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Measure, Scope
 
 
 def _act(frame: Frame, lag_s: float) -> Action:
@@ -32,4 +32,5 @@ EFFECT = Effect(
     act=_act,
     confounders={'time_offset': (Measure.FAST_CHANGE,)},
     errs_in=('speed_through_water',),
+    lasts_s=365.0 * DAY_S,
 )

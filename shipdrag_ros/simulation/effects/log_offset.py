@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, offset_m_s: float) -> Action:
@@ -37,4 +37,5 @@ EFFECT = Effect(
         WithoutBaseline.LOG_TRACK: 'an offset is the same at all speeds',
         WithoutBaseline.CONSTANT_FORCE: '',
     },
+    lasts_s=365.0 * DAY_S,
 )

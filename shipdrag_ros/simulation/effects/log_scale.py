@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope, WithoutBaseline
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Measure, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, factor: float) -> Action:
@@ -36,4 +36,5 @@ EFFECT = Effect(
     without_baseline={
         WithoutBaseline.LOG_TRACK: 'a scale grows with the speed, on every course',
     },
+    lasts_s=365.0 * DAY_S,
 )

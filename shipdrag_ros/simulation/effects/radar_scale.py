@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Scope, WithoutBaseline
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Scope, WithoutBaseline
 
 
 def _act(frame: Frame, factor: float) -> Action:
@@ -34,4 +34,5 @@ EFFECT = Effect(
     },
     # the scale of latitude and longitude is that of the Earth
     in_geodetic=False,
+    lasts_s=365.0 * DAY_S,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect, Frame, Scope
+from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Scope
 
 
 def _act(frame: Frame, offset_s: float) -> Action:
@@ -30,4 +30,5 @@ EFFECT = Effect(
     odds=0.02,
     act=_act,
     errs_in=('speed_through_water',),
+    lasts_s=30.0 * DAY_S,
 )

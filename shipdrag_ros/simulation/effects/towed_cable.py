@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import AREAS, DENIES, Effect, Frame, Measure, Scope
+from shipdrag_ros.simulation.effect import AREAS, DAY_S, DENIES, Effect, Frame, Measure, Scope
 from shipdrag_ros.simulation.hydrodynamics import ROPES, QuadraticDrag
 
 
@@ -38,4 +38,5 @@ EFFECT = Effect(
         'displacement': (Measure.DRAUGHT, Measure.WITHOUT_CABLE),
     },
     facts={'no_towed_cable': DENIES},
+    lasts_s=7.0 * DAY_S,
 )

@@ -8,7 +8,7 @@ from scipy.special import expit
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import SPEEDS, Effect, Frame, Measure, Said, Scope
+from shipdrag_ros.simulation.effect import DAY_S, SPEEDS, Effect, Frame, Measure, Said, Scope
 from shipdrag_ros.simulation.hydrodynamics import disc_area_m2, drag_n
 
 _LOCKED = 0.42  # 0.65 on the speed behind a wake of 0.2
@@ -64,4 +64,5 @@ EFFECT = Effect(
     confounders={'towed_cable': (Measure.WITHOUT_CABLE, Measure.SHAFT)},
     needs=('propeller',),
     facts={'shaft': Said(('free',))},
+    lasts_s=90.0 * DAY_S,
 )

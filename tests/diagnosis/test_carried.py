@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Earlier diagnoses: what lasts counts, less with time; what is wrong with one is said."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose, words
+from shipdrag_ros.diagnosis.carried import Carried, carried
+from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
+from shipdrag_ros.diagnosis.facts import Facts, StatedFact
+from shipdrag_ros.diagnosis.model import Hypothesis
+from shipdrag_ros.diagnosis.posterior import Posterior
+from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.terms import EffectTerm
+from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation import Window
+from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Fact, Ship, StatedEffect
+from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation.effect import Scope
+from shipdrag_ros.simulation.effects import LIBRARY, find, parse
+
+SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
+DAY_NS = 86400 * 10**9
+NOW_NS = START_NS + 1000 * DAY_NS
+RUNS = (SeenRun('now', NOW_NS),)
+NOTHING = Posterior({}, {(): 1.0})
+NO_SD = Parameter(0.35, math.nan)
+SIZES = {
+    'fouling': {'friction_factor': Parameter(0.35, 0.04)},
+    'log_scale': {'factor': Parameter(-0.1, 0.01)},
+    'towed_cable': {'drag_area_m2': Parameter(3.0, 0.4)},
+    'current': {
+        'along_track_m_s': Parameter(0.4, 0.05),
+        'cross_track_m_s': Parameter(0.0, 0.1),
+    },
+}
+
+
+def earlier(days: float = 10.0, **candidates: float) -> EarlierDiagnosis:
+    """Find some candidates, so many days before; two underscores join a pair."""
+    found = [
+        EarlierCandidate(p, {each: SIZES[each] for each in names.split('__') if each in SIZES})
+        for names, p in candidates.items()
+    ]
+    run = SeenRun('then', NOW_NS - round(days * DAY_NS))
+    return EarlierDiagnosis(
+        'then.json', SHIP.name, SHIP.length_m, (run,), (), tuple(found), of_force=True
+    )
+
+
+def known(*given: EarlierDiagnosis, ship: Ship = SHIP, facts: tuple[Fact, ...] = ()) -> Carried:
+    told = Facts(ship, tuple(StatedFact(fact, None, NOW_NS) for fact in facts))
+    found = carried(given, ship, RUNS, told)
+    assert found is not None
+    return found
+
+
+def weight(found: Carried, *names: str, kept: tuple[str, ...] = ()) -> float:
+    """Return by how much a hypothesis is likelier."""
+    terms = tuple(EffectTerm(find(name), SHIP, kept=name in kept) for name in names)
+    return math.exp(found.log_weight(Hypothesis(names, terms)))
+
+
+def test_an_effect_declares_that_it_lasts_where_it_is_of_hull_or_instruments() -> None:
+    for effect in LIBRARY.values():
+        assert (effect.lasts_s > 0.0) == (effect.scope in (Scope.HULL, Scope.SENSOR))
+
+
+def test_what_was_found_is_likelier_the_less_time_has_passed() -> None:
+    def of(days: float) -> float:
+        return weight(known(earlier(days, fouling=0.99)), 'fouling', kept=('fouling',))
+
+    assert of(1.0) > of(100.0) > of(1000.0)
+    assert of(1.0) > 10.0
+    assert of(10000.0) < 1e-8
+    long_ago = known(earlier(10000.0, fouling=0.99))
+    assert weight(long_ago, 'fouling') == pytest.approx(1.0, abs=1e-3)
+
+
+def test_never_sure_that_it_is_there_and_never_that_it_is_not() -> None:
+    sure = known(earlier(0.001, fouling=1.0))
+    assert 0.005 < weight(sure) < 0.05
+    assert 0.005 < weight(sure, 'log_scale') < 0.05
+    nothing = known(earlier(0.001, none=1.0))
+    assert 0.4 < weight(nothing, 'fouling') < 0.6
+    assert 1.0 < weight(nothing) < 1.3
+
+
+def test_water_and_weather_of_another_day_say_nothing() -> None:
+    found = known(earlier(1.0, current=0.99))
+    assert weight(found, 'current') == pytest.approx(weight(found))
+    assert found.kept('current') == ()
+    (told,) = found.judged(NOTHING)
+    assert told.effects == ()
+    assert told.unused[0].startswith('current: water, weather')
+
+
+def test_weights_are_one_on_the_average_over_what_may_be() -> None:
+    some = ('fouling', 'log_scale', 'towed_cable')
+    # what the ship file states is not missing: of the others nothing is said
+    others = tuple(StatedEffect(name, {}) for name in LIBRARY if name not in some)
+    given = earlier(2.0, fouling=0.5, towed_cable=0.3, fouling__log_scale=0.1, none=0.08)
+    found = known(given, ship=replace(SHIP, effects=others))
+    total = 0.0
+    for there in subsets(some):
+        odds = [find(name).odds for name in there]
+        prior = math.prod(odds) / math.prod(1.0 + find(name).odds for name in some)
+        total += prior * sum(weight(found, *there, kept=kept) for kept in subsets(there))
+    assert total == pytest.approx(1.0)
+
+
+def subsets(names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    return [each for n in range(len(names) + 1) for each in combinations(names, n)]
+
+
+def test_a_size_that_stays_is_known_less_well_the_more_time_has_passed() -> None:
+    (soon,) = known(earlier(1.0, fouling=0.9)).kept('fouling')
+    (late,) = known(earlier(300.0, fouling=0.9)).kept('fouling')
+    assert soon.first == late.first == pytest.approx(0.35)
+    assert 0.1 < soon.second < 0.25 < late.second
+    (scale,) = known(earlier(1.0, log_scale=0.9)).kept('log_scale')
+    assert (scale.first, scale.second) == pytest.approx((-0.1, 0.0174), abs=1e-3)
+    # a size whose sd could not be found may be anything
+    unknown = replace(
+        earlier(1.0),
+        candidates=(EarlierCandidate(0.9, {'fouling': {'friction_factor': NO_SD}}),),
+    )
+    assert known(unknown).kept('fouling')[0].second > 0.8
+
+
+def test_a_hull_cleaned_in_between_is_no_longer_fouled() -> None:
+    day = '2029-02-22'  # three days before the runs
+    cleaned = Fact('hull_cleaned', day)
+    assert 0 < NOW_NS - (cleaned.time_ns or 0) < 10 * DAY_NS
+    before = weight(known(earlier(fouling=0.99)), 'fouling', kept=('fouling',))
+    after = weight(known(earlier(fouling=0.99), facts=(cleaned,)), 'fouling', kept=('fouling',))
+    assert after == pytest.approx(0.02 * before, rel=0.01)
+    long_before = Fact('hull_cleaned', '2028-01-01')
+    same = known(earlier(fouling=0.99), facts=(long_before,))
+    assert weight(same, 'fouling', kept=('fouling',)) == before
+
+
+def test_of_the_hull_the_latest_diagnosis_counts_alone() -> None:
+    old, new = earlier(20.0, fouling=0.9, log_scale=0.05), earlier(10.0, fouling=0.8)
+    found = known(replace(old, name='old.json'), new)
+    assert [each.diagnosis.name for each in found.weighed] == ['then.json', 'old.json']
+    assert 'fouling' not in found.weighed[1].stays
+    assert found.judged(NOTHING)[1].unused[0].endswith('and then.json is later')
+    # one without a baseline speaks of the instruments alone
+    sailing = replace(earlier(5.0, log_scale=0.9), of_force=False)
+    assert 'fouling' in known(sailing, replace(old, name='old.json')).weighed[1].stays
+
+
+@pytest.mark.parametrize(
+    ('changes', 'said'),
+    [
+        ({'ship': 'Another'}, "it is of the ship 'Another'"),
+        ({'length_m': 100.0}, 'these runs are of'),
+        ({'runs': (SeenRun('later', NOW_NS + DAY_NS),)}, 'is later than the first one'),
+        ({'runs': (SeenRun('now again', NOW_NS + 10**9),)}, 'counts here already'),
+        ({'before': (SeenRun('now again', NOW_NS),)}, 'counts here already'),
+    ],
+)
+def test_what_cannot_count_is_refused(changes: dict[str, object], said: str) -> None:
+    with pytest.raises(DiagnosisError, match=said):
+        known(replace(earlier(fouling=0.9), **changes))  # type: ignore[arg-type]
+
+
+def test_a_run_that_two_diagnoses_hold_is_refused() -> None:
+    one = earlier(10.0, fouling=0.9)
+    chained = replace(earlier(5.0, fouling=0.9), name='chained.json', before=one.runs)
+    with pytest.raises(DiagnosisError, match='counts in chained'):
+        known(one, chained)
+
+
+def coast(effect: str, start_ns: int, seed: int) -> CoastRun:
+    scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1000.0)
+    truth = simulate(SHIP, scenario, effects=[parse(effect)])
+    block = sense(truth, standard_sensors(rate_hz=0.5), seed=seed, start_ns=start_ns)
+    stop_ns = start_ns + 1200 * 10**9
+    window = Window.from_block(block, stop_ns, int(block.stamp_ns.max()), before_ns=start_ns)
+    return CoastRun(effect, window)
+
+
+@pytest.fixture(scope='module')
+def fouled() -> CoastRun:
+    return coast('fouling=0.35', NOW_NS, seed=3)
+
+
+def diagnosed(run: CoastRun, *given: EarlierDiagnosis) -> DiagnosisResult:
+    return diagnose([run], SHIP, Parameters(), earlier=given, advise=False)
+
+
+@pytest.fixture(scope='module')
+def alone(fouled: CoastRun) -> DiagnosisResult:
+    return diagnosed(fouled)
+
+
+def test_an_earlier_diagnosis_names_what_one_run_leaves_open(
+    fouled: CoastRun, alone: DiagnosisResult
+) -> None:
+    told = diagnosed(fouled, earlier(fouling=0.98))
+    assert alone.verdict == 'one_of'
+    assert alone.earlier == ()
+    assert [effect.name for effect in told.effects] == ['fouling']
+    (size,) = told.effects[0].parameters.values()
+    assert abs(size.value - 0.35) < 3.0 * size.sd
+    (counted,) = told.earlier
+    assert not counted.effects[0].contradicted
+    said = ' '.join(words.earlier(told))
+    assert 'The earlier diagnosis then.json (2029-02-15' in said
+    assert 'fouling' in said
+    assert set(words.earlier(told)) <= set(told.summary())
+    # what it found counts for the next one, with the runs that it holds
+    passed_on = EarlierDiagnosis.of(told, SHIP, name='now')
+    assert passed_on.before == earlier().runs
+    assert passed_on.probability('fouling') == pytest.approx(told.effects[0].probability)
+    assert passed_on.last_ns == pytest.approx(NOW_NS + 1200 * 10**9, abs=20 * 10**9)
+
+
+def test_an_earlier_diagnosis_that_the_runs_contradict_is_said(
+    fouled: CoastRun, alone: DiagnosisResult
+) -> None:
+    told = diagnosed(fouled, earlier(log_scale=0.98))
+    (effect,) = told.earlier[0].effects
+    assert effect.contradicted
+    assert 'contradict the earlier diagnosis then.json: log scale' in ' '.join(words.earlier(told))
+    before, after = (
+        sum(each.probability for each in found.candidates if 'fouling' in each.names)
+        for found in (alone, told)
+    )
+    assert math.log(after / before) > -0.3
