@@ -236,6 +236,7 @@ def _short(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+@cache
 def _folder(module: str) -> Path | None:
     """Return where a module's compiled functions are kept; None if nowhere."""
     package, _, name = module.partition('.')
