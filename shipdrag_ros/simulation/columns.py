@@ -250,7 +250,9 @@ def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float]) -> list[int]:
     counts = []
     for start, end in pairwise(edges):
         step = longest
-        if any(0.0 <= start - order < _FINE_RUN_DOWNS * run_down_s for order in orders):
+        # by its middle: the end of a run-down is an edge, to the last bit or not
+        middle = 0.5 * (start + end)
+        if any(0.0 <= middle - order < _FINE_RUN_DOWNS * run_down_s for order in orders):
             step = min(step, run_down_s / _STEPS_A_RUN_DOWN)
         # before anything happens the speed is steady, and a step of any length exact
         counts.append(1 if end <= quiet_s else max(1, int(np.ceil((end - start) / step))))

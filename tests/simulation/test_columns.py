@@ -28,6 +28,7 @@ from shipdrag_ros.simulation import (
     simulate,
     simulate_columns,
 )
+from shipdrag_ros.simulation.columns import _steps
 from shipdrag_ros.simulation.effects import LIBRARY
 
 CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
@@ -224,3 +225,14 @@ def test_what_columns_cannot_do_is_told():
         simulate_columns(CARGO, SCENARIO, [Action(turns=(Turn(50.0, -1.0, 0.0),))], TIME_S)
     with pytest.raises(ShipdragError, match='no baseline'):
         simulate_columns(replace(CARGO, baseline=None), SCENARIO, [Action()], TIME_S)
+
+
+def test_steps_are_small_until_the_run_down_has_ended_and_no_longer() -> None:
+    # the end of the run-down is an edge: whatever its last bit, what follows it is not a run-down
+    ship, found = replace(CARGO, propulsion=Propulsion(2.1)), set()
+    for lead_in_s in np.linspace(1785.0, 1786.0, 40).tolist():
+        scenario = replace(SCENARIO, lead_in_s=lead_in_s, turns=())
+        settled = lead_in_s + 8.0 * 2.1
+        found.add(tuple(_steps(ship, scenario, [0.0, lead_in_s, settled, settled + 600.0])))
+    assert {(before, after < 120) for before, _, after in found} == {(1, True)}
+    assert all(running_down >= 32 for _, running_down, _ in found)
