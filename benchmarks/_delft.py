@@ -156,7 +156,7 @@ def delft(path: Path) -> tuple[list[str], Figure]:
 
 def over(error: Float64, ok: np.ndarray, sd: Float64) -> tuple[str, ...]:
     """
-    Tell how many relative errors are too large, with and without the guard, in %.
+    Say how many relative errors are too large, with and without the guard, in %.
     """
     bad = np.abs(error) > WRONG
     shares = (bad[ok].mean(), bad[~ok].mean(), (~ok)[bad].mean(), np.median(sd[ok]))

@@ -33,7 +33,7 @@ PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'import.md'
 BEGIN, END = '<!-- bad_imports begin -->', '<!-- bad_imports end -->'
 LIMIT_S = 20
 MEMORY_MB = 300
-PER_LINE = 8  # values that one line tells at most
+PER_LINE = 8  # values of one line at most
 HEAD_LINES = 5  # of a table: its names and units decide about all lines
 
 Value = tuple[int, float, float]

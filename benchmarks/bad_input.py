@@ -56,7 +56,7 @@ def cell(text: str) -> str:
 
 def shown(case: Case, seen: Seen) -> str:
     """
-    Return the lines that tell the user, shortened.
+    Return the lines that the user reads, shortened.
     """
     lines = [
         line

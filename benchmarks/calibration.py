@@ -8,7 +8,7 @@ Simulation-based calibration (Talts et al. 2018): the law of r(v), the current, 
 and all sizes and times of the noise are drawn from the priors that the fit has; then the rank of
 the true r at one speed of each record, drawn at random, within its band is uniform where the code
 is right. Laws that do not slow the ship at every speed are drawn again. It tests the code; whether
-the priors are those of the sea, other worlds tell (`band_score.py`).
+the priors are those of the sea, other worlds show (`band_score.py`).
 """
 
 from __future__ import annotations

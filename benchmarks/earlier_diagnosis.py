@@ -102,10 +102,10 @@ def trials(number: int) -> dict[str, tuple[float, float, float]]:
     alone = {each: diagnosed(seen[each], 1) for each in seen}
     found = {}
     for way, (first, second) in zip(WAYS, ((names, names), (names, ()), ((), names), ((), ()))):
-        told = diagnosed(seen[second], 1, [before[first]])
+        with_before = diagnosed(seen[second], 1, [before[first]])
         found[way] = (
             log_probability(alone[second], second),
-            log_probability(told, second),
+            log_probability(with_before, second),
             allowed(before[first], ship, alone[second], second),
         )
     return found
@@ -140,8 +140,8 @@ def line(way: str, rows: Sequence[tuple[float, float, float]]) -> str:
     """
     Say means and two standard errors.
     """
-    alone, told, allowed = np.array(rows).T
-    gain = told - alone
+    alone, with_before, allowed = np.array(rows).T
+    gain = with_before - alone
     twice = 2.0 * float(gain.std(ddof=1)) / len(gain) ** 0.5
     beyond = int((gain < allowed - 0.05).sum())
     return (

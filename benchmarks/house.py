@@ -9,7 +9,7 @@ Core code is what a coastdown may need: lines of `shipdrag_ros` without
 docstrings, blanks and comments, and without the studies S2 to S5. The walk is a
 replay of a simulated coastdown, traced: which calls cross from one room into
 another between the bytes of the bag and those of a published estimate. The
-diagnosis of the same bag tells which modules run in it.
+diagnosis of the same bag shows which modules run in it.
 """
 
 from __future__ import annotations

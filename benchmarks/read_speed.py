@@ -259,7 +259,7 @@ def measure(path: Path) -> None:
 
 
 def _peak_mb() -> float:
-    """Peak of this process; `getrusage` would tell that of the one that started it."""
+    """Peak of this process; `getrusage` would give that of the one that started it."""
     return int(Path('/proc/self/status').read_text().split('VmHWM:')[1].split()[0]) / 1e3
 
 

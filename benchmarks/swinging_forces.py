@@ -7,7 +7,7 @@ Forces that swing: does a diagnosis say that something is there?
 Ships, weather and instruments of world a in which nothing of the library is hidden. A force that
 begins to swing with or after the stop, by 5 to 25 % of the resistance there over 100 to 600 s, is
 to be answered 'unknown'. The same swing before the stop already is weather, of which the steady
-record tells: it is to pass for noise.
+record shows: it is to pass for noise.
 """
 
 from __future__ import annotations

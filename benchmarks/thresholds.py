@@ -41,7 +41,7 @@ def named_from(done: Sequence[Trial], threshold: float) -> Share:
     Count the right ones of those that would be named from a probability on.
 
     A set whose first is more probable than a name must be is one of confounders that nothing
-    tells apart, and is never named.
+    separates, and is never named.
     """
     chosen = []
     for trial in done:

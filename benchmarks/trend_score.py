@@ -63,7 +63,7 @@ def ship(rng: np.random.Generator, years: float, cleaning: float) -> World:
 
 
 def _is_jump(world: World, year: float) -> bool:
-    """Tell whether the hull fouled by 2 % or more within a month around a step."""
+    """Say whether the hull fouled by 2 % or more within a month around a step."""
     near = np.abs(world.runs.years - year) < 0.5 * MONTH
     return bool(near.any() and np.ptp(world.level[near]) > 0.02)
 

@@ -185,7 +185,7 @@ def _plans() -> tuple[_Plan, ...]:
         wanted += [()] * _NONE
         plans += [_Plan(kinds, condition) for kinds in wanted]
         plans += [_Plan((), replace(condition, misstated=True))] * _MISSTATED
-    # mixed, so that any part of them is a sample of all, and the number tells nothing
+    # mixed, so that any part of them is a sample of all, and the number says nothing
     order = np.random.default_rng(SEED).permutation(len(plans))
     return tuple(plans[i] for i in order)
 

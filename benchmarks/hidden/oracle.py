@@ -4,7 +4,7 @@ The best that could be done: a diagnosis that knows the physics of the cases.
 
 Each hypothesis is simulated with the generator's own simulator and weighed by
 its Laplace evidence, under the true covariance of all that is random and with
-the true shares of the kinds of cases. What no diagnosis can tell, it cannot.
+the true shares of the kinds of cases. What no diagnosis can know, it cannot.
 """
 
 from __future__ import annotations

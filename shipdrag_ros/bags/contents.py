@@ -141,7 +141,7 @@ def read_index(data: Buffer) -> Contents | None:
     for place in walk(data, footer.summary_start, footer_at):
         if place.opcode in _SUMMARY:
             found.setdefault(place.opcode, []).append(parse(data, place))
-    if not _tells_all(found):
+    if not _indexes_all(found):
         return None
     contents = Contents()
     for record in found.get(Opcode.SCHEMA, []) + found.get(Opcode.CHANNEL, []):
@@ -188,7 +188,7 @@ _SUMMARY = {
 }
 
 
-def _tells_all(summary: Mapping[int, list[Any]]) -> bool:
+def _indexes_all(summary: Mapping[int, list[Any]]) -> bool:
     """Say whether everything that the statistics count is indexed."""
     if Opcode.STATISTICS not in summary:
         return False

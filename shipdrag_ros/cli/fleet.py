@@ -159,7 +159,7 @@ def _progress(output: Output) -> Iterator[Progress]:
         with output.progress('') as bar:
             yield lambda text, done, total: bar(done, total)
         return
-    yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).tell
+    yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).show
 
 
 def _count(text: str) -> int:

@@ -116,7 +116,7 @@ class Output:
         )
         shown = ''
 
-        def tell(text: str, done: int, total: int) -> None:
+        def show(text: str, done: int, total: int) -> None:
             nonlocal shown
             if text != shown:
                 shown = text
@@ -125,7 +125,7 @@ class Output:
 
         with bar:
             task = bar.add_task('', total=None)
-            yield tell
+            yield show
 
     def json(self, document: Mapping[str, Any]) -> None:
         """

@@ -34,9 +34,9 @@ def stages(output: Output) -> Iterator[Progress]:
     from shipdrag_ros.cli.compiling import CompilingNotice
 
     with output.bar() as bar:
-        tell = bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).tell
+        show = bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).show
         with event.install_listener('numba:compile', CompilingNotice(output.log)):
-            yield tell
+            yield show
 
 
 class ProgressLines:
@@ -60,7 +60,7 @@ class ProgressLines:
         self._begun_s = self._said_s = time.monotonic()
         self._waits = not at_once
 
-    def tell(self, text: str, done: int, total: int) -> None:
+    def show(self, text: str, done: int, total: int) -> None:
         """
         Say how far a stage is, with the time left in it, unless a line was said just now.
         """

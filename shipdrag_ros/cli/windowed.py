@@ -40,11 +40,11 @@ def open_sources(paths: Sequence[Path], output: Output, *, remap: Mapping[str, s
         return open_runs(paths, remap=remap)
     from shipdrag_ros.importing.reading import Understanding, read_any  # a bag needs no importer
 
-    def tell(found: Understanding) -> None:
+    def show(found: Understanding) -> None:
         for line in found.lines():
             output.log(line)
 
-    return read_any(paths, remap=remap, tell=tell)
+    return read_any(paths, remap=remap, show=show)
 
 
 class WindowedBag(NamedTuple):

@@ -18,7 +18,7 @@ from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.samples import Float64
 
-_PARTS = 12  # of a coastdown, in telling where a gap is
+_PARTS = 12  # of a coastdown, to say where a gap is
 _SHARE = 0.9  # of the excess, between the ends of where it is
 _EVEN_NATS = 3.0  # of evidence by which two channels are not separated
 _ROUNDS = 3

@@ -72,7 +72,7 @@ def read_any(
     remap: Mapping[str, str] | None = None,
     joined: bool = False,
     options: Mapping[str, Any] | None = None,
-    tell: Callable[[Understanding], None] | None = None,
+    show: Callable[[Understanding], None] | None = None,
 ) -> list[Run]:
     """
     Open files of any format that is known, as `open_runs` opens bags.
@@ -89,7 +89,7 @@ def read_any(
     options
         Values by `format.Option.key`, such as `{'speed_unit': 'kn'}`; a format
         takes those that it knows.
-    tell
+    show
         Called with what was understood of each log.
 
     Returns
@@ -126,14 +126,14 @@ def read_any(
         (bags if is_bag(path) else logs).append(path)
     runs = open_runs(bags, remap=remap) if bags else []
     groups = [logs] if joined and logs else [[path] for path in logs]
-    return runs + [_imported(group, remap, options or {}, tell) for group in groups]
+    return runs + [_imported(group, remap, options or {}, show) for group in groups]
 
 
 def _imported(
     sources: Sequence[Path],
     remap: Mapping[str, str] | None,
     options: Mapping[str, Any],
-    tell: Callable[[Understanding], None] | None,
+    show: Callable[[Understanding], None] | None,
 ) -> Run:
     folder = TemporaryDirectory(prefix='shipdrag-import-')
     bag = Path(folder.name) / 'imported.mcap'
@@ -148,8 +148,8 @@ def _imported(
             f'{error} (make a bag of it with `shipdrag import`, which takes these options)'
         ) from error
     for (declared, job), result in zip(parts, found.results, strict=True):
-        if tell is not None:
-            tell(Understanding(job.source, declared.kind, result))
+        if show is not None:
+            show(Understanding(job.source, declared.kind, result))
     run = ImportedRun(bag, sources, remap)
     weakref.finalize(run, folder.cleanup)
     return run

@@ -313,7 +313,7 @@ def _found(
                 f'{each.name}: the clock of {name} is too slow or too fast, and on board it is '
                 'rejected; it is diagnosed all the same'
             )
-        _tell_cuts(listener, result, window)
+        _log_cuts(listener, result, window)
         windows = coast_windows(result)
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
@@ -353,7 +353,7 @@ def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | N
     return sheet, None if of_run == ship else of_run
 
 
-def _tell_cuts(listener: Listener, result: ReplayResult, window: WindowSpan | None) -> None:
+def _log_cuts(listener: Listener, result: ReplayResult, window: WindowSpan | None) -> None:
     """Say what of the coastdowns was cut; a window of which nothing is left is an error."""
     name = result.run.name
     for coastdown in result.coastdowns:

@@ -110,9 +110,9 @@ class Bridge:
         if self._heard_s is not None:
             self._heard_s = now_s
 
-    def tell(self, view: VerdictView) -> None:
+    def show_verdict(self, view: VerdictView) -> None:
         """
-        Take a verdict that no node gave.
+        Show a verdict that no node gave.
         """
         self._verdict = view
 

@@ -144,7 +144,7 @@ class BagSource:
                 self._open(self._number + 1)
             else:
                 self._playing = False
-        self._tell_verdict()
+        self._show_verdict()
         jumped, self._jumped = self._jumped, False
         return jumped
 
@@ -258,7 +258,7 @@ class BagSource:
             self.bridge.hear(Samples(concatenate(waiting)), now_s)
         self.bridge.keep_alive(now_s)
 
-    def _tell_verdict(self) -> None:
+    def _show_verdict(self) -> None:
         """Say what the diagnosis says of a coastdown that has ended by now."""
         assert self._diagnosing is not None
         status = self._diagnosing.status
@@ -266,6 +266,6 @@ class BagSource:
         if of is not None and of.end_ns > self._at_ns:  # read ahead, and not played yet
             return
         if status.state is DiagnosisState.DONE and found is not None:
-            self.bridge.tell(of_diagnosis(found))
+            self.bridge.show_verdict(of_diagnosis(found))
         else:
-            self.bridge.tell(VerdictView(status.state.value, status.reason))
+            self.bridge.show_verdict(VerdictView(status.state.value, status.reason))

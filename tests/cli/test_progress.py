@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a long verb tells while it works: on stderr alone, to a terminal and to a pipe."""
+"""What a long verb shows while it works: on stderr alone, to a terminal and to a pipe."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_lines_are_told_now_and_then_with_the_time_left(monkeypatch: pytest.Monk
     said: list[str] = []
     lines = ProgressLines(said.append, every_s=15.0, at_once=False)
     for done in range(5):
-        lines.tell('replaying', done, 10)
+        lines.show('replaying', done, 10)
         clock[0] += 10.0
     assert said == ['replaying: 2 of 10, 80 s left', 'replaying: 4 of 10, 60 s left']
 
@@ -53,9 +53,9 @@ def test_the_first_word_comes_at_once_and_the_others_wait(
     monkeypatch.setattr('shipdrag_ros.cli.progress.time.monotonic', lambda: clock[0])
     said: list[str] = []
     lines = ProgressLines(said.append, every_s=3.0, at_once=True)
-    lines.tell('reading', 0, 0)
+    lines.show('reading', 0, 0)
     for done in range(8):
-        lines.tell('fitting', done, 8)
+        lines.show('fitting', done, 8)
         clock[0] += 1.0
     assert said == ['reading', 'fitting: 3 of 8, 5 s left', 'fitting: 6 of 8, 2 s left']
 
@@ -115,5 +115,5 @@ def test_a_terminal_is_shown_a_bar_that_goes_away(short_bag: Path) -> None:
 def test_nothing_done_is_nothing_divided(at_once: bool) -> None:
     said: list[str] = []
     lines = ProgressLines(said.append, every_s=0.0, at_once=at_once)
-    lines.tell('fitting', 0, 0)
+    lines.show('fitting', 0, 0)
     assert said == (['fitting'] if at_once else [])

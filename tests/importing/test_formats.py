@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every format tells the same minute of the same ship alike, and what it does not know is told."""
+"""Every format gives the same minute of the same ship alike, and what it does not know is said."""
 
 from __future__ import annotations
 
@@ -132,10 +132,10 @@ def test_engine_revolutions_are_the_shaft_only_with_a_gear(files: dict[str, Path
     assert found[:, 0] == pytest.approx(1500 / 2.5 * math.pi / 30)
 
 
-def test_the_first_line_is_told(files: dict[str, Path]) -> None:
-    told: list[Understanding] = []
-    read_any([files['csv']], tell=told.append)
-    lines = told[0].lines()
+def test_the_first_line_is_shown(files: dict[str, Path]) -> None:
+    shown: list[Understanding] = []
+    read_any([files['csv']], show=shown.append)
+    lines = shown[0].lines()
     assert "  speed_through_water <- 'STW [kn]' [kn], first 6 m/s" in lines
     assert any(
         "'Heading [deg]' is taken as degrees clockwise from north" in line for line in lines
@@ -157,7 +157,7 @@ def test_files_of_one_instrument_each_are_one_run(files: dict[str, Path], tmp_pa
     assert len(values(block, Channel.POSITION_GEODETIC)) == 60
     assert len(values(block, Channel.SPEED_THROUGH_WATER)) == 60
     assert (np.diff(block.receive_ns) >= 0).all()
-    both = block_of(track, log)  # of an input that both tell, the first file's
+    both = block_of(track, log)  # of an input that both hold, the first file's
     assert len(values(both, Channel.POSITION_GEODETIC)) == 60
     assert len(values(both, Channel.SPEED_THROUGH_WATER)) == 60
 
@@ -220,9 +220,9 @@ def test_a_line_of_deep_brackets_is_counted(tmp_path: Path) -> None:
     path = tmp_path / 'log.jsonl'
     deep = '{"updates":' + '[' * 30_000
     path.write_bytes(made.signalk() + b'\n' + deep.encode())
-    told: list[Understanding] = []
-    read_any([path], tell=told.append)
-    assert any('more than 12 brackets deep' in line for line in told[0].lines())
+    shown: list[Understanding] = []
+    read_any([path], show=shown.append)
+    assert any('more than 12 brackets deep' in line for line in shown[0].lines())
 
 
 def test_a_packed_bomb_ends_in_an_error(tmp_path: Path) -> None:
@@ -241,12 +241,12 @@ def test_times_that_jump_away_and_back_are_left_out(tmp_path: Path) -> None:
     lines[140] = lines[140].replace('(17', '(16', 1)
     path = tmp_path / 'log.txt'
     path.write_text('\n'.join(lines))
-    told: list[Understanding] = []
-    (run,) = read_any([path], tell=told.append)
+    shown: list[Understanding] = []
+    (run,) = read_any([path], show=shown.append)
     span = run.span_ns
     assert span is not None
     assert span[1] - span[0] == (made.ROWS - 1) * 10**9
-    assert any('time: 2 rejected, jumps away and back' in line for line in told[0].lines())
+    assert any('time: 2 rejected, jumps away and back' in line for line in shown[0].lines())
 
 
 def test_the_formats_load_no_library_before_it_is_needed() -> None:

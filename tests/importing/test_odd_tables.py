@@ -20,13 +20,13 @@ SPEED = 5.0  # m/s, to the north
 
 
 def read(folder: Path, header: str, rows: Iterable[str]) -> tuple[Block, str]:
-    """Return the samples of a table, and what is told of it."""
+    """Return the samples of a table, and what is shown of it."""
     path = folder / 'log.csv'
     path.write_text('\n'.join([header, *rows]) + '\n')
-    told: list[Understanding] = []
-    (run,) = read_any([path], tell=told.append)
+    shown: list[Understanding] = []
+    (run,) = read_any([path], show=shown.append)
     block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
-    return block, '\n'.join(told[0].lines())
+    return block, '\n'.join(shown[0].lines())
 
 
 def of(block: Block, channel: Channel) -> np.ndarray:
@@ -47,9 +47,9 @@ def test_a_longitude_in_degrees_stays_one(tmp_path: Path, written: str, degrees:
         f'2018-03-02T{clock(i)}Z,{latitude(i)},{"999.9" if i == 50 else written}'
         for i in range(100)
     ]
-    block, told = read(tmp_path, 'time,Lat,Lon', rows)
+    block, shown = read(tmp_path, 'time,Lat,Lon', rows)
     assert set(of(block, Channel.POSITION_GEODETIC)[:, 1]) == {degrees}
-    assert "line 52: '999.9'" in told
+    assert "line 52: '999.9'" in shown
 
 
 def test_a_time_in_large_steps_and_no_unit_is_asked_about(tmp_path: Path) -> None:
@@ -62,9 +62,9 @@ def test_a_time_in_large_steps_and_no_unit_is_asked_about(tmp_path: Path) -> Non
 
 def test_longitudes_in_the_column_of_latitudes_are_none(tmp_path: Path) -> None:
     rows = [f'{i},110.25,{latitude(i)},10' for i in range(20)]
-    block, told = read(tmp_path, 'time,Lat,Lon,STW [kn]', rows)
+    block, shown = read(tmp_path, 'time,Lat,Lon,STW [kn]', rows)
     assert len(of(block, Channel.POSITION_GEODETIC)) == 0
-    assert 'position: 20 cell(s) rejected' in told
+    assert 'position: 20 cell(s) rejected' in shown
 
 
 @pytest.mark.parametrize(
@@ -105,12 +105,12 @@ def test_days_of_a_spreadsheet_are_refused(tmp_path: Path) -> None:
         ('Lat [m],Lon [m]', '50,60'),
     ],
 )
-def test_a_unit_that_does_not_fit_is_told_and_not_used(
+def test_a_unit_that_does_not_fit_is_said_and_not_used(
     tmp_path: Path, name: str, value: str
 ) -> None:
-    block, told = read(tmp_path, f'time,STW [kn],{name}', [f'{i},10,{value}' for i in range(20)])
+    block, shown = read(tmp_path, f'time,STW [kn],{name}', [f'{i},10,{value}' for i in range(20)])
     assert set(block.channel.tolist()) == {Channel.SPEED_THROUGH_WATER}
-    assert 'Not used: ' in told
+    assert 'Not used: ' in shown
 
 
 @pytest.mark.parametrize(('unit', 'factor'), [('mph', 0.44704), ('ft/s', 0.3048)])
@@ -143,15 +143,15 @@ def test_rows_that_change_places_at_midnight_stay_in_their_day(tmp_path: Path) -
 
 def test_thousands_with_points_beside_decimal_commas_are_refused(tmp_path: Path) -> None:
     rows = [f'{i};10,25;1.234;3,5' for i in range(20)]
-    block, told = read(tmp_path, 'time;STW [kn];Shaft [rpm];Rudder [deg]', rows)
+    block, shown = read(tmp_path, 'time;STW [kn];Shaft [rpm];Rudder [deg]', rows)
     assert set(block.channel.tolist()) == {Channel.SPEED_THROUGH_WATER, Channel.RUDDER}
-    assert 'shaft: 20 cell(s) rejected' in told
+    assert 'shaft: 20 cell(s) rejected' in shown
 
 
-def test_lines_behind_an_open_quotation_mark_are_told(tmp_path: Path) -> None:
+def test_lines_behind_an_open_quotation_mark_are_said(tmp_path: Path) -> None:
     rows = [f'{i},10,{chr(34) if i == 20 else ""}x' for i in range(50)]
-    _, told = read(tmp_path, 'time,STW [kn],Note', rows)
-    assert '29 line(s) were taken as part of a cell in quotation marks' in told
+    _, shown = read(tmp_path, 'time,STW [kn],Note', rows)
+    assert '29 line(s) were taken as part of a cell in quotation marks' in shown
 
 
 def test_a_title_with_empty_cells_behind_it(tmp_path: Path) -> None:

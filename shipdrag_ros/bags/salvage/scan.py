@@ -162,8 +162,8 @@ class Scanner:
         Returns the record before, None where that one is the damaged one, and what the
         damaged bytes are.
         """
-        for tell in self._within_bounds, self._by_own_fields:
-            here = tell(data, at, end, kinds)
+        for known_by in self._within_bounds, self._by_own_fields:
+            here = known_by(data, at, end, kinds)
             if here is not None:
                 return held, here
         if held is not None and self._is_unwitnessed(data, held):

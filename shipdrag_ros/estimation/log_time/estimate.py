@@ -173,7 +173,7 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     # every column but the thrust: its prior is not about nothing
     full = np.ones(len(rows), np.bool_)
     full[-1] = False
-    full[-3:-1] = inputs.tells_water_from_ground
+    full[-3:-1] = inputs.separates_water_from_ground
     columns = np.flatnonzero(full)
     start, weight, noise_sd, used_sd = robust_fit(
         rows,
@@ -240,7 +240,7 @@ def _loose(polynomials: int, distance: float, deceleration: float) -> tuple[Floa
 
 def _known(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
     """Say whether the data show current and factor of the log, and why not."""
-    if not inputs.tells_water_from_ground:
+    if not inputs.separates_water_from_ground:
         return (False, False), []
     current, scale = sd[0] < _IDENTIFIED * CURRENT_SD_M_S, sd[1] < _IDENTIFIED * SCALE_SD
     notes = []

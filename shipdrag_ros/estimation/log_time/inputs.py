@@ -66,7 +66,7 @@ class Inputs:
         return [int(kind) for kind in Input if self.count[kind]]
 
     @property
-    def tells_water_from_ground(self) -> bool:
+    def separates_water_from_ground(self) -> bool:
         """Whether there is a log, and something over ground."""
         over_ground = self.count[POSITION] + self.count[OVER_GROUND]
         return bool(self.count[LOG] and over_ground)

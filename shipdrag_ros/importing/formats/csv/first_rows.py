@@ -25,7 +25,7 @@ _SAMPLE_ROWS = 20_000
 
 @dataclass(frozen=True)
 class NamedColumn:
-    """A column with a role; `key` is its name, or its number where that does not tell it."""
+    """A column with a role; `key` is its name, or its number where the name is not enough."""
 
     key: str
     place: int

@@ -113,7 +113,7 @@ class RowClock:
             words = {'d': 'day', 'm': 'month', 'y': 'year'}
             written = '/'.join(words[each] for each in order)
             self.notes.append(f'Dates are {written}, as {known_by} show.')
-        stated = 'utc' in ' '.join(time.names).lower() or any(map(_tells_zone, texts[:1]))
+        stated = 'utc' in ' '.join(time.names).lower() or any(map(_has_zone, texts[:1]))
         if time.zone is UTC and not stated:
             self.notes.append('The times state no zone and are taken as UTC (--zone).')
 
@@ -178,6 +178,6 @@ class RowClock:
         return self._start_ns + self._midnights * _DAY_NS + of_day_ns
 
 
-def _tells_zone(text: str) -> bool:
+def _has_zone(text: str) -> bool:
     clock = parts(text)[1]
     return clock.endswith(('Z', 'UTC', 'GMT')) or '+' in clock or '-' in clock
