@@ -111,6 +111,23 @@ def test_every_direct_dependency_is_pinned_with_a_hash() -> None:
     assert lock.count('--hash=sha256:') > 100
 
 
+def test_every_dependency_is_installed_under_ros_too() -> None:
+    setup = (ROOT / 'setup.py').read_text().partition('install_requires=')[2].partition(']')[0]
+    xml = (ROOT / 'package.xml').read_text()
+    names = re.findall(r"^ {8}'([A-Za-z][\w.-]*)',", setup, flags=re.MULTILINE)
+    assert {'numpy', 'mcap', 's3fs'} <= set(names)
+    keys = set(re.findall(r'<exec_depend>python3-(\S+)</exec_depend>', xml))
+    from_pip = set(re.findall(r'[\w.]+', xml.partition('<!-- from pip')[2].partition('-->')[0]))
+    for name in names:
+        assert name.lower().removeprefix('py') in keys or name in from_pip, name
+    (line,) = re.findall(
+        r'pip install --break-system-packages (.+)', (ROOT / 'docs/ros.md').read_text()
+    )
+    by_hand = set(line.split())
+    assert set(names) & from_pip == by_hand
+    assert by_hand <= set(names)
+
+
 def test_console_scripts_are_installed() -> None:
     scripts = {item.name: item for item in entry_points(group='console_scripts')}
     assert callable(scripts['shipdrag'].load())

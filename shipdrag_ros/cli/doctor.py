@@ -24,7 +24,10 @@ BROKEN = 1
 _PAGE_PORT = 8088
 _LITTLE_BYTES = 2e9  # a week of three inputs at 10 Hz
 _SYNCHRONISED = Path('/run/systemd/timesync/synchronized')
-_NEEDED = ('numpy', 'scipy', 'numba', 'mcap', 'rosbags', 'pynmeagps', 'ruamel.yaml', 'matplotlib')
+_NEEDED = (
+    *('numpy', 'scipy', 'numba', 'ruamel.yaml', 'matplotlib'),
+    *('mcap', 'isal', 'rosbags', 'pynmeagps'),
+)
 _OPTIONAL = {  # module: what does not work without it
     'rclpy': 'node, demo, and watch over a running node',
     'starlette': 'watch',
