@@ -61,7 +61,7 @@ def _try(data: mmap, segment: FileSegment) -> bytes | DamagedRecord:
         if first.opcode == Opcode.CHUNK:
             return unpack_chunk(data, first)[1]
     except DamagedRecord as damage:
-        return damage
+        return DamagedRecord(str(damage))  # as it was caught, it holds the bytes of the chunk
     records = data[segment.offset : segment.end]
     release(data, segment.offset, segment.end)
     return records

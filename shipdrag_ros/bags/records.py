@@ -190,7 +190,7 @@ def unpack_chunk(data: Buffer, place: Place) -> tuple[str, bytes]:
 
 def stated_bytes(data: Buffer, start: int, end: int) -> int:
     """
-    Return how many bytes a record unpacks to at most, as it says itself.
+    Return how many bytes a record takes at most, packed or unpacked as it says itself.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def stated_bytes(data: Buffer, start: int, end: int) -> int:
     """
     if end - start < HEAD.size + _CHUNK_HEAD.size or data[start] != Opcode.CHUNK:
         return end - start
-    return int(_CHUNK_HEAD.unpack_from(data, start + HEAD.size)[2])
+    return max(end - start, int(_CHUNK_HEAD.unpack_from(data, start + HEAD.size)[2]))
 
 
 def chunk_fields(data: Buffer, start: int, end: int) -> tuple[int, int, str, int, int]:

@@ -258,8 +258,8 @@ def _magnitude(extra: Float64) -> Float64:
     Without a direction, at rest, the larger of the two variances.
     """
     x, y, variance_x, variance_y, covariance = extra.T
-    speed = np.hypot(x, y)
     with np.errstate(divide='ignore', over='ignore', invalid='ignore'):
+        speed = np.hypot(x, y)
         c = x / speed
         s = y / speed
         along = c * c * variance_x + s * s * variance_y + 2.0 * c * s * covariance

@@ -15,7 +15,7 @@ import pytest
 from shipdrag_ros.bags.ahead import unpacked
 from shipdrag_ros.bags.contents import FileSegment
 from shipdrag_ros.bags.mcap_file import McapFile
-from shipdrag_ros.bags.records import DamagedRecord
+from shipdrag_ros.bags.records import DamagedRecord, stated_bytes
 
 NAME = 'shipdrag-unpack'
 
@@ -71,3 +71,29 @@ def test_who_stops_early_leaves_no_thread(
         next(records)
         assert any(thread.name.startswith(NAME) for thread in threading.enumerate())
     assert not any(thread.name.startswith(NAME) for thread in threading.enumerate())
+
+
+def test_damage_holds_no_bytes_of_its_chunk(
+    opened: tuple[mmap, list[FileSegment]], cores: Callable[[int], None]
+) -> None:
+    """Or a file full of damaged chunks would be in the memory as a whole."""
+    data, segments = opened
+    for many in (1, 2):
+        cores(many)
+        with closing(unpacked(data, segments)) as records:
+            (damage,) = (each for each in records if isinstance(each, DamagedRecord))
+        assert damage.__traceback__ is None
+        assert damage.__cause__ is None
+        assert damage.__context__ is None
+
+
+def test_a_chunk_takes_its_packed_bytes_at_least(
+    opened: tuple[mmap, list[FileSegment]],
+) -> None:
+    """Whatever size it states: by that is bounded what is unpacked ahead."""
+    data, segments = opened
+    first = segments[0]
+    chunk = bytearray(data[first.offset : first.end])
+    for stated, expected in ((0, len(chunk)), (1 << 40, 1 << 40)):
+        chunk[25:33] = stated.to_bytes(8, 'little')
+        assert stated_bytes(bytes(chunk), 0, len(chunk)) == expected

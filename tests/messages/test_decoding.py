@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -214,6 +215,17 @@ def test_a_variance_that_says_nothing_is_unknown(reference: Any, variance: float
     message = reference.message(source.type, 1, '', [1.0, 0.0, variance, 0, 0, 0, 0, 0])
     block = decode(source, [reference.serialize(source.type, message)], [0]).block
     assert np.isnan(block.variance).all()
+
+
+def test_a_nan_of_either_kind_is_decoded_in_silence(reference: Any) -> None:
+    message = reference.message(types.TWIST, 1, '', [1.0] * 8)
+    good = reference.serialize(types.TWIST, message)
+    for bits in (0x7FF8 << 48, (0x7FF0 << 48) + 1):  # the second one signals to the processor
+        payload = good.replace(np.float64(1.0).tobytes(), bits.to_bytes(8, 'little'), 1)
+        with warnings.catch_warnings():
+            warnings.simplefilter('error')
+            decoded = decode(Source('speed_over_ground', types.TWIST), [payload], [0])
+        assert np.isnan(decoded.block.value[0, 0])
 
 
 def test_variance_of_the_speed_over_ground_is_that_along_the_track(reference: Any) -> None:
