@@ -32,7 +32,8 @@ ERRS = 0.02  # of earlier diagnoses, how many are wrong of an effect whatever th
 _HALF = 0.5  # power of an earlier likelihood
 _UNSEEN = 0.5  # of effects that are there, how many a diagnosis does not list
 _SIZE_SD = 0.1  # relative, by which a size that stays differs from what was found
-_WIDEST = 1.0  # sd of the logarithm of a size
+_WIDEST = 1.0  # sd of the logarithm of a size ...
+_WIDE = 2.0  # ... and a relative sd that is wider
 _LEAST = 0.01  # probability that is worth a word
 
 
@@ -243,7 +244,8 @@ def _about(vague: Prior, mean: float, sd: float) -> Prior:
         return normal(sd, mean=mean)
     if mean <= 0.0:
         return normal(0.0)
-    return log_normal(mean, min(math.sqrt(math.log1p((sd / mean) ** 2)), _WIDEST))
+    relative = min(sd / mean, _WIDE)  # a file may state any; the square of a large one overflows
+    return log_normal(mean, min(math.sqrt(math.log1p(relative**2)), _WIDEST))
 
 
 def carried(

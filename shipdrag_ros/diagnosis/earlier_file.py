@@ -112,7 +112,8 @@ def _candidates(value: Any) -> tuple[EarlierCandidate, ...]:
         sizes = _sizes(candidate.get('effects'), f'{place}.effects')
         if names == [_UNKNOWN]:
             continue
-        if names != [_NOTHING] and (not names or set(map(str, names)) != set(sizes)):
+        named = set() if names == [_NOTHING] else set(map(str, names))
+        if not names or named != set(sizes):
             raise _Wrong(f'{place}: the names are {_shown(names)}, and the effects others')
         found.append(EarlierCandidate(probability, sizes))
     total = math.fsum(each.probability for each in found)

@@ -50,6 +50,10 @@ _BRAKED = (
 )
 _HELD = 'all of each glide is held against the model, such parts with the rest'
 _AGREES = 'all of each glide, held against the model, shows nothing more'
+_SOUND_PART = (
+    'So it is not known whether anything is missing; give the sound part alone with '
+    '--window START END'
+)
 _APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 
@@ -155,7 +159,8 @@ def _of_whole_glides(
     """
     Diagnose with the parts that are no coastdown though no instrument shows why.
 
-    Where these show nothing either, what the coastdowns show stands.
+    Where these show nothing either, what the coastdowns show stands. Where they cannot be
+    followed, it stands too, but for that nothing is missing, which is an error then.
     """
     try:
         whole = diagnose(
@@ -167,9 +172,9 @@ def _of_whole_glides(
             progress=progress,
         )
     except ShipdragError as error:  # a glide that is like none may not be followed
-        if found is None:
-            raise DiagnosisError(f'{"; ".join(seen.notes)}; diagnosed whole: {error}') from error
         why = f'all of each glide could not be held against the model: {error}'
+        if found is None or found.verdict is Verdict.NONE:  # what is cut is no sign of nothing
+            raise DiagnosisError(f'{"; ".join((*seen.notes, why))}. {_SOUND_PART}') from error
         return replace(found, notes=(*found.notes, *seen.notes, why))
     if found is not None and whole.verdict is Verdict.NONE:
         return replace(found, notes=(*found.notes, *seen.notes, _AGREES))

@@ -124,16 +124,20 @@ def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window | Non
     slow_m_s = float(result.ship.speed(result.parameters.froude_min))
     rises = speed > np.minimum.accumulate(speed) + _RISE * float(speed[0])
     over = np.flatnonzero((speed < slow_m_s) | rises)
-    ends_s = [float(time_s[int(np.argmin(speed[: over[0] + 1]))])] if len(over) else []
-    for cut in (
+    end_s = length_s(window)
+    if len(over):  # what she does afterwards, going astern for instance, ends nothing before it
+        end_s = float(time_s[int(np.argmin(speed[: over[0] + 1]))])
+        if end_s < gone_s(result.ship):
+            return None
+        window = window.part(start_ns, start_ns + round(end_s * SECOND_NS))
+    cuts = (
         *thrust(window, result.ship, steady=steady),
         *astern(window, result.parameters),
         *turns(window, result.parameters),
-    ):
-        ends_s.append((cut.start_ns - start_ns) * 1e-9)
-    if not ends_s:
+    )
+    if not cuts:
         return window
-    end_s = min(ends_s)
+    end_s = min(end_s, *((cut.start_ns - start_ns) * 1e-9 for cut in cuts))
     if end_s < gone_s(result.ship):
         return None
     return window.part(start_ns, start_ns + round(end_s * SECOND_NS))

@@ -136,6 +136,14 @@ def test_a_size_that_stays_is_known_less_well_the_more_time_has_passed() -> None
     assert known(unknown).kept('fouling')[0].second > 0.8
 
 
+@pytest.mark.parametrize('size', [Parameter(1e-200, 1e12), Parameter(5e-324, 1.0)])
+def test_a_size_far_less_well_known_than_it_is_large_may_be_anything(size: Parameter) -> None:
+    given = replace(
+        earlier(1.0), candidates=(EarlierCandidate(0.9, {'fouling': {'friction_factor': size}}),)
+    )
+    assert known(given).kept('fouling')[0].second == 1.0
+
+
 def test_a_hull_cleaned_in_between_is_no_longer_fouled() -> None:
     day = '2029-02-22'  # three days before the runs
     cleaned = Fact('hull_cleaned', day)

@@ -88,6 +88,11 @@ def test_what_is_no_diagnosis_is_refused(tmp_path: Path, text: str, said: str) -
         ('candidates', [{'names': ['fog'], 'probability': 0.6, 'effects': []}], 'effects others'),
         (
             'candidates',
+            [{'names': ['none'], 'probability': 0.6, 'effects': [FOULED]}],
+            'effects others',
+        ),
+        (
+            'candidates',
             [{'names': ['fog'], 'probability': 0.6, 'effects': [{'name': 'fog'}]}],
             "'fog' is no effect that this version knows",
         ),

@@ -14,6 +14,9 @@ import pytest
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.diagnosis import diagnose
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.library import diagnosing
 from shipdrag_ros.replay import replay
 from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
@@ -133,3 +136,35 @@ def test_the_whole_glide_goes_on_where_the_coastdown_ends(tmp_path: Path) -> Non
     assert glide.before is not None
     assert glide.start_ns == coastdown.start_ns
     assert glide.end_ns > coastdown.end_ns + 200 * 10**9
+
+
+def crash_stop(time_s: float) -> float:
+    """Brake her until she goes astern."""
+    return -4.0 if 300.0 < time_s < 400.0 else 0.0
+
+
+def test_what_she_does_after_she_was_slow_hides_no_glide(tmp_path: Path) -> None:
+    (run,) = open_runs([sailed(tmp_path / 'run.mcap', crash_stop)])
+    result = replay(run, compare=False)
+    (coastdown,) = result.coastdowns
+    glide = whole_glide(result, coastdown)
+    assert glide is not None
+    assert glide.end_ns > coastdown.end_ns
+
+
+def test_a_glide_that_cannot_be_followed_does_not_let_nothing_be_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def once(*args: Any, **options: Any) -> Any:
+        asked.append(args)
+        if len(asked) > 1:
+            raise ShipdragError('asked for nan')
+        return diagnose(*args, **options)
+
+    monkeypatch.setattr(diagnosing, 'diagnose', once)
+    assert main(['diagnose', str(sailed(tmp_path / 'run.mcap', crash_stop))]) == 1
+    said = capsys.readouterr()
+    assert 'nothing is missing' not in said.out
+    assert 'it is not known whether anything is missing' in said.err
