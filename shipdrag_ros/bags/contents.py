@@ -8,7 +8,6 @@ index, and goes on behind a damaged chunk.
 
 from __future__ import annotations
 
-import zlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
+from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 
@@ -134,7 +134,7 @@ def read_index(data: Buffer) -> Contents | None:
         return None
     # the checksum covers the footer too, up to itself
     summary = data[footer.summary_start : place.end - _FOOTER_CHECKSUM_BYTES]
-    if footer.summary_crc not in (0, zlib.crc32(summary)):
+    if footer.summary_crc not in (0, crc32(summary)):
         raise DamagedRecord('the index has a wrong checksum')
 
     found: dict[int, list[Any]] = {}

@@ -12,8 +12,8 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from zlib import crc32
 
+from isal.isal_zlib import crc32
 from mcap.data_stream import RecordBuilder
 from mcap.records import (
     Attachment,

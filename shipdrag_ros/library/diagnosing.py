@@ -106,15 +106,19 @@ def diagnose_runs(
         return _unused(sailing, facts, earlier), None
     seen = _found(listener, runs, given, progress)
     found: DiagnosisResult | None = None
+    failed: tuple[str, ...] = ()
     try:
         found = _of_coastdowns(runs, seen, facts, earlier, progress)
-    except DiagnosisError:
+    except DiagnosisError as error:
         if not seen.whole:
             raise
+        if seen.coasts:
+            failed = (f'the coastdowns alone could not be diagnosed: {error}',)
     if found is not None and seen.whole and found.verdict is Verdict.NAMED:
         found = replace(found, notes=(*found.notes, *seen.notes, _APART))
     elif found is None or seen.whole:
         found = _of_whole_glides(found, seen, facts, earlier, progress)
+        found = replace(found, notes=(*found.notes, *failed))
     return found, seen.ship
 
 

@@ -9,13 +9,13 @@ each of those apart and encode it anew costs twenty times as much.
 from __future__ import annotations
 
 import struct
-import zlib
 from array import array
 from collections import Counter
 from typing import IO
 
 import numpy as np
 import zstandard
+from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -160,7 +160,7 @@ class IndexedFile:
         footer = Footer(
             summary_start=start,
             summary_offset_start=offsets_start,
-            summary_crc=zlib.crc32(head, zlib.crc32(summary)),
+            summary_crc=crc32(head, crc32(summary)),
         )
         self._file.write(summary + as_bytes(footer) + MAGIC)
 
@@ -213,7 +213,7 @@ class IndexedFile:
             data=zstandard.compress(records),
             message_start_time=int(log_ns.min()),
             message_end_time=int(log_ns.max()),
-            uncompressed_crc=zlib.crc32(records),
+            uncompressed_crc=crc32(records),
             uncompressed_size=len(records),
         )
         offset, length = self._put(as_bytes(chunk))

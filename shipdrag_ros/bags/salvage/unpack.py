@@ -5,7 +5,6 @@ Unpacking what may be damaged: as far as it goes, and never without bound.
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from mmap import ACCESS_READ, mmap
@@ -15,6 +14,7 @@ from typing import IO, Any, NamedTuple
 
 import lz4.frame
 import zstandard
+from isal.isal_zlib import crc32
 
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
@@ -79,7 +79,7 @@ def unpack_chunk_partly(data: Buffer, start: int, end: int) -> Unpacked:
         return Unpacked(
             records[:CHUNK_LIMIT_BYTES], DamageKind.TOO_LARGE, False, len(packed) - read
         )
-    verified = checksum != 0 and zlib.crc32(records) == checksum
+    verified = checksum != 0 and crc32(records) == checksum
     if not damage:
         damage = _damage_of(whole, read == len(packed), len(records) == size, checksum, verified)
     return Unpacked(records, damage, verified, len(packed) - read)
