@@ -201,9 +201,10 @@ def _prepare(
     speed_m_s: Float64 | None,
     step_s: float | None,
 ) -> _Prepared:
-    law = law_of(ship, scenario)
+    law = law_of(ship, scenario.speed_m_s)
     speeds = np.full(len(actions), scenario.speed_m_s) if speed_m_s is None else speed_m_s
     also = _also_s(ship, scenario, actions, step_s)
+    longest = _longest_step_s(ship, scenario.speed_m_s)
     legs: list[Records] = []
     places: dict[tuple[Turn, ...], tuple[int, int]] = {}
     for action in actions:
@@ -211,7 +212,7 @@ def _prepare(
             of_column = acted(scenario, action) if action.turns else scenario
             edges = edges_of(of_column, also_s=also)
             steps = (
-                _steps(ship, of_column, edges)
+                _steps(ship, of_column, edges, longest)
                 if step_s is None
                 else steps_of(ship, of_column, edges, step_s=step_s)
             )
@@ -240,10 +241,14 @@ def _also_s(
     return times
 
 
-def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float]) -> list[int]:
+def _longest_step_s(ship: Ship, speed_m_s: float) -> float:
+    """Return the length of a step where no thrust runs down."""
+    r = float(ship.resistance_n(speed_m_s)) / ship.mass_kg
+    return min(_STEP_S, speed_m_s / r / _STEPS_A_SLOW_DOWN)
+
+
+def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float], longest: float) -> list[int]:
     """Return the number of steps between edges: small ones where thrust runs down."""
-    r = float(ship.resistance_n(scenario.speed_m_s)) / ship.mass_kg
-    longest = min(_STEP_S, scenario.speed_m_s / r / _STEPS_A_SLOW_DOWN)
     run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
     orders = [scenario.moment_s(order.time_s) for order in scenario.orders]
     quiet_s = min(scenario.events_s(), default=scenario.length_s)
