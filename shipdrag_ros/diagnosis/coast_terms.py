@@ -9,7 +9,7 @@ measured, and needs no simulation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import ClassVar, Protocol
 
@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
-from shipdrag_ros.parameter import Parameter, flat, free, heavy_tailed, normal
+from shipdrag_ros.parameter import Parameter, flat, free, half_normal, heavy_tailed, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import CoefficientBaseline
@@ -34,6 +34,8 @@ _SHAPES = 5
 _DISCREPANCIES = 6
 _FORMS = 4
 _FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
+_FILTER_SD_S, _FILTER_SD = 6.0, 0.01  # of what is usual, and over the time of slowing down
+_FILTER_START = 0.3  # z
 _CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
 _SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
 
@@ -147,6 +149,48 @@ def baseline_parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
 
 
 @dataclass(frozen=True)
+class FilterNuisance:
+    """
+    The filters of log and speed over ground, which every instrument has.
+
+    Manuals state 2 to 15 s; on a craft that slows down quickly they are shorter.
+
+    Attributes
+    ----------
+    slow_down_s
+        Speed over deceleration, roughly, at the stop.
+    has_log, has_ground
+        Whether there are such rows.
+    """
+
+    slow_down_s: float
+    has_log: bool
+    has_ground: bool
+    one_size: ClassVar[Sequence[int]] = ()
+
+    @cached_property
+    def unknowns(self) -> tuple[Parameter, ...]:
+        """Time constants [s]."""
+        sd = min(_FILTER_SD_S, _FILTER_SD * self.slow_down_s)
+        places = {'log filter': self.has_log, 'ground filter': self.has_ground}
+        return tuple(
+            replace(free(name, half_normal(sd)), start=_FILTER_START)
+            for name, there in places.items()
+            if there
+        )
+
+    def acts_in(self, run: int) -> bool:
+        """Say that the instruments are the same in all runs."""
+        return True
+
+    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
+        """Return the filters."""
+        given = iter(values)
+        log, ground = (next(given) if there else 0.0 for there in (self.has_log, self.has_ground))
+        return Action(log_lag_s=log, ground_lag_s=ground)
+
+
+@dataclass(frozen=True)
 class ForceTerm:
     """
     Any smooth resistance beyond the baseline, as a function of the speed.
@@ -186,9 +230,9 @@ class Predicted:
     ----------
     along, across : (n,), (k,)
         Rows.
-    speed, over_ground : (m,)
-        Speed through water, and velocity along the heading over ground, at the
-        times of the observation.
+    speed, log, over_ground : (m,)
+        Speed through water, as it is and as the log shows it, and velocity along the
+        heading over ground, at the times of the observation.
     distance : (m,)
         Over ground, along the heading.
     """
@@ -196,6 +240,7 @@ class Predicted:
     along: Float64
     across: Float64
     speed: Float64
+    log: Float64
     over_ground: Float64
     distance: Float64
 
@@ -289,7 +334,7 @@ class RunNuisance:
         position = kind == POSITION
         along[0, position] = 1.0
         after = seen.time_s >= seen.lead_in_s
-        slowing = np.where(after, np.gradient(base.speed, seen.time_s), 0.0)
+        slowing = np.where(after, np.gradient(base.log, seen.time_s), 0.0)
         gained = np.where(after, base.over_ground[0] - base.over_ground, 0.0)
         along[3] = np.where(position, gained[at], -slowing[at])
         since = np.maximum(seen.time_s - seen.lead_in_s, 0.0)

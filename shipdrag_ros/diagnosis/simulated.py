@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, Predicted, Term
+from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, FilterNuisance, Predicted, Term
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import trial_z
@@ -70,6 +70,7 @@ class _Predictions:
     along: Float64
     across: Float64
     speed: Float64
+    log: Float64
     over_ground: Float64
     distance: Float64
 
@@ -79,6 +80,7 @@ class _Predictions:
             self.along[column],
             self.across[column],
             self.speed[column],
+            self.log[column],
             self.over_ground[column],
             self.distance[column],
         )
@@ -337,11 +339,11 @@ class CoastSimulation:
 
 
 def _known(hypothesis: Hypothesis) -> list[int]:
-    """Return the unknowns of the baseline, which stay near where they were."""
+    """Return the unknowns of baseline and filters, which stay near where they were."""
     return [
         place + k
         for part, place in hypothesis.parts
-        if isinstance(part, BaselineTerm)
+        if isinstance(part, BaselineTerm | FilterNuisance)
         for k in range(len(part.unknowns))
     ]
 
@@ -358,4 +360,5 @@ def _predicted(seen: Observation, columns: Columns) -> _Predictions:
     along[:, kind == LOG] = columns.log_m_s[:, at[kind == LOG]]
     along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
     across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
-    return _Predictions(along, across, columns.speed_through_water_m_s, ground, ahead)
+    speed = columns.speed_through_water_m_s
+    return _Predictions(along, across, speed, columns.log_m_s, ground, ahead)
