@@ -156,7 +156,8 @@ class Observation:
         }
         heading_rad, heading_sd = _heading(window, series, seconds, lead_in_s, parameters)
         edges = _edges(lead_in_s, max(float(time[-1]) for time in seconds.values()))
-        parts, across = _condensed_all(series, seconds, edges, record.white_sd, heading_rad)
+        noise_of = {name: (sd, record.display_sd[name]) for name, sd in record.white_sd.items()}
+        parts, across = _condensed_all(series, seconds, edges, noise_of, heading_rad)
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
         noise = SteadyNoise(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
@@ -222,17 +223,27 @@ def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
 
 
 def _condensed(
-    time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int
+    time_s: Float64, value: Float64, edges: Float64, noise: tuple[float, float], kind: int
 ) -> CondensedRows:
+    """
+    Return means, by the noise of a sample and what its last digit hides.
+
+    Rounding errs alike while the signal stands, and averages out as it moves on.
+    """
     when, mean, count = bin_means(time_s, value, edges)
-    return CondensedRows(when, kind, mean, sd**2 / count)
+    sd, display = noise
+    variance = sd**2 / count
+    if display > 0.0 and len(mean) > 1:
+        digits = np.abs(np.gradient(mean)) / (math.sqrt(12.0) * display)
+        variance += display**2 / np.clip(digits**2, 1.0, count)
+    return CondensedRows(when, kind, mean, variance)
 
 
 def _condensed_all(
     series: dict[str, Series],
     seconds: dict[str, Float64],
     edges: Float64,
-    white_sd: Mapping[str, float],
+    noise_of: Mapping[str, tuple[float, float]],
     heading_rad: float,
 ) -> tuple[list[CondensedRows], list[CondensedRows]]:
     """Return the rows along the heading, and those to port of it."""
@@ -240,16 +251,17 @@ def _condensed_all(
     along: list[CondensedRows] = []
     across: list[CondensedRows] = []
     for input_, found in series.items():
-        sd, time = white_sd[input_], seconds[input_]
+        noise, time = noise_of[input_], seconds[input_]
+        sd = noise[0]
         if input_ != 'position':
             keep = _kept(found.value, sd)
-            along.append(_condensed(time[keep], found.value[keep], edges, sd, CODES[input_]))
+            along.append(_condensed(time[keep], found.value[keep], edges, noise, CODES[input_]))
             continue
         east, north = (found.value - found.value[0]).T
         ahead, to_port = cos * east + sin * north, cos * north - sin * east
         keep = _kept(ahead, sd) & _kept(to_port, sd)
-        along.append(_condensed(time[keep], ahead[keep], edges, sd, POSITION))
-        across.append(_condensed(time[keep], to_port[keep], edges, sd, POSITION))
+        along.append(_condensed(time[keep], ahead[keep], edges, noise, POSITION))
+        across.append(_condensed(time[keep], to_port[keep], edges, noise, POSITION))
     return along, across
 
 

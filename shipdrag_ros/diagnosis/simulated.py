@@ -343,7 +343,7 @@ def _known(hypothesis: Hypothesis) -> list[int]:
     return [
         place + k
         for part, place in hypothesis.parts
-        if isinstance(part, BaselineTerm | FilterNuisance)
+        if isinstance(part, BaselineTerm)
         for k in range(len(part.unknowns))
     ]
 

@@ -37,7 +37,7 @@ _FINE_RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left
 _STEPS_A_RUN_DOWN = 4
 _STEPS_A_SLOW_DOWN = 40  # of v / r
 _STEP_S = 10.0
-_LOOKS_A_STEP = 4  # at a motion that is read late
+_LOOKS_A_RUN_DOWN, _LOOKS_GROW = 16, 1.1  # at a motion that is read late
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def simulate_columns(
         Heading of the first run, as in `simulate`.
     step_s
         As in `simulate`; found from the ship where it is not given, coarser
-        than there, and good for 0.1 mm/s.
+        than there, and good for 0.1 mm/s (1 mm/s where an instrument reads late).
 
     Raises
     ------
@@ -186,13 +186,17 @@ def simulate_columns(
 
 def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
     """Return when a motion must be followed to be read late, straight lines between."""
-    edges = edges_of(scenario, also_s=_also_s(ship, scenario, (), None))
-    steps = _steps(ship, scenario, edges)
-    looks = [
-        np.linspace(start, end, 1 + _LOOKS_A_STEP * count)
-        for (start, end), count in zip(pairwise(edges), steps, strict=True)
-    ]
-    return np.unique(np.concatenate(looks))
+    longest, run_down_s = _longest_step_s(ship, scenario), _run_down_s(ship)
+    looks = [np.array([0.0, scenario.length_s])]
+    for start, end in pairwise([*scenario.events_s(), scenario.length_s]):
+        # what changes at once is smooth later
+        first = min(longest, run_down_s / _LOOKS_A_RUN_DOWN if run_down_s else longest)
+        count = int(np.ceil(np.log(longest / first) / np.log(_LOOKS_GROW)))
+        steps = first * _LOOKS_GROW ** np.arange(count)
+        even = np.arange(start + steps.sum(), end, longest)
+        looks += [np.array([start]), (start + np.cumsum(steps))[:-1], even]
+    found = np.concatenate(looks)
+    return found[found <= scenario.length_s]
 
 
 def _prepare(
@@ -241,11 +245,18 @@ def _also_s(
     return times
 
 
+def _longest_step_s(ship: Ship, scenario: Scenario) -> float:
+    r = float(ship.resistance_n(scenario.speed_m_s)) / ship.mass_kg
+    return min(_STEP_S, scenario.speed_m_s / r / _STEPS_A_SLOW_DOWN)
+
+
+def _run_down_s(ship: Ship) -> float:
+    return ship.propulsion.run_down_s if ship.propulsion else 0.0
+
+
 def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float]) -> list[int]:
     """Return the number of steps between edges: small ones where thrust runs down."""
-    r = float(ship.resistance_n(scenario.speed_m_s)) / ship.mass_kg
-    longest = min(_STEP_S, scenario.speed_m_s / r / _STEPS_A_SLOW_DOWN)
-    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    longest, run_down_s = _longest_step_s(ship, scenario), _run_down_s(ship)
     orders = [scenario.moment_s(order.time_s) for order in scenario.orders]
     quiet_s = min(scenario.events_s(), default=scenario.length_s)
     counts = []
