@@ -15,6 +15,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.special import gammainc
 
 from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.observation import Observation
@@ -36,6 +37,7 @@ _FORMS = 4
 _FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
 _FILTER_SD_S, _FILTER_SD = 6.0, 0.01  # of what is usual, and over the time of slowing down
 _FILTER_START = 0.3  # z
+_FALLS, _FALL_SD = 3, 0.4  # of thrust beside an exponential fall, relative to the steady one
 _CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
 _SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
 
@@ -300,7 +302,9 @@ class RunNuisance:
     Notes
     -----
     A coastdown under 1 + c times the resistance is the same motion, 1 + c
-    times as fast in time.
+    times as fast in time. Thrust that falls in another way than
+    exp(-t / run_down_s), as s^k exp(-s) / k! with s = t / run_down_s, leaves
+    the integral of that behind, which fades as a quadratic resistance lets it.
     """
 
     run: int
@@ -313,7 +317,7 @@ class RunNuisance:
 
     @cached_property
     def unknowns(self) -> tuple[Parameter, ...]:
-        """Place [m], heading [rad], stop [s], factor on the resistance, - 1, clocks [s]."""
+        """Place [m], heading [rad], stop [s], factor - 1, clocks [s], fall of the thrust."""
         # where no row shows it, a place with a prior leaves the evidence as it is
         place = flat() if self.has_positions else normal(1.0)
         return (
@@ -323,11 +327,12 @@ class RunNuisance:
             free('stop', normal(self.stop_sd_s)),
             free('factor', normal(self.scatter)),
             free('log late', normal(_CLOCKS_SD_S if self.has_positions else 0.0)),
+            *(free(f'fall {k}', normal(_FALL_SD)) for k in range(_FALLS)),
         )
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (6, n) and (6, k)."""
-        along, across = _nothing(seen, 6)
+        """Return (6 + 3, n) and (6 + 3, k)."""
+        along, across = _nothing(seen, 6 + _FALLS)
         if run != self.run:
             return along, across
         kind, at = seen.along.rows.kind, seen.along.at
@@ -341,10 +346,24 @@ class RunNuisance:
         way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
         along[4] = np.where(position, (since * base.speed - way)[at], (since * slowing)[at])
         along[5] = np.where(kind == LOG, -slowing[at], 0.0)
+        gained = self._fall(since, base.speed, -slowing.min(), seen.run_down_s)
+        ahead = cumulative_trapezoid(gained, since, initial=0.0)
+        along[6:] = np.where(position, ahead[:, at], gained[:, at])
         if seen.across is not None:
             across[1] = 1.0
             across[2] = base.distance[seen.across.at]
         return along, across
+
+    def _fall(
+        self, since_s: Float64, speed_m_s: Float64, steady_m_s2: float, run_down_s: float
+    ) -> Float64:
+        """Return the speed that each form of thrust adds, (3, m)."""
+        if run_down_s <= 0.0:
+            return np.zeros((_FALLS, len(since_s)))
+        order = 1.0 + np.arange(_FALLS)[:, None]
+        fading = (speed_m_s / speed_m_s[0]) ** 2
+        found: Float64 = gammainc(order, since_s / run_down_s) * fading
+        return steady_m_s2 * run_down_s * found
 
 
 @dataclass(frozen=True)

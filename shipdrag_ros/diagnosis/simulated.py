@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, FilterNuisance, Predicted, Term
+from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, Predicted, Term
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import trial_z
@@ -339,7 +339,7 @@ class CoastSimulation:
 
 
 def _known(hypothesis: Hypothesis) -> list[int]:
-    """Return the unknowns of baseline and filters, which stay near where they were."""
+    """Return the unknowns of the baseline, which stay near where they were."""
     return [
         place + k
         for part, place in hypothesis.parts

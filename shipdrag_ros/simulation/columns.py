@@ -88,9 +88,7 @@ class _Prepared:
     def paths(self, time_s: Float64) -> Float64:
         """Return what `follow` does (k, m, 5)."""
         paths = np.empty((len(self.records), len(time_s), 5))
-        follow_columns(
-            self.law, self.records, self.extra, self.legs, self.own_legs, time_s, paths
-        )
+        follow_columns(self.law, self.records, self.extra, self.legs, self.own_legs, time_s, paths)
         lost = np.maximum.accumulate(outside(self.law, paths[:, :, 0]), axis=1)
         paths[lost] = np.nan
         return paths
