@@ -35,9 +35,9 @@ _SHAPES = 5
 _DISCREPANCIES = 6
 _FORMS = 4
 _FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
-_FILTER_SD_S, _FILTER_SD = 6.0, 0.01  # of what is usual, and over the time of slowing down
+_FILTER_SD_S, _FILTER_SD = 8.0, 0.015  # of what is usual, and over the time of slowing down
 _FILTER_START = 0.3  # z
-_FALLS, _FALL_SD = 3, 0.4  # of thrust beside an exponential fall, relative to the steady one
+_FALLS, _FALL_SD = 3, 0.7  # of thrust beside an exponential fall, relative to the steady one
 _CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
 _SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
 
