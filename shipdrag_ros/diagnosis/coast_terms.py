@@ -37,7 +37,7 @@ _FORMS = 4
 _FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
 _FILTER_SD_S, _FILTER_SD = 8.0, 0.015  # of what is usual, and over the time of slowing down
 _FILTER_START = 0.3  # z
-_FALLS, _FALL_SD = 3, 0.7  # of thrust beside an exponential fall, relative to the steady one
+_FALLS, _FALL_SD = 3, 0.5  # of thrust beside an exponential fall, relative to the steady one
 _CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
 _SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
 
@@ -298,6 +298,8 @@ class RunNuisance:
     heading_sd_rad, stop_sd_s
     scatter
         Of the resistance from run to run, relative.
+    fall_sd
+        Of thrust beside an exponential fall, relative to the steady one.
 
     Notes
     -----
@@ -312,6 +314,7 @@ class RunNuisance:
     stop_sd_s: float
     has_positions: bool
     scatter: float = 0.0
+    fall_sd: float = _FALL_SD
     place_of_stop: ClassVar[int] = 3  # among the unknowns
     one_size: ClassVar[Sequence[int]] = ()
 
@@ -327,7 +330,7 @@ class RunNuisance:
             free('stop', normal(self.stop_sd_s)),
             free('factor', normal(self.scatter)),
             free('log late', normal(_CLOCKS_SD_S if self.has_positions else 0.0)),
-            *(free(f'fall {k}', normal(_FALL_SD)) for k in range(_FALLS)),
+            *(free(f'fall {k}', normal(self.fall_sd)) for k in range(_FALLS)),
         )
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:

@@ -33,6 +33,7 @@ _STEADY_BIN_S = 30.0
 _FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
 _LEAST_LONGEST_S, _BINS = 12.0, 80.0  # the longest bin is at least this, or this part of all
 _ALIKE_S = 12.0  # beyond which the errors of filters and swell are as good as independent
+_LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last digit counts
 _NEIGHBOURS = 9  # an outlier is found by the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
@@ -246,9 +247,9 @@ def _condensed(
         _, means, counts = bin_means(time_s[steady], value[steady], evenly)
         sd = max(sd, white_sd(means) * math.sqrt(float(np.median(counts))))
     variance = sd**2 / count
-    if display > 0.0 and len(mean) > 1:
-        digits = np.abs(np.gradient(mean)) / (math.sqrt(12.0) * display)
-        variance += display**2 / np.clip(digits, 1.0, np.sqrt(count)) ** 2
+    if display > _LEAST_DISPLAY * sd and len(mean) > 1:
+        moved = np.clip(np.abs(np.gradient(mean)) / math.sqrt(12.0), display, None)
+        variance += display**2 / np.minimum((moved / display) ** 2, count)
     return CondensedRows(when, kind, mean, variance)
 
 
