@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, SteadyNoise
 from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.ode_fit.record import RunRows
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
 from shipdrag_ros.estimation.ode_fit.steady import LEAST_S, white_sd
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, bin_means
@@ -162,6 +162,8 @@ class Observation:
         parts, across = _condensed_all(series, seconds, edges, noise_of, heading_rad, lead_in_s)
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
+        shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
+        stop = Stop(since_ns, lead_in_s, heading_rad, speed, shaft_s)
         noise = SteadyNoise(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
         return cls(
             name,
@@ -175,7 +177,7 @@ class Observation:
             speed,
             noise.measured(parts, times),
             noise.measured(across, times) if across else None,
-            Context.of(window, ship, times, Stop(since_ns, lead_in_s, heading_rad, speed)),
+            Context.of(window, ship, times, stop),
             replace(ship, effects=()),
         )
 
