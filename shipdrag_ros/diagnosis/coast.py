@@ -20,6 +20,7 @@ from scipy.special import ndtri
 from shipdrag_ros.diagnosis.carried import Carried
 from shipdrag_ros.diagnosis.coast_terms import (
     BaselineTerm,
+    FilterNuisance,
     ForceTerm,
     MeasurementTerm,
     ModelErrorTerm,
@@ -29,11 +30,12 @@ from shipdrag_ros.diagnosis.coast_terms import (
 )
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.measured import damping_of
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND
 from shipdrag_ros.parameter import Parameter, Shape, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effect import Effect, Scope
@@ -107,8 +109,17 @@ class CoastModel(CoastSimulation):
             for effect in self.ship.effects
         ]
         log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES) + _SWINGING))
-        found = Hypothesis((), (baseline, *given), places, log_prior=log_prior)
+        found = Hypothesis((), (baseline, *given, self._filters), places, log_prior=log_prior)
         return replace(found, log_prior=log_prior + self._log_evidence(found))
+
+    @cached_property
+    def _filters(self) -> FilterNuisance:
+        """Those that log and speed over ground have without anything missing."""
+        kinds = set(np.concatenate([run.along.rows.kind for run in self.seen]).tolist())
+        top = np.array([max(run.speed_m_s for run in self.seen)])
+        # v over r is about 2 over dr/dv
+        slow_down_s = 2.0 / float(damping_of(self.bare, top)[0][0])
+        return FilterNuisance(slow_down_s, LOG in kinds, OVER_GROUND in kinds)
 
     def _log_evidence(self, hypothesis: Hypothesis) -> float:
         """Return the log evidence of facts and of earlier diagnoses; it is no prior."""
