@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.model import Hypothesis, Part
+from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
 from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.search import SearchResult
@@ -26,7 +26,7 @@ from shipdrag_ros.parameter import Parameter, Shape
 SET = 0.99  # of the candidates
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _SHAPE_SD = 2.5  # prior standard deviations of a shape parameter of an effect
-_FORM_SD = 3.5  # of its departure from its formula, of which there are four
+_FORM_SD = 3.5  # of its departures from its formula, together
 _SIZE_SD = 5.0  # of the logarithm of a size
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
 
@@ -188,8 +188,8 @@ def outside_prior(fit: Fit) -> bool:
 
     However large it is, a turn that hardly changes the heading, or is over in some seconds, is
     something else: a shape parameter beyond 2.5 prior sd. So is one that follows its formula
-    only with a departure beyond 3.5 sd, and a size whose logarithm is beyond 5. Sizes of either
-    sign, and components of one, are no shape.
+    only with departures beyond 3.5 sd together, and a size whose logarithm is beyond 5. Sizes
+    of either sign, and components of one, are no shape.
 
     Parameters
     ----------
@@ -201,18 +201,18 @@ def outside_prior(fit: Fit) -> bool:
     bool
         Of any effect that is not stated in the ship file.
     """
-    z = np.abs(fit.best.z)
-    return any(
-        each > _most_sd(fit.hypothesis, part, i)
-        for part, place in fit.hypothesis.parts
-        for i, each in enumerate(z[place : place + len(part.unknowns)])
-    )
+    for part, place in fit.hypothesis.parts:
+        z = np.abs(fit.best.z[place : place + len(part.unknowns)])
+        if any(part is error for error in fit.hypothesis.model_errors):
+            if float(np.linalg.norm(z)) > _FORM_SD:
+                return True
+        elif any(each > _most_sd(part, i) for i, each in enumerate(z)):
+            return True
+    return False
 
 
-def _most_sd(hypothesis: Hypothesis, part: Part, place: int) -> float:
+def _most_sd(part: Part, place: int) -> float:
     """Return the prior standard deviations beyond which an unknown of an effect is odd."""
-    if any(part is error for error in hypothesis.model_errors):
-        return _FORM_SD
     if not isinstance(part, EffectTerm) or part.stated or part.kept or place in part.one_size:
         return math.inf
     unknown = part.unknowns[place]
