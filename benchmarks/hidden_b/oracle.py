@@ -35,7 +35,7 @@ ALARM_BELOW = 0.1  # probability that nothing is hidden
 NAME_FROM = 0.9
 HELD = 0.99  # by the set of candidates
 LACK_NATS = 5.0  # by which a smooth discrepancy may beat the name alone
-_STEPS = 7
+_STEPS = 12
 _STARTS = 3  # where the first point may be on the wrong slope
 _WORTH_NATS = 15.0  # below the best: not looked at closely
 _SPEED_SD, _COURSE_SD = 0.3, 0.2  # relative; [rad]
@@ -259,7 +259,7 @@ class _Oracle:
         cost, damping = float(white @ white + z @ z), 1e-3
         plain = self._white(self.slopes)
         slopes = np.concatenate([plain, self._white(self._slopes(names, signs, z, which))], 1)
-        for _ in range(_STEPS):
+        for done in range(_STEPS):
             precision = slopes.T @ slopes + np.eye(len(used))
             turn = precision + damping * np.diag(np.diag(precision))
             step = np.linalg.solve(turn, slopes.T @ white - z[used])
@@ -274,7 +274,10 @@ class _Oracle:
                 continue
             gained, cost, z, white = cost - after_cost, after_cost, after, after_white
             damping *= 0.1
-            if gained < 0.3 or (cost > floor + 4.0 * _WORTH_NATS and gained < 0.4 * cost):
+            # what more runs cost in any case is no hope of gaining more; far off, slopes mislead
+            above = cost - floor
+            hopeless = above > 4.0 * _WORTH_NATS and gained < 0.2 * above
+            if gained < 0.3 or (done > 1 and hopeless):
                 break
             slopes[:, self.common :] = self._white(self._slopes(names, signs, z, which))
         return Fit(names, signs, z, cost)
@@ -300,10 +303,12 @@ class _Oracle:
         fits = [nothing, *self._all_climbed(begun, nothing.cost)]
         weighed = self._worth(fits)
         best, terms = max(weighed, key=lambda each: each[0].evidence)
-        if max(terms.beside(self.weather).values()) > best.evidence:  # no name alone will do
-            starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
-            pairs = [tuple(sorted(pair)) for pair in PAIRS if set(pair) <= starts.keys()]
-            begun = [fit for pair in pairs for fit in self._begun(pair, starts)]
+        starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
+        pairs = [tuple(sorted(pair)) for pair in PAIRS if set(pair) <= starts.keys()]
+        if max(terms.beside(self.weather).values()) < best.evidence:  # a name alone may do
+            pairs = [pair for pair in pairs if set(best.names) & set(pair)]
+        begun = [fit for pair in pairs for fit in self._begun(pair, starts)]
+        if begun:
             fits += self._all_climbed(begun, min(fit.cost for fit in fits))
             weighed = self._worth(fits)
         return self._verdict(weighed)
