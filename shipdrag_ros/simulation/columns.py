@@ -184,7 +184,8 @@ def simulate_columns(
 
 def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
     """Return when a motion must be followed to be read late, straight lines between."""
-    longest, run_down_s = _longest_step_s(ship, scenario), _run_down_s(ship)
+    longest = _longest_step_s(ship, scenario.speed_m_s)
+    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
     looks = [np.array([0.0, scenario.length_s])]
     for start, end in pairwise([*scenario.events_s(), scenario.length_s]):
         # what changes at once is smooth later
@@ -204,9 +205,10 @@ def _prepare(
     speed_m_s: Float64 | None,
     step_s: float | None,
 ) -> _Prepared:
-    law = law_of(ship, scenario)
+    law = law_of(ship, scenario.speed_m_s)
     speeds = np.full(len(actions), scenario.speed_m_s) if speed_m_s is None else speed_m_s
     also = _also_s(ship, scenario, actions, step_s)
+    longest = _longest_step_s(ship, scenario.speed_m_s)
     legs: list[Records] = []
     places: dict[tuple[Turn, ...], tuple[int, int]] = {}
     for action in actions:
@@ -214,7 +216,7 @@ def _prepare(
             of_column = acted(scenario, action) if action.turns else scenario
             edges = edges_of(of_column, also_s=also)
             steps = (
-                _steps(ship, of_column, edges)
+                _steps(ship, of_column, edges, longest)
                 if step_s is None
                 else steps_of(ship, of_column, edges, step_s=step_s)
             )
@@ -243,18 +245,15 @@ def _also_s(
     return times
 
 
-def _longest_step_s(ship: Ship, scenario: Scenario) -> float:
-    r = float(ship.resistance_n(scenario.speed_m_s)) / ship.mass_kg
-    return min(_STEP_S, scenario.speed_m_s / r / _STEPS_A_SLOW_DOWN)
+def _longest_step_s(ship: Ship, speed_m_s: float) -> float:
+    """Return the length of a step where no thrust runs down."""
+    r = float(ship.resistance_n(speed_m_s)) / ship.mass_kg
+    return min(_STEP_S, speed_m_s / r / _STEPS_A_SLOW_DOWN)
 
 
-def _run_down_s(ship: Ship) -> float:
-    return ship.propulsion.run_down_s if ship.propulsion else 0.0
-
-
-def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float]) -> list[int]:
+def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float], longest: float) -> list[int]:
     """Return the number of steps between edges: small ones where thrust runs down."""
-    longest, run_down_s = _longest_step_s(ship, scenario), _run_down_s(ship)
+    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
     orders = [scenario.moment_s(order.time_s) for order in scenario.orders]
     quiet_s = min(scenario.events_s(), default=scenario.length_s)
     counts = []

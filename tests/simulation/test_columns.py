@@ -245,6 +245,24 @@ def test_steps_are_small_until_the_run_down_has_ended_and_no_longer() -> None:
     for lead_in_s in np.linspace(1785.0, 1786.0, 40).tolist():
         scenario = replace(SCENARIO, lead_in_s=lead_in_s, turns=())
         settled = lead_in_s + 8.0 * 2.1
-        found.add(tuple(_steps(ship, scenario, [0.0, lead_in_s, settled, settled + 600.0])))
+        edges = [0.0, lead_in_s, settled, settled + 600.0]
+        found.add(tuple(_steps(ship, scenario, edges, longest=10.0)))
     assert {(before, after < 120) for before, _, after in found} == {(1, True)}
     assert all(running_down >= 32 for _, running_down, _ in found)
+
+
+def test_a_resistance_that_columns_share_is_computed_once() -> None:
+    asked = []
+
+    def drag(speed_m_s: np.ndarray) -> np.ndarray:
+        asked.append(len(speed_m_s))
+        return 50.0 * speed_m_s**2
+
+    shared = Action(resistance=(drag,))
+    other = Action(resistance=(lambda speed_m_s: 50.0 * speed_m_s**2,))
+    columns = simulate_columns(
+        CARGO, SCENARIO, [shared, shared + shared, shared + other], np.array([900.0])
+    )
+    assert len(asked) == 1
+    once, twice, both = columns.speed_through_water_m_s[:, 0].tolist()
+    assert both == twice < once
