@@ -78,6 +78,7 @@ class _Predictions:
     along: Float64
     across: Float64
     speed: Float64
+    log: Float64
     over_ground: Float64
     distance: Float64
 
@@ -87,6 +88,7 @@ class _Predictions:
             self.along[column],
             self.across[column],
             self.speed[column],
+            self.log[column],
             self.over_ground[column],
             self.distance[column],
         )
@@ -373,4 +375,5 @@ def _predicted(seen: Observation, columns: Columns) -> _Predictions:
     along[:, kind == LOG] = columns.log_m_s[:, at[kind == LOG]]
     along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
     across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
-    return _Predictions(along, across, columns.speed_through_water_m_s, ground, ahead)
+    speed = columns.speed_through_water_m_s
+    return _Predictions(along, across, speed, columns.log_m_s, ground, ahead)

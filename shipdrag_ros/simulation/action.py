@@ -74,6 +74,8 @@ class Action:
         A reading of the log is of this time before its stamp.
     radar_factor
         Positions and speeds over ground read (1 + radar_factor) times truth.
+    ground_lag_s
+        Time constant of a first-order filter of the speed over ground.
     """
 
     resistance: tuple[ResistanceLaw, ...] = ()
@@ -97,6 +99,7 @@ class Action:
     log_dead_band_m_s: float = 0.0
     log_late_s: float = 0.0
     radar_factor: float = 0.0
+    ground_lag_s: float = 0.0
 
     def __add__(self, other: Action) -> Action:
         parts = dict(vars(self))
