@@ -77,8 +77,13 @@ class Columns:
 
 @dataclass(frozen=True)
 class _Prepared:
-    """What the kernel takes of some columns."""
+    """
+    What the kernel takes of some columns: each motion once, however instruments read it.
 
+    `motion` (k,) is the number of each column's motion.
+    """
+
+    motion: NDArray[np.int64]
     law: SurgeLaw
     records: Records
     extra: Float64
@@ -86,7 +91,7 @@ class _Prepared:
     own_legs: NDArray[np.int64]
 
     def paths(self, time_s: Float64) -> Float64:
-        """Return what `follow` does (k, m, 5)."""
+        """Return what `follow` does, a path a motion (p, m, 5)."""
         paths = np.empty((len(self.records), len(time_s), 5))
         follow_columns(self.law, self.records, self.extra, self.legs, self.own_legs, time_s, paths)
         lost = np.maximum.accumulate(outside(self.law, paths[:, :, 0]), axis=1)
@@ -154,7 +159,7 @@ def simulate_columns(
     if any(action.log_lag_s or action.log_late_s or action.ground_lag_s for action in actions):
         seen = np.unique(np.concatenate([time, _looks_s(ship, scenario)]))
     whole = prepared.paths(seen)
-    paths = whole[:, np.searchsorted(seen, time)]
+    paths = whole[prepared.motion[:, np.newaxis], np.searchsorted(seen, time)]
     speed, position, velocity = paths[:, :, 0], paths[:, :, 1:3], paths[:, :, 3:]
     log = log_flow(
         speed,
@@ -165,10 +170,11 @@ def simulate_columns(
     )
     over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
     for i, action in enumerate(actions):
+        path = whole[prepared.motion[i]]
         if action.log_lag_s or action.log_late_s:
-            log[i] = log_reading(action, seen, whole[i, :, 0], time)
+            log[i] = log_reading(action, seen, path[:, 0], time)
         if action.ground_lag_s > 0.0:
-            moved = np.hypot(whole[i, :, 3], whole[i, :, 4])
+            moved = np.hypot(path[:, 3], path[:, 4])
             over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))
     radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
     return Columns(
@@ -223,12 +229,21 @@ def _prepare(
             first = sum(map(len, legs))
             legs.append(legs_of(ship, of_column, edges, steps))
             places[action.turns] = first, first + len(steps)
+    records = columns_of(ship, scenario, actions, speed_m_s=speeds)
+    motions: dict[tuple[object, ...], int] = {}
+    motion = [
+        motions.setdefault((record.tobytes(), action.resistance, action.turns), len(motions))
+        for record, action in zip(records, actions)
+    ]
+    once = np.unique(motion, return_index=True)[1]
+    moving = [actions[i] for i in once]
     return _Prepared(
+        np.array(motion),
         law,
-        columns_of(ship, scenario, actions, speed_m_s=speeds),
-        extra_of(ship, law, actions),
+        records[once],
+        extra_of(ship, law, moving),
         np.concatenate(legs),
-        np.array([places[action.turns] for action in actions]),
+        np.array([places[action.turns] for action in moving]),
     )
 
 

@@ -28,7 +28,7 @@ from shipdrag_ros.simulation import (
     simulate,
     simulate_columns,
 )
-from shipdrag_ros.simulation.columns import _steps
+from shipdrag_ros.simulation.columns import _prepare, _steps
 from shipdrag_ros.simulation.effects import LIBRARY
 
 CARGO = Ship.load(Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml')
@@ -266,3 +266,21 @@ def test_a_resistance_that_columns_share_is_computed_once() -> None:
     assert len(asked) == 1
     once, twice, both = columns.speed_through_water_m_s[:, 0].tolist()
     assert both == twice < once
+
+
+def test_a_motion_is_followed_once_however_instruments_read_it() -> None:
+    turned = Action(turns=(Turn(100.0, 50.0, 0.002),))
+    late, scaled = Action(log_lag_s=5.0, ground_lag_s=3.0), Action(radar_factor=0.1)
+    actions = [Action(), late, turned, scaled, turned + late, Action(n_r_change=0.1)]
+    prepared = _prepare(CARGO, SCENARIO, actions, None, None)
+    assert prepared.motion.tolist() == [0, 0, 1, 0, 1, 2]
+    assert len(prepared.paths(TIME_S)) == 3
+    together = simulate_columns(CARGO, SCENARIO, actions, TIME_S)
+    faster = simulate_columns(CARGO, SCENARIO, actions, TIME_S, speed_m_s=np.full(6, 8.3))
+    assert np.all(faster.speed_through_water_m_s > together.speed_through_water_m_s)
+    for i, action in enumerate(actions):
+        # whatever else is looked at, it is followed in the same steps
+        alone = simulate_columns(CARGO, SCENARIO, [action, late], TIME_S)
+        assert np.array_equal(alone.log_m_s[0], together.log_m_s[i])
+        assert np.array_equal(alone.radar_position_m[0], together.radar_position_m[i])
+        assert np.array_equal(alone.radar_speed_m_s[0], together.radar_speed_m_s[i])
