@@ -77,6 +77,10 @@ class DiagnosisError(ShipdragError):
     """Runs, or a ship file, from which no effect can be named."""
 
 
+class EarlierError(DiagnosisError):
+    """An earlier diagnosis that cannot count for the runs at hand."""
+
+
 class SensitivityError(ShipdragError):
     """A question of what matters that cannot be answered."""
 

@@ -231,6 +231,13 @@ def observe_hiding(number: int, kinds: tuple[type[Effect], ...]) -> Observation:
     )
 
 
+def hiding(number: int, kinds: tuple[type[Effect], ...]) -> tuple[Effect, ...]:
+    """
+    Return what is hidden in a case where `observe_hiding` hides others.
+    """
+    return _case(number, kinds).effects
+
+
 def known(number: int) -> Known:
     """
     Return what the oracle alone knows.

@@ -13,12 +13,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
+from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown
 from shipdrag_ros.coastdown.instruments import cut_of, length_s, runs, until
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings, seconds
 from shipdrag_ros.estimation.ode_fit.shaft_fall import STANDS_RAD_S
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
 _IDLE = 0.1  # of the fastest shaft or the largest pitch: a hundredth of the thrust
@@ -132,6 +132,31 @@ def gone_s(ship: Ship) -> float:
     """
     constant_s = 0.0 if ship.propulsion is None else ship.propulsion.run_down_s
     return _ONSET_S + _RUN_DOWNS * constant_s
+
+
+def start_of(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
+    """
+    Return the start of a coastdown, and whether what comes before it may be steady sailing.
+
+    Parameters
+    ----------
+    coastdown
+        That has ended.
+    ship
+        For how long the thrust runs down.
+
+    Notes
+    -----
+    The run-down of the thrust is cut, but it follows the stop: with it, the record before is as
+    good as before any other. What was cut before that, the engine drove: it may be steady.
+    """
+    if not coastdown.cut_at_start:
+        return coastdown.start_ns, True
+    cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
+    first_ns = min(cut.start_ns for cut in cuts)
+    if all(cut.reason is Dismissal.THRUST for cut in cuts):
+        return max(first_ns, coastdown.start_ns - round(gone_s(ship) * SECOND_NS)), True
+    return coastdown.start_ns, False
 
 
 def _joined(window: Window, number: int) -> tuple[Float64, Float64, NDArray[np.bool_]]:

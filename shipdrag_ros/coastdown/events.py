@@ -10,6 +10,11 @@ from enum import Enum
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 
+BRAKED = (
+    'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
+    'from the rest alone'
+)
+
 
 class State(Enum):
     """Where the monitor stands."""
@@ -50,6 +55,18 @@ class Dismissal(Enum):
     GAP = 'gap'  # the data stopped before it could be confirmed
     OUTLIER = 'outlier'  # bad readings
     OTHER = 'other'
+
+
+BY_SPEED = frozenset(
+    {
+        Dismissal.BRAKE,
+        Dismissal.LEAD_IN,
+        Dismissal.PLATEAU,
+        Dismissal.SETTLED,
+        Dismissal.THRUST,
+    }
+)
+"""For these a candidate is dismissed by its speed; a turn, a gap and bad readings are causes."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +136,13 @@ class EndedCoastdown:
     def stands(self) -> bool:
         """Whether it ended as a coastdown: neither withdrawn nor cut short by a reset."""
         return not self.withdrawn and self.ended_by is not EndedBy.RESET
+
+    @property
+    def braked(self) -> bool:
+        """Whether something but the water slowed her in a part of it, as `BRAKED` says."""
+        return self.ended_by is EndedBy.BRAKE or any(
+            cut.reason is Dismissal.BRAKE for cut in self.cuts
+        )
 
     @property
     def cut_at_start(self) -> bool:

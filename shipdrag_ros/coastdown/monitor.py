@@ -16,6 +16,7 @@ import numpy as np
 from shipdrag_ros.coastdown.bins import SOURCES
 from shipdrag_ros.coastdown.direction import heading_doubt
 from shipdrag_ros.coastdown.dismissals import Dismissals
+from shipdrag_ros.coastdown.driving import start_of
 from shipdrag_ros.coastdown.ending import End, cut_short, end_of, withdrawn
 from shipdrag_ros.coastdown.events import (
     Dismissal,
@@ -246,8 +247,9 @@ class Monitor:
 
         What is older than `history_ns` may be missing; after a reset all is.
         """
-        before_ns = 0 if ended.cut_at_start else round(self._parameters.steady_s * SECOND_NS)
-        return self._cut(ended.start_ns, ended.end_ns, ended.start_ns - before_ns)
+        start_ns, steady = start_of(ended, self._ship)
+        before_ns = round(self._parameters.steady_s * SECOND_NS) if steady else 0
+        return self._cut(start_ns, ended.end_ns, start_ns - before_ns)
 
     def _fresh(self, tally: InputTally) -> Memory:
         return Memory.fresh(self._tuning.slopes, seconds=self._seconds, tally=tally)

@@ -198,7 +198,13 @@ class Carried:
                 each.diagnosis.name,
                 each.diagnosis.runs,
                 tuple(
-                    CarriedEffect(name, then, stays, now.get(name, 0.0))
+                    CarriedEffect(
+                        name,
+                        then,
+                        stays,
+                        now.get(name, 0.0),
+                        resized=self._source(name) is each and _resized(name, posterior),
+                    )
                     for name, stays in each.stays.items()
                     if (then := each.diagnosis.probability(name)) >= _LEAST
                 ),
@@ -231,6 +237,16 @@ class Carried:
             sd = math.hypot(math.sqrt(variance / _HALF), mean * (_SIZE_SD + lasted))
             priors.append(_about(quantity.prior, mean, sd))
         return tuple(priors) if all(prior.second > 0.0 for prior in priors) else ()
+
+
+def _resized(name: str, posterior: Posterior) -> bool:
+    """Say whether an effect is likelier of any size than as it was found."""
+    for names in posterior.named():
+        if name in names and names in posterior.best:
+            terms = posterior.best[names].hypothesis.terms
+            own = [t for t in terms if isinstance(t, EffectTerm) and not t.stated]
+            return not any(term.kept for term in own if term.effect.name == name)
+    return False
 
 
 def _sd(size: Parameter) -> float:

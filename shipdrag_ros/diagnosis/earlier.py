@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.display import utc
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import EarlierError
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import Ship
 
@@ -123,18 +123,18 @@ def check(latest_first: Sequence[EarlierDiagnosis], ship: Ship, runs: Sequence[S
 
     Raises
     ------
-    DiagnosisError
+    EarlierError
         If one is of another ship or of later runs, or holds a run that would count twice.
     """
     for each in latest_first:
         if not each.runs:
-            raise DiagnosisError(f'{each.name}: when its runs were is not known; leave it out')
+            raise EarlierError(f'{each.name}: when its runs were is not known; leave it out')
         _refuse_other_ship(each, ship)
     _refuse_twice(latest_first, runs)
     first_ns = min(run.time_ns for run in runs)
     for each in latest_first:
         if each.last_ns > first_ns:
-            raise DiagnosisError(
+            raise EarlierError(
                 f'{each.name}: its run of {utc(each.last_ns)} is later than the first one '
                 f'diagnosed here, {utc(first_ns)}; give diagnoses of runs of before with '
                 '--earlier FILE'
@@ -147,7 +147,7 @@ def _refuse_other_ship(earlier: EarlierDiagnosis, ship: Ship) -> None:
         other = other or abs(earlier.length_m / ship.length_m - 1.0) > _LENGTHS
     if other:
         length = '' if earlier.length_m is None else f' of {earlier.length_m:g} m'
-        raise DiagnosisError(
+        raise EarlierError(
             f'{earlier.name}: it is of the ship {earlier.ship!r}{length}, and these runs are of '
             f'{ship.name!r} of {ship.length_m:g} m; give diagnoses of one ship with --earlier FILE'
         )
@@ -163,7 +163,7 @@ def _refuse_twice(earlier: Sequence[EarlierDiagnosis], runs: Sequence[SeenRun]) 
                 where for other, where in known if abs(other.time_ns - run.time_ns) < _SAME_NS
             ]
             if twice:
-                raise DiagnosisError(
+                raise EarlierError(
                     f'{each.name}: it holds the run of {utc(run.time_ns)} ({run.name}), which '
                     f'counts {twice[0]} already; a run counts once, so leave one of them out'
                 )

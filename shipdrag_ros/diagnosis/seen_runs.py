@@ -40,17 +40,21 @@ class CarriedEffect:
         That it is there still and as it was, if it was, before the runs at hand.
     now
         That it is there, with the runs at hand.
+    resized
+        Whether it is there, if it is, of another size or sign than was found then.
     """
 
     name: str
     probability: float
     stays: float
     now: float
+    resized: bool = False
 
     @property
     def contradicted(self) -> bool:
-        """Whether the runs at hand contradict it."""
-        return self.probability * self.stays > DOUBTED > self.now
+        """Whether the runs at hand contradict it, or its size."""
+        expected = self.probability * self.stays > DOUBTED
+        return expected and (self.resized or self.now < DOUBTED)
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,8 @@ class SwingTerm:
         across = np.zeros((2, 0 if seen.across is None else len(seen.across)))
         if run != self.run:
             return np.zeros((2, len(seen.along))), across
+        if not np.isfinite(base.speed).all():  # a step that leaves the baseline is not taken
+            return np.full((2, len(seen.along)), np.nan), across
         return swung(seen, base.speed, np.array([self.period_s])), across
 
 

@@ -164,9 +164,10 @@ def _earlier(given: WeighedEarlier) -> Iterator[str]:
     yield f'The earlier diagnosis {given.name} ({when}) counts: {counts or nothing}.'
     for each in given.effects:
         if each.contradicted:
+            size = ', and of another size or sign than it was then' if each.resized else ''
             yield (
                 f'These runs contradict the earlier diagnosis {given.name}: '
-                f'{names_text([each.name])} is {probability(each.now)} probable now. It was '
+                f'{names_text([each.name])} is {probability(each.now)} probable now{size}. It was '
                 'repaired, cleaned or set anew since, or one of the two is wrong; look which.'
             )
     for line in given.unused:

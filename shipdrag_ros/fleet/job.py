@@ -11,6 +11,8 @@ from __future__ import annotations
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +20,8 @@ from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose, diagnose_fitted
+from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
+from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
@@ -25,6 +29,7 @@ from shipdrag_ros.fleet.local import fetched
 from shipdrag_ros.fleet.rows import BagResult, Row, coastdown_row
 from shipdrag_ros.importing.reading import read_any
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
+from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
 from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship
 
@@ -131,9 +136,8 @@ def _coastdowns(
     rows, notes = [], []
     windows = coast_windows(result)
     for coastdown, window in windows:
-        diagnosis, why = _diagnosis(result, hull, window)
-        if why:
-            notes.append(f'the coastdown at {coastdown.start_ns} ns is not diagnosed: {why}')
+        diagnosis, said = _diagnosis(result, hull, coastdown, window)
+        notes += [f'the coastdown at {coastdown.start_ns} ns{each}' for each in said]
         rows.append(
             coastdown_row(coastdown, hull.ship, diagnosis=diagnosis, context=context, flags=shared)
         )
@@ -144,20 +148,46 @@ def _coastdowns(
             )
     if not windows:
         notes.append(f'no coastdown was found: {why_no_coastdown(result)}')
+        notes += _dismissed(result, hull)
     return sorted(rows, key=lambda row: int(row['time_ns'])), notes
 
 
 def _diagnosis(
-    result: ReplayResult, hull: _ShipInRun, window: Window
-) -> tuple[DiagnosisResult | None, str]:
-    """Diagnose one coastdown, or say why that cannot be."""
-    runs = [CoastRun(Path(result.run.name).name, window, hull.facts)]
+    result: ReplayResult, hull: _ShipInRun, coastdown: EndedCoastdown, window: Window
+) -> tuple[DiagnosisResult | None, list[str]]:
+    """Diagnose one coastdown; with the ends of sentences that are to be said of it."""
+    run = CoastRun(Path(result.run.name).name, window, hull.facts)
     try:
         if hull.ship.baseline is None:
-            return diagnose_fitted(runs, hull.ship), ''
-        return diagnose(runs, hull.ship, result.parameters, advise=False), ''
+            return diagnose_fitted([run], hull.ship), []
+        glide = whole_glide(result, coastdown)
+        if glide is None:
+            return _held(result, hull, run), []
+        whole = None
+        if glide.window is not None:
+            whole = partial(_held, result, hull, replace(run, window=glide.window))
+        alone = partial(_held, result, hull, run)
+        found = with_whole_glides(alone, whole, (glide.note,), coastdowns=1)
+        return found, [f': {note}' for note in found.notes]
     except (DiagnosisError, EstimationError) as error:
-        return None, str(error)
+        return None, [f' is not diagnosed: {error}']
+
+
+def _dismissed(result: ReplayResult, hull: _ShipInRun) -> list[str]:
+    """Diagnose a glide that was taken for none; it has no row, as it gives no r(v)."""
+    glide = None if hull.ship.baseline is None else dismissed_glide(result)
+    if glide is None:
+        return []
+    run = CoastRun(Path(result.run.name).name, glide, hull.facts)
+    try:
+        said = sentence(_held(result, hull, run))
+    except ShipdragError as error:  # a glide that is like none may not be followed
+        said = f'it could not be: {error}'
+    return [f'{DISMISSED}. All of it held against the model: {said}']
+
+
+def _held(result: ReplayResult, hull: _ShipInRun, run: CoastRun) -> DiagnosisResult:
+    return diagnose([run], hull.ship, result.parameters, advise=False)
 
 
 def _hull(source: BagToRead, run: Run) -> _ShipInRun:

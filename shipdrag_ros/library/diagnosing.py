@@ -17,10 +17,11 @@ from shipdrag_ros.diagnosis import (
     diagnose_sailing,
 )
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
-from shipdrag_ros.diagnosis.result import Verdict, WeighedFact
+from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.diagnosis.together import with_log_track
-from shipdrag_ros.errors import DiagnosisError, ShipdragError
+from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
+from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_two_ships
@@ -35,26 +36,10 @@ from shipdrag_ros.replay import (
     why_no_coastdown,
 )
 from shipdrag_ros.replay.cuts import cut_lines
-from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
+from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import overriding
-
-_GLIDED = (
-    'she lost her speed about as fast as after an engine stop, though not as water slows a ship; '
-    'no coastdown is taken from it'
-)
-_BRAKED = (
-    'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
-    'from the rest alone'
-)
-_HELD = 'all of each glide is held against the model, such parts with the rest'
-_AGREES = 'all of each glide, held against the model, shows nothing more'
-_SOUND_PART = (
-    'So it is not known whether anything is missing; give the sound part alone with '
-    '--window START END'
-)
-_APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 
 def diagnose_runs(
@@ -105,20 +90,21 @@ def diagnose_runs(
         sailing = _sailing(runs, f'No coastdown was found: {why}.', progress)
         return _unused(sailing, facts, earlier), None
     seen = _found(listener, runs, given, progress)
-    found: DiagnosisResult | None = None
-    failed: tuple[str, ...] = ()
-    try:
-        found = _of_coastdowns(runs, seen, facts, earlier, progress)
-    except DiagnosisError as error:
-        if not seen.whole:
-            raise
-        if seen.coasts:
-            failed = (f'the coastdowns alone could not be diagnosed: {error}',)
-    if found is not None and seen.whole and found.verdict is Verdict.NAMED:
-        found = replace(found, notes=(*found.notes, *seen.notes, _APART))
-    elif found is None or seen.whole:
-        found = _of_whole_glides(found, seen, facts, earlier, progress)
-        found = replace(found, notes=(*found.notes, *failed))
+    alone = partial(_of_coastdowns, runs, seen, facts, earlier, progress)
+    of_whole = partial(
+        diagnose,
+        seen.whole,
+        seen.ship,
+        seen.parameters,
+        facts=facts,
+        earlier=earlier,
+        progress=progress,
+    )
+    found = with_whole_glides(
+        alone, of_whole if seen.whole else None, seen.notes, coastdowns=len(seen.coasts)
+    )
+    if seen.whole:
+        found = replace(found, no_coastdown=seen.no_coastdown, estimates=seen.estimates)
     return found, seen.ship
 
 
@@ -151,45 +137,6 @@ def _of_coastdowns(
         )
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates)
-
-
-def _of_whole_glides(
-    found: DiagnosisResult | None,
-    seen: _Coastdowns,
-    facts: Sequence[Fact],
-    earlier: Sequence[EarlierDiagnosis],
-    progress: Progress,
-) -> DiagnosisResult:
-    """
-    Diagnose with the parts that are no coastdown though no instrument shows why.
-
-    Where these show nothing either, what the coastdowns show stands. Where they cannot be
-    followed, it stands too, but for that nothing is missing, which is an error then.
-    """
-    try:
-        whole = diagnose(
-            seen.whole,
-            seen.ship,
-            seen.parameters,
-            facts=facts,
-            earlier=earlier,
-            progress=progress,
-        )
-    except ShipdragError as error:  # a glide that is like none may not be followed
-        why = f'all of each glide could not be held against the model: {error}'
-        if found is None or found.verdict is Verdict.NONE:  # what is cut is no sign of nothing
-            raise DiagnosisError(f'{"; ".join((*seen.notes, why))}. {_SOUND_PART}') from error
-        return replace(found, notes=(*found.notes, *seen.notes, why))
-    if found is not None and whole.verdict is Verdict.NONE:
-        return replace(found, notes=(*found.notes, *seen.notes, _AGREES))
-    before = () if found is None else found.notes
-    return replace(
-        whole,
-        notes=tuple(dict.fromkeys((*before, *whole.notes, *seen.notes, _HELD))),
-        no_coastdown=seen.no_coastdown,
-        coastdowns_used=len(seen.coasts) if found is None else found.coastdowns_used,
-        estimates=seen.estimates,
-    )
 
 
 def _with_log_track(
@@ -280,7 +227,7 @@ class _Coastdowns:
     The coastdowns of all bags, their estimates, and of each bag without one why.
 
     `whole` are all glides with the parts of them that are no coastdown, though no instrument
-    shows why; empty where there is no such part. `notes` says what these are.
+    shows why; empty where no such part can be followed. `notes` says what these are.
     """
 
     coasts: list[CoastRun]
@@ -307,6 +254,7 @@ def _found(
     coasts: list[CoastRun] = []
     whole: list[CoastRun] = []
     notes: list[str] = []
+    followed = False
     without: list[str] = []
     estimates: list[Estimate] = []
     ship, parameters = given, None
@@ -327,22 +275,27 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-            glide = dismissed_glide(result) if ship.baseline is not None else None
-            if glide is not None:
-                whole.append(CoastRun(each.name, glide, sheet.facts, of_run))
-                notes.append(f'{each.name}: {_GLIDED}')
+            missed = dismissed_glide(result) if ship.baseline is not None else None
+            if missed is not None:
+                whole.append(CoastRun(each.name, missed, sheet.facts, of_run))
+                notes.append(f'{each.name}: {DISMISSED}')
+                followed = True
         for place, (coastdown, found) in enumerate(windows, start=1):
             name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
             coasts.append(CoastRun(name, found, sheet.facts, of_run))
             glide = whole_glide(result, coastdown) if ship.baseline is not None else None
-            whole.append(replace(coasts[-1], window=glide or found))
-            if glide is not None:
-                notes.append(f'{name}: {_BRAKED}')
+            whole.append(coasts[-1])
+            if glide is None:
+                continue
+            notes.append(f'{name}: {glide.note}')
+            if glide.window is not None:
+                whole[-1] = replace(whole[-1], window=glide.window)
+                followed = True
     assert ship is not None
     assert parameters is not None
     return _Coastdowns(
         coasts,
-        whole if notes else [],
+        whole if followed else [],
         tuple(notes),
         ship,
         parameters,

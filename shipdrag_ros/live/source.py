@@ -266,6 +266,6 @@ class BagSource:
         if of is not None and of.end_ns > self._at_ns:  # read ahead, and not played yet
             return
         if status.state is DiagnosisState.DONE and found is not None:
-            self.bridge.show_verdict(of_diagnosis(found))
+            self.bridge.show_verdict(of_diagnosis(found, status.caveat))
         else:
             self.bridge.show_verdict(VerdictView(status.state.value, status.reason))

@@ -51,6 +51,8 @@ def of_status(status: Status) -> VerdictView:
     for key, text in values.items():
         name, _, unit = key.partition(' [')
         unit = unit.rstrip(']').removesuffix('1')
+        if name.startswith('note '):
+            continue
         if name.startswith('advice'):
             decide.append(_OPTION.sub('', text))
         elif name.startswith(('probability of ', 'probability that ')):
@@ -73,9 +75,15 @@ def of_status(status: Status) -> VerdictView:
     )
 
 
-def of_diagnosis(found: DiagnosisResult) -> VerdictView:
+def of_diagnosis(found: DiagnosisResult, caveat: str = '') -> VerdictView:
     """
     Take a diagnosis.
+
+    Parameters
+    ----------
+    found
+    caveat
+        What it has not looked at, a sentence.
     """
     from shipdrag_ros.diagnosis import words
     from shipdrag_ros.simulation.effects import LIBRARY
@@ -100,7 +108,7 @@ def of_diagnosis(found: DiagnosisResult) -> VerdictView:
     ]
     return VerdictView(
         'done',
-        words.sentence(found),
+        ' '.join(filter(None, [words.sentence(found), caveat])),
         tuple(sizes),
         tuple((each.words, each.probability) for each in words.answers(found)),
         tuple(_OPTION.sub('', line) for line in words.advice(found)),

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from shipdrag_ros.coastdown.events import (
+    BY_SPEED,
     EndedBy,
     EndedCoastdown,
     Event,
@@ -34,6 +35,10 @@ SILENCE_SAID_AFTER_S = 10.0
 COMPILING_SAID_AFTER_S = 3.0  # to load what was kept is faster
 AGAIN_S = 10.0  # a finding that comes and goes is said this often at most
 _NS = 1e-9
+_LOOK = (
+    '; if the engine was stopped there, `shipdrag diagnose BAG` of the recording holds all of it '
+    'against the model'
+)
 _ENDED_BY = {
     EndedBy.SPEED: 'the minimum speed is reached',
     EndedBy.TURN: 'the ship turned',
@@ -69,7 +74,8 @@ def line_of(event: Event) -> LogLine | None:
         case EndedCoastdown():
             return _ended(event)
         case NotCoastdown():
-            return LogLine(f'nearly a coastdown: {event.text}')
+            hint = _LOOK if event.reason in BY_SPEED else ''
+            return LogLine(f'nearly a coastdown: {event.text}{hint}')
         case Reset(_, reason):
             return LogLine(f'all memory is dropped: {reason}', warning=True)
         case NoEstimate() | _:

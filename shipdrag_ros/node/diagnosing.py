@@ -19,7 +19,7 @@ from enum import Enum
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -28,6 +28,10 @@ from shipdrag_ros.ship import Ship
 if TYPE_CHECKING:  # the process that diagnoses imports it, the node need not
     from shipdrag_ros.diagnosis import DiagnosisResult
 
+_GOES_ON = (
+    'The coastdown alone is diagnosed here; `shipdrag diagnose BAG` of the recording holds all of '
+    'the glide against the model'
+)
 LIMIT_S = 900.0  # the first diagnosis of a machine compiles
 _NICE = 10  # estimates come first
 
@@ -63,6 +67,12 @@ class DiagnosisStatus:
     reason: str = ''
     coastdown: EndedCoastdown | None = None
     found: DiagnosisResult | None = None
+
+    @property
+    def caveat(self) -> str:
+        """What the diagnosis has not looked at, a sentence; '' where it saw all of a glide."""
+        braked = self.coastdown is not None and self.coastdown.braked
+        return f'{BRAKED[0].upper()}{BRAKED[1:]}. {_GOES_ON}' if braked else ''
 
 
 @dataclass(frozen=True)

@@ -265,14 +265,16 @@ def diagnosis_status(status: DiagnosisStatus) -> DiagnosticStatus:
     if status.found is None:
         level = WARN if status.state is DiagnosisState.FAILED else OK
         text = status.state.value
-        return _status(
-            'diagnosis', level, f'{text}: {status.reason}' if status.reason else text, values
-        )
+        text = f'{text}: {status.reason}' if status.reason else text
+        if status.state in (DiagnosisState.IMPOSSIBLE, DiagnosisState.FAILED) and status.caveat:
+            text = f'{text}. {status.caveat}'
+        return _status('diagnosis', level, text, values)
     from shipdrag_ros.diagnosis import Verdict, words
 
     found = status.found
-    level = OK if found.verdict is Verdict.NONE else WARN
-    return _status('diagnosis', level, words.sentence(found), values | _figures(found))
+    level = OK if found.verdict is Verdict.NONE and not status.caveat else WARN
+    message = ' '.join(filter(None, [words.sentence(found), status.caveat]))
+    return _status('diagnosis', level, message, values | _figures(found))
 
 
 def _figures(found: DiagnosisResult) -> dict[str, object]:
@@ -306,6 +308,7 @@ def _figures(found: DiagnosisResult) -> dict[str, object]:
     values['mean square of whitened residuals, before [1]'] = found.before.chi2_per_sample
     if found.after is not None:
         values['mean square of whitened residuals, after [1]'] = found.after.chi2_per_sample
+    values |= {f'note {i}': note for i, note in enumerate(found.notes, start=1)}
     return values | {f'advice {i}': line for i, line in enumerate(advice(found), start=1)}
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from shipdrag_ros.coastdown import Monitor, validate
-from shipdrag_ros.coastdown.driving import gone_s
-from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, Event
+from shipdrag_ros.coastdown.driving import start_of
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown, Event
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
@@ -136,28 +136,3 @@ def window_between(
     accepted = block[np.flatnonzero(reasons == Reason.ACCEPTED)]
     before = start_ns - before_ns if steady else None
     return Window.from_block(accepted, start_ns, end_ns, before_ns=before)
-
-
-def start_of(coastdown: EndedCoastdown, ship: Ship) -> tuple[int, bool]:
-    """
-    Return the start of a coastdown, and whether what comes before it may be steady sailing.
-
-    Parameters
-    ----------
-    coastdown
-        That has ended.
-    ship
-        For how long the thrust runs down.
-
-    Notes
-    -----
-    The run-down of the thrust is cut, but it follows the stop: with it, the record before is as
-    good as before any other. What was cut before that, the engine drove: it may be steady.
-    """
-    if not coastdown.cut_at_start:
-        return coastdown.start_ns, True
-    cuts = [cut for cut in coastdown.cuts if cut.start_ns < coastdown.start_ns]
-    first_ns = min(cut.start_ns for cut in cuts)
-    if all(cut.reason is Dismissal.THRUST for cut in cuts):
-        return max(first_ns, coastdown.start_ns - round(gone_s(ship) * SECOND_NS)), True
-    return coastdown.start_ns, False

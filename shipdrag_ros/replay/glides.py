@@ -8,39 +8,62 @@ where no instrument shows the cause.
 
 from __future__ import annotations
 
+from contextlib import suppress
+from typing import NamedTuple
+
 import numpy as np
 
-from shipdrag_ros.coastdown.driving import gone_s, thrust
-from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.driving import gone_s, start_of, thrust
+from shipdrag_ros.coastdown.events import BRAKED, BY_SPEED, Dismissal, EndedBy, EndedCoastdown
 from shipdrag_ros.coastdown.expectation import expect
 from shipdrag_ros.coastdown.instruments import astern, length_s, turns
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.replay.coasts import clocks_apart, start_of, window_between
+from shipdrag_ros.replay.coasts import clocks_apart, window_between
 from shipdrag_ros.replay.playback import ReplayResult
 from shipdrag_ros.replay.sailing import accepted_samples
 from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship
 
+DISMISSED = (
+    'she lost her speed about as fast as after an engine stop, though not as water slows a ship; '
+    'no coastdown is taken from it'
+)
+_NOT_FOLLOWED = (
+    '{braked}; all of the glide is not held against the model, as {why}, and what is said rests '
+    'on the coastdown alone'
+)
 _BIN_S = 10.0
 _BEFORE_S = 300.0  # that show the speed before a stop
 _RISE = 0.05  # of the first speed: a ship that gains so much no longer glides
 _LEFT = 0.6  # of the speed, which a glide reaches ...
 _EARLIEST, _LATEST = 0.5, 2.5  # ... after so many times the time that the ship file expects
 _LONGEST_S = 7200.0  # no glide is longer
-# for these a candidate is dismissed by its speed alone; a turn, a gap and bad readings are causes
-_BY_SPEED = (
-    Dismissal.BRAKE,
-    Dismissal.LEAD_IN,
-    Dismissal.PLATEAU,
-    Dismissal.SETTLED,
-    Dismissal.THRUST,
-)
 
 
-def whole_glide(result: ReplayResult, coastdown: EndedCoastdown) -> Window | None:
+class Glide(NamedTuple):
     """
-    Return the window of a coastdown with what was cut as the work of something but the water.
+    A glide that is more than its coastdown.
+
+    Attributes
+    ----------
+    window
+        All of it; None where it cannot be followed.
+    note
+        What is no coastdown of it, and why it cannot be followed, a sentence.
+    """
+
+    window: Window | None
+    note: str
+
+
+class _Unfollowed(Exception):
+    """Why a glide cannot be followed; '' where an instrument shows why it ends."""
+
+
+def whole_glide(result: ReplayResult, coastdown: EndedCoastdown) -> Glide | None:
+    """
+    Return a coastdown with what was cut as the work of something but the water.
 
     Parameters
     ----------
@@ -51,22 +74,26 @@ def whole_glide(result: ReplayResult, coastdown: EndedCoastdown) -> Window | Non
 
     Returns
     -------
-    Window or None
+    Glide or None
         None where nothing was cut for that, or an instrument shows the cause.
     """
-    braked = [cut for cut in coastdown.cuts if cut.reason is Dismissal.BRAKE]
-    if coastdown.ended_by is not EndedBy.BRAKE and not braked:
+    if not coastdown.braked:
         return None
+    braked = [cut for cut in coastdown.cuts if cut.reason is Dismissal.BRAKE]
     start_ns, steady = start_of(coastdown, result.ship)
     if any(cut.start_ns < coastdown.start_ns for cut in braked):
         start_ns, steady = min(cut.start_ns for cut in coastdown.cuts), True
     if coastdown.ended_by is EndedBy.GIVEN:
         end_ns = max(coastdown.end_ns, *(cut.end_ns for cut in braked))
-        return window_between(result, start_ns, end_ns, steady=steady)
-    found = _glide(result, start_ns, steady=steady)
-    if found is None or (found.start_ns, found.end_ns) == (start_ns, coastdown.end_ns):
+        return Glide(window_between(result, start_ns, end_ns, steady=steady), BRAKED)
+    try:
+        found = _glide(result, start_ns, steady=steady)
+    except _Unfollowed as why:
+        said = _NOT_FOLLOWED.format(braked=BRAKED, why=why)
+        return Glide(None, said) if str(why) else None
+    if (found.start_ns, found.end_ns) == (start_ns, coastdown.end_ns):
         return None
-    return found
+    return Glide(found, BRAKED)
 
 
 def dismissed_glide(result: ReplayResult) -> Window | None:
@@ -84,7 +111,7 @@ def dismissed_glide(result: ReplayResult) -> Window | None:
         None where a coastdown was found, or where the ship lost no such part of her speed in
         about such a time as after an engine stop: then power was reduced.
     """
-    dismissed = [one for one in result.not_coastdowns if one.reason in _BY_SPEED]
+    dismissed = [one for one in result.not_coastdowns if one.reason in BY_SPEED]
     if result.coastdowns or not dismissed:
         return None
     block, _ = accepted_samples(result.run)
@@ -99,27 +126,24 @@ def dismissed_glide(result: ReplayResult) -> Window | None:
     for one in dismissed:
         since_s = time_s - (one.start_ns - record.start_ns) * 1e-9
         if _as_after_a_stop(since_s, speed, result.ship):
-            found = _glide(result, one.start_ns, steady=True)
-            if found is not None:
-                return found
+            with suppress(_Unfollowed):
+                return _glide(result, one.start_ns, steady=True)
     return None
 
 
-def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window | None:
+def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window:
     """Read on from a start to where she is slow, gains speed, or an instrument ends it."""
-    if result.run.span_ns is None:
-        return None
+    if result.run.span_ns is None or result.run.span_ns[1] <= start_ns:
+        raise _Unfollowed('the clocks of record and instruments differ')
     last_ns = min(result.run.span_ns[1], start_ns + round(_LONGEST_S * SECOND_NS))
-    if last_ns <= start_ns:
-        return None
     apart = bool(clocks_apart(result))
     try:
         window = window_between(result, start_ns, last_ns, steady=steady, apart=apart)
-    except ValueError:  # a clock was set after the coastdown
-        return None
+    except ValueError as error:
+        raise _Unfollowed('a clock was set after it') from error
     time_s, speed = readings(window)
     if len(speed) < LEAST_READINGS:
-        return None
+        raise _Unfollowed(f'it has {len(speed)} readings of the speed')
     time_s, speed = binned(time_s, speed, max(int(length_s(window) / _BIN_S), LEAST_READINGS))
     slow_m_s = float(result.ship.speed(result.parameters.froude_min))
     rises = speed > np.minimum.accumulate(speed) + _RISE * float(speed[0])
@@ -128,7 +152,10 @@ def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window | Non
     if len(over):  # what she does afterwards, going astern for instance, ends nothing before it
         end_s = float(time_s[int(np.argmin(speed[: over[0] + 1]))])
         if end_s < gone_s(result.ship):
-            return None
+            raise _Unfollowed(
+                f'she is slow or gains speed within {end_s:.0f} s of the stop, while the thrust '
+                'may still run down'
+            )
         window = window.part(start_ns, start_ns + round(end_s * SECOND_NS))
     cuts = (
         *thrust(window, result.ship, steady=steady),
@@ -139,7 +166,7 @@ def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window | Non
         return window
     end_s = min(end_s, *((cut.start_ns - start_ns) * 1e-9 for cut in cuts))
     if end_s < gone_s(result.ship):
-        return None
+        raise _Unfollowed
     return window.part(start_ns, start_ns + round(end_s * SECOND_NS))
 
 

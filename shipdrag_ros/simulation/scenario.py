@@ -89,7 +89,7 @@ class Turn:
         """
         time = np.asarray(after_lead_in_s, np.float64)
         begins, grown, falls, ends = self.corners_s
-        if self.edge_s == 0.0:
+        if grown <= begins or ends <= falls:  # an edge of nothing, or lost beside the times
             return ((time >= begins) & (time < ends)).astype(np.float64)
         risen = np.clip((time - begins) / (grown - begins), 0.0, 1.0)
         result: Float64 = risen - np.clip((time - falls) / (ends - falls), 0.0, 1.0)

@@ -246,3 +246,18 @@ def test_an_earlier_diagnosis_that_the_runs_contradict_is_said(
         for found in (alone, told)
     )
     assert math.log(after / before) > -0.3
+
+
+def test_an_earlier_size_that_the_runs_contradict_is_said(
+    fouled: CoastRun, alone: DiagnosisResult
+) -> None:
+    wrong = EarlierCandidate(0.98, {'fouling': {'friction_factor': Parameter(1.2, 0.04)}})
+    told = diagnosed(fouled, replace(earlier(), candidates=(wrong,)))
+    (effect,) = told.earlier[0].effects
+    assert effect.resized
+    assert effect.contradicted
+    assert 'of another size or sign than it was then' in ' '.join(words.earlier(told))
+    # what a run leaves open, a size that it excludes does not name
+    assert alone.verdict == told.verdict == 'one_of'
+    sizes = [each.effects[0].parameters for each in told.candidates if each.names == ('fouling',)]
+    assert all(abs(size['friction_factor'].value - 0.35) < 0.15 for size in sizes)

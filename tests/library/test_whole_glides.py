@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,16 @@ from shipdrag_ros.cli import main
 from shipdrag_ros.coastdown.events import EndedBy
 from shipdrag_ros.diagnosis import diagnose
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.fleet import job
+from shipdrag_ros.fleet.find import find
+from shipdrag_ros.fleet.job import BagJob, work
+from shipdrag_ros.fleet.rows import BagResult
 from shipdrag_ros.library import diagnosing
 from shipdrag_ros.replay import replay
 from shipdrag_ros.replay.glides import dismissed_glide, whole_glide
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.sections import Propulsion
 from shipdrag_ros.simulation import START_NS
 
 SHIP_FILE = Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml'
@@ -133,9 +139,10 @@ def test_the_whole_glide_goes_on_where_the_coastdown_ends(tmp_path: Path) -> Non
     assert coastdown.ended_by is EndedBy.BRAKE
     glide = whole_glide(result, coastdown)
     assert glide is not None
-    assert glide.before is not None
-    assert glide.start_ns == coastdown.start_ns
-    assert glide.end_ns > coastdown.end_ns + 200 * 10**9
+    assert glide.window is not None
+    assert glide.window.before is not None
+    assert glide.window.start_ns == coastdown.start_ns
+    assert glide.window.end_ns > coastdown.end_ns + 200 * 10**9
 
 
 def crash_stop(time_s: float) -> float:
@@ -149,7 +156,60 @@ def test_what_she_does_after_she_was_slow_hides_no_glide(tmp_path: Path) -> None
     (coastdown,) = result.coastdowns
     glide = whole_glide(result, coastdown)
     assert glide is not None
-    assert glide.end_ns > coastdown.end_ns
+    assert glide.window is not None
+    assert glide.window.end_ns > coastdown.end_ns
+    # of a ship whose thrust runs down for longer than that, too little is left, which is said
+    slow = replace(SHIP, propulsion=Propulsion(run_down_s=80.0, sd=2.0))
+    short = whole_glide(replace(result, ship=slow), coastdown)
+    assert short is not None
+    assert short.window is None
+    assert 'no instrument shows what' in short.note
+    assert 'while the thrust may still run down' in short.note
+
+
+def in_a_fleet(path: Path, force: Force) -> BagResult:
+    (source,) = find([str(sailed(path / 'run.mcap', force))]).sources
+    return work(BagJob((source,), 'hash'))
+
+
+def test_the_fleet_sees_the_whole_glide_as_the_verb_does(tmp_path: Path) -> None:
+    result = in_a_fleet(tmp_path, crash_stop)
+    (row,) = result.coastdowns
+    assert row['verdict'] == 'unknown'  # nothing is missing in the coastdown alone
+    said = ' '.join(result.bag['warnings'])
+    assert 'no instrument shows what' in said
+    assert 'all of each glide is held against the model' in said
+
+
+def test_the_fleet_says_of_a_glide_that_gives_no_row_what_it_shows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*args: Any, **options: Any) -> Any:
+        raise ShipdragError('asked for nan')
+
+    monkeypatch.setattr(job, 'diagnose', refuse)
+    result = in_a_fleet(tmp_path, tug)
+    assert result.coastdowns == ()
+    (said,) = (each for each in result.bag['warnings'] if 'as after an engine stop' in each)
+    assert 'All of it held against the model: it could not be: asked for nan' in said
+
+
+def test_an_earlier_diagnosis_of_another_ship_is_refused_in_its_own_words(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bag, earlier = sailed(tmp_path / 'run.mcap', tug), tmp_path / 'earlier.json'
+    document = {
+        'ship': {'name': 'Another', 'length_m': 90.0, 'effects': []},
+        'runs': [{'bag': 'may.mcap', 'time_ns': START_NS - 10**15}],
+        'earlier': [],
+        'candidates': [{'names': ['none'], 'probability': 1.0, 'effects': []}],
+        'baseline': 'stated',
+    }
+    earlier.write_text(json.dumps(document))
+    assert main(['diagnose', str(bag), '--earlier', str(earlier)]) == 1
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert "it is of the ship 'Another' of 90 m" in said
+    assert 'glide' not in said
 
 
 def test_a_glide_that_cannot_be_followed_does_not_let_nothing_be_missing(

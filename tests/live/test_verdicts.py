@@ -3,8 +3,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.result import Advice
 from shipdrag_ros.live.verdicts import of_diagnosis, of_status
@@ -56,3 +59,23 @@ def test_of_a_node() -> None:
         ('if towed cable, drag area m2', '2.5 ± 0.8 m^2'),
     )
     assert view.decide == of_diagnosis(FOUND).decide
+
+
+def test_a_coastdown_that_something_braked_says_that_its_glide_goes_on() -> None:
+    pytest.importorskip('diagnostic_msgs')
+    from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
+    from shipdrag_ros.node.diagnostics import OK, WARN, diagnosis_status
+
+    nothing = replace(FOUND, verdict=Verdict.NONE, nothing=1.0, candidates=(Candidate((), 1.0),))
+    ended = EndedCoastdown(0, 10**12, 1, EndedBy.SPEED, None)
+    sound = DiagnosisStatus(DiagnosisState.DONE, coastdown=ended, found=nothing)
+    braked = replace(sound, coastdown=replace(ended, ended_by=EndedBy.BRAKE))
+    assert diagnosis_status(sound).level == OK
+    assert sound.caveat == ''
+    told = diagnosis_status(braked)
+    assert told.level == WARN
+    for text in (told.message, of_diagnosis(nothing, braked.caveat).sentence):
+        assert 'nothing is missing' in text
+        assert '`shipdrag diagnose BAG` of the recording holds all of the glide' in text
+    failed = replace(braked, state=DiagnosisState.IMPOSSIBLE, found=None, reason='no estimate')
+    assert 'no instrument shows what' in diagnosis_status(failed).message

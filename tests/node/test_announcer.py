@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from rclpy.logging import get_logger
 
-from shipdrag_ros.node.announcer import Announcer
+from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
+from shipdrag_ros.node.announcer import Announcer, line_of
 from shipdrag_ros.node.judging import Finding, Level
 
 
@@ -31,3 +33,13 @@ def test_an_input_that_is_worse_is_logged_once(capfd: pytest.CaptureFixture[str]
     assert len(lines) == 1  # what was never heard, and what is well, are not said
     assert lines[0].startswith('[WARN]')
     assert lines[0].endswith(': position: it is stuck')
+
+
+def test_a_glide_that_was_dismissed_by_its_speed_is_worth_a_look() -> None:
+    near = NotCoastdown(0, 10**12, Dismissal.BRAKE, 'something held her back')
+    line = line_of(near)
+    assert line is not None
+    assert 'something held her back; if the engine was stopped there' in line.text
+    turned = line_of(replace(near, reason=Dismissal.TURN, text='she turned'))
+    assert turned is not None
+    assert turned.text == 'nearly a coastdown: she turned'
