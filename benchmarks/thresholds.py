@@ -9,10 +9,13 @@ Thresholds of a verdict, by the answers that `diagnosis_score.py` kept.
 For a name, risk control: the lowest probability from which (wrong + 1) / (named + 1) is at most
 the risk, on the answers of the first file (world a); below it nothing is named. For a set, split
 conformal: the share of the named probability that holds the truth in the part wanted of those
-answered with a set. Both are then counted on the other file.
+answered with a set. Both hold on average over files like the first. Beside them stands what holds
+with a confidence for this one: the limits are tried from the strictest on, each by an exact
+binomial test, and the last before the first that fails is taken. All are then counted on the
+other file.
 
 Sources: Angelopoulos et al. (2024), Conformal risk control; Romano, Sesia and Candes (2020),
-Classification with valid and adaptive coverage.
+Classification with valid and adaptive coverage; Angelopoulos et al. (2025), Learn then Test.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -29,11 +32,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np
 from diagnosis_score import trials
 from hidden.scoring import Share, Trial
+from scipy.stats import beta, binom
 
 from shipdrag_ros.diagnosis.posterior import CERTAIN
 from shipdrag_ros.diagnosis.verdict import SET
 
 GRID = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.92, 0.94, 0.96, 0.98, 0.99, 0.995, 0.999)
+SHARES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, SET)
 
 
 def named_from(done: Sequence[Trial], threshold: float) -> Share:
@@ -89,6 +94,53 @@ def set_share(done: Sequence[Trial], *, part: float) -> float | None:
     return needed[place - 1] if 0 < place <= len(needed) else None
 
 
+def held_with(done: Sequence[Trial], share: float) -> Share:
+    """
+    Count the sets that would hold the truth, were they to hold a share of the named probability.
+    """
+    return Share.over(share_needed(trial) < share for trial in sets(done))
+
+
+def wrong_at_most(found: Share, *, confidence: float) -> float:
+    """
+    Return the share of wrong ones that is not exceeded, after Clopper and Pearson.
+    """
+    if found.count == 0:
+        return 1.0
+    return float(beta.ppf(confidence, found.of - found.count + 1, found.count))
+
+
+def needed(wrong: int, *, risk: float, confidence: float) -> int:
+    """
+    Return how many answers show that at most a share is wrong, if so many of them are.
+    """
+    number = wrong + 1
+    while binom.cdf(wrong, number, risk) > 1.0 - confidence:
+        number += 1
+    return number
+
+
+def sure_limit(by_limit: Mapping[float, Share], *, risk: float, confidence: float) -> float | None:
+    """
+    Return the loosest limit that is sure to hold; None: the strictest is not.
+
+    Parameters
+    ----------
+    by_limit
+        Right ones of those that a limit lets through, the strictest limit last.
+    risk
+        Share of wrong ones that is allowed.
+    confidence
+        With which it holds, whichever limit is taken: they are tried in one order.
+    """
+    taken = None
+    for limit, found in reversed(by_limit.items()):
+        if wrong_at_most(found, confidence=confidence) > risk:
+            break
+        taken = limit
+    return taken
+
+
 def sets(done: Sequence[Trial]) -> list[Trial]:
     """
     Return what was answered with a set, where something of the library is hidden.
@@ -116,6 +168,25 @@ def read(path: Path, world: str) -> list[Trial]:
     return [trial for trial in done if not trial.truth.condition.misstated]
 
 
+def print_sure(done: Sequence[Trial], *, risk: float, part: float, confidence: float) -> None:
+    """
+    Print what is sure of names and of sets, and how many answers would show what is wanted.
+    """
+    names = {limit: named_from(done, limit) for limit in GRID}
+    holding = {limit: held_with(done, limit) for limit in SHARES}
+    for what, by_limit, wanted, used in (
+        ('names from', names, risk, CERTAIN),
+        ('sets of', holding, 1.0 - part, SET),
+    ):
+        limit = sure_limit(by_limit, risk=wanted, confidence=confidence)
+        print(f'with {confidence:.0%} confidence on a: {what} {_or_none(limit)}')
+        found = by_limit[used]
+        wrong, most = found.of - found.count, wrong_at_most(found, confidence=confidence)
+        print(f'  {what} {used:g}, in use: wrong {wrong} of {found.of}, at most {most:.1%}')
+        least = [needed(number, risk=wanted, confidence=confidence) for number in (0, wrong)]
+        print(f'  {wanted:.0%} needs {least[0]} without a wrong one, {least[1]} with {wrong}')
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """
     Print what is chosen, and what it gives.
@@ -125,6 +196,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--check', type=Path, help='answers about world b')
     parser.add_argument('--risk', type=float, default=0.02, help='of a wrong name')
     parser.add_argument('--part', type=float, default=0.95, help='of sets that hold the truth')
+    parser.add_argument('--confidence', type=float, default=0.9, help='of the binomial bound')
     options = parser.parse_args(arguments)
     groups = {'a': read(options.chosen_on, 'a')}
     if options.check is not None:
@@ -141,6 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     share_of_set = set_share(groups['a'], part=options.part)
     print(f'by risk control on a: names from {_or_none(name)}, in use {CERTAIN:g}')
     print(f'by split conformal on a: sets of {_or_none(share_of_set)}, in use {SET:g}')
+    print_sure(groups['a'], risk=options.risk, part=options.part, confidence=options.confidence)
 
 
 def _or_none(value: float | None) -> str:

@@ -35,7 +35,7 @@ from hidden_b.weather import Weather, draw_weather
 
 SEED = 77_001
 LEAST, MOST, EVERYDAY = 0.03, 0.45, 0.01
-RECIPROCAL = 'reciprocal_run'
+RECIPROCAL, THIRD = 'reciprocal_run', 'third_run'
 TESTS = (RECIPROCAL, *CONTEXT, *FURTHER)
 EPOCH_NS = 1_780_272_000_000_000_000  # 1 June 2026
 
@@ -149,13 +149,14 @@ def observe(number: int, *, added: tuple[str, ...] = (), seed: int = SEED) -> Ob
     number
         Of the case, from 0.
     added
-        Of `TESTS`: what is measured besides. All else keeps its last digit.
+        Of `TESTS`: what is measured besides; `THIRD`, a third run on another course, too. All
+        else keeps its last digit.
     seed
         Of the world.
     """
     case, given = _case(number, seed), condition(number, seed)
-    runs = max(2, given.runs) if RECIPROCAL in added else given.runs
-    inputs = {*MOTION, *(CONTEXT if given.context else ()), *added} - {RECIPROCAL}
+    runs = 3 if THIRD in added else max(2, given.runs) if RECIPROCAL in added else given.runs
+    inputs = {*MOTION, *(CONTEXT if given.context else ()), *added} - {RECIPROCAL, THIRD}
     ordered = tuple(name for name in (*MOTION, *CONTEXT, *FURTHER) if name in inputs)
     readings = []
     for setting in case.settings[:runs]:

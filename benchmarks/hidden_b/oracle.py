@@ -27,6 +27,7 @@ from hidden_b.oracle_noise import Scatter
 from hidden_b.oracle_priors import SIZES, Names, drawn, free, possible, shares, would_decide
 from hidden_b.oracle_rows import Run
 from hidden_b.oracle_sail import made, run_of, sailed, stated
+from hidden_b.oracle_shared import Change, shared
 from hidden_b.plans import PAIRS
 from hidden_b.setting import Setting
 from hidden_b.voyage import steady_point
@@ -35,7 +36,7 @@ ALARM_BELOW = 0.1  # probability that nothing is hidden
 NAME_FROM = 0.9
 HELD = 0.99  # by the set of candidates
 LACK_NATS = 5.0  # by which a smooth discrepancy may beat the name alone
-_STEPS = 7
+_STEPS = 12
 _STARTS = 3  # where the first point may be on the wrong slope
 _WORTH_NATS = 15.0  # below the best: not looked at closely
 _SPEED_SD, _COURSE_SD = 0.3, 0.2  # relative; [rad]
@@ -85,12 +86,7 @@ class _Oracle:
         first = run_of(known, hull, 0, hull.speed_m_s, 0.0)
         self.steady = steady_point(first, need)[1:]
         self.common = 2 * len(self.runs)
-        self.shared = self._shared()
-        nothing = np.zeros(self.common)
-        self.factor = np.linalg.cholesky(
-            summed(self._scatter(Fit((), (), nothing, np.inf))[0], (EDDIES[1], HELM[1]))
-        )
-        self.slopes = self._slopes((), (), nothing, range(self.common))
+        self._about(Fit((), (), np.zeros(self.common), np.inf))
 
     # what would be seen
 
@@ -127,38 +123,23 @@ class _Oracle:
         sail = [sailed(setting, self.known) for setting in settings]
         return np.concatenate([run.predicted(each) for run, each in zip(self.runs, sail)])
 
-    def _shared(self) -> Array:
-        """Return what is wrong alike in all runs, a column each."""
-        nothing = np.zeros(self.common)
-        plain = self._row(self._settings((), (), nothing))
-        hull, first = self.stated.hull, self.stated.hull.speed_m_s
-        columns = []
-        hulls = [replace(hull, still_n=hull.still_n + miss) for miss in self.stated.misses]
-        hulls.append(replace(hull, n_r=hull.n_r + self.stated.added_sd))
-        for each in hulls:
-            columns.append(self._row(self._settings((), (), nothing, each)) - plain)
-        late = 1.0 + self.stated.run_down_sd
-        screw = self.known.screw
-        late_screw = replace(screw, inertia_s=screw.inertia_s * late, ramp_s=screw.ramp_s * late)
-        weather = [
-            ('wind', (0.65, 0.0)), ('wind', (0.0, 0.65)),
-            ('flow', (1.6e-3 * first, 0.0)), ('flow', (0.0, 1.6e-3 * first)),
-            ('tide', (6e-3, 0.0, 0.0)), ('tide', (0.0, 6e-3, 0.0)),
-            ('tide', (6e-3, 0.0, -np.pi / 2)), ('tide', (0.0, 6e-3, -np.pi / 2)),
-        ]  # fmt: skip
-        faults = [('scale', 1.7e-3), ('offset_m_s', 7e-4 * first)]
+    def _shared(self, fit: Fit) -> Array:
+        """Return what is wrong alike in all runs, a column each, as it acts about a fit."""
 
-        def changed(**fields: Any) -> Array:
-            settings = self._settings((), (), nothing)
-            return self._row([replace(each, **fields) for each in settings]) - plain
+        def row(change: Change, hull: Hull) -> Array:
+            settings = self._settings(fit.names, fit.signs, fit.z, hull)
+            for each in settings:
+                change(each)
+            return self._row(settings)
 
-        columns.append(changed(screw=late_screw))
-        setting = self._settings((), (), nothing)[0]
-        for name, value in weather:
-            columns.append(changed(weather=replace(setting.weather, **{name: value})))
-        for name, size in faults:
-            columns.append(changed(faults=replace(setting.faults, **{name: size})))
-        return np.stack(columns, axis=1)
+        return shared(row, self.stated)
+
+    def _about(self, fit: Fit) -> None:
+        """Linearize about a fit what is not fitted: what all runs share, speeds and courses."""
+        self.shared = self._shared(fit)
+        self.slopes = self._slopes(fit.names, fit.signs, fit.z, range(self.common))
+        covariance = summed(self._scatter(fit)[0], (EDDIES[1], HELM[1]))
+        self.factor = np.linalg.cholesky(covariance)
 
     def _scatter(self, fit: Fit) -> tuple[list[Array], dict[str, Array]]:
         """Return covariances, apart, of eddies and of helm, and columns of smooth unknowns."""
@@ -259,7 +240,7 @@ class _Oracle:
         cost, damping = float(white @ white + z @ z), 1e-3
         plain = self._white(self.slopes)
         slopes = np.concatenate([plain, self._white(self._slopes(names, signs, z, which))], 1)
-        for _ in range(_STEPS):
+        for done in range(_STEPS):
             precision = slopes.T @ slopes + np.eye(len(used))
             turn = precision + damping * np.diag(np.diag(precision))
             step = np.linalg.solve(turn, slopes.T @ white - z[used])
@@ -274,7 +255,10 @@ class _Oracle:
                 continue
             gained, cost, z, white = cost - after_cost, after_cost, after, after_white
             damping *= 0.1
-            if gained < 0.3 or (cost > floor + 4.0 * _WORTH_NATS and gained < 0.4 * cost):
+            # what more runs cost in any case is no hope of gaining more; far off, slopes mislead
+            above = cost - floor
+            hopeless = above > 4.0 * _WORTH_NATS and gained < 0.2 * above
+            if gained < 0.3 or (done > 1 and hopeless):
                 break
             slopes[:, self.common :] = self._white(self._slopes(names, signs, z, which))
         return Fit(names, signs, z, cost)
@@ -298,12 +282,19 @@ class _Oracle:
         nothing = self._climbed(Fit((), (), np.zeros(self.common), np.inf))
         begun = [fit for name in possible(self.known) for fit in self._begun((name,), {})]
         fits = [nothing, *self._all_climbed(begun, nothing.cost)]
+        starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
+        near = min(fits, key=lambda fit: fit.cost)
+        self._about(near)
+        close = [fit for fit in fits[1:] if fit.cost < near.cost + 4.0 * _WORTH_NATS]
+        nothing = self._climbed(nothing)
+        fits = [nothing, *self._all_climbed(close, nothing.cost)]
         weighed = self._worth(fits)
         best, terms = max(weighed, key=lambda each: each[0].evidence)
-        if max(terms.beside(self.weather).values()) > best.evidence:  # no name alone will do
-            starts = {fit.names[0]: fit for fit in sorted(fits[1:], key=lambda f: -f.cost)}
-            pairs = [tuple(sorted(pair)) for pair in PAIRS if set(pair) <= starts.keys()]
-            begun = [fit for pair in pairs for fit in self._begun(pair, starts)]
+        pairs = [tuple(sorted(pair)) for pair in PAIRS if set(pair) <= starts.keys()]
+        if max(terms.beside(self.weather).values()) < best.evidence:  # a name alone may do
+            pairs = [pair for pair in pairs if set(best.names) & set(pair)]
+        begun = [fit for pair in pairs for fit in self._begun(pair, starts)]
+        if begun:
             fits += self._all_climbed(begun, min(fit.cost for fit in fits))
             weighed = self._worth(fits)
         return self._verdict(weighed)

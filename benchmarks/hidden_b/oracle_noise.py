@@ -213,7 +213,7 @@ class Scatter:
         """Of what is independent from bin to bin."""
         kit, parts = self.run.known.kit, []
         for name, means in self.run.means.items():
-            width = means.end - means.start
+            width = means.width
             if name == 'speed_through_water':
                 slow = 2.0 * (0.3 * kit.log_filter_s + 1.0)
                 variance = self.run.quick_sd**2 * np.minimum(slow / width, 1.0)
@@ -242,7 +242,7 @@ class Scatter:
     def _white_places(self, means: Means) -> Array:
         kit, n = self.run.known.kit, len(means.t)
         if kit.fix != 'radar':
-            width = means.end - means.start
+            width = means.width
             slow = (0.06 * kit.wander_m) ** 2 * np.minimum(30.0 / width, 1.0)
             return np.diag(np.tile(slow + (0.05**2 + 0.05**2) / means.n + 1e-4, 2))
         _, scatter = _fixes(means.value, kit)

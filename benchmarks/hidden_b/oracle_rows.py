@@ -3,10 +3,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hidden_b.cases import EPOCH_NS, Known
 from hidden_b.hulls import Array, Hull
@@ -18,40 +18,50 @@ _COARSE = (4, 16)  # of what is measured beside the motion
 _ROWS = ('speed_through_water', 'position', 'heading', 'shaft', 'wind_apparent')
 
 
-@dataclass(frozen=True)
 class Means:
     """
-    Means of an input over bins: starts, ends, values (n, k) and numbers of readings.
+    Means of an input over bins.
+
+    Parameters
+    ----------
+    t : (readings,)
+        Times of the readings [s]; where some are missing a mean is of another moment.
+    value : (readings, k)
+    place : (readings,)
+        Number of the bin of each, ascending.
+
+    Attributes
+    ----------
+    t, width
+        Mean times of the readings; from the first to the last, by their number [s].
+    value : (bins, k)
+    n
+        Numbers of readings.
     """
 
-    start: Array
-    end: Array
-    value: Array
-    n: Array
-
-    @property
-    def t(self) -> Array:
-        """Middles."""
-        return 0.5 * (self.start + self.end)
+    def __init__(self, t: Array, value: Array, place: NDArray[np.int64]) -> None:
+        _, self._place, n = np.unique(place, return_inverse=True, return_counts=True)
+        self._times, self.n = t, n
+        self.t = np.bincount(self._place, t) / n
+        self.value = np.stack([np.bincount(self._place, column) for column in value.T], 1)
+        self.value /= n[:, None]
+        self.width = n * float(np.median(np.diff(t)))
+        self._weights: dict[tuple[int, float, float], Array] = {}
 
     def of(self, t: Array, value: Array) -> Array:
         """
         Return the means of curves (times, k): (bins, k); straight on before they begin.
         """
-        steps = 0.5 * (value[1:] + value[:-1]) * np.diff(t)[:, None]
-        total = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
-        width = (self.end - self.start)[:, None]
-        found = (_at(self.end, t, total) - _at(self.start, t, total)) / width
-        early = self.start < t[0]
-        slope = (value[1] - value[0]) / (t[1] - t[0])
-        found[early] = value[0] + (self.t[early, None] - t[0]) * slope
+        grid = len(t), float(t[0]), float(t[-1])
+        if grid not in self._weights:
+            i = np.clip(np.searchsorted(t, self._times) - 1, 0, len(t) - 2)
+            part = np.minimum((self._times - t[i]) / (t[i + 1] - t[i]), 1.0)
+            weights = np.zeros((len(self.n), len(t)))
+            np.add.at(weights, (self._place, i), 1.0 - part)
+            np.add.at(weights, (self._place, i + 1), part)
+            self._weights[grid] = weights / self.n[:, None]
+        found: Array = self._weights[grid] @ value
         return found
-
-
-def _at(when: Array, t: Array, total: Array) -> Array:
-    i = np.clip(np.searchsorted(t, when) - 1, 0, len(t) - 2)
-    part = ((when - t[i]) / (t[i + 1] - t[i]))[:, None]
-    return total[i] * (1.0 - part) + total[i + 1] * part
 
 
 def _means(series: Series, start_ns: int, edges: Array) -> Means:
@@ -64,14 +74,10 @@ def _means(series: Series, start_ns: int, edges: Array) -> Means:
     every = float(np.median(np.diff(t)))
     place = np.searchsorted(edges, t) - 1
     inside = (place >= 0) & (place < len(edges) - 1)
-    place, t, value = place[inside], t[inside], value[inside]
-    n = np.bincount(place, minlength=len(edges) - 1)
-    enough = n >= np.maximum(0.6 * np.diff(edges) / every, 1)
-    sums = np.stack([np.bincount(place, column, len(n)) for column in value.T], axis=1)
-    # where readings are missing the mean is of another moment
-    middle = np.bincount(place, t, len(n))[enough] / n[enough]
-    half = 0.5 * np.diff(edges)[enough]
-    return Means(middle - half, middle + half, sums[enough] / n[enough, None], n[enough])
+    n = np.bincount(place[inside], minlength=len(edges) - 1)
+    enough = np.append(n >= np.maximum(0.6 * np.diff(edges) / every, 1), False)
+    inside &= enough[place]
+    return Means(t[inside], value[inside], place[inside])
 
 
 class Run:

@@ -148,7 +148,20 @@ def made(name: str, numbers: Sequence[float], hull: Hull, known: Known, steady: 
     """
     given = _Given(numbers)
     draw = Draw(given, hull, known.screw, 1.0, known.coast_s, steady)  # type: ignore[arg-type]
-    return LIBRARY[name][0](draw)
+    found = LIBRARY[name][0](draw)
+    return _exact(found, numbers[0]) if name == 'fouling' else found
+
+
+def _exact(found: Hidden, factor: float) -> Hidden:
+    """Return fouling of a factor itself: its maker takes the next of 200 heights, in steps."""
+    part = factor / found.parameters['friction_factor']
+
+    def apply(setting: Setting) -> None:
+        found.apply(setting)
+        law = setting.still.pop()
+        setting.still.append(lambda hull, v, r: r + part * (law(hull, v, r) - r))
+
+    return replace(found, parameters={'friction_factor': factor}, apply=apply)
 
 
 @dataclass(frozen=True)

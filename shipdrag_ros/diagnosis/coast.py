@@ -15,10 +15,12 @@ from itertools import product
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import ndtri
 
 from shipdrag_ros.diagnosis.carried import Carried
 from shipdrag_ros.diagnosis.coast_terms import (
     BaselineTerm,
+    FilterNuisance,
     ForceTerm,
     MeasurementTerm,
     ModelErrorTerm,
@@ -28,11 +30,12 @@ from shipdrag_ros.diagnosis.coast_terms import (
 )
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.measured import damping_of
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND
 from shipdrag_ros.parameter import Parameter, Shape, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.effect import Effect, Scope
@@ -40,7 +43,7 @@ from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
 DISCREPANCIES = ('force', 'log', 'radar')
 _SWINGING = 1  # place of something that swings in time
-_EVERYWHERE = (-1.8, -1.4, -1.0, -0.6, -0.2, 0.2, 0.8)  # z of what may be anywhere
+_EVERYWHERE = (0.03, 0.08, 0.16, 0.27, 0.42, 0.58, 0.79)  # of what may be anywhere in a run
 _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find from 0
 
 
@@ -106,8 +109,17 @@ class CoastModel(CoastSimulation):
             for effect in self.ship.effects
         ]
         log_prior = math.log(nothing_missing(self.effects, places=len(DISCREPANCIES) + _SWINGING))
-        found = Hypothesis((), (baseline, *given), places, log_prior=log_prior)
+        found = Hypothesis((), (baseline, *given, self._filters), places, log_prior=log_prior)
         return replace(found, log_prior=log_prior + self._log_evidence(found))
+
+    @cached_property
+    def _filters(self) -> FilterNuisance:
+        """Those that log and speed over ground have without anything missing."""
+        kinds = set(np.concatenate([run.along.rows.kind for run in self.seen]).tolist())
+        top = np.array([max(run.speed_m_s for run in self.seen)])
+        # v over r is about 2 over dr/dv
+        slow_down_s = 2.0 / float(damping_of(self.bare, top)[0][0])
+        return FilterNuisance(slow_down_s, LOG in kinds, OVER_GROUND in kinds)
 
     def _log_evidence(self, hypothesis: Hypothesis) -> float:
         """Return the log evidence of facts and of earlier diagnoses; it is no prior."""
@@ -138,7 +150,8 @@ class CoastModel(CoastSimulation):
         choices = [q for q in effect.parameters if q.prior.shape is Shape.CHOICE]
         signed = [q for q in free if q.prior.shape is Shape.EITHER_SIGN]
         signs = list(product((1.0, -1.0), repeat=len(signed)))
-        starts = list(product(*(_starts(q, first=q is free[0]) for q in free)))
+        longest_s = max(run.duration_s for run in self.seen)
+        starts = list(product(*(_starts(q, longest_s, first=q is free[0]) for q in free)))
         words = list(product(*((q.prior.first, q.prior.second) for q in choices)))
         runs = scope_runs(effect, len(self.seen))
         ways = len(words) * len(signs) * len(runs)
@@ -172,6 +185,40 @@ class CoastModel(CoastSimulation):
         )
         gained = self._log_evidence(more) - self._log_evidence(base)
         return replace(more, log_prior=more.log_prior + gained)
+
+    def with_nameless(self, base: Hypothesis, term: EffectTerm, plain: EffectTerm) -> Hypothesis:
+        """
+        Return a hypothesis in which one of the effects is something without a name.
+
+        Parameters
+        ----------
+        base
+            Of this model.
+        term
+            Of the effect, in the hypothesis.
+        plain
+            What stands in its place.
+
+        Returns
+        -------
+        Hypothesis
+            With prior odds of `UNNAMED_ODDS` in place of those of the effect.
+        """
+        swapped = replace(
+            base,
+            names=tuple(name for name in base.names if name != term.effect.name),
+            terms=tuple(plain if each is term else each for each in base.terms),
+            model_errors=tuple(
+                replace(each, term=plain) if each.term is term else each
+                for each in base.model_errors
+            ),
+            discrepancy='force',
+            log_odds=base.log_odds - math.log(term.effect.odds),
+        )
+        less = math.log(UNNAMED_ODDS / term.effect.odds)
+        ways = math.log(2.0) * (len(term.signs) - len(plain.signs))
+        gained = self._log_evidence(swapped) - self._log_evidence(base)
+        return replace(swapped, log_prior=base.log_prior + less + ways + gained)
 
     def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
         """
@@ -270,12 +317,15 @@ class CoastModel(CoastSimulation):
         return np.array([run.speed_m_s for run in self.seen])
 
 
-def _starts(quantity: Parameter, *, first: bool) -> tuple[float, ...]:
+def _starts(quantity: Parameter, longest_s: float, *, first: bool) -> tuple[float, ...]:
+    """Return z that fits begin from; what may be at any time, within the longest run."""
     shape = quantity.prior.shape
     if first:
         return {Shape.HALF_NORMAL: (0.3,), Shape.LOG_NORMAL: _APART}.get(shape, (0.0,))
     if shape is Shape.UNIFORM:
-        return _EVERYWHERE
+        low, high = quantity.prior.first, quantity.prior.second
+        part = min(longest_s / (high - low), 1.0)
+        return tuple(float(ndtri(part * each)) for each in _EVERYWHERE)
     return (0.0,) if shape in (Shape.NORMAL, Shape.EITHER_SIGN) else _APART
 
 

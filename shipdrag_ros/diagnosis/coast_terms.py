@@ -9,18 +9,19 @@ measured, and needs no simulation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import ClassVar, Protocol
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.special import gammainc
 
 from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
-from shipdrag_ros.parameter import Parameter, flat, free, heavy_tailed, normal
+from shipdrag_ros.parameter import Parameter, flat, free, half_normal, heavy_tailed, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import CoefficientBaseline
@@ -34,6 +35,9 @@ _SHAPES = 5
 _DISCREPANCIES = 6
 _FORMS = 4
 _FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
+_FILTER_SD_S, _FILTER_SD = 8.0, 0.015  # of what is usual, and over the time of slowing down
+_FILTER_START = 0.3  # z
+_FALLS, _FALL_SD = 3, 0.5  # of thrust beside an exponential fall, relative to the steady one
 _CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
 _SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
 
@@ -147,6 +151,48 @@ def baseline_parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
 
 
 @dataclass(frozen=True)
+class FilterNuisance:
+    """
+    The filters of log and speed over ground, which every instrument has.
+
+    Manuals state 2 to 15 s; on a craft that slows down quickly they are shorter.
+
+    Attributes
+    ----------
+    slow_down_s
+        Speed over deceleration, roughly, at the stop.
+    has_log, has_ground
+        Whether there are such rows.
+    """
+
+    slow_down_s: float
+    has_log: bool
+    has_ground: bool
+    one_size: ClassVar[Sequence[int]] = ()
+
+    @cached_property
+    def unknowns(self) -> tuple[Parameter, ...]:
+        """Time constants [s]."""
+        sd = min(_FILTER_SD_S, _FILTER_SD * self.slow_down_s)
+        places = {'log filter': self.has_log, 'ground filter': self.has_ground}
+        return tuple(
+            replace(free(name, half_normal(sd)), start=_FILTER_START)
+            for name, there in places.items()
+            if there
+        )
+
+    def acts_in(self, run: int) -> bool:
+        """Say that the instruments are the same in all runs."""
+        return True
+
+    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
+        """Return the filters."""
+        given = iter(values)
+        log, ground = (next(given) if there else 0.0 for there in (self.has_log, self.has_ground))
+        return Action(log_lag_s=log, ground_lag_s=ground)
+
+
+@dataclass(frozen=True)
 class ForceTerm:
     """
     Any smooth resistance beyond the baseline, as a function of the speed.
@@ -186,9 +232,9 @@ class Predicted:
     ----------
     along, across : (n,), (k,)
         Rows.
-    speed, over_ground : (m,)
-        Speed through water, and velocity along the heading over ground, at the
-        times of the observation.
+    speed, log, over_ground : (m,)
+        Speed through water, as it is and as the log shows it, and velocity along the
+        heading over ground, at the times of the observation.
     distance : (m,)
         Over ground, along the heading.
     """
@@ -196,6 +242,7 @@ class Predicted:
     along: Float64
     across: Float64
     speed: Float64
+    log: Float64
     over_ground: Float64
     distance: Float64
 
@@ -251,11 +298,15 @@ class RunNuisance:
     heading_sd_rad, stop_sd_s
     scatter
         Of the resistance from run to run, relative.
+    fall_sd
+        Of thrust beside an exponential fall, relative to the steady one.
 
     Notes
     -----
     A coastdown under 1 + c times the resistance is the same motion, 1 + c
-    times as fast in time.
+    times as fast in time. Thrust that falls in another way than
+    exp(-t / run_down_s), as s^k exp(-s) / k! with s = t / run_down_s, leaves
+    the integral of that behind, which fades as a quadratic resistance lets it.
     """
 
     run: int
@@ -263,12 +314,13 @@ class RunNuisance:
     stop_sd_s: float
     has_positions: bool
     scatter: float = 0.0
+    fall_sd: float = _FALL_SD
     place_of_stop: ClassVar[int] = 3  # among the unknowns
     one_size: ClassVar[Sequence[int]] = ()
 
     @cached_property
     def unknowns(self) -> tuple[Parameter, ...]:
-        """Place [m], heading [rad], stop [s], factor on the resistance, - 1, clocks [s]."""
+        """Place [m], heading [rad], stop [s], factor - 1, clocks [s], fall of the thrust."""
         # where no row shows it, a place with a prior leaves the evidence as it is
         place = flat() if self.has_positions else normal(1.0)
         return (
@@ -278,28 +330,43 @@ class RunNuisance:
             free('stop', normal(self.stop_sd_s)),
             free('factor', normal(self.scatter)),
             free('log late', normal(_CLOCKS_SD_S if self.has_positions else 0.0)),
+            *(free(f'fall {k}', normal(self.fall_sd)) for k in range(_FALLS)),
         )
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (6, n) and (6, k)."""
-        along, across = _nothing(seen, 6)
+        """Return (6 + 3, n) and (6 + 3, k)."""
+        along, across = _nothing(seen, 6 + _FALLS)
         if run != self.run:
             return along, across
         kind, at = seen.along.rows.kind, seen.along.at
         position = kind == POSITION
         along[0, position] = 1.0
         after = seen.time_s >= seen.lead_in_s
-        slowing = np.where(after, np.gradient(base.speed, seen.time_s), 0.0)
+        slowing = np.where(after, np.gradient(base.log, seen.time_s), 0.0)
         gained = np.where(after, base.over_ground[0] - base.over_ground, 0.0)
         along[3] = np.where(position, gained[at], -slowing[at])
         since = np.maximum(seen.time_s - seen.lead_in_s, 0.0)
         way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
         along[4] = np.where(position, (since * base.speed - way)[at], (since * slowing)[at])
         along[5] = np.where(kind == LOG, -slowing[at], 0.0)
+        gained = self._fall(since, base.speed, -slowing.min(), seen.run_down_s)
+        ahead = cumulative_trapezoid(gained, since, initial=0.0)
+        along[6:] = np.where(position, ahead[:, at], gained[:, at])
         if seen.across is not None:
             across[1] = 1.0
             across[2] = base.distance[seen.across.at]
         return along, across
+
+    def _fall(
+        self, since_s: Float64, speed_m_s: Float64, steady_m_s2: float, run_down_s: float
+    ) -> Float64:
+        """Return the speed that each form of thrust adds, (3, m)."""
+        if run_down_s <= 0.0:
+            return np.zeros((_FALLS, len(since_s)))
+        order = 1.0 + np.arange(_FALLS)[:, None]
+        fading = (speed_m_s / speed_m_s[0]) ** 2
+        found: Float64 = gammainc(order, since_s / run_down_s) * fading
+        return steady_m_s2 * run_down_s * found
 
 
 @dataclass(frozen=True)

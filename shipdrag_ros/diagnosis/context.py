@@ -24,6 +24,7 @@ from shipdrag_ros.simulation import Action, Columns
 
 _BIN_S = 60.0
 _WIND_SD_M_S, _WIND_RELATIVE_SD = 0.6, 0.05  # of a true wind: the ship bends the flow
+_VANE_SD_RAD = 0.05  # by which an anemometer is turned
 _GUSTY = 1.6  # of the median change from bin to bin: gusts outlast a bin
 _DEPTH_SD = 0.03  # relative
 _DEEP_DRAUGHTS = 8.0  # of water: from there on its depth does not matter
@@ -47,12 +48,15 @@ class Stop:
         Time of the stop [s].
     heading_rad, speed_m_s
         In the lead-in.
+    shaft_s
+        Time constant of the shaft as it was seen to run down; 0: not seen.
     """
 
     since_ns: int
     lead_in_s: float
     heading_rad: float
     speed_m_s: float
+    shaft_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,7 +117,7 @@ class Context:
         depth = _binned(window, 'depth', stop, edges)[1]
         shaft_s, shaft, turns = _shaft(window, ship, stop, edges)
         values = [wind[:, 0], wind[:, 1]]
-        blocks = [_wind_covariance(wind[:, i]) for i in range(2)]
+        blocks = [_wind_covariance(wind[:, i], wind[:, 1 - i]) for i in range(2)]
         draught_m = ship.draught_m if len(depth) else None
         if draught_m is not None:
             draughts = float(np.median(depth)) / draught_m
@@ -197,7 +201,7 @@ def _shaft(
         return nothing
     steady = float(np.median(np.abs(window.before.shaft.value)))
     run_down_s = ship.propulsion.run_down_s if ship.propulsion else _BIN_S
-    fallen_s = stop.lead_in_s + _FALL_RUN_DOWNS * run_down_s
+    fallen_s = stop.lead_in_s + _FALL_RUN_DOWNS * max(run_down_s, stop.shaft_s)
     time_s, value = _binned(window, 'shaft', stop, edges)
     late = time_s > fallen_s
     if steady <= 0.0 or not late.any():
@@ -224,14 +228,19 @@ def _binned(window: Window, name: str, stop: Stop, edges: Float64) -> tuple[Floa
     return found_s, found
 
 
-def _wind_covariance(values: Float64) -> Float64:
-    """Return a constant error of the true wind, and what the bins scatter."""
+def _wind_covariance(values: Float64, other: Float64) -> Float64:
+    """
+    Return a constant error of the true wind, wrong gain and direction, and what the bins scatter.
+
+    Gain and direction go with what is felt, the ship's own way included: it is no other speed.
+    """
     n = len(values)
     if n == 0:
         return np.zeros((0, 0))
     scatter = max(_GUSTY * float(np.median(np.abs(np.diff(values)))), 0.1) if n > 1 else 0.3
-    constant = _WIND_SD_M_S**2 + (_WIND_RELATIVE_SD * float(np.abs(values).max())) ** 2
-    return np.eye(n) * scatter**2 + constant
+    turned = _VANE_SD_RAD**2 * np.outer(other, other)
+    gain = _WIND_RELATIVE_SD**2 * np.outer(values, values)
+    return np.eye(n) * scatter**2 + _WIND_SD_M_S**2 + gain + turned
 
 
 def _whitener(blocks: Sequence[Float64]) -> Float64:

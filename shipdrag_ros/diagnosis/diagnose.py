@@ -13,6 +13,7 @@ from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
+from shipdrag_ros.diagnosis.nameless import with_nameless
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
     FORCE,
@@ -117,6 +118,7 @@ def diagnose(
     seen = model.seen
     found = with_swinging(found, model)
     found = with_pairs(with_differing(found, model), progress=progress)
+    found = with_nameless(found, model)
     best = found.best
     predicted = held_out(model, best) if found.alarm else None
     # an instrument that errs before the stop has taught the noise what it should have shown

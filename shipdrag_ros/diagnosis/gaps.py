@@ -75,7 +75,7 @@ def frozen(model: CoastModel) -> Fit:
     """
     nothing = model.nothing
     places = tuple(
-        replace(term, scatter=0.0) if isinstance(term, RunNuisance) else term
+        replace(term, scatter=0.0, fall_sd=0.0) if isinstance(term, RunNuisance) else term
         for term in nothing.measurement_terms
     )
     as_stated = replace(nothing, terms=nothing.terms[1:], measurement_terms=places)

@@ -21,8 +21,8 @@ from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, SteadyNoise
 from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation.ode_fit.record import RunRows
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
-from shipdrag_ros.estimation.ode_fit.steady import LEAST_S
+from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
+from shipdrag_ros.estimation.ode_fit.steady import LEAST_S, white_sd
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, bin_means
 from shipdrag_ros.parameters import Parameters
@@ -32,6 +32,8 @@ from shipdrag_ros.ship import Ship
 _STEADY_BIN_S = 30.0
 _FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
 _LEAST_LONGEST_S, _BINS = 12.0, 80.0  # the longest bin is at least this, or this part of all
+_ALIKE_S = 12.0  # beyond which the errors of filters and swell are as good as independent
+_LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last digit counts
 _NEIGHBOURS = 9  # an outlier is found by the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
@@ -156,9 +158,12 @@ class Observation:
         }
         heading_rad, heading_sd = _heading(window, series, seconds, lead_in_s, parameters)
         edges = _edges(lead_in_s, max(float(time[-1]) for time in seconds.values()))
-        parts, across = _condensed_all(series, seconds, edges, record.white_sd, heading_rad)
+        noise_of = {name: (sd, record.display_sd[name]) for name, sd in record.white_sd.items()}
+        parts, across = _condensed_all(series, seconds, edges, noise_of, heading_rad, lead_in_s)
         times = np.unique(np.concatenate([part.time_s for part in (*parts, *across)]))
         speed = _speed(parts, lead_in_s)
+        shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
+        stop = Stop(since_ns, lead_in_s, heading_rad, speed, shaft_s)
         noise = SteadyNoise(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
         return cls(
             name,
@@ -172,7 +177,7 @@ class Observation:
             speed,
             noise.measured(parts, times),
             noise.measured(across, times) if across else None,
-            Context.of(window, ship, times, Stop(since_ns, lead_in_s, heading_rad, speed)),
+            Context.of(window, ship, times, stop),
             replace(ship, effects=()),
         )
 
@@ -222,34 +227,60 @@ def _kept(value: Float64, sd: float) -> NDArray[np.bool_]:
 
 
 def _condensed(
-    time_s: Float64, value: Float64, edges: Float64, sd: float, kind: int
+    time_s: Float64,
+    value: Float64,
+    edges: Float64,
+    noise: tuple[float, float],
+    kind: int,
+    lead_in_s: float,
 ) -> CondensedRows:
+    """
+    Return means, by the noise of a sample and what its last digit hides.
+
+    Behind a filter, and in a swell, samples err alike for seconds: what their means scatter by
+    in the steady record says how many count for one. Rounding errs alike while the signal
+    stands, and averages out as it moves on.
+    """
     when, mean, count = bin_means(time_s, value, edges)
-    return CondensedRows(when, kind, mean, sd**2 / count)
+    steady = time_s < lead_in_s
+    sd, display = noise
+    if kind != POSITION and steady.any():
+        evenly = np.arange(0.0, lead_in_s, _ALIKE_S)
+        _, means, counts = bin_means(time_s[steady], value[steady], evenly)
+        sd = max(sd, white_sd(means) * math.sqrt(float(np.median(counts))))
+    variance = sd**2 / count
+    if display > _LEAST_DISPLAY * sd and len(mean) > 1:
+        moved = np.clip(np.abs(np.gradient(mean)) / math.sqrt(12.0), display, None)
+        variance += display**2 / np.minimum((moved / display) ** 2, count)
+    return CondensedRows(when, kind, mean, variance)
 
 
 def _condensed_all(
     series: dict[str, Series],
     seconds: dict[str, Float64],
     edges: Float64,
-    white_sd: Mapping[str, float],
+    noise_of: Mapping[str, tuple[float, float]],
     heading_rad: float,
+    lead_in_s: float,
 ) -> tuple[list[CondensedRows], list[CondensedRows]]:
     """Return the rows along the heading, and those to port of it."""
     cos, sin = math.cos(heading_rad), math.sin(heading_rad)
     along: list[CondensedRows] = []
     across: list[CondensedRows] = []
     for input_, found in series.items():
-        sd, time = white_sd[input_], seconds[input_]
+        noise, time = noise_of[input_], seconds[input_]
+        sd = noise[0]
         if input_ != 'position':
             keep = _kept(found.value, sd)
-            along.append(_condensed(time[keep], found.value[keep], edges, sd, CODES[input_]))
+            along.append(
+                _condensed(time[keep], found.value[keep], edges, noise, CODES[input_], lead_in_s)
+            )
             continue
         east, north = (found.value - found.value[0]).T
         ahead, to_port = cos * east + sin * north, cos * north - sin * east
         keep = _kept(ahead, sd) & _kept(to_port, sd)
-        along.append(_condensed(time[keep], ahead[keep], edges, sd, POSITION))
-        across.append(_condensed(time[keep], to_port[keep], edges, sd, POSITION))
+        along.append(_condensed(time[keep], ahead[keep], edges, noise, POSITION, lead_in_s))
+        across.append(_condensed(time[keep], to_port[keep], edges, noise, POSITION, lead_in_s))
     return along, across
 
 

@@ -27,20 +27,28 @@ from shipdrag_ros.simulation import Action, Columns, Frame, Scenario, simulate_c
 
 _STEP_Z = 0.02  # of the differences, in units of the prior
 _STEP_M_S = 0.01  # of the steady speed
+_NOTHING = Action()
 
 
 @dataclass
 class _Batch:
-    """Columns of one simulation, as they are asked for."""
+    """Columns of one simulation, as they are asked for; each is there once."""
 
-    actions: list[Action] = field(default_factory=list)
-    speeds: list[float] = field(default_factory=list)
+    numbers: dict[tuple[Action, float], int] = field(default_factory=dict)
 
     def add(self, action: Action, speed_m_s: float) -> int:
         """Ask for a column; return its number."""
-        self.actions.append(action)
-        self.speeds.append(speed_m_s)
-        return len(self.actions) - 1
+        return self.numbers.setdefault((action, speed_m_s), len(self.numbers))
+
+    @property
+    def actions(self) -> list[Action]:
+        """What acts in each column."""
+        return [action for action, _ in self.numbers]
+
+    @property
+    def speeds(self) -> list[float]:
+        """Steady speed of each column [m/s]."""
+        return [speed_m_s for _, speed_m_s in self.numbers]
 
 
 @dataclass(frozen=True)
@@ -70,6 +78,7 @@ class _Predictions:
     along: Float64
     across: Float64
     speed: Float64
+    log: Float64
     over_ground: Float64
     distance: Float64
 
@@ -79,6 +88,7 @@ class _Predictions:
             self.along[column],
             self.across[column],
             self.speed[column],
+            self.log[column],
             self.over_ground[column],
             self.distance[column],
         )
@@ -174,19 +184,20 @@ class CoastSimulation:
             batch = _Batch()
             speed = float(base.z[len(base.hypothesis.unknowns) + j])
             acting = self._acting(j, base.hypothesis, base.z)
-            whole = sum((term.action(frame, j, values) for term, _, values in acting), Action())
-            batch.add(whole, speed)
+            whole = sum((term.action(frame, j, values) for term, _, values in acting), _NOTHING)
+            base_column = batch.add(whole, speed)
+            own_columns = []
             for hypothesis in hypotheses:
                 term = hypothesis.terms[-1]
                 first, *others = term.unknowns
                 sizes = [first.prior.at(trial_z(first)), *(u.prior.at(u.start) for u in others)]
-                more = term.action(frame, j, sizes) if term.acts_in(j) else Action()
-                batch.add(whole + more, speed)
+                more = term.action(frame, j, sizes) if term.acts_in(j) else _NOTHING
+                own_columns.append(batch.add(whole + more, speed))
             columns = self._simulate(j, batch)
             context = seen.context.predict(columns, batch.actions)
             predicted = _predicted(seen, columns)
             rows = np.hstack([predicted.along, predicted.across, context])
-            change = rows[1:] - rows[0]
+            change = rows[own_columns] - rows[base_column]
             change[~np.isfinite(change).all(axis=1)] = 0.0
             found.append(self._whitened(j, change))
         return np.hstack(found)
@@ -254,19 +265,22 @@ class CoastSimulation:
         speed = float(z[len(hypothesis.unknowns) + run])
         acting = self._acting(run, hypothesis, z)
         actions = [term.action(frame, run, values) for term, _, values in acting]
-        whole = sum(actions, Action())
+        whole = sum(actions, _NOTHING)
         base = batch.add(whole, speed)
         steps: list[tuple[int, int, float]] = []
         without: dict[int, int] = {}
         errors = hypothesis.model_errors
         with_errors = {id(error.term) for error in errors}
         for i, (term, place, values) in enumerate(acting):
-            others = sum((action for j, action in enumerate(actions) if j != i), Action())
+            free = [k for k in range(len(term.unknowns)) if place + k not in skipped]
+            if not free and id(term) not in with_errors:
+                continue
+            others = sum((action for j, action in enumerate(actions) if j != i), _NOTHING)
             if id(term) in with_errors:
                 without[id(term)] = batch.add(others, speed)
-            for k, unknown in enumerate(term.unknowns):
-                value = unknown.prior.at(z[place + k] + _STEP_Z)
-                if value != values[k] and place + k not in skipped:
+            for k in free:
+                value = term.unknowns[k].prior.at(z[place + k] + _STEP_Z)
+                if value != values[k]:
                     stepped = [*values[:k], value, *values[k + 1 :]]
                     column = batch.add(others + term.action(frame, run, stepped), speed)
                     steps.append((place + k, column, _STEP_Z))
@@ -329,11 +343,14 @@ class CoastSimulation:
         seen = self.seen[run]
         n = len(seen.along)
         k = 0 if seen.across is None else len(seen.across)
-        parts = [apply(seen.along.whitener, table[:, :n])]
+        # unknowns of other runs, and those known from near by, leave lines of 0, which stay so
+        lines = table.any(axis=1)
+        filled, whitened = table[lines], np.zeros(table.shape, order='F')
+        whitened[lines, :n] = apply(seen.along.whitener, filled[:, :n])
         if seen.across is not None:
-            parts.append(apply(seen.across.whitener, table[:, n : n + k]))
-        parts.append(apply(seen.context.whitener, table[:, n + k :]))
-        return np.hstack(parts)
+            whitened[lines, n : n + k] = apply(seen.across.whitener, filled[:, n : n + k])
+        whitened[lines, n + k :] = apply(seen.context.whitener, filled[:, n + k :])
+        return whitened
 
 
 def _known(hypothesis: Hypothesis) -> list[int]:
@@ -358,4 +375,5 @@ def _predicted(seen: Observation, columns: Columns) -> _Predictions:
     along[:, kind == LOG] = columns.log_m_s[:, at[kind == LOG]]
     along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
     across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
-    return _Predictions(along, across, columns.speed_through_water_m_s, ground, ahead)
+    speed = columns.speed_through_water_m_s
+    return _Predictions(along, across, speed, columns.log_m_s, ground, ahead)

@@ -20,6 +20,8 @@ _BINS, _LEAST_ROWS = 150, 20
 _STOP_BEFORE_S, _STOP_AFTER_S = 240.0, 240.0  # of the onset that was found
 _STOP_LEAST = 20  # samples on either side
 _FARTHEST_S = 90.0
+_FIRM = 6.0  # 1 / sd of the run-down's logarithm, and of the power
+_LEAST_POWER = 0.05
 
 
 @dataclass(frozen=True)
@@ -148,9 +150,10 @@ def stop_time_s(time_s: Float64, speed_m_s: Float64, *, sd_m_s: float, run_down_
 
     Notes
     -----
-    Steady until the stop, then v0 / (1 + c s), the fall of a ship under a
-    resistance as the square of her speed, with s the time less what the thrust
-    gives back of it. So simple a form is off by some 2 s.
+    Steady until the stop, then the fall of a ship under a resistance as a power of her speed,
+    v0 (1 + p c s)^(-1 / p), with s the time less what the thrust gives back of it. The thrust
+    may run down faster or slower than stated; what is returned stands for a stop after which
+    it runs down as stated, and is gone as late.
     """
     near = (time_s > -_STOP_BEFORE_S) & (time_s < _STOP_AFTER_S)
     time, speed = time_s[near], speed_m_s[near]
@@ -162,14 +165,18 @@ def stop_time_s(time_s: Float64, speed_m_s: Float64, *, sd_m_s: float, run_down_
         return 0.0
 
     def left(unknown: Float64) -> Float64:
-        steady, fall, stop_s = unknown
+        steady, fall, power, slower, stop_s = unknown
         since = np.maximum(time - stop_s, 0.0)
         if run_down_s > 0.0:
-            since = since - run_down_s * (1.0 - np.exp(-since / run_down_s))
-        result: Float64 = (speed - steady / (1.0 + np.maximum(fall, 0.0) * since)) / sd_m_s
-        return result
+            down_s = run_down_s * math.exp(slower)
+            since = since - down_s * (1.0 - np.exp(-since / down_s))
+        power = max(power, _LEAST_POWER)
+        law = (1.0 + power * max(fall, 0.0) * since) ** (-1.0 / power)
+        # rows besides, of the priors
+        return np.append((speed - steady * law) / sd_m_s, np.array([slower, power - 1.0]) * _FIRM)
 
-    guess = np.array([top, (top / last - 1.0) / time[-1], 0.0])
-    found = least_squares(left, guess, loss='soft_l1', x_scale=[top, guess[1], 10.0])
-    stop_s = float(found.x[2])
+    guess = np.array([top, (top / last - 1.0) / time[-1], 1.0, 0.0, 0.0])
+    scale = [top, guess[1], 0.5, 0.5, 10.0]
+    found = least_squares(left, guess, loss='soft_l1', x_scale=scale)
+    stop_s = float(found.x[4]) + run_down_s * (math.exp(float(found.x[3])) - 1.0)
     return stop_s if abs(stop_s) < _FARTHEST_S else 0.0

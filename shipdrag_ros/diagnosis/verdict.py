@@ -16,15 +16,18 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
 from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.parameter import Parameter, Shape
 
 SET = 0.99  # of the candidates
 _LACK_NATS = 5.0  # of evidence that something smooth besides must gain
 _SHAPE_SD = 2.5  # prior standard deviations of a shape parameter of an effect
+_FORM_SD = 3.5  # of its departures from its formula, together
+_SIZE_SD = 5.0  # of the logarithm of a size
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
 
 
@@ -181,10 +184,12 @@ def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:
 
 def outside_prior(fit: Fit) -> bool:
     """
-    Say whether a shape parameter of an effect lies beyond 2.5 prior sd.
+    Say whether an effect is there in a way that its prior hardly holds.
 
-    However large it is, a turn that hardly changes the heading, or is over in some
-    seconds, is something else. Sizes, and components of one, are no shape.
+    However large it is, a turn that hardly changes the heading, or is over in some seconds, is
+    something else: a shape parameter beyond 2.5 prior sd. So is one that follows its formula
+    only with departures beyond 3.5 sd together, and a size whose logarithm is beyond 5. Sizes
+    of either sign, and components of one, are no shape.
 
     Parameters
     ----------
@@ -196,13 +201,24 @@ def outside_prior(fit: Fit) -> bool:
     bool
         Of any effect that is not stated in the ship file.
     """
-    return any(
-        abs(float(fit.best.z[place + i])) > _SHAPE_SD
-        for part, place in fit.hypothesis.parts
-        if isinstance(part, EffectTerm) and not part.stated and not part.kept
-        for i, unknown in enumerate(part.unknowns)
-        if unknown.name != part.effect.parameters[0].name and i not in part.one_size
-    )
+    for part, place in fit.hypothesis.parts:
+        z = np.abs(fit.best.z[place : place + len(part.unknowns)])
+        if any(part is error for error in fit.hypothesis.model_errors):
+            if float(np.linalg.norm(z)) > _FORM_SD:
+                return True
+        elif any(each > _most_sd(part, i) for i, each in enumerate(z)):
+            return True
+    return False
+
+
+def _most_sd(part: Part, place: int) -> float:
+    """Return the prior standard deviations beyond which an unknown of an effect is odd."""
+    if not isinstance(part, EffectTerm) or part.stated or part.kept or place in part.one_size:
+        return math.inf
+    unknown = part.unknowns[place]
+    if unknown.name != part.effect.parameters[0].name:
+        return _SHAPE_SD
+    return _SIZE_SD if unknown.prior.shape is Shape.LOG_NORMAL else math.inf
 
 
 def exceeds_noise(chi2_per_row: float, rows: int) -> bool:

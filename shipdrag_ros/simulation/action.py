@@ -9,7 +9,7 @@ nothing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -74,6 +74,8 @@ class Action:
         A reading of the log is of this time before its stamp.
     radar_factor
         Positions and speeds over ground read (1 + radar_factor) times truth.
+    ground_lag_s
+        Time constant of a first-order filter of the speed over ground.
     """
 
     resistance: tuple[ResistanceLaw, ...] = ()
@@ -97,11 +99,14 @@ class Action:
     log_dead_band_m_s: float = 0.0
     log_late_s: float = 0.0
     radar_factor: float = 0.0
+    ground_lag_s: float = 0.0
 
     def __add__(self, other: Action) -> Action:
-        return Action(
-            **{name: add(getattr(self, name), getattr(other, name)) for name, add in _PARTS}
-        )
+        parts = dict(vars(self))
+        for name, value in vars(other).items():
+            if value != _NOTHING[name]:  # most actions have a part or two
+                parts[name] = _ADD.get(name, _sum)(parts[name], value)
+        return Action(**parts)
 
     def resistance_n(self, speed_m_s: ArrayLike) -> Float64:
         """
@@ -131,4 +136,4 @@ _ADD: dict[str, Callable[[Any, Any], Any]] = {
     'stall_m_s': max,
     'depth_m': min,
 }
-_PARTS = tuple((field.name, _ADD.get(field.name, _sum)) for field in fields(Action))
+_NOTHING = vars(Action())

@@ -19,7 +19,7 @@ from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.faults import log_flow, log_reading
+from shipdrag_ros.simulation.faults import lagged, log_flow, log_reading
 from shipdrag_ros.simulation.kernel import Records, SurgeLaw, follow_columns
 from shipdrag_ros.simulation.scenario import Scenario, Turn
 from shipdrag_ros.simulation.surge import own_action, steps_of
@@ -37,7 +37,7 @@ _FINE_RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left
 _STEPS_A_RUN_DOWN = 4
 _STEPS_A_SLOW_DOWN = 40  # of v / r
 _STEP_S = 10.0
-_LOG_STEP_S = 0.5  # at which a log that lags is followed
+_LOOKS_A_RUN_DOWN, _LOOKS_GROW = 16, 1.1  # at a motion that is read late
 
 
 @dataclass(frozen=True)
@@ -85,19 +85,10 @@ class _Prepared:
     legs: Records
     own_legs: NDArray[np.int64]
 
-    def paths(self, time_s: Float64, chosen: slice) -> Float64:
-        """Return what `follow` does (k, m, 5), of consecutive columns."""
-        records = self.records[chosen]
-        paths = np.empty((len(records), len(time_s), 5))
-        follow_columns(
-            self.law,
-            records,
-            self.extra[chosen],
-            self.legs,
-            self.own_legs[chosen],
-            time_s,
-            paths,
-        )
+    def paths(self, time_s: Float64) -> Float64:
+        """Return what `follow` does (k, m, 5)."""
+        paths = np.empty((len(self.records), len(time_s), 5))
+        follow_columns(self.law, self.records, self.extra, self.legs, self.own_legs, time_s, paths)
         lost = np.maximum.accumulate(outside(self.law, paths[:, :, 0]), axis=1)
         paths[lost] = np.nan
         return paths
@@ -132,7 +123,7 @@ def simulate_columns(
         Heading of the first run, as in `simulate`.
     step_s
         As in `simulate`; found from the ship where it is not given, coarser
-        than there, and good for 0.1 mm/s.
+        than there, and good for 0.1 mm/s (1 mm/s where an instrument reads late).
 
     Raises
     ------
@@ -159,7 +150,11 @@ def simulate_columns(
     if own != Action():
         actions = [own + action for action in actions]
     prepared = _prepare(ship, scenario, actions, speed_m_s, step_s)
-    paths = prepared.paths(time, slice(0, len(actions)))
+    seen = time
+    if any(action.log_lag_s or action.log_late_s or action.ground_lag_s for action in actions):
+        seen = np.unique(np.concatenate([time, _looks_s(ship, scenario)]))
+    whole = prepared.paths(seen)
+    paths = whole[:, np.searchsorted(seen, time)]
     speed, position, velocity = paths[:, :, 0], paths[:, :, 1:3], paths[:, :, 3:]
     log = log_flow(
         speed,
@@ -168,13 +163,14 @@ def simulate_columns(
             for name in ('log_dead_band_m_s', 'log_factor', 'log_offset_m_s')
         ),
     )
+    over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
     for i, action in enumerate(actions):
         if action.log_lag_s or action.log_late_s:
-            seen = _log_times_s(action, time, scenario.length_s)
-            followed = prepared.paths(seen, slice(i, i + 1))[0, :, 0]
-            log[i] = log_reading(action, seen, followed, time)
+            log[i] = log_reading(action, seen, whole[i, :, 0], time)
+        if action.ground_lag_s > 0.0:
+            moved = np.hypot(whole[i, :, 3], whole[i, :, 4])
+            over_ground[i] = np.interp(time, seen, lagged(seen, moved, action.ground_lag_s))
     radar = 1.0 + np.array([action.radar_factor for action in actions])[:, None]
-    over_ground = np.hypot(velocity[:, :, 0], velocity[:, :, 1])
     return Columns(
         time,
         speed,
@@ -186,12 +182,20 @@ def simulate_columns(
     )
 
 
-def _log_times_s(action: Action, time_s: Float64, length_s: float) -> Float64:
-    """Return when a log with memory must be followed to be read at some times."""
-    if action.log_lag_s > 0.0:
-        return np.linspace(0.0, length_s, int(np.ceil(length_s / _LOG_STEP_S)) + 1)
-    late: Float64 = np.clip(time_s - action.log_late_s, 0.0, length_s)
-    return late
+def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
+    """Return when a motion must be followed to be read late, straight lines between."""
+    longest = _longest_step_s(ship, scenario.speed_m_s)
+    run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    looks = [np.array([0.0, scenario.length_s])]
+    for start, end in pairwise([*scenario.events_s(), scenario.length_s]):
+        # what changes at once is smooth later
+        first = min(longest, run_down_s / _LOOKS_A_RUN_DOWN if run_down_s else longest)
+        count = int(np.ceil(np.log(longest / first) / np.log(_LOOKS_GROW)))
+        steps = first * _LOOKS_GROW ** np.arange(count)
+        even = np.arange(start + steps.sum(), end, longest)
+        looks += [np.array([start]), (start + np.cumsum(steps))[:-1], even]
+    found = np.concatenate(looks)
+    return found[found <= scenario.length_s]
 
 
 def _prepare(
@@ -201,9 +205,10 @@ def _prepare(
     speed_m_s: Float64 | None,
     step_s: float | None,
 ) -> _Prepared:
-    law = law_of(ship, scenario)
+    law = law_of(ship, scenario.speed_m_s)
     speeds = np.full(len(actions), scenario.speed_m_s) if speed_m_s is None else speed_m_s
     also = _also_s(ship, scenario, actions, step_s)
+    longest = _longest_step_s(ship, scenario.speed_m_s)
     legs: list[Records] = []
     places: dict[tuple[Turn, ...], tuple[int, int]] = {}
     for action in actions:
@@ -211,7 +216,7 @@ def _prepare(
             of_column = acted(scenario, action) if action.turns else scenario
             edges = edges_of(of_column, also_s=also)
             steps = (
-                _steps(ship, of_column, edges)
+                _steps(ship, of_column, edges, longest)
                 if step_s is None
                 else steps_of(ship, of_column, edges, step_s=step_s)
             )
@@ -240,10 +245,14 @@ def _also_s(
     return times
 
 
-def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float]) -> list[int]:
+def _longest_step_s(ship: Ship, speed_m_s: float) -> float:
+    """Return the length of a step where no thrust runs down."""
+    r = float(ship.resistance_n(speed_m_s)) / ship.mass_kg
+    return min(_STEP_S, speed_m_s / r / _STEPS_A_SLOW_DOWN)
+
+
+def _steps(ship: Ship, scenario: Scenario, edges: Sequence[float], longest: float) -> list[int]:
     """Return the number of steps between edges: small ones where thrust runs down."""
-    r = float(ship.resistance_n(scenario.speed_m_s)) / ship.mass_kg
-    longest = min(_STEP_S, scenario.speed_m_s / r / _STEPS_A_SLOW_DOWN)
     run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
     orders = [scenario.moment_s(order.time_s) for order in scenario.orders]
     quiet_s = min(scenario.events_s(), default=scenario.length_s)

@@ -159,6 +159,9 @@ class Effect:
         Whether it can be where positions are latitude and longitude.
     facts
         What facts of the log book say of it, by name of the fact.
+    nameless_at
+        Values of parameters at which many other causes leave the same trace, so that it
+        is no name.
     lasts_s
         Time in which it goes unseen, to 1 - 1/e: repaired, cleaned, set anew [s]. 0:
         of its run or its day, so that it says nothing of another.
@@ -180,6 +183,7 @@ class Effect:
     without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)
     in_geodetic: bool = True
     facts: Mapping[str, Said] = field(default_factory=dict)
+    nameless_at: Mapping[str, float] = field(default_factory=dict)
     lasts_s: float = 0.0
 
     def goes_with(self, other: Effect) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a log with faults reads of a speed through water."""
+"""What instruments with faults read of a speed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def log_reading(action: Action, time_s: Float64, speed_m_s: Float64, at_s: Float
     """
     flow = log_flow(speed_m_s, action.log_dead_band_m_s, action.log_factor, action.log_offset_m_s)
     if action.log_lag_s > 0.0:
-        flow = _lagged(time_s, flow, action.log_lag_s)
+        flow = lagged(time_s, flow, action.log_lag_s)
     reading: Float64 = np.interp(at_s - action.log_late_s, time_s, flow)
     return reading
 
@@ -53,8 +53,22 @@ def log_flow(
 
 
 @compiled
-def _lagged(time_s: Float64, value: Float64, lag_s: float) -> Float64:
-    """Filter what is linear between times, exactly, from a steady start."""
+def lagged(time_s: Float64, value: Float64, lag_s: float) -> Float64:
+    """
+    Filter what is linear between times, exactly, from a steady start.
+
+    Parameters
+    ----------
+    time_s, value : (n,)
+        Ascending times [s], and what is filtered.
+    lag_s
+        Time constant of the first-order filter, more than 0.
+
+    Returns
+    -------
+    (n,)
+        What the filter shows at the times.
+    """
     result = value.copy()
     for i in range(1, len(value)):
         step = time_s[i] - time_s[i - 1]

@@ -153,10 +153,12 @@ def _current_m_s(column: Any, time_s: float) -> tuple[float, float]:
 
 
 @compiled
-def _yaw_rad(leg: Any, elapsed: float) -> float:
-    """Return the heading within a leg."""
-    yaw: float = leg.yaw_rad + (leg.yaw_rate_rad_s + 0.5 * leg.yaw_rate_rad_s2 * elapsed) * elapsed
-    return yaw
+def _heading(leg: Any, first: tuple[float, float], elapsed: float) -> tuple[float, float]:
+    """Return cosine and sine of the heading within a leg; `first` are those at its start."""
+    if leg.yaw_rate_rad_s == 0.0 and leg.yaw_rate_rad_s2 == 0.0:
+        return first
+    yaw = leg.yaw_rad + (leg.yaw_rate_rad_s + 0.5 * leg.yaw_rate_rad_s2 * elapsed) * elapsed
+    return np.cos(yaw), np.sin(yaw)
 
 
 @compiled
@@ -179,10 +181,7 @@ def _rates(
     `thrust` is the one ordered and what is still above it, nominal and
     residual, at the start of the leg; `heading` cosine and sine of it then.
     """
-    cos, sin = heading
-    if leg.yaw_rate_rad_s != 0.0 or leg.yaw_rate_rad_s2 != 0.0:
-        yaw = _yaw_rad(leg, elapsed)
-        cos, sin = np.cos(yaw), np.sin(yaw)
+    cos, sin = _heading(leg, heading, elapsed)
     turning_1_m = leg.turning_1_m + leg.turning_1_m_s * elapsed
     east, north = _current_m_s(column, leg.start_s + elapsed)
     over_ground = speed + water
@@ -302,10 +301,10 @@ def follow(
                 path[sample, 2] = y + b1 * y1 + b2 * (y2 + y3) + b4 * y4
                 along = path[sample, 0] + water + p * water_change
                 at = start + p * h
-                yaw = _yaw_rad(leg, at)
+                cos, sin = _heading(leg, heading, at)
                 east, north = _current_m_s(column, leg.start_s + at)
-                path[sample, 3] = along * np.cos(yaw) + east
-                path[sample, 4] = along * np.sin(yaw) + north
+                path[sample, 3] = along * cos + east
+                path[sample, 4] = along * sin + north
                 sample += 1
             u += h * (u1 + 2.0 * u2 + 2.0 * u3 + u4) / 6.0
             x += h * (x1 + 2.0 * x2 + 2.0 * x3 + x4) / 6.0

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
-from shipdrag_ros.simulation.faults import log_reading
+from shipdrag_ros.simulation.faults import lagged, log_reading
 from shipdrag_ros.simulation.noise import GaussMarkov
 from shipdrag_ros.simulation.surge import Truth
 
@@ -212,9 +212,12 @@ def _perfect_values(whole: Truth, time: Float64, channel: Channel) -> Float64:
             speed = whole.speed_through_water_m_s
             return log_reading(action, whole.time_s, speed, time)[:, None]
         case Channel.SPEED_OVER_GROUND:
-            east, north = truth.velocity_over_ground_m_s.T
-            over_ground: Float64 = (1.0 + action.radar_factor) * np.hypot(east, north)
-            return over_ground[:, None]
+            shown: Float64 = np.hypot(*truth.velocity_over_ground_m_s.T)
+            if action.ground_lag_s > 0.0:
+                moved = np.hypot(*whole.velocity_over_ground_m_s.T)
+                late = lagged(whole.time_s, moved, action.ground_lag_s)
+                shown = np.interp(time, whole.time_s, late)
+            return ((1.0 + action.radar_factor) * shown)[:, None]
         case Channel.POSITION:
             return (1.0 + action.radar_factor) * truth.position_m
         case Channel.HEADING:

@@ -173,7 +173,7 @@ def simulate(
     'r(5 m/s) = 0.00678 m/s^2'
     """
     action = own_action(ship, scenario, reference_rad=reference_rad, effects=effects)
-    law = law_of(ship, scenario)
+    law = law_of(ship, scenario.speed_m_s)
     columns = columns_of(ship, scenario, [action], speed_m_s=np.array([scenario.speed_m_s]))
     scenario = acted(scenario, action)
     changes = any(action.current_change_m_s)

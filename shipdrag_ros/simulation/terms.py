@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from math import hypot
 
 import numpy as np
@@ -22,9 +23,10 @@ _EXTRA_CELLS = 512  # of what effects add to it, which is smooth
 _RANGE = 2.0  # times the steady speed: room for disturbances, and the cells stay fine
 
 
-def law_of(ship: Ship, scenario: Scenario) -> SurgeLaw:
+@lru_cache(maxsize=8)
+def law_of(ship: Ship, speed_m_s: float) -> SurgeLaw:
     """
-    Tabulate the baseline.
+    Tabulate the baseline; kept, as a ship is simulated again and again.
 
     Raises
     ------
@@ -32,12 +34,12 @@ def law_of(ship: Ship, scenario: Scenario) -> SurgeLaw:
         If the steady speed is outside the baseline's table.
     """
     low, high = ship.baseline_range_m_s
-    if not low <= scenario.speed_m_s <= high:
+    if not low <= speed_m_s <= high:
         raise SimulationError(
-            f'speed_m_s is {scenario.speed_m_s!r}, the baseline is stated for '
+            f'speed_m_s is {speed_m_s!r}, the baseline is stated for '
             f'{low:.4g}..{high:.4g} m/s; choose a speed inside or extend the baseline'
         )
-    speeds = np.linspace(low, min(high, _RANGE * scenario.speed_m_s), _CELLS + 1)
+    speeds = np.linspace(low, min(high, _RANGE * speed_m_s), _CELLS + 1)
     table = CubicSpline(speeds, ship.resistance_n(speeds) / ship.mass_kg)
     span = float(speeds[-1] - low)
     return SurgeLaw(
@@ -81,9 +83,12 @@ def extra_of(ship: Ship, law: SurgeLaw, actions: Sequence[Action]) -> Float64:
     speeds: Float64 = law.low_m_s + law.extra_cell_m_s * np.arange(_EXTRA_CELLS + 1.0)
     speeds[-1] = min(speeds[-1], ship.baseline_range_m_s[1])  # to the last digit
     table = np.zeros((len(actions), len(speeds)))
+    # steps of a hypothesis differ in one function of several
+    functions = {function for action in actions for function in action.resistance}
+    added = {function: function(speeds) for function in functions}
     for row, action in zip(table, actions):
         for function in action.resistance:
-            row += function(speeds)
+            row += added[function]
     table /= ship.mass_kg
     return table
 
@@ -177,11 +182,10 @@ def legs_of(
     legs['steps'] = steps
     legs['thrust_ordered'] = [scenario.thrust_ordered(start) for start in edges_s[:-1]]
     legs['yaw_rad'] = scenario.heading(edges[:-1])
+    quarters = edges[:-1] + np.array([[0.25], [0.75]]) * length - scenario.lead_in_s
     for turn in scenario.turns:
         # linear within a leg, and at its ends perhaps a step
-        early, late = (
-            turn.share(edges[:-1] + part * length - scenario.lead_in_s) for part in (0.25, 0.75)
-        )
+        early, late = turn.share(quarters)
         per_s = 2.0 * (late - early) / length
         share = early - 0.25 * length * per_s
         area_1_m = 0.5 * ship.water.density_kg_m3 * turn.drag_area_m2 / ship.mass_kg

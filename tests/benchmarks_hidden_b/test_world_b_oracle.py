@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-# even, one run: a stream, and nothing
-CURRENT, NOTHING = 4, 34
+# even, one run: a stream, a radar that is wrong in scale, and nothing
+CURRENT, SCALE, NOTHING = 4, 188, 34
 
 
 @pytest.fixture(scope='module')
@@ -41,7 +41,7 @@ def test_it_is_told_nothing_of_what_is_hidden(cases) -> None:
     assert np.any(setting.flow)
 
 
-@pytest.mark.parametrize('number', [CURRENT, NOTHING])
+@pytest.mark.parametrize('number', [SCALE, NOTHING])
 def test_it_names_what_is_plain_and_nothing_where_nothing_is(cases, number) -> None:
     from diagnosis_score import diagnosis
 
@@ -50,3 +50,37 @@ def test_it_names_what_is_plain_and_nothing_where_nothing_is(cases, number) -> N
     true = cases.reveal(number).names
     assert found['verdict'] == ('named' if true else 'none')
     assert tuple(effect['name'] for effect in found['effects']) == true
+
+
+def test_fouling_is_of_any_size_and_not_in_steps(cases) -> None:
+    from hidden_b.oracle_sail import made, run_of, stated
+
+    known = cases.known(CURRENT)
+    hull = stated(cases.observe(CURRENT).ship_file, known).hull
+
+    def drag(factor: float) -> float:
+        setting = run_of(known, hull, 0, hull.speed_m_s, 0.0)
+        made('fouling', [factor], hull, known, (1.0, 1.0)).apply(setting)
+        return float(np.sum(setting.still_n() - hull.still_n))
+
+    factors = 0.2 * 1.002 ** np.arange(8)  # a step of its maker is some percent
+    assert np.array([drag(f) for f in factors]) / factors == pytest.approx(
+        drag(0.2) / 0.2, rel=0.01
+    )
+    assert np.all(np.diff([drag(f) for f in factors]) > 0.0)
+
+
+def test_a_mean_is_of_the_readings_that_are_there(cases) -> None:
+    from hidden_b.instruments import Series
+    from hidden_b.oracle_rows import _means
+
+    t = np.arange(0.0, 100.0, 1.0)
+    t = t[(t < 11.0) | (t > 22.0)]  # a gap of a kind that every source has
+    grid = np.linspace(0.0, 100.0, 1001)
+    series = Series((t * 1e9).astype(np.int64), np.exp(-t / 8.0), (t * 1e9).astype(np.int64))
+    means = _means(series, 0, np.linspace(0.0, 100.0, 4))
+    found = means.of(grid, np.exp(-grid / 8.0)[:, None])
+    assert found == pytest.approx(means.value, rel=1e-3)
+    assert means.of(grid - 50.0, grid[:, None] - 50.0).shape == (3, 1)
+    late = means.of(grid[400:], grid[400:, None])  # straight on before it begins
+    assert late[0, 0] == pytest.approx(means.t[0])

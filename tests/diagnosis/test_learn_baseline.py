@@ -156,7 +156,7 @@ def test_what_is_stated_of_friction_and_wave_together_counts() -> None:
     # friction and wave that err against each other leave their sum known
     base = scaled(*TRUE).baseline
     assert isinstance(base, CoefficientBaseline)
-    run = [coast(scaled(1.1 * TRUE[0], 1.3 * TRUE[1]), seed=80)]
+    run = [coast(scaled(1.15 * TRUE[0], 1.45 * TRUE[1]), seed=80)]
     chance = []
     for correlation in (-0.95, 0.95):
         sd = CoefficientSd(friction=0.05, wave=0.15, correlation=correlation)

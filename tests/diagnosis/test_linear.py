@@ -12,10 +12,11 @@ import pytest
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.simulated import _Batch
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation import Action, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import find
 
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
@@ -131,3 +132,24 @@ def test_effects_that_a_ship_file_states_are_part_of_the_model(model: CoastModel
     coast = model.seen[0].along.rows.time_s > model.seen[0].lead_in_s + 300.0
     at = np.flatnonzero(log & coast)
     assert np.all(slower.residuals[0][:n][at] > clean.residuals[0][:n][at] + 0.05)
+
+
+def test_a_column_that_is_asked_for_twice_is_simulated_once() -> None:
+    batch = _Batch()
+    wind, calm = Action(wind_m_s=(3.0, 0.0)), Action()
+    asked = [(calm, 8.0), (wind, 8.0), (calm + wind, 8.0), (calm, 8.01), (calm, 8.0)]
+    assert [batch.add(*each) for each in asked] == [0, 1, 1, 2, 0]
+    assert batch.actions == [calm, wind, calm]
+    assert batch.speeds == [8.0, 8.0, 8.01]
+
+
+def test_lines_are_whitened_alike_whatever_lines_of_0_stand_between(model: CoastModel) -> None:
+    seen = model.seen[0]
+    assert seen.across is not None
+    rows = len(seen.along) + len(seen.across) + len(seen.context)
+    lines = np.random.default_rng(3).standard_normal((2, rows))
+    nothing = np.zeros(rows)
+    found = model._whitened(0, np.array([lines[0], nothing, lines[1]]))
+    assert np.array_equal(found[[0, 2]], model._whitened(0, lines))
+    assert not found[1].any()
+    assert found[0, 0] == pytest.approx(seen.along.whitener[0, 0] * lines[0, 0])

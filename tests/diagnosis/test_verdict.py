@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from shipdrag_ros.diagnosis.coast_terms import ModelErrorTerm
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear
 from shipdrag_ros.diagnosis.posterior import posterior_of, prune_by_bayes_factor
@@ -110,18 +111,30 @@ def test_what_is_more_than_noise_depends_on_the_number_of_rows(rows: int, limit:
 
 
 @pytest.mark.parametrize(
-    ('name', 'parameter', 'outside'),
+    ('name', 'parameter', 'sd', 'outside'),
     [
-        ('turning', 'duration_s', True),
-        ('turning', 'drag_area_m2', False),
-        ('current', 'cross_track_m_s', False),
+        ('turning', 'duration_s', 3.0, True),
+        ('turning', 'drag_area_m2', 3.0, False),
+        ('turning', 'drag_area_m2', 6.0, True),
+        ('current', 'cross_track_m_s', 6.0, False),
+        ('log_scale', 'factor', 6.0, False),
     ],
-    ids=['shape', 'size', 'component of a size'],
+    ids=['shape', 'size', 'size of no such ship', 'component of a size', 'size of either sign'],
 )
 def test_a_shape_beyond_its_prior_is_not_what_an_effect_is_known_as(
-    name: str, parameter: str, outside: bool, cargo: Ship
+    name: str, parameter: str, sd: float, outside: bool, cargo: Ship
 ) -> None:
     term = EffectTerm(find(name), cargo)
-    z = np.array([3.0 * (unknown.name == parameter) for unknown in term.unknowns])
+    z = np.array([sd * (unknown.name == parameter) for unknown in term.unknowns])
     linear = Linear(Hypothesis((name,), (term,)), z, (np.zeros((1, 9)),), (np.zeros(9),))
+    assert outside_prior(Fit(linear, np.eye(len(z)), 0.0)) is outside
+
+
+@pytest.mark.parametrize(('sd', 'outside'), [(3.0, False), (4.0, True)])
+def test_an_effect_far_from_its_formula_is_another(sd: float, outside: bool, cargo: Ship) -> None:
+    error = ModelErrorTerm(EffectTerm(find('towed_cable'), cargo), 0.05)
+    hypothesis = Hypothesis(('towed_cable',), (error.term,), model_errors=(error,))
+    z = np.zeros(len(hypothesis.unknowns))
+    z[-1] = -sd
+    linear = Linear(hypothesis, z, (np.zeros((1, 9)),), (np.zeros(9),))
     assert outside_prior(Fit(linear, np.eye(len(z)), 0.0)) is outside

@@ -90,4 +90,6 @@ EFFECT = Effect(
         'current_change': (Measure.HEADING, Measure.RUDDER, Measure.ANOTHER_RUN),
     },
     facts={'helm_amidships': DENIES},
+    # a net, a bank, ice: any drag that comes and goes
+    nameless_at={'rate_rad_s': 0.0},
 )
