@@ -125,19 +125,20 @@ def log_probability(found: Mapping[str, Any], names: Sequence[str]) -> float:
     return float(np.log(_LEAST))
 
 
-def answers(task: tuple[str, int]) -> dict[str, Any]:
+def answers(task: tuple[str, int, Sequence[str]]) -> dict[str, Any]:
     """
-    Return the log probability of the truth of a case with each thing given, and the verdicts.
+    Return the log probability of the truth of a case with each thing given, and the answers.
     """
-    world, number = task
+    world, number, wanted = task
     names = WORLDS[world].reveal(number).names
     seen = everything(world, number)
-    row: dict[str, Any] = {'case': number, 'log_probability': {}, 'verdict': {}}
-    for name, given in given_of(world).items():
+    row: dict[str, Any] = {'case': number, 'log_probability': {}, 'found': {}}
+    for name in wanted:
+        given = GIVEN[name]
         diagnose = diagnosis('command', 'bags', number, world, given.facts)
         found, _ = diagnose(only(seen, given))
         row['log_probability'][name] = log_probability(found, names)
-        row['verdict'][name] = found['verdict']
+        row['found'][name] = {key: found[key] for key in ('verdict', 'candidates')}
     return row
 
 
@@ -151,7 +152,7 @@ def lines(rows: Sequence[Mapping[str, float]], given: Mapping[str, Given]) -> It
         mean = f'{np.mean([row[name] for row in rows]):.2f}'
         if not each.against:
             yield f'| {name} | {mean} | | | |'
-        for less in each.against:
+        for less in [name for name in each.against if name in given]:
             gains = np.array([row[name] - row[less] for row in rows])
             gain, twice = float(gains.mean()), np.inf
             if len(gains) > 1:
@@ -169,25 +170,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--skip', type=int, default=0, help='that many cases at the beginning')
     parser.add_argument('--count', type=int, default=20)
     parser.add_argument('--processes', type=int, default=2)
+    parser.add_argument('--only', nargs='+', choices=tuple(GIVEN), help='all there is otherwise')
     parser.add_argument('--out', type=Path, help='answers, one line of JSON a case')
     options = parser.parse_args(arguments)
+    given = given_of(options.world)
+    if options.only is not None:
+        given = {name: each for name, each in given.items() if name in options.only}
     out = options.out or OUT / f'more_information_{options.world}.jsonl'
     out.parent.mkdir(parents=True, exist_ok=True)
     kept = {}
     if out.exists():
-        text = out.read_text(encoding='utf-8')
-        kept = {row['case']: row for row in map(json.loads, text.splitlines())}
+        rows = map(json.loads, out.read_text(encoding='utf-8').splitlines())
+        kept = {row['case']: row for row in rows if given.keys() <= row['log_probability'].keys()}
     numbers = list(islice(bare(options.world), options.skip, options.skip + options.count))
-    tasks = [(options.world, number) for number in numbers if number not in kept]
+    tasks = [(options.world, number, list(given)) for number in numbers if number not in kept]
     with ProcessPoolExecutor(options.processes) as pool, out.open('a', encoding='utf-8') as file:
         for row in pool.map(answers, tasks):
             file.write(json.dumps(row) + '\n')
             file.flush()
             kept[row['case']] = row
-    rows = [kept[number]['log_probability'] for number in numbers]
     seed = WORLDS[options.world].SEED
-    print(f'{len(rows)} cases of world {options.world}, seed {seed}; natural logarithms')
-    for line in lines(rows, given_of(options.world)):
+    print(f'{len(numbers)} cases of world {options.world}, seed {seed}; natural logarithms')
+    for line in lines([kept[number]['log_probability'] for number in numbers], given):
         print(line)
 
 
