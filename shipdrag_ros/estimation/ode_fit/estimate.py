@@ -81,7 +81,6 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     # after a stop a log's filter begins to fall behind: without it, that passes for a current
     stopped = window.before is not None
     problem = Problem.of(record, run_down, ship, guess, stopped=stopped).damped(plain)
-    problem = problem.with_powers(first.law.powers)
     problem = problem.disturbed(_at_first(record, problem, run_down, guess).typical)
     start = Start.of(problem, first)
     if start.near is None:

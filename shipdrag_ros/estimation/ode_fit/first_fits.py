@@ -9,7 +9,6 @@ import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_SCALE
-from shipdrag_ros.estimation.ode_fit.families import PLAIN
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.problem import Problem
 from shipdrag_ros.estimation.ode_fit.weighing import drop_gross, weigh
@@ -67,7 +66,7 @@ def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
     -------
     first, problem
         With the variance of each input as it scatters, larger for outliers
-        (Huber's weights). Of two powers where four do not converge.
+        (Huber's weights).
 
     Raises
     ------
@@ -91,8 +90,6 @@ def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
         weigh(white, problem.rows.kind, problem.steady, unknown, base, weight)
     else:
         problem = problem.weighted(base / weight)
-    if first is None and len(problem.first.powers) > len(PLAIN):
-        return fit_robustly(problem.with_powers(PLAIN))
     if first is None:
         raise EstimationError(
             'the equation of motion could not be fitted to the window: give one coastdown, '

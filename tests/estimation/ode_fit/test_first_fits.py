@@ -33,22 +33,21 @@ LAUNCH = Ship.from_yaml(
 STEADY_S, SPEED_M_S = 600.0, 3.5
 
 
-def window(early_s: float, seed: int = 0) -> Window:
+def window(early_s: float) -> Window:
     """One that begins so long before the stop."""
     scenario = Scenario(speed_m_s=SPEED_M_S, lead_in_s=STEADY_S, duration_s=300.0, heading_rad=0.4)
     inputs = ('speed_through_water', 'position')
     sensors = standard_sensors(rate_hz=1.0, noise=0.1, inputs=inputs)
-    block = sense(simulate(LAUNCH, scenario), sensors, seed=seed)
+    block = sense(simulate(LAUNCH, scenario), sensors, seed=0)
     start_ns = START_NS + round((STEADY_S - early_s) * 1e9)
     return Window.from_block(block, start_ns, int(block.stamp_ns.max()), before_ns=START_NS)
 
 
-# What does not converge: at 14 s a later round of weights; at 20 s the whole law about the
-# coastdown alone, or four powers. Before, one gave an error of 16 % and half the cover without
-# a word, and the others no estimate.
-@pytest.mark.parametrize(('early_s', 'seed'), [(14.0, 0), (20.0, 0), (20.0, 1)])
-def test_a_stop_that_comes_late_in_the_window_is_found(early_s: float, seed: int) -> None:
-    found = estimate(window(early_s, seed), LAUNCH, Parameters())
+# at 14 s a later round of weights fails, at 20 s the whole law about the coastdown alone:
+# before, the one gave no estimate and the other an error of 16 % and half the cover, unsaid
+@pytest.mark.parametrize('early_s', [14.0, 20.0])
+def test_a_stop_that_comes_late_in_the_window_is_found(early_s: float) -> None:
+    found = estimate(window(early_s), LAUNCH, Parameters())
     speed = found.curve.speed_m_s
     true = np.array([LAUNCH.resistance_n(float(v)) for v in speed]) / LAUNCH.mass_kg
     error = found.curve.resistance_m_s2 - true
