@@ -90,13 +90,7 @@ def end_of(
     slope, level, _ = line(bins, coasting.source, number, width)
     if level < tuning.speed_min:
         return End(EndedBy.SPEED, number)
-    end = _departed(coasting, bins, tuning, parameters, number, slope, level)
-    # where the shaft is seen to stand, it was not the engine
-    if end is not None and end.ended_by is EndedBy.ENGINE:
-        stands = 0.5 * parameters.shaft_stopped_fraction
-        if all_stand(bins, coasting.drive, number, stands):
-            return None
-    return end
+    return _departed(coasting, bins, tuning, parameters, number, slope, level)
 
 
 def _departed(
@@ -130,6 +124,9 @@ def _departed(
         first, before = start, line(bins, source, start + long, long // 2)[0]
         slope = overall
     if excess > coasting.limits[0]:
+        # where the shaft is seen to stand, it was not the engine
+        if all_stand(bins, coasting.drive, number, 0.5 * parameters.shaft_stopped_fraction):
+            return None
         return End(EndedBy.ENGINE, _bend(bins, coasting, tuning, first, number, sign=-1))
     if -excess > coasting.limits[0]:
         # where nothing gives the heading, this is how a turn shows, unless it is too much for one

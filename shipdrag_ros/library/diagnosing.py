@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 from shipdrag_ros.bags import Run
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.diagnosis import (
     CoastRun,
     DiagnosisResult,
@@ -22,6 +24,7 @@ from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.listener import Listener
 from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_two_ships
@@ -251,10 +254,7 @@ def _found(
     progress: Progress,
 ) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
-    coasts: list[CoastRun] = []
-    whole: list[CoastRun] = []
-    notes: list[str] = []
-    followed = False
+    seen: list[_OfRun] = []
     without: list[str] = []
     estimates: list[Estimate] = []
     ship, parameters = given, None
@@ -275,33 +275,66 @@ def _found(
         estimates += [part.estimate for part, _ in windows if part.estimate is not None]
         if not windows:
             without.append(f'in {each.name!r}: {why_no_coastdown(result)}')
-            missed = dismissed_glide(result) if ship.baseline is not None else None
-            if missed is not None:
-                whole.append(CoastRun(each.name, missed, sheet.facts, of_run))
-                notes.append(f'{each.name}: {DISMISSED}')
-                followed = True
-        for place, (coastdown, found) in enumerate(windows, start=1):
-            name = each.name if len(windows) == 1 else f'{each.name}, coastdown {place}'
-            coasts.append(CoastRun(name, found, sheet.facts, of_run))
-            glide = whole_glide(result, coastdown) if ship.baseline is not None else None
-            whole.append(coasts[-1])
-            if glide is None:
-                continue
-            notes.append(f'{name}: {glide.note}')
-            if glide.window is not None:
-                whole[-1] = replace(whole[-1], window=glide.window)
-                followed = True
+        run = partial(CoastRun, facts=sheet.facts, ship=of_run)
+        if ship.baseline is None:
+            seen.append(_OfRun([run(*one) for one in _named(each.name, windows)]))
+        else:
+            seen.append(_of_run(result, windows, run))
     assert ship is not None
     assert parameters is not None
     return _Coastdowns(
-        coasts,
-        whole if followed else [],
-        tuple(notes),
+        [coast for one in seen for coast in one.coasts],
+        [glide for one in seen for glide in one.whole] if any(one.more for one in seen) else [],
+        tuple(note for one in seen for note in one.notes),
         ship,
         parameters,
         tuple(without),
         tuple(estimates),
     )
+
+
+class _OfRun(NamedTuple):
+    """Coastdowns of a bag; whether it has more of a glide; the glides, and what these are."""
+
+    coasts: list[CoastRun]
+    more: bool = False
+    whole: Sequence[CoastRun] = ()
+    notes: tuple[str, ...] = ()
+
+
+def _of_run(
+    result: ReplayResult,
+    windows: Sequence[tuple[EndedCoastdown, Window]],
+    run: Callable[[str, Window], CoastRun],
+) -> _OfRun:
+    """Look for glides that are more than the coastdowns of a bag."""
+    bag = result.run.name
+    coasts = [run(*one) for one in _named(bag, windows)]
+    missed = None if windows else dismissed_glide(result)
+    if missed is not None:
+        return _OfRun([], True, [run(bag, missed)], (f'{bag}: {DISMISSED}',))
+    whole: list[CoastRun] = []
+    notes: list[str] = []
+    glide_end_ns = 0
+    for coast, (coastdown, window) in zip(coasts, windows, strict=True):
+        if window.start_ns < glide_end_ns:  # a part of the glide before, which counts once
+            continue
+        whole.append(coast)
+        glide = whole_glide(result, coastdown)
+        if glide is not None:
+            notes.append(f'{coast.name}: {glide.note}')
+        if glide is not None and glide.window is not None:
+            whole[-1] = replace(coast, window=glide.window)
+            glide_end_ns = glide.window.end_ns
+    return _OfRun(coasts, glide_end_ns > 0, whole, tuple(notes))
+
+
+def _named(
+    bag: str, windows: Sequence[tuple[EndedCoastdown, Window]]
+) -> Iterator[tuple[str, Window]]:
+    """Yield the coastdowns of a bag with a name each."""
+    for place, (_, window) in enumerate(windows, start=1):
+        yield (bag if len(windows) == 1 else f'{bag}, coastdown {place}'), window
 
 
 def _sheet(listener: Listener, run: Run, ship: Ship) -> tuple[RunSheet, Ship | None]:

@@ -24,7 +24,8 @@ from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.inference.settings import Settings, noise_of
 from shipdrag_ros.samples import Float64, Int64
 
-_ROUNDS, _WHOLE_ROUNDS = 16, 3  # the later ones go half the way: a late onset may oscillate
+# Rounds that go the whole way, half of it, and a fifth: stop, thrust and lag may oscillate.
+_WHOLE_ROUNDS, _HALF_ROUNDS, _ROUNDS = 3, 16, 40
 # sd of what has no prior, over that by the samples alone: nothing is held
 _VAGUE = 1e6
 _CLOSE, _NEAR = 0.03, 1.0  # of chi^2, between one average and the next; and at the end
@@ -125,12 +126,13 @@ def average(
             return False, unknowns, covariance
         step /= total
         away = 0.0
-        part = 1.0 if number < _WHOLE_ROUNDS else 0.5
+        part = 1.0 if number < _WHOLE_ROUNDS else 0.5 if number < _HALF_ROUNDS else 0.2
         for a in range(p):
             unknowns[active[a]] += part * step[a]
             for b in range(p):
                 away += step[a] * information[a, b] / total * step[b]
                 covariance[active[a], active[b]] = second[a, b] / total - step[a] * step[b]
-        if away < _CLOSE:
+        # so far or never: the small steps are for what still oscillates
+        if away < _CLOSE or (away < _NEAR and number == _HALF_ROUNDS - 1):
             break
     return away < _NEAR, unknowns, covariance

@@ -18,11 +18,7 @@ from shipdrag_ros.estimation.assemble import AtEnd, assembled
 from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.ode_fit.batch_means import BatchMeans
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_LAG, LOG_SCALE, V0, predict
-from shipdrag_ros.estimation.ode_fit.first_fits import (
-    fit_robustly,
-    weigh_disturbed,
-    with_log_scale,
-)
+from shipdrag_ros.estimation.ode_fit.first_fits import Start, fit_robustly
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.problem import Problem
@@ -41,6 +37,15 @@ from shipdrag_ros.ship import Ship
 
 NAME = 'ode_fit'
 _CURVE_POINTS = 257
+_NOT_AVERAGED = (
+    'the fit did not converge under all settings of the slow disturbances: it is by the most '
+    'probable one of the steady record, and its band may be too narrow'
+)
+_FIRST_ALONE = (
+    'the whole law of r did not converge: r is a sum of the powers of the speed fitted first, '
+    'without wave making or knowledge of the thrust, and its band is too narrow; give the time '
+    'of the stop, a shaft, or a window that begins after it'
+)
 _QUIET_S = 5.0  # before the stop the last seconds teach nothing; more where it is known worse
 
 
@@ -76,22 +81,26 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     # after a stop a log's filter begins to fall behind: without it, that passes for a current
     stopped = window.before is not None
     problem = Problem.of(record, run_down, ship, guess, stopped=stopped).damped(plain)
+    problem = problem.with_powers(first.law.powers)
     problem = problem.disturbed(_at_first(record, problem, run_down, guess).typical)
-    problem = weigh_disturbed(problem, first)
-    full = problem
-    first, problem = with_log_scale(problem.condensed(first), first)
+    start = Start.of(problem, first)
+    if start.near is None:
+        start = start.again(problem)
+    first, full, problem = start.first, start.full, start.condensed
     if LOG_SCALE in problem.extras:
         scale, sd = first.unknown(LOG_SCALE)
         notes.append(
             f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
             'deviations), taken out'
         )
-    whole = problem.whole(first)
-    near = problem.average(whole)
-    noise = learn(problem.seen(near or whole), guess.speed_m_s)
+    near = start.near or problem.whole(first)
+    noise = learn(problem.seen(near), guess.speed_m_s)
     problem = problem.disturbed(noise.settings)
-    # where the whole law cannot be fitted, the first family stands alone
-    found = problem.average(near or whole) or near or first
+    found = problem.average(near)
+    if found is None:
+        # where the whole law cannot be fitted, the first family stands alone
+        found = start.near or first
+        notes.append(_NOT_AVERAGED if start.near else _FIRST_ALONE)
     full = full.disturbed(noise.typical)
     notes += _noise_notes(noise, record)
     correlated = full.correlated(found)

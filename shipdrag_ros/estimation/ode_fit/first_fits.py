@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_SCALE
+from shipdrag_ros.estimation.ode_fit.families import PLAIN
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.problem import Problem
 from shipdrag_ros.estimation.ode_fit.weighing import drop_gross, weigh
@@ -16,6 +17,46 @@ from shipdrag_ros.inference.noise import whiten
 
 _ROUNDS, _ROUNDS_DISTURBED = 3, 2  # of the weights
 _SCALE_SIGNIFICANT = 3.0  # standard deviations
+
+
+@dataclass(frozen=True)
+class Start:
+    """
+    What the whole law is fitted to, and a first fit of it.
+
+    Attributes
+    ----------
+    first
+        Fit of the first family.
+    full, condensed
+        Every row weighed; a row a step, with the scale of the log where it shows.
+    near
+        The whole law; None where it does not converge.
+    """
+
+    first: FittedMotion
+    full: Problem
+    condensed: Problem
+    near: FittedMotion | None
+
+    @classmethod
+    def of(cls, problem: Problem, first: FittedMotion) -> Start:
+        """
+        Fit the whole law, about a fit of the first family.
+        """
+        full = weigh_disturbed(problem, first)
+        first, condensed = with_log_scale(full.condensed(first), first)
+        return cls(first, full, condensed, condensed.average(condensed.whole(first)))
+
+    def again(self, problem: Problem) -> Start:
+        """
+        Return the start about a first fit to all rows.
+
+        The coastdown alone cannot show where the stop was: without the record before it, an
+        onset that was found seconds early passes for a higher speed.
+        """
+        first, _ = self.full.fit_first(self.first.unknowns)
+        return self if first is None else Start.of(problem, first)
 
 
 def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
@@ -26,12 +67,12 @@ def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
     -------
     first, problem
         With the variance of each input as it scatters, larger for outliers
-        (Huber's weights).
+        (Huber's weights). Of two powers where four do not converge.
 
     Raises
     ------
     EstimationError
-        If the fit does not converge.
+        If the fit does not converge even once.
     """
     base = problem.white.variance.copy()
     weight = np.ones(len(base))
@@ -39,20 +80,27 @@ def fit_robustly(problem: Problem) -> tuple[FittedMotion, Problem]:
     unknown = problem.first.size + len(problem.extras)
     crude = FittedMotion(problem.first, start, np.zeros((len(start), len(start))))
     drop_gross(problem.residual(crude), problem.rows.kind, weight)
+    first: FittedMotion | None = None
     for _ in range(_ROUNDS):
-        problem = problem.weighted(base / weight)
-        first, white = problem.fit_first(start)
-        if first is None:
-            raise EstimationError(
-                'the equation of motion could not be fitted to the window: give one coastdown, '
-                'with the engine stopped; leave out an input that moves otherwise, as a path '
-                'does that drifts sideways; or set `estimator` to log_time or one of s1_speed, '
-                's1_position, s1_joint'
-            )
-        start = first.unknowns
+        weighted = problem.weighted(base / weight)
+        found, white = weighted.fit_first(start)
+        if found is None:
+            # a round before it is near enough to begin with
+            break
+        problem, first, start = weighted, found, found.unknowns
         weigh(white, problem.rows.kind, problem.steady, unknown, base, weight)
-    assert first is not None
-    return first, problem.weighted(base / weight)
+    else:
+        problem = problem.weighted(base / weight)
+    if first is None and len(problem.first.powers) > len(PLAIN):
+        return fit_robustly(problem.with_powers(PLAIN))
+    if first is None:
+        raise EstimationError(
+            'the equation of motion could not be fitted to the window: give one coastdown, '
+            'with the engine stopped; leave out an input that moves otherwise, as a path '
+            'does that drifts sideways; or set `estimator` to log_time or one of s1_speed, '
+            's1_position, s1_joint'
+        )
+    return first, problem
 
 
 def weigh_disturbed(problem: Problem, near: FittedMotion) -> Problem:

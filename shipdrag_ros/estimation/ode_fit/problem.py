@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -152,6 +153,12 @@ class Problem:
         """That of the first setting."""
         found: Noise = noise_of(self.settings, 0, self.rows, self.white, self.steady)
         return found
+
+    def with_powers(self, powers: Sequence[int] | Int64) -> Problem:
+        """
+        Return the problem whose first fit has other powers of the speed.
+        """
+        return replace(self, first=self.first._replace(powers=np.array(powers, np.int64)))
 
     def damped(self, plain: FittedMotion) -> Problem:
         """
