@@ -14,6 +14,7 @@ BRAKED = (
     'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
     'from the rest alone'
 )
+"""What is said of a coastdown that is `braked`."""
 
 
 class State(Enum):

@@ -20,7 +20,6 @@ from scipy.special import ndtri
 from shipdrag_ros.diagnosis.carried import Carried
 from shipdrag_ros.diagnosis.coast_terms import (
     BaselineTerm,
-    FilterNuisance,
     ForceTerm,
     MeasurementTerm,
     ModelErrorTerm,
@@ -29,6 +28,7 @@ from shipdrag_ros.diagnosis.coast_terms import (
     Term,
 )
 from shipdrag_ros.diagnosis.facts import Facts
+from shipdrag_ros.diagnosis.filters import FilterNuisance
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.measured import damping_of
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing
@@ -43,7 +43,7 @@ from shipdrag_ros.simulation.effects import LIBRARY, find, inseparable
 
 DISCREPANCIES = ('force', 'log', 'radar')
 _SWINGING = 1  # place of something that swings in time
-_EVERYWHERE = (0.03, 0.08, 0.16, 0.27, 0.42, 0.58, 0.79)  # of what may be anywhere in a run
+_EVERYWHERE = (0.03, 0.08, 0.16, 0.27, 0.42, 0.58, 0.79)  # shares of the longest run
 _APART = (-0.8, 0.8)  # z of parameters besides the size that a fit may not find from 0
 
 
@@ -318,7 +318,7 @@ class CoastModel(CoastSimulation):
 
 
 def _starts(quantity: Parameter, longest_s: float, *, first: bool) -> tuple[float, ...]:
-    """Return z that fits begin from; what may be at any time, within the longest run."""
+    """Return z that fits begin from; a uniform prior is that of a time: within the longest run."""
     shape = quantity.prior.shape
     if first:
         return {Shape.HALF_NORMAL: (0.3,), Shape.LOG_NORMAL: _APART}.get(shape, (0.0,))

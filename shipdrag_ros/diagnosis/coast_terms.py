@@ -9,7 +9,7 @@ measured, and needs no simulation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import ClassVar, Protocol
 
@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.model import Part
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
-from shipdrag_ros.parameter import Parameter, flat, free, half_normal, heavy_tailed, normal
+from shipdrag_ros.parameter import Parameter, flat, free, heavy_tailed, normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import CoefficientBaseline
@@ -31,12 +31,10 @@ from shipdrag_ros.simulation.hydrodynamics import viscous_n
 
 SHAPE_SD = 0.01  # of a baseline's form, beyond what its coefficients can follow
 FREE_SHAFT, FREE_SHAFT_SD = 0.5, 0.15  # shaft speed of a free propeller over that under power
-_SHAPES = 5
-_DISCREPANCIES = 6
-_FORMS = 4
+# B-splines: of a baseline's form over the speed; of what has no name, over speed or time; and of
+# the departure of an effect from its formula, over the run
+_SHAPES, _DISCREPANCIES, _FORMS = 5, 6, 4
 _FORCE_SD = 0.15  # of an unknown force, relative to the resistance at the steady speed
-_FILTER_SD_S, _FILTER_SD = 8.0, 0.015  # of what is usual, and over the time of slowing down
-_FILTER_START = 0.3  # z
 _FALLS, _FALL_SD = 3, 0.5  # of thrust beside an exponential fall, relative to the steady one
 _CLOCKS_SD_S = 1.0  # by which stamps of two instruments that are in order differ
 _SPEED_SD = 0.05  # of an unknown error of log or radar, relative to the steady speed
@@ -148,48 +146,6 @@ def baseline_parts(ship: Ship, top_m_s: float, speeds: bytes) -> Float64:
         viscous = viscous_n(ship, speed_m_s)
         parts = [viscous, total - ship.air_drag_n(speed_m_s) - viscous]
     return np.vstack([*parts, total * cubic_bsplines(speed_m_s / top_m_s, _SHAPES)])
-
-
-@dataclass(frozen=True)
-class FilterNuisance:
-    """
-    The filters of log and speed over ground, which every instrument has.
-
-    Manuals state 2 to 15 s; on a craft that slows down quickly they are shorter.
-
-    Attributes
-    ----------
-    slow_down_s
-        Speed over deceleration, roughly, at the stop.
-    has_log, has_ground
-        Whether there are such rows.
-    """
-
-    slow_down_s: float
-    has_log: bool
-    has_ground: bool
-    one_size: ClassVar[Sequence[int]] = ()
-
-    @cached_property
-    def unknowns(self) -> tuple[Parameter, ...]:
-        """Time constants [s]."""
-        sd = min(_FILTER_SD_S, _FILTER_SD * self.slow_down_s)
-        places = {'log filter': self.has_log, 'ground filter': self.has_ground}
-        return tuple(
-            replace(free(name, half_normal(sd)), start=_FILTER_START)
-            for name, there in places.items()
-            if there
-        )
-
-    def acts_in(self, run: int) -> bool:
-        """Say that the instruments are the same in all runs."""
-        return True
-
-    def action(self, frame: Frame, run: int, values: Sequence[float]) -> Action:
-        """Return the filters."""
-        given = iter(values)
-        log, ground = (next(given) if there else 0.0 for there in (self.has_log, self.has_ground))
-        return Action(log_lag_s=log, ground_lag_s=ground)
 
 
 @dataclass(frozen=True)
@@ -334,7 +290,7 @@ class RunNuisance:
         )
 
     def columns(self, seen: Observation, run: int, base: Predicted) -> tuple[Float64, Float64]:
-        """Return (6 + 3, n) and (6 + 3, k)."""
+        """Return (6 + 3, n) and (6 + 3, k): of what all runs have, and of forms of the thrust."""
         along, across = _nothing(seen, 6 + _FALLS)
         if run != self.run:
             return along, across
@@ -349,9 +305,9 @@ class RunNuisance:
         way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
         along[4] = np.where(position, (since * base.speed - way)[at], (since * slowing)[at])
         along[5] = np.where(kind == LOG, -slowing[at], 0.0)
-        gained = self._fall(since, base.speed, -slowing.min(), seen.run_down_s)
-        ahead = cumulative_trapezoid(gained, since, initial=0.0)
-        along[6:] = np.where(position, ahead[:, at], gained[:, at])
+        faster = self._fall(since, base.speed, -slowing.min(), seen.run_down_s)
+        ahead = cumulative_trapezoid(faster, since, initial=0.0)
+        along[6:] = np.where(position, ahead[:, at], faster[:, at])
         if seen.across is not None:
             across[1] = 1.0
             across[2] = base.distance[seen.across.at]

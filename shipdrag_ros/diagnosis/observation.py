@@ -29,7 +29,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
-_STEADY_BIN_S = 30.0
+_STEADY_BIN_S = 30.0  # in the steady record, where the motion hardly changes
 _FIRST_BIN_S, _BIN_GROWTH = 3.0, 1.06  # shortest where the motion changes
 _LEAST_LONGEST_S, _BINS = 12.0, 80.0  # the longest bin is at least this, or this part of all
 _ALIKE_S = 12.0  # beyond which the errors of filters and swell are as good as independent
@@ -37,9 +37,9 @@ _LEAST_DISPLAY = 0.01  # of the noise of a sample, from where a display's last d
 _NEIGHBOURS = 9  # an outlier is found by the median of so many
 _OUTLIER = 5.0  # standard deviations
 _COMPASS_SD_RAD, _COURSE_SD_RAD = 0.03, 0.1  # of the direction through water, leeway included
-_LEAST_ROWS = 8
-_KNOWN_S = 5.0  # of the time of the stop
-_DISCREPANCY_M_S = 0.15  # six times what is usual
+_LEAST_ROWS = 8  # of the steady record, for its speed
+_KNOWN_S = 5.0  # sd of the time of the stop, above which the speed shows it better
+_DISCREPANCY_M_S = 0.15  # of the water, slowly: six times what is usual
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,8 @@ class Observation:
         speed = _speed(parts, lead_in_s)
         shaft_s = run_down.shaft_s if run_down.stop_sd_s < ONSET_SD_S else 0.0
         stop = Stop(since_ns, lead_in_s, heading_rad, speed, shaft_s)
-        noise = SteadyNoise(ship, speed, lead_in_s, 30.0 if run_down.stop_sd_s > 5.0 else 0.0)
+        margin_s = ONSET_SD_S if run_down.stop_sd_s > _KNOWN_S else 0.0
+        noise = SteadyNoise(ship, speed, lead_in_s, margin_s)
         return cls(
             name,
             lead_in_s,
@@ -250,6 +251,7 @@ def _condensed(
         sd = max(sd, white_sd(means) * math.sqrt(float(np.median(counts))))
     variance = sd**2 / count
     if display > _LEAST_DISPLAY * sd and len(mean) > 1:
+        # both are sd of a uniform spread; as many errors are independent as digits are passed
         moved = np.clip(np.abs(np.gradient(mean)) / math.sqrt(12.0), display, None)
         variance += display**2 / np.minimum((moved / display) ** 2, count)
     return CondensedRows(when, kind, mean, variance)

@@ -16,12 +16,12 @@ from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Fact, Ship
 
-_BINS, _LEAST_ROWS = 150, 20
+_BINS, _LEAST_ROWS = 150, 20  # means of a coastdown: at most, and at least from the top on
 _STOP_BEFORE_S, _STOP_AFTER_S = 240.0, 240.0  # of the onset that was found
 _STOP_LEAST = 20  # samples on either side
-_FARTHEST_S = 90.0
-_FIRM = 6.0  # 1 / sd of the run-down's logarithm, and of the power
-_LEAST_POWER = 0.05
+_FARTHEST_S = 90.0  # three sd of an onset found from the speed alone
+_FIRM = 6.0  # 1 / sd of the run-down's logarithm, and of the power about that of a hull, 1
+_LEAST_POWER = 0.05  # as good as an exponential, which 0 is
 
 
 @dataclass(frozen=True)

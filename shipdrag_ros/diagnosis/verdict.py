@@ -23,11 +23,11 @@ from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.parameter import Parameter, Shape
 
-SET = 0.99  # of the candidates
-_LACK_NATS = 5.0  # of evidence that something smooth besides must gain
-_SHAPE_SD = 2.5  # prior standard deviations of a shape parameter of an effect
-_FORM_SD = 3.5  # of its departures from its formula, together
-_SIZE_SD = 5.0  # of the logarithm of a size
+SET = 0.99  # of what has a name, in the candidates
+_LACK_NATS = 5.0  # of evidence that something smooth besides must gain: a factor of 150
+_SHAPE_SD = 2.5  # prior sd of a shape parameter of an effect: 1 in 80 is beyond
+_FORM_SD = 3.5  # of its four departures from its formula, together: 1 in 60 is beyond
+_SIZE_SD = 5.0  # of the logarithm of a size: 32 times the median where its sd is a factor of 2
 _LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
 
 

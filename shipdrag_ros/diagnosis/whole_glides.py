@@ -35,7 +35,7 @@ def with_whole_glides(
     notes
         What these parts are, a sentence each.
     coastdowns
-        That there are.
+        How many there are.
 
     Returns
     -------

@@ -37,7 +37,8 @@ _FINE_RUN_DOWNS = 8.0  # after an order; e^-8 of the thrust is left
 _STEPS_A_RUN_DOWN = 4
 _STEPS_A_SLOW_DOWN = 40  # of v / r
 _STEP_S = 10.0
-_LOOKS_A_RUN_DOWN, _LOOKS_GROW = 16, 1.1  # at a motion that is read late
+# looks at a motion that is read late, at first and how they grow apart: good for 1 mm/s
+_LOOKS_A_RUN_DOWN, _LOOKS_GROW = 16, 1.1
 
 
 @dataclass(frozen=True)
@@ -192,12 +193,12 @@ def _looks_s(ship: Ship, scenario: Scenario) -> Float64:
     """Return when a motion must be followed to be read late, straight lines between."""
     longest = _longest_step_s(ship, scenario.speed_m_s)
     run_down_s = ship.propulsion.run_down_s if ship.propulsion else 0.0
+    # what changes at once is smooth later
+    first = min(longest, run_down_s / _LOOKS_A_RUN_DOWN if run_down_s else longest)
+    count = int(np.ceil(np.log(longest / first) / np.log(_LOOKS_GROW)))
+    steps = first * _LOOKS_GROW ** np.arange(count)
     looks = [np.array([0.0, scenario.length_s])]
     for start, end in pairwise([*scenario.events_s(), scenario.length_s]):
-        # what changes at once is smooth later
-        first = min(longest, run_down_s / _LOOKS_A_RUN_DOWN if run_down_s else longest)
-        count = int(np.ceil(np.log(longest / first) / np.log(_LOOKS_GROW)))
-        steps = first * _LOOKS_GROW ** np.arange(count)
         even = np.arange(start + steps.sum(), end, longest)
         looks += [np.array([start]), (start + np.cumsum(steps))[:-1], even]
     found = np.concatenate(looks)

@@ -14,7 +14,7 @@ from shipdrag_ros.diagnosis.nameless import with_nameless
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.simulation.effects import find
 
-EFFECT = next(effect for effect in map(find, ('turning',)) if effect.nameless_at)
+EFFECT = find('turning')
 
 
 def found_in(model: CoastModel) -> SearchResult:

@@ -72,9 +72,9 @@ def test_a_coastdown_that_something_braked_says_that_its_glide_goes_on() -> None
     braked = replace(sound, coastdown=replace(ended, ended_by=EndedBy.BRAKE))
     assert diagnosis_status(sound).level == OK
     assert sound.caveat == ''
-    told = diagnosis_status(braked)
-    assert told.level == WARN
-    for text in (told.message, of_diagnosis(nothing, braked.caveat).sentence):
+    shown = diagnosis_status(braked)
+    assert shown.level == WARN
+    for text in (shown.message, of_diagnosis(nothing, braked.caveat).sentence):
         assert 'nothing is missing' in text
         assert '`shipdrag diagnose BAG` of the recording holds all of the glide' in text
     failed = replace(braked, state=DiagnosisState.IMPOSSIBLE, found=None, reason='no estimate')

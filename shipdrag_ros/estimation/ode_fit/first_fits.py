@@ -42,6 +42,18 @@ class Start:
     def of(cls, problem: Problem, first: FittedMotion) -> Start:
         """
         Fit the whole law, about a fit of the first family.
+
+        Parameters
+        ----------
+        problem
+            Every row of the window.
+        first
+            Of the coastdown.
+
+        Returns
+        -------
+        Start
+            Its `near` is None where the whole law does not converge.
         """
         full = weigh_disturbed(problem, first)
         first, condensed = with_log_scale(full.condensed(first), first)
@@ -53,6 +65,16 @@ class Start:
 
         The coastdown alone cannot show where the stop was: without the record before it, an
         onset that was found seconds early passes for a higher speed.
+
+        Parameters
+        ----------
+        problem
+            As in `of`.
+
+        Returns
+        -------
+        Start
+            The same where that does not converge either.
         """
         first, _ = self.full.fit_first(self.first.unknowns)
         return self if first is None else Start.of(problem, first)
