@@ -22,7 +22,7 @@ from typing import Any, TextIO
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from shipdrag_ros.bags import BagWriter
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
@@ -41,7 +41,13 @@ from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
-settings.register_profile('repeatable', derandomize=True)
+# how long an example takes says how busy the machine is
+settings.register_profile(
+    'repeatable',
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile('repeatable')
 
 NO_BROWSER = 'no browser'
