@@ -188,9 +188,9 @@ class Predicted:
     ----------
     along, across : (n,), (k,)
         Rows.
-    speed, log, over_ground : (m,)
-        Speed through water, as it is and as the log shows it, and velocity along the
-        heading over ground, at the times of the observation.
+    speed, log, ground, over_ground : (m,)
+        Speed through water, as it is and as the log shows it, speed over ground as it is
+        shown, and velocity along the heading over ground, at the times of the observation.
     distance : (m,)
         Over ground, along the heading.
     """
@@ -199,6 +199,7 @@ class Predicted:
     across: Float64
     speed: Float64
     log: Float64
+    ground: Float64
     over_ground: Float64
     distance: Float64
 
@@ -298,14 +299,19 @@ class RunNuisance:
         position = kind == POSITION
         along[0, position] = 1.0
         after = seen.time_s >= seen.lead_in_s
-        slowing = np.where(after, np.gradient(base.log, seen.time_s), 0.0)
+        slowing, slowing_ground = (
+            np.where(after, np.gradient(shown, seen.time_s), 0.0)
+            for shown in (base.log, base.ground)
+        )
+        shown_at = np.where(kind == OVER_GROUND, slowing_ground[at], slowing[at])
         gained = np.where(after, base.over_ground[0] - base.over_ground, 0.0)
-        along[3] = np.where(position, gained[at], -slowing[at])
+        along[3] = np.where(position, gained[at], -shown_at)
         since = np.maximum(seen.time_s - seen.lead_in_s, 0.0)
         way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
-        along[4] = np.where(position, (since * base.speed - way)[at], (since * slowing)[at])
+        along[4] = np.where(position, (since * base.speed - way)[at], since[at] * shown_at)
         along[5] = np.where(kind == LOG, -slowing[at], 0.0)
-        faster = self._fall(since, base.speed, -slowing.min(), seen.run_down_s)
+        steady_m_s2 = -float(np.gradient(base.speed, seen.time_s).min())
+        faster = self._fall(since, base.speed, steady_m_s2, seen.run_down_s)
         ahead = cumulative_trapezoid(faster, since, initial=0.0)
         along[6:] = np.where(position, ahead[:, at], faster[:, at])
         if seen.across is not None:

@@ -79,6 +79,7 @@ class _Predictions:
     across: Float64
     speed: Float64
     log: Float64
+    ground: Float64
     over_ground: Float64
     distance: Float64
 
@@ -89,6 +90,7 @@ class _Predictions:
             self.across[column],
             self.speed[column],
             self.log[column],
+            self.ground[column],
             self.over_ground[column],
             self.distance[column],
         )
@@ -376,4 +378,5 @@ def _predicted(seen: Observation, columns: Columns) -> _Predictions:
     along[:, kind == OVER_GROUND] = columns.radar_speed_m_s[:, at[kind == OVER_GROUND]]
     across = to_port[:, :0] if seen.across is None else to_port[:, seen.across.at]
     speed = columns.speed_through_water_m_s
-    return _Predictions(along, across, speed, columns.log_m_s, ground, ahead)
+    shown = columns.log_m_s, columns.radar_speed_m_s
+    return _Predictions(along, across, speed, *shown, ground, ahead)

@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis.coast import CoastModel
+from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.simulated import _Batch
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import find
+from shipdrag_ros.simulation.faults import lagged
 
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 INPUTS = (
@@ -83,6 +86,17 @@ def test_the_derivatives_are_those_of_the_residual(model: CoastModel, name: str)
         change = (table[0] - other.tables[0][0]) / (step if i < count else 0.01)
         off = np.sqrt(np.mean((change - table[1 + i]) ** 2))
         assert off < 0.05 * size[i] + 1e-6, (i, [u.name for u in hypothesis.unknowns][i])
+
+
+def test_a_slow_log_moves_the_stop_of_its_own_rows_alone(model: CoastModel) -> None:
+    seen, nothing = model.seen[0], model.nothing
+    base = model.predict(0, model.linearise([nothing], [start(model, nothing)])[0])
+    slow = replace(base, log=lagged(seen.time_s, base.log, 60.0))
+    (run,) = (term for term in nothing.measurement_terms if isinstance(term, RunNuisance))
+    plain, late = (run.columns(seen, 0, each)[0] for each in (base, slow))
+    by_log = seen.along.rows.kind == LOG
+    np.testing.assert_array_equal(late[:, ~by_log], plain[:, ~by_log])
+    assert np.abs(late[3, by_log] - plain[3, by_log]).max() > 0.01
 
 
 def test_hypotheses_together_are_as_each_alone(model: CoastModel) -> None:
