@@ -299,10 +299,8 @@ class RunNuisance:
         position = kind == POSITION
         along[0, position] = 1.0
         after = seen.time_s >= seen.lead_in_s
-        slowing, slowing_ground = (
-            np.where(after, np.gradient(shown, seen.time_s), 0.0)
-            for shown in (base.log, base.ground)
-        )
+        shown = np.gradient(np.array([base.log, base.ground, base.speed]), seen.time_s, axis=1)
+        slowing, slowing_ground = np.where(after, shown[:2], 0.0)
         shown_at = np.where(kind == OVER_GROUND, slowing_ground[at], slowing[at])
         gained = np.where(after, base.over_ground[0] - base.over_ground, 0.0)
         along[3] = np.where(position, gained[at], -shown_at)
@@ -310,8 +308,7 @@ class RunNuisance:
         way = cumulative_trapezoid(np.where(after, base.speed, 0.0), since, initial=0.0)
         along[4] = np.where(position, (since * base.speed - way)[at], since[at] * shown_at)
         along[5] = np.where(kind == LOG, -slowing[at], 0.0)
-        steady_m_s2 = -float(np.gradient(base.speed, seen.time_s).min())
-        faster = self._fall(since, base.speed, steady_m_s2, seen.run_down_s)
+        faster = self._fall(since, base.speed, -float(shown[2].min()), seen.run_down_s)
         ahead = cumulative_trapezoid(faster, since, initial=0.0)
         along[6:] = np.where(position, ahead[:, at], faster[:, at])
         if seen.across is not None:
