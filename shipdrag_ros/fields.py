@@ -13,6 +13,7 @@ import difflib
 import reprlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
+from numbers import Real
 from os import PathLike
 from typing import Any
 
@@ -101,7 +102,7 @@ def number(low: float, high: float, unit: str = '') -> Kind:
     expectation = f'{low:g}..{high:g} {unit}'.rstrip()
 
     def read(value: object, path: str, problems: Problems) -> float | _Invalid:
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(value, Real):
             hint = ' without quotes or unit' if isinstance(value, str) else ''
             problems.append(f'{path}: {show(value)}, expected a number{hint}, {expectation}')
             return INVALID
