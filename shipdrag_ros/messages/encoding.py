@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.messages import types
 from shipdrag_ros.samples import PITCHES, SECOND_NS, SHAFTS, Block, Channel, Float64, Int64, UInt8
 
-Numbers = tuple[NDArray[Any], ...]
+SentNumbers = tuple[NDArray[Any], ...]
 
 _VEHICLE_FRAME = 'base_link'
 _EARTH_FRAME = 'map'
@@ -297,36 +297,36 @@ def _depth(stamp_ns: int, depth_m: float, variance: float) -> Any:
 # the numbers that a message holds, of (n, 2) values and variances
 
 
-def _one(value: Float64, variance: Float64) -> Numbers:
+def _one(value: Float64, variance: Float64) -> SentNumbers:
     return (value[:, 0],)
 
 
-def _two(value: Float64, variance: Float64) -> Numbers:
+def _two(value: Float64, variance: Float64) -> SentNumbers:
     return value[:, 0], value[:, 1]
 
 
-def _one_known(value: Float64, variance: Float64) -> Numbers:
+def _one_known(value: Float64, variance: Float64) -> SentNumbers:
     return value[:, 0], _zero(variance[:, 0])
 
 
-def _two_known(value: Float64, variance: Float64) -> Numbers:
+def _two_known(value: Float64, variance: Float64) -> SentNumbers:
     return *_two(value, variance), _zero(variance[:, 0]), _zero(variance[:, 1])
 
 
-def _fix_numbers(value: Float64, variance: Float64) -> Numbers:
+def _fix_numbers(value: Float64, variance: Float64) -> SentNumbers:
     fix = types.class_of(types.NAV_SAT_FIX)
     known = _zero(variance).any(axis=1)
     kind = np.where(known, fix.COVARIANCE_TYPE_DIAGONAL_KNOWN, fix.COVARIANCE_TYPE_UNKNOWN)
     return *_two_known(value, variance), kind
 
 
-def _half_angle(value: Float64, variance: Float64) -> Numbers:
+def _half_angle(value: Float64, variance: Float64) -> SentNumbers:
     # of the C library, whose last bit is the same for one and for many
     half = (0.5 * value[:, 0]).tolist()
     return np.array([*map(sin, half)]), np.array([*map(cos, half)])
 
 
-def _float32(value: Float64, variance: Float64) -> Numbers:
+def _float32(value: Float64, variance: Float64) -> SentNumbers:
     with np.errstate(over='ignore'):  # too large for float32: infinite, and rejected as such
         depth, known = _one_known(value, variance)
         return depth.astype(np.float32), known.astype(np.float32)
@@ -354,7 +354,7 @@ class _Encoder(NamedTuple):
     type: str
     build: Callable[..., Any]
     forms: str
-    numbers: Callable[[Float64, Float64], Numbers]
+    numbers: Callable[[Float64, Float64], SentNumbers]
 
 
 def _of_joint(name: str, *, moves: bool) -> _Encoder:
