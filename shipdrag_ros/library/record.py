@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from os import PathLike
@@ -127,10 +126,7 @@ class Record(Shown):
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():
             raise BagError(f'{str(out)!r} exists; choose another name or remove it')
-        try:
-            shutil.copyfile(files[0], out)
-        except OSError as error:
-            raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
+        self.runs[0].save(out)
         return out
 
     def _lines(self) -> Sequence[str]:

@@ -15,8 +15,8 @@ from functools import cache, wraps
 from typing import ParamSpec, TypeVar
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.importing import formats
 from shipdrag_ros.imports import what_to_install
+from shipdrag_ros.sources import formats
 
 P = ParamSpec('P')
 R = TypeVar('R')
