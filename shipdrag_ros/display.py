@@ -29,7 +29,7 @@ _UNIT_RATIOS = {
     1.0 / 1.852: 'knots over km/h',
 }
 _UNITS_NEAR = 0.1  # relative; a current and the error of a log are in a ratio too
-# what `float` takes besides, 1_000 or nan or infinity, is no measured number
+# what `float` takes too, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
 """Below it a ship is stated in kg and N, above in t and kN."""
