@@ -20,8 +20,8 @@ from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import CODES, LOG, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import Posterior, infer
-from shipdrag_ros.posterior.problem import Problem, Stop
+from shipdrag_ros.posterior.laplace import RunPosterior, infer
+from shipdrag_ros.posterior.problem import RunModel, StopPrior
 from shipdrag_ros.posterior.readout import read
 from shipdrag_ros.posterior.rows import condense
 from shipdrag_ros.ship import Ship
@@ -57,12 +57,12 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
     coast, variance = condense(record.coast, record.variance(record.coast, record.coast_weight))
     steady = record.steady
-    problem = Problem.of(
+    problem = RunModel.of(
         Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast))),
         np.concatenate([record.steady_variance(), variance]),
         len(steady.time_s),
         ship,
-        Stop(run_down.stop_sd_s, run_down.shaft_s, run_down.run_down_sd_s),
+        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.run_down_sd_s),
         speed_m_s=guess.speed_m_s,
         low_m_s=guess.lowest * guess.speed_m_s,
     )
@@ -70,7 +70,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     return _result(found, record, window, ship, parameters, (*run_down.notes, *_notes(found)))
 
 
-def _notes(found: Posterior) -> tuple[str, ...]:
+def _notes(found: RunPosterior) -> tuple[str, ...]:
     chances = ', '.join(
         f'{name} {found.chance(name):.2g}'
         for name in dict.fromkeys(each.name for each in found.problem.families)
@@ -84,7 +84,7 @@ def _notes(found: Posterior) -> tuple[str, ...]:
 
 
 def _result(
-    found: Posterior,
+    found: RunPosterior,
     record: RunRows,
     window: Window,
     ship: Ship,

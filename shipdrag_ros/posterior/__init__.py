@@ -2,6 +2,6 @@
 """
 One posterior: a ship that slows down, her instruments and the noise, inferred together.
 
-The model is docs/model.md, letter by letter. `problem.Problem` holds one run under that model,
-`laplace.infer(problem)` returns its `laplace.Posterior`, and `readout` reads r(v) from it.
+The model is docs/model.md, letter by letter. `problem.RunModel` holds one run under that model,
+`laplace.infer(problem)` returns its `laplace.RunPosterior`, and `readout` reads r(v) from it.
 """

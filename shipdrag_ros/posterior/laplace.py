@@ -24,7 +24,7 @@ from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.posterior.motion import damping_of, predict
-from shipdrag_ros.posterior.problem import Problem
+from shipdrag_ros.posterior.problem import RunModel
 from shipdrag_ros.samples import Float64
 
 _ITERATIONS = 12  # of Gauss and Newton, to where the noise is learnt
@@ -45,7 +45,7 @@ class Families(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Posterior:
+class RunPosterior:
     """
     What a run says of all unknowns.
 
@@ -56,19 +56,16 @@ class Posterior:
         Of the mixture over families and settings of the noise.
     family : (f,)
         Probability of each family of `problem.families`.
-    log_evidence
-        Of all families together, up to a constant of the rows.
     noise
         Settings with their probabilities.
     converged
         Whether the mean of the mixture stood still.
     """
 
-    problem: Problem
+    problem: RunModel
     mean: Float64
     covariance: Float64
     family: Float64
-    log_evidence: float
     noise: NoisePosterior
     converged: bool
 
@@ -123,7 +120,7 @@ def mix(
     steady: int,
     settings: Settings,
     families: Families,
-) -> tuple[float, Float64, Float64, Float64]:
+) -> tuple[Float64, Float64, Float64]:
     """
     Average linear models over settings of the noise and families of priors.
 
@@ -140,7 +137,7 @@ def mix(
 
     Returns
     -------
-    log_evidence, step, covariance, weight
+    step, covariance, weight
         Of the mixture; `weight` (s, f) sums to 1.
     """
     s, f, p = len(settings.weight), len(families.log_chance), len(table) - 1
@@ -166,8 +163,7 @@ def mix(
             if alike > 0.0:
                 of_family_q = np.exp(logs[k, q] - top + families.log_chance[q])
                 weight[k, q] = settings.weight[k] * of_family_q / alike
-    total = weight.sum()
-    weight /= total
+    weight /= weight.sum()
     mean, second = np.zeros(p), np.zeros((p, p))
     kept = 0.0
     for k in range(s):
@@ -175,9 +171,7 @@ def mix(
             if weight[k, q] < _LEAST:
                 continue
             kept += weight[k, q]
-            _, _, step, lower, scale = of_family(
-                every[k], families.mean[q], families.precision[q]
-            )
+            _, _, step, lower, scale = of_family(every[k], families.mean[q], families.precision[q])
             covariance = substitute(lower, scale, np.eye(p))
             for a in range(p):
                 mean[a] += weight[k, q] * step[a]
@@ -188,10 +182,10 @@ def mix(
     for a in range(p):
         for b in range(p):
             second[a, b] -= mean[a] * mean[b]
-    return top + np.log(total), mean, second, weight
+    return mean, second, weight
 
 
-def _families(problem: Problem, now: Float64) -> Families:
+def _families(problem: RunModel, now: Float64) -> Families:
     return Families(
         np.array([each.mean for each in problem.families]) - now,
         np.array([each.precision for each in problem.families]),
@@ -199,7 +193,7 @@ def _families(problem: Problem, now: Float64) -> Families:
     )
 
 
-def _linear(problem: Problem, now: Float64) -> tuple[Float64, Noise]:
+def _linear(problem: RunModel, now: Float64) -> tuple[Float64, Noise]:
     """Return residual and columns at some unknowns, and the noise as the hull damps there."""
     table, speed = predict(problem.forces, now, problem.grid_s, problem.rows)
     if not np.all(np.isfinite(table)):
@@ -212,22 +206,20 @@ def _linear(problem: Problem, now: Float64) -> tuple[Float64, Noise]:
     return table, problem.white._replace(damping_1_s=damping, inertia=inertia)
 
 
-def _seen(problem: Problem, now: Float64) -> Seen:
+def _seen(problem: RunModel, now: Float64) -> Seen:
     table, white = _linear(problem, now)
     families = _families(problem, now)
     return Seen(problem.rows, table, families.mean, families.precision, white, problem.steady)
 
 
-def _typical(problem: Problem, noise: NoisePosterior) -> Float64:
+def _typical(problem: RunModel, noise: NoisePosterior) -> Float64:
     """Climb, by Gauss and Newton, to the mean under one typical setting of the noise."""
     now = problem.start.copy()
     sd = 1.0 / np.sqrt(problem.widest.precision)
     for _ in range(_ITERATIONS):
         table, white = _linear(problem, now)
         families = _families(problem, now)
-        _, step, _, _ = mix(
-            table, problem.rows, white, problem.steady, noise.typical, families
-        )
+        step, _, _ = mix(table, problem.rows, white, problem.steady, noise.typical, families)
         length = float(np.max(np.abs(step[: problem.coefficients]) / sd[: problem.coefficients]))
         now += step * min(1.0, _LARGEST_STEP / max(length, 1e-12))
         if length < _CLOSE:
@@ -235,7 +227,7 @@ def _typical(problem: Problem, noise: NoisePosterior) -> Float64:
     return now
 
 
-def infer(problem: Problem) -> Posterior:
+def infer(problem: RunModel) -> RunPosterior:
     """
     Return the posterior of a run.
 
@@ -255,7 +247,7 @@ def infer(problem: Problem) -> Posterior:
     away = np.inf
     for _ in range(_ROUNDS):
         table, white = _linear(problem, now)
-        log_evidence, step, covariance, weight = mix(
+        step, covariance, weight = mix(
             table, problem.rows, white, problem.steady, noise.settings, _families(problem, now)
         )
         now = now + step
@@ -264,6 +256,4 @@ def infer(problem: Problem) -> Posterior:
             break
     settings = noise.settings._replace(weight=weight.sum(axis=1))
     noise = replace(noise, settings=settings)
-    return Posterior(
-        problem, now, covariance, weight.sum(axis=0), log_evidence, noise, away < 1.0
-    )
+    return RunPosterior(problem, now, covariance, weight.sum(axis=0), noise, away < 1.0)

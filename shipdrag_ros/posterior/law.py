@@ -16,20 +16,20 @@ from shipdrag_ros.posterior.motion import Forces
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import TableBaseline
-from shipdrag_ros.simulation.hydrodynamics import drag_n, friction_n, viscous_n
 from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
+from shipdrag_ros.simulation.hydrodynamics import drag_n, friction_n, viscous_n
 
 _NODES = 97  # of the grid of speeds
 _ABOVE = 1.25  # of the highest speed that a fit may try
 _SPLINE_FROUDE, _FEWEST, _MOST = 0.02, 6, 14  # spacing and number of splines
-_ALIKE = 3.0  # spacings over which neighbours are alike, but for a tenth of their variance
-_OWN = 0.1
+_ALIKE = 5.0  # spacings over which neighbours are alike, but for the humps of wave making
+_OWN = 0.02  # of their variance, with the share of waves more
 # C_W = _WAVE (Fr / _WAVE_FROUDE)^4 without a baseline
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
 
 
 @dataclass(frozen=True)
-class Law:
+class HullLaw:
     """
     The law over a grid of speeds.
 
@@ -50,7 +50,7 @@ class Law:
     stated: bool
 
     @classmethod
-    def of(cls, ship: Ship, low_m_s: float, top_m_s: float) -> Law:
+    def of(cls, ship: Ship, low_m_s: float, top_m_s: float) -> HullLaw:
         """
         Tabulate the law.
 
@@ -107,9 +107,7 @@ def _generic(ship: Ship, speed: Float64) -> Float64:
     return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
 
 
-def _shapes(
-    ship: Ship, speed: Float64, parts: Float64, low_m_s: float, top_m_s: float
-) -> Float64:
+def _shapes(ship: Ship, speed: Float64, parts: Float64, low_m_s: float, top_m_s: float) -> Float64:
     """Return columns of s: cubic B-splines of neighbours that are alike, less both parts."""
     froude = float(ship.froude(top_m_s - low_m_s))
     count = int(np.clip(np.ceil(froude / _SPLINE_FROUDE), _FEWEST, _MOST))
@@ -117,7 +115,9 @@ def _shapes(
     d = np.abs((speed - 0.9 * low_m_s) / spacing - np.arange(count)[:, None])
     splines = np.where(d < 1.0, 2 / 3 - d**2 + d**3 / 2, np.maximum(2.0 - d, 0.0) ** 3 / 6)
     apart = np.arange(count)[:, None] - np.arange(count)
-    alike = (1.0 - _OWN) * np.exp(-0.5 * (apart / _ALIKE) ** 2) + _OWN * np.eye(count)
+    middle = 0.9 * low_m_s + spacing * np.arange(count)
+    waves = np.interp(middle, speed, parts[1] / np.maximum(parts.sum(axis=0), 1e-12))
+    alike = np.exp(-0.5 * (apart / _ALIKE) ** 2) + np.diag(_OWN + waves**2)
     found = np.linalg.cholesky(alike).T @ splines
     inside = (speed >= 0.9 * low_m_s) & (speed <= 1.05 * top_m_s)
     total = np.maximum(parts.sum(axis=0), 1e-12)

@@ -69,10 +69,7 @@ def _look(table: Float64, step: float, u: float) -> tuple[float, float]:
     m = table.shape[1]
     cell, a, b, c, d = _basis(step, m, u)
     value = (
-        a * table[0, cell]
-        + b * table[0, cell + 1]
-        + c * table[1, cell]
-        + d * table[1, cell + 1]
+        a * table[0, cell] + b * table[0, cell + 1] + c * table[1, cell] + d * table[1, cell + 1]
     )
     s = min(max(u / step - cell, 0.0), 1.0)
     return value, (1.0 - s) * table[1, cell] + s * table[1, cell + 1]

@@ -24,6 +24,7 @@ class Declared:
         As in docs/model.md.
     meaning
     prior
+        A number where it is taken as known.
     unit
         '' for a pure number.
     source
@@ -32,9 +33,19 @@ class Declared:
 
     letter: str
     meaning: str
-    prior: Prior
+    prior: Prior | float
     unit: str
     source: str
+
+    @property
+    def mean(self) -> float:
+        """Mean of a normal prior, median of a log-normal one, or the number."""
+        return self.prior.first if isinstance(self.prior, Prior) else self.prior
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation, of the logarithm of a log-normal one; 0 of a number."""
+        return self.prior.second if isinstance(self.prior, Prior) else 0.0
 
 
 _REALITY = 'records of many craft, as a range'
@@ -74,13 +85,6 @@ LAW_ERROR = Declared(
     half_normal(0.015),
     '',
     'residuals of model tests about two parts: 0.5 to 2 %',
-)
-SMOOTH = Declared(
-    's',
-    'the same where something smooth in u is missing, or no baseline is stated',
-    log_normal(0.12, 1.0),
-    '',
-    'log-uniform between 0.03 and 0.4, by four points',
 )
 FOULED = Declared(
     'theta_f',
@@ -129,11 +133,24 @@ GROUND_LAG = Declared(
 # the water
 CURRENT = Declared('c', 'current along the track', normal(0.4), 'm/s', 'steady 0.1 to 0.8 m/s')
 WRONG = Declared(
-    'epsilon', 'chance that a reading is something else', normal(0.0, mean=0.01), '', _REALITY
+    'epsilon',
+    'chance that a reading is anything within the range of its input',
+    0.01,
+    '',
+    _REALITY,
 )
-WRONG_RANGE = Declared(
-    '', 'what such a reading is spread over, in ranges of the input', normal(0.0, mean=1.0), '', ''
-)
+# what a hull may differ by: probabilities, and points of what a size is averaged over
+NOTHING, FRICTION_ALONE, SMOOTH = 'nothing', 'friction', 'smooth in u'
+CHANCES = {NOTHING: 0.5, FRICTION_ALONE: 0.2, SMOOTH: 0.3}
+"""Prior probability of each, where a baseline is stated."""
+HALF_NORMAL = ((0.3, 0.35), (0.9, 0.45), (1.8, 0.20))
+"""Points and weights of a half-normal size, in its standard deviation."""
+LOG_UNIFORM = (0.03, 0.09, 0.27)
+"""Points of the size of s where something smooth in u is missing, all alike."""
+WIDE = (0.01, 0.03, 0.1, 0.3)
+"""The same without a baseline."""
+WIDER, WIDER_CHANCE = 3.0, 0.1
+"""A baseline is so many times worse than stated, so often."""
 
 TABLE: tuple[Declared, ...] = (
     FRICTION,
@@ -141,7 +158,6 @@ TABLE: tuple[Declared, ...] = (
     GENERIC_FRICTION,
     GENERIC_WAVE,
     LAW_ERROR,
-    SMOOTH,
     FOULED,
     THRUST,
     RUN_DOWN,
@@ -153,6 +169,5 @@ TABLE: tuple[Declared, ...] = (
     GROUND_LAG,
     CURRENT,
     WRONG,
-    WRONG_RANGE,
 )
 """What docs/model.md prints, in its order."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.posterior import motion, priors
-from shipdrag_ros.posterior.law import Law
+from shipdrag_ros.posterior.law import HullLaw
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
@@ -28,17 +28,10 @@ _SPREAD = 25.0  # of all over the time from which steps grow
 _STEPS_A_RUN_DOWN = 3.0
 _VAGUE_SPEED, _VAGUE_S = 0.3, 300.0  # of the steady speed, and of where she was
 _EXACT = 1e-8  # sd of what does not act, so that every prior is proper
-# points and weights of a half-normal size, and of a log-uniform one
-_HALF_NORMAL = ((0.3, 0.35), (0.9, 0.45), (1.8, 0.20))
-_LOG_UNIFORM = (0.03, 0.075, 0.18, 0.45)
-_WIDER, _WIDER_CHANCE = 3.0, 0.1  # a baseline is so many times worse than stated, so often
-# prior probability of what a hull may differ by, where a baseline is stated
-NOTHING, FOULED, SMOOTH = 'nothing', 'friction', 'smooth in u'
-_CHANCES = {NOTHING: 0.5, FOULED: 0.2, SMOOTH: 0.3}
 
 
 @dataclass(frozen=True)
-class Stop:
+class StopPrior:
     """
     What is known of the stop beforehand; times count from it.
 
@@ -68,7 +61,7 @@ class Family:
 
 
 @dataclass(frozen=True)
-class Problem:
+class RunModel:
     """
     One run.
 
@@ -96,7 +89,7 @@ class Problem:
     start: Float64
     families: tuple[Family, ...]
     speed_m_s: float
-    law: Law
+    law: HullLaw
 
     @property
     def coefficients(self) -> int:
@@ -106,7 +99,9 @@ class Problem:
     @property
     def widest(self) -> Family:
         """The family that holds the coefficients least."""
-        return min(self.families, key=lambda each: float(each.precision[: self.coefficients].sum()))
+        return min(
+            self.families, key=lambda each: float(each.precision[: self.coefficients].sum())
+        )
 
     @classmethod
     def of(
@@ -115,11 +110,11 @@ class Problem:
         variance: Float64,
         steady: int,
         ship: Ship,
-        stop: Stop,
+        stop: StopPrior,
         *,
         speed_m_s: float,
         low_m_s: float,
-    ) -> Problem:
+    ) -> RunModel:
         """
         Set up the model of a run.
 
@@ -136,7 +131,7 @@ class Problem:
         speed_m_s, low_m_s
             At the stop and at the end, roughly.
         """
-        law = Law.of(ship, low_m_s, speed_m_s)
+        law = HullLaw.of(ship, low_m_s, speed_m_s)
         tau_s = _tau_s(stop)
         forces = law.forces(ship, tau_s)
         end = float(rows.time_s[-1]) + 3.0 * stop.sd_s
@@ -145,7 +140,7 @@ class Problem:
         start = np.zeros(forces.columns.shape[1] + EXTRAS)
         k = forces.columns.shape[1]
         start[k + motion.SPEED] = speed_m_s
-        start[k + motion.THRUST] = priors.THRUST.prior.first
+        start[k + motion.THRUST] = priors.THRUST.mean
         if len(position):
             at = np.searchsorted(rows.time_s[rows.kind == POSITION], 0.0)
             start[k + motion.PLACE] = position[min(int(at), len(position) - 1)]
@@ -166,10 +161,10 @@ class Problem:
         return found
 
 
-def _tau_s(stop: Stop) -> float:
+def _tau_s(stop: StopPrior) -> float:
     if stop.run_down_s > 0.0:
         return stop.run_down_s
-    return priors.RUN_DOWN.prior.first if stop.sd_s > 0.0 else 0.0
+    return priors.RUN_DOWN.mean if stop.sd_s > 0.0 else 0.0
 
 
 def _grid(end_s: float, tau_s: float) -> Float64:
@@ -185,7 +180,7 @@ def _grid(end_s: float, tau_s: float) -> Float64:
 
 
 def _extras(
-    ship: Ship, stop: Stop, start: Float64, kinds: frozenset[int]
+    ship: Ship, stop: StopPrior, start: Float64, kinds: frozenset[int]
 ) -> tuple[Float64, Float64]:
     """Return mean and sd of the unknowns that are no coefficients; alike in all families."""
     mean, sd = start[-EXTRAS:].copy(), np.full(EXTRAS, _EXACT)
@@ -196,27 +191,27 @@ def _extras(
         sd[motion.INERTIA] = max(ship.added_mass.sd, _EXACT)
     if stop.sd_s > 0.0:
         sd[motion.STOP] = stop.sd_s
-        sd[motion.THRUST] = priors.THRUST.prior.second
-        sd[motion.TAU] = priors.RUN_DOWN.prior.second
+        sd[motion.THRUST] = priors.THRUST.sd
+        sd[motion.TAU] = priors.RUN_DOWN.sd
         if stop.run_down_s > 0.0:
-            shape = priors.RUN_DOWN_SHAPE.prior.second
+            shape = priors.RUN_DOWN_SHAPE.sd
             sd[motion.TAU] = math.hypot(shape, stop.run_down_sd_s / stop.run_down_s)
     if POSITION in kinds:
         sd[motion.PLACE] = _VAGUE_S * mean[motion.SPEED]
     if LOG in kinds:
-        sd[motion.SCALE] = priors.LOG_SCALE.prior.second
-        sd[motion.OFFSET] = priors.LOG_OFFSET.prior.second
-        mean[motion.LAG], sd[motion.LAG] = priors.LOG_LAG.prior.first, priors.LOG_LAG.prior.second
+        sd[motion.SCALE] = priors.LOG_SCALE.sd
+        sd[motion.OFFSET] = priors.LOG_OFFSET.sd
+        mean[motion.LAG], sd[motion.LAG] = priors.LOG_LAG.mean, priors.LOG_LAG.sd
     if ground:
-        sd[motion.CURRENT] = priors.CURRENT.prior.second
+        sd[motion.CURRENT] = priors.CURRENT.sd
     if ground - {POSITION}:
-        lag = priors.GROUND_LAG.prior
-        mean[motion.GROUND_LAG], sd[motion.GROUND_LAG] = lag.first, lag.second
+        lag = priors.GROUND_LAG
+        mean[motion.GROUND_LAG], sd[motion.GROUND_LAG] = lag.mean, lag.sd
     return mean, sd
 
 
 def _all_families(
-    ship: Ship, law: Law, stop: Stop, start: Float64, kinds: frozenset[int]
+    ship: Ship, law: HullLaw, stop: StopPrior, start: Float64, kinds: frozenset[int]
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
     count = len(law.shapes)
@@ -232,26 +227,48 @@ _Hull = tuple[str, float, tuple[tuple[float, float], tuple[float, float]], float
 def _hulls(ship: Ship) -> Iterator[_Hull]:
     """Yield what hulls may be: name, probability, mean and sd of both scales, size of s."""
     base = ship.baseline
-    unsure = priors.LAW_ERROR.prior.second
+    unsure = priors.LAW_ERROR.sd
     if base is None:
-        friction, wave = priors.GENERIC_FRICTION.prior, priors.GENERIC_WAVE.prior
-        scales = ((friction.first, friction.second), (wave.first, wave.second))
-        for size in _LOG_UNIFORM:
-            yield SMOOTH, 1.0 / len(_LOG_UNIFORM), scales, size
+        friction, wave = priors.GENERIC_FRICTION, priors.GENERIC_WAVE
+        scales = ((friction.mean, friction.sd), (wave.mean, wave.sd))
+        for size in priors.WIDE:
+            yield priors.SMOOTH, 1.0 / len(priors.WIDE), scales, size
         return
     if isinstance(base, CoefficientBaseline):
         sds = max(base.relative_sd.friction, _EXACT), max(base.relative_sd.wave, _EXACT)
     else:
         sds = max(base.relative_sd, _EXACT), _EXACT
     for (wide, chance), (size, part) in product(
-        ((1.0, 1.0 - _WIDER_CHANCE), (_WIDER, _WIDER_CHANCE)), _HALF_NORMAL
+        ((1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)), priors.HALF_NORMAL
     ):
         stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
-        yield NOTHING, _CHANCES[NOTHING] * chance * part, stated, size * unsure
-    fouled = priors.FOULED.prior
-    for size, part in _HALF_NORMAL:
-        scales = ((fouled.first, fouled.second), (0.0, _WIDER * sds[1]))
-        yield FOULED, _CHANCES[FOULED] * part, scales, size * unsure
-    for size in _LOG_UNIFORM:
+        yield priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
+    fouled = priors.FOULED
+    for size, part in priors.HALF_NORMAL:
+        scales = ((fouled.mean, fouled.sd), (0.0, priors.WIDER * sds[1]))
+        yield (
+            priors.FRICTION_ALONE,
+            priors.CHANCES[priors.FRICTION_ALONE] * part,
+            scales,
+            size * unsure,
+        )
+    for size in priors.LOG_UNIFORM:
         scales = ((0.0, sds[0]), (0.0, sds[1]))
-        yield SMOOTH, _CHANCES[SMOOTH] / len(_LOG_UNIFORM), scales, size
+        yield priors.SMOOTH, priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM), scales, size
+
+
+def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
+    """
+    Yield the families of a ship whose baseline states 2 % of friction and 10 % of waves.
+
+    Yields
+    ------
+    tuple
+        Name, probability, mean and sd of both scales, size of s, as text.
+    """
+    ship = Ship.example()
+    for which in (ship, replace(ship, baseline=None)):
+        for name, chance, scales, size in _hulls(which):
+            friction, wave = (f'{mean:g} ± {sd:g}' for mean, sd in scales)
+            beside = name if which.baseline is not None else f'{name}, no baseline'
+            yield beside, chance, friction, wave, f'{size:.2g}'

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.posterior import motion
-from shipdrag_ros.posterior.laplace import Posterior
+from shipdrag_ros.posterior.laplace import RunPosterior
 from shipdrag_ros.samples import Float64
 
 PARTS = {
@@ -43,7 +43,7 @@ class ReadOut:
     parts_m_s2: dict[str, Float64]
 
 
-def read(found: Posterior, speed_m_s: Float64) -> ReadOut:
+def read(found: RunPosterior, speed_m_s: Float64) -> ReadOut:
     """
     Read r(v) and its band.
 

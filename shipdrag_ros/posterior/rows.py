@@ -18,8 +18,6 @@ from shipdrag_ros.samples import Float64
 _FIRST_PART, _FIRST_S, _GROWTH = 60.0, 3.0, 1.06  # of all, longest, and from one to the next
 _LONGEST_PART, _LONGEST_S = 80.0, 12.0
 _NEIGHBOURS = 4  # on each side, whose median shows where a reading should be
-_WRONG = priors.WRONG.prior.first
-_RANGES = priors.WRONG_RANGE.prior.first
 
 
 @compiled
@@ -36,7 +34,7 @@ def right(value: Float64, sd: Float64, wrong: float) -> Float64:
     """
     n = len(value)
     found, near = np.ones(n), np.empty(n)
-    spread = max(_RANGES * (value.max() - value.min()), 1e-12)
+    spread = max(value.max() - value.min(), 1e-12)
     for i in range(n):
         low, high = max(0, i - _NEIGHBOURS), min(n, i + _NEIGHBOURS + 1)
         near[i] = np.median(value[low:high])
@@ -85,7 +83,7 @@ def condense(rows: Rows, variance: Float64) -> tuple[Rows, Float64]:
         if not chosen.any():
             continue
         time_s, value, sd = rows.time_s[chosen], rows.value[chosen], np.sqrt(variance[chosen])
-        weight = right(value, sd, _WRONG) / sd**2
+        weight = right(value, sd, priors.WRONG.mean) / sd**2
         cell = np.searchsorted(edges, time_s, side='right')
         first = np.concatenate([[0], np.flatnonzero(np.diff(cell)) + 1])
         total = np.add.reduceat(weight, first)
