@@ -65,6 +65,16 @@ DEVELOPMENT = [
     'colcon-python-setup-py',
     'setuptools',
 ]
+FORMATS = {  # of logs: name and module
+    'ardupilot': 'ardupilot',
+    'csv': 'csv.declaration',
+    'gpx': 'gpx',
+    'n2k': 'n2k.declaration',
+    'nmea': 'nmea.declaration',
+    'rosbag': 'rosbag',
+    'signalk': 'signalk',
+    'ulog': 'ulog',
+}
 
 setup(
     name=PACKAGE,
@@ -113,6 +123,9 @@ setup(
         'console_scripts': [
             f'shipdrag = {PACKAGE}.cli:main',
             f'coastdown_node = {PACKAGE}.node.main:main',
+        ],
+        'shipdrag.formats': [
+            f'{name} = {PACKAGE}.sources.formats.{place}:FORMAT' for name, place in FORMATS.items()
         ],
     },
 )
