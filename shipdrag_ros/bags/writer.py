@@ -9,22 +9,25 @@ publish time = stamp.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from enum import Enum
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 from uuid import uuid4
 
+from mcap.records import Attachment, Channel, Schema
 from mcap.writer import CompressionType, Writer
 
 from shipdrag_ros.bags.declarations import (
     LIBRARY,
     PROFILE,
     as_bytes,
+    attachment,
     channel,
-    media_type,
     metadata,
     schema,
 )
@@ -32,6 +35,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block
 
+CHUNK_BYTES = 1 << 20
 METADATA = 'shipdrag_ros'
 """Name of the metadata record that says which recording a file is part of."""
 
@@ -63,9 +67,9 @@ _MCAP_COMPRESSION = {
 }
 
 
-class BagWriter:
+class RecordWriter:
     """
-    Writes one MCAP file; a context manager.
+    Writes the records of an MCAP file; a context manager.
 
     Parameters
     ----------
@@ -75,9 +79,8 @@ class BagWriter:
         Of the chunks.
     chunk_bytes
         Messages are written in chunks of this size [bytes], not before they are full.
-    recording_id, part
-        Files of one recording carry the same id and are numbered from 0; by
-        default the file is a recording of its own.
+    profile
+        Of the messages.
 
     Raises
     ------
@@ -90,13 +93,11 @@ class BagWriter:
         path: Path,
         *,
         compression: Compression = Compression.ZSTD,
-        chunk_bytes: int = 1 << 20,
-        recording_id: str | None = None,
-        part: int = 0,
+        chunk_bytes: int = CHUNK_BYTES,
+        profile: str = PROFILE,
     ) -> None:
         self.path = Path(path)
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[tuple[str, str], int] = {}
+        self._numbers: dict[bytes, int] = {}
         try:
             self._file = open(self.path, 'xb', opener=private_opener)  # noqa: SIM115
         except FileExistsError:
@@ -109,21 +110,153 @@ class BagWriter:
         self._writer = Writer(
             self._file, chunk_size=chunk_bytes, compression=_MCAP_COMPRESSION[compression]
         )
-        self._writer.start(profile=PROFILE, library=LIBRARY)
-        self._writer.add_metadata(METADATA, metadata(recording_id or uuid4().hex, part))
+        self._writer.start(profile=profile, library=LIBRARY)
+
+    def declare(self, channel: Channel, schema: Schema | None) -> int:
+        """
+        Write a channel and its schema, unless they are there; return its number.
+
+        Parameters
+        ----------
+        channel, schema
+            Their own numbers do not count.
+        """
+        with self.errors_named():
+            number = 0
+            if schema is not None:
+                texts = schema.name, schema.encoding, schema.data
+                register = partial(self._writer.register_schema, *texts)
+                number = self._number(replace(schema, id=0), register)
+            register = partial(
+                self._writer.register_channel,
+                channel.topic,
+                channel.message_encoding,
+                number,
+                channel.metadata,
+            )
+            return self._number(replace(channel, id=0, schema_id=number), register)
+
+    def _number(self, record: Schema | Channel, register: Callable[[], int]) -> int:
+        key = as_bytes(record)
+        if key not in self._numbers:
+            number = self._numbers[key] = register()
+            # outside of chunks too: the first chunk may be damaged and the others sound
+            self._file.write(as_bytes(replace(record, id=number)))
+        return self._numbers[key]
+
+    def add(
+        self, number: int, payload: bytes, *, log_ns: int, publish_ns: int, sequence: int = 0
+    ) -> None:
+        """
+        Write a message of a channel that was declared.
+
+        Parameters
+        ----------
+        number
+            Of the channel.
+        payload
+            CDR bytes.
+        log_ns, publish_ns
+            Time of arrival and of measurement [ns since the epoch].
+        sequence
+            Of the publisher.
+        """
+        with self.errors_named():
+            self._writer.add_message(number, log_ns, payload, publish_ns, sequence)
+
+    def add_attachment(self, attached: Attachment) -> None:
+        """
+        Write an attachment, before the first message if it is to survive a crash.
+        """
+        with self.errors_named():
+            self._writer.add_attachment(
+                attached.create_time,
+                attached.log_time,
+                attached.name,
+                attached.media_type,
+                attached.data,
+            )
+
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """
+        Write metadata.
+        """
+        with self.errors_named():
+            self._writer.add_metadata(name, dict(values))
+
+    def close(self) -> None:
+        """
+        Write the index and bring everything to the disk; again is harmless.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        if self._file.closed:
+            return
+        try:
+            with self.errors_named():
+                self._writer.finish()
+                self._file.flush()
+                os.fsync(self._file.fileno())
+        finally:
+            with suppress(OSError):
+                self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    @contextmanager
+    def errors_named(self) -> Iterator[None]:
+        """
+        Say which file it is that the disk does not take.
+        """
+        try:
+            yield
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
+
+
+class BagWriter(RecordWriter):
+    """
+    Writes a recording of types that are known.
+
+    Parameters
+    ----------
+    path, compression, chunk_bytes
+        As of `RecordWriter`.
+    recording_id, part
+        Files of one recording carry the same id and are numbered from 0; by
+        default the file is a recording of its own.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        compression: Compression = Compression.ZSTD,
+        chunk_bytes: int = CHUNK_BYTES,
+        recording_id: str | None = None,
+        part: int = 0,
+    ) -> None:
+        super().__init__(path, compression=compression, chunk_bytes=chunk_bytes)
+        self._channels: dict[tuple[str, str], int] = {}
+        self.add_metadata(METADATA, metadata(recording_id or uuid4().hex, part))
 
     def attach(self, name: str, text: str) -> None:
         """
         Write a text file into the bag, before the first message if it is to survive a crash.
         """
-        with self._errors_named():
-            self._writer.add_attachment(
-                create_time=0,
-                log_time=0,
-                name=name,
-                media_type=media_type(name),
-                data=text.encode(),
-            )
+        self.add_attachment(attachment(name, text))
 
     def register(self, topic: str, type_name: str) -> None:
         """
@@ -134,8 +267,7 @@ class BagWriter:
         BagError
             If the definition of the type is not known.
         """
-        with self._errors_named():
-            self._channel(topic, type_name)
+        self._channel(topic, type_name)
 
     def write(
         self, topic: str, type_name: str, payload: bytes, *, log_ns: int, publish_ns: int
@@ -159,14 +291,9 @@ class BagWriter:
         BagError
             If the type is not known or the file cannot be written.
         """
-        with self._errors_named():
-            self._writer.add_message(
-                self._channel(topic, type_name),
-                log_time=log_ns,
-                data=payload,
-                # a stamp before 1970 has no place here; the message itself keeps it
-                publish_time=max(publish_ns, 0),
-            )
+        # a stamp before 1970 has no place here; the message itself keeps it
+        number = self._channel(topic, type_name)
+        self.add(number, payload, log_ns=log_ns, publish_ns=max(publish_ns, 0))
 
     def write_samples(self, block: Block) -> None:
         """
@@ -186,61 +313,9 @@ class BagWriter:
                 publish_ns=message.publish_ns,
             )
 
-    def close(self) -> None:
-        """
-        Write the index and bring everything to the disk; again is harmless.
-
-        Raises
-        ------
-        BagError
-            If the disk does not take it.
-        """
-        if self._file.closed:
-            return
-        try:
-            with self._errors_named():
-                self._writer.finish()
-                self._file.flush()
-                os.fsync(self._file.fileno())
-        finally:
-            with suppress(OSError):
-                self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    @contextmanager
-    def _errors_named(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
-
     def _channel(self, topic: str, type_name: str) -> int:
         key = (topic, type_name)
         if key not in self._channels:
-            schema_id = self._schema(type_name)
-            made = channel(len(self._channels) + 1, topic, type_name, schema_id=schema_id)
-            # outside of chunks too: the first chunk may be damaged and the others sound
-            self._file.write(as_bytes(made))
-            self._channels[key] = self._writer.register_channel(
-                made.topic, made.message_encoding, made.schema_id, made.metadata
-            )
+            declared = channel(0, topic, type_name, schema_id=0)
+            self._channels[key] = self.declare(declared, schema(0, type_name))
         return self._channels[key]
-
-    def _schema(self, type_name: str) -> int:
-        if type_name not in self._schemas:
-            made = schema(len(self._schemas) + 1, type_name)
-            self._file.write(as_bytes(made))
-            self._schemas[type_name] = self._writer.register_schema(
-                made.name, made.encoding, made.data
-            )
-        return self._schemas[type_name]

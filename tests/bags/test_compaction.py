@@ -16,7 +16,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.bags import compaction
 from shipdrag_ros.bags.compaction import SUFFIX, compact
 from shipdrag_ros.bags.live import LiveFile
-from shipdrag_ros.bags.writer import BagWriter
+from shipdrag_ros.bags.writer import RecordWriter
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block
@@ -113,7 +113,7 @@ def test_what_an_interrupted_attempt_left_is_no_obstacle(tmp_path: Path, block: 
 @pytest.mark.parametrize(
     ('owner', 'step', 'whole'),
     [
-        (BagWriter, 'close', 'before'),
+        (RecordWriter, 'close', 'before'),
         (Path, 'replace', 'before'),
         (compaction, 'sync_directory', 'after'),
     ],

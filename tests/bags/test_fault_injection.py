@@ -9,10 +9,8 @@ the outcome is sound, and the damage is found.
 from __future__ import annotations
 
 import random
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from importlib import import_module
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,15 +25,13 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from shipdrag_ros.bags import info, open_runs
+from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.records import HEAD, MAGIC
-from shipdrag_ros.bags.salvage import check, indexed_file, recover
-from shipdrag_ros.bags.salvage.layout import name
-from shipdrag_ros.bags.salvage.whole_chunk import read_whole
+from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import encode, types
 from shipdrag_ros.samples import Block
 
-RECOVERY = import_module('shipdrag_ros.bags.salvage.recover')
 WRITERS: dict[str, dict[str, Any]] = {
     'zstd': {'compression': CompressionType.ZSTD, 'chunk_size': 2048},
     'lz4': {'compression': CompressionType.LZ4, 'chunk_size': 4096},
@@ -203,49 +199,6 @@ def test_a_sound_file_is_sound_and_comes_out_whole(
         'footer',
         *(['message'] if writer == 'unchunked' else ['chunk', 'message_index', 'chunk_index']),
     }
-
-
-@pytest.mark.parametrize('writer', WRITERS)
-def test_chunks_taken_at_once_give_what_their_records_give(
-    writer: str,
-    samples: dict[str, Sample],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    sample = samples[writer]
-    taken: Counter[bool] = Counter()
-
-    def counted(records: bytes) -> Any:
-        whole = read_whole(records)
-        taken[whole is not None] += 1
-        return whole
-
-    for number, record in enumerate(_each_kind(sample)):
-        content = bytearray(sample.content)
-        content[(record.offset + record.end) // 2] ^= 1
-        source = tmp_path / f'{number}.mcap'
-        source.write_bytes(content)
-        monkeypatch.setattr(RECOVERY, 'read_whole', counted)
-        one = recover(source, tmp_path / f'{number}.a.mcap')
-        monkeypatch.setattr(RECOVERY, 'read_whole', lambda records: None)
-        other = recover(source, tmp_path / f'{number}.b.mcap')
-        assert one.output.read_bytes() == other.output.read_bytes()
-        assert (one.quarantine is None) == (other.quarantine is None)
-        if one.quarantine is not None and other.quarantine is not None:
-            assert one.quarantine.read_bytes() == other.quarantine.read_bytes()
-        assert (one.bytes_lost, one.damage) == (other.bytes_lost, other.damage)
-    assert (taken[True] > 0) == (writer != 'unchunked')
-
-
-@pytest.mark.parametrize('writer', WRITERS)
-def test_what_is_saved_is_written_in_as_many_chunks_as_it_needs(
-    writer: str,
-    samples: dict[str, Sample],
-    save: Callable[[bytes], Saved],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(indexed_file, 'CHUNK_BYTES', 700)
-    assert save(samples[writer].content) == (samples[writer].messages, frozenset())
 
 
 @pytest.mark.parametrize('writer', WRITERS)
@@ -442,6 +395,10 @@ def _mangled(data: st.DataObject, samples: dict[str, Sample]) -> bytes:
                 huge = data.draw(st.sampled_from([1 << 31, 1 << 40, 1 << 60, (1 << 64) - 1]))
                 content[at : at + 8] = huge.to_bytes(8, 'little')
     return bytes(content)
+
+
+def name(opcode: int) -> str:
+    return Opcode(opcode).name.lower()
 
 
 def _each_kind(sample: Sample) -> list[Record]:
