@@ -11,13 +11,13 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO
+from typing import IO, NamedTuple
 
 import numpy as np
 import zstandard
@@ -39,8 +39,8 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import UInt8
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
-# smaller chunks are read together: what a chunk costs beside its bytes is then small
-_WORTHWHILE_BYTES = 1 << 18
+# smaller chunks are unpacked and decoded together
+_WORTHWHILE_BYTES = 1 << 20
 # messages held back because earlier ones may follow in the file
 _WAITING_LIMIT_BYTES = 1 << 29
 # of a packed file, by its size; logs of ships are packed to a tenth or so
@@ -108,15 +108,17 @@ class McapFile:
         in_time = [
             s for s in self.contents.segments if s.end_ns >= start_ns and s.start_ns <= end_ns
         ]
-        segments = deque(s for s in in_time if not s.channels or s.channels & wanted)
+        segments = [s for s in in_time if not s.channels or s.channels & wanted]
         table = np.zeros(CHANNELS, np.uint8)
         table[list(wanted)] = 1
         read = 0
         waiting: Messages | None = None
-        with self._data() as data, closing(_unpacked_ahead(data, tuple(segments))) as unpacked:
-            while segments:
+        with self._data() as data:
+            groups = deque(_grouped(data, segments))
+            unpacked = _unpacked_ahead(data, tuple(groups))
+            while groups:
                 # as much again as waits, so that what overlaps is not sorted over and over
-                loaded = self._load(unpacked, segments, table, len(waiting.data) if waiting else 0)
+                loaded = self._load(unpacked, groups, table, len(waiting.data) if waiting else 0)
                 read += len(loaded)
                 if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
                     loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
@@ -125,8 +127,8 @@ class McapFile:
                     waiting = None
                 loaded = loaded.in_arrival_order()
                 ready = len(loaded)
-                if segments:  # the next may begin before this one ends
-                    ready = int(np.searchsorted(loaded.log_ns, segments[0].start_ns))
+                if groups:  # the next may begin before this one ends
+                    ready = int(np.searchsorted(loaded.log_ns, groups[0].segments[0].start_ns))
                 if ready < len(loaded):
                     waiting = loaded[ready:].packed()
                     if len(waiting.data) > _WAITING_LIMIT_BYTES:
@@ -142,24 +144,23 @@ class McapFile:
 
     def _load(
         self,
-        unpacked: Iterator[Unpacked],
-        segments: deque[FileSegment],
+        unpacked: Iterator[list[Unpacked]],
+        groups: deque[_Group],
         wanted: UInt8,
         least_bytes: int,
     ) -> Messages:
-        """Take segments off the queue, one or as many small ones as are worth it."""
-        least_bytes = max(least_bytes, _WORTHWHILE_BYTES)
+        """Take groups off the queue, one or as many as are worth it."""
         sound: list[bytes] = []
         offsets: list[int] = []
         size = 0
-        while segments and size < least_bytes:
-            segment, chunk = segments.popleft(), next(unpacked)
-            if chunk.damage is not None:
-                self._warn(damaged_chunk(segment.offset, chunk.damage.value))
-                continue
-            sound.append(chunk.records)
-            offsets.append(segment.offset)
-            size += len(chunk.records)
+        while groups and (not size or size < least_bytes):
+            for segment, chunk in zip(groups.popleft().segments, next(unpacked), strict=True):
+                size += 1 + len(chunk.records)
+                if chunk.damage is not None:
+                    self._warn(damaged_chunk(segment.offset, chunk.damage.value))
+                    continue
+                sound.append(chunk.records)
+                offsets.append(segment.offset)
         indexed = index_messages(sound, offsets, wanted)
         for text in indexed.damage:
             self._warn(text)
@@ -195,35 +196,26 @@ def not_mcap(path: Path, head: bytes) -> str:
     )
 
 
-def _unpacked_ahead(
-    data: mmap, segments: Sequence[FileSegment]
-) -> Generator[Unpacked, None, None]:
-    """
-    Yield the records of each segment in order, unpacked on other cores meanwhile.
+class _Group(NamedTuple):
+    """Segments that are unpacked together, and how many bytes they are then, as they say."""
 
-    Decompression and checksum leave Python's lock to others.
-    """
-    threads = min(len(os.sched_getaffinity(0)) - 1, _THREADS)
-    if threads < 1:
-        yield from (_records(data, segment) for segment in segments)
-        return
-    with ThreadPoolExecutor(threads, 'shipdrag-unpack') as pool:
-        ahead: deque[tuple[int, Future[Unpacked]]] = deque()
-        size = 0
-        for segment in segments:
-            more = _stated_bytes(data, segment)
-            while ahead and size + more > _AHEAD_BYTES:
-                done, future = ahead.popleft()
-                size -= done
-                yield future.result()
-            ahead.append((more, pool.submit(_records, data, segment)))
-            size += more
-        while ahead:
-            yield ahead.popleft()[1].result()
+    segments: list[FileSegment]
+    size: int
+
+
+def _grouped(data: mmap, segments: Sequence[FileSegment]) -> Iterator[_Group]:
+    """Put small segments together: what each costs beside its bytes is then small."""
+    group: list[FileSegment] = []
+    size = 0
+    for segment in segments:
+        group.append(segment)
+        size += _stated_bytes(data, segment)
+        if size >= _WORTHWHILE_BYTES or segment is segments[-1]:
+            yield _Group(group, size)
+            group, size = [], 0
 
 
 def _stated_bytes(data: mmap, segment: FileSegment) -> int:
-    """Return how many bytes a segment takes, packed or unpacked as it says itself."""
     size = segment.end - segment.offset
     if data[segment.offset] != Opcode.CHUNK:
         return size
@@ -231,7 +223,35 @@ def _stated_bytes(data: mmap, segment: FileSegment) -> int:
     return max(size, int.from_bytes(data[at : at + 8], 'little'))
 
 
-def _records(data: mmap, segment: FileSegment) -> Unpacked:
+def _unpacked_ahead(data: mmap, groups: Sequence[_Group]) -> Iterator[list[Unpacked]]:
+    """
+    Yield the records of each group in order, unpacked on other cores meanwhile.
+
+    Decompression and checksum leave Python's lock to others.
+    """
+    threads = min(len(os.sched_getaffinity(0)) - 1, _THREADS)
+    if threads < 1 or len(groups) < 2:
+        yield from (_records(data, group) for group in groups)
+        return
+    with ThreadPoolExecutor(threads, 'shipdrag-unpack') as pool:
+        ahead: deque[tuple[int, Future[list[Unpacked]]]] = deque()
+        waiting = 0
+        for group in groups:
+            while ahead and waiting + group.size > _AHEAD_BYTES:
+                done, future = ahead.popleft()
+                waiting -= done
+                yield future.result()
+            ahead.append((group.size, pool.submit(_records, data, group)))
+            waiting += group.size
+        while ahead:
+            yield ahead.popleft()[1].result()
+
+
+def _records(data: mmap, group: _Group) -> list[Unpacked]:
+    return [_unpacked(data, segment) for segment in group.segments]
+
+
+def _unpacked(data: mmap, segment: FileSegment) -> Unpacked:
     if data[segment.offset] == Opcode.CHUNK:
         start = segment.offset + HEAD.size
         return unpack(data, Place(Opcode.CHUNK, segment.offset, start, segment.end))

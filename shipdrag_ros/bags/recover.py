@@ -358,8 +358,18 @@ class _Salvage:
         if damage not in (None, chunk.damage):
             self.damages.add(chunk.offset, 'chunk', damage)
         sound = verified or (damage is None and chunk.damage is None)
+        messages, others, notes = index_messages([records], [0], EVERY_CHANNEL)
+        if sound and not notes:
+            for at in others.tolist():
+                start = at + HEAD.size
+                place = Place(records[at], at, start, start + HEAD.unpack_from(records, at)[1])
+                self._record(records, place, chunk.offset, sound=True, verified=verified)
+            starts = (messages.start - MESSAGE_HEAD.size).tolist()
+            for start, end in zip(starts, messages.end.tolist(), strict=True):
+                self._message(records[start:end], chunk.offset, self._sound)
+            return
         used = 0
-        for place in _places(records, sound=sound):
+        for place in walk(records, 0, len(records), IN_CHUNK):
             if place.damage is not None and sound:
                 # elsewhere it is what the damage of the chunk has made
                 self.damages.add(chunk.offset, place.name, place.damage)
@@ -376,7 +386,7 @@ class _Salvage:
         self.records += 1
         bag = self._sound if sound else self._doubtful
         if place.opcode == Opcode.MESSAGE:
-            self._message(data, place, offset, bag)
+            self._message(data[place.start : place.end], offset, bag)
             return
         record = read(data, place)
         match record:
@@ -396,39 +406,20 @@ class _Salvage:
             case None:
                 self.damages.add(offset, place.name, DamageKind.CONTENT)
 
-    def _message(self, data: Buffer, place: Place, offset: int, bag: _Salvaged) -> None:
-        number, sequence, log_ns, publish_ns = MESSAGE_HEAD.unpack_from(data, place.start)
-        if number not in self._declared.channels:
+    def _message(self, content: bytes, offset: int, bag: _Salvaged) -> None:
+        channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(content)
+        if channel not in self._declared.channels:
             bag = self._doubtful
-            if number not in bag.numbers:  # said once; a thousand messages may be of it
-                self.damages.add(offset, 'message', DamageKind.REFERENCE, f'channel {number}')
-        payload = data[place.start + MESSAGE_HEAD.size : place.end]
+            if channel not in bag.numbers:  # said once; a thousand messages may be of it
+                self.damages.add(offset, 'message', DamageKind.REFERENCE, f'channel {channel}')
         if self._bag.message_compression:
             try:
-                payload = unpack_zstd(payload, CHUNK_LIMIT_BYTES)
+                payload = unpack_zstd(content[MESSAGE_HEAD.size :], CHUNK_LIMIT_BYTES)
             except (zstandard.ZstdError, ValueError, MemoryError):
                 self.damages.add(offset, 'message', DamageKind.COMPRESSION)
-                self.bytes_lost += place.end - place.offset
+                self.bytes_lost += HEAD.size + len(content)
                 return
+            content = content[: MESSAGE_HEAD.size] + payload
+        number = bag.numbers.get(channel) or bag.number(channel, self._declared)
+        bag.writer.add_content(number, content, log_ns=log_ns)
         bag.messages += 1
-        bag.writer.add(
-            bag.number(number, self._declared),
-            payload,
-            log_ns=log_ns,
-            publish_ns=publish_ns,
-            sequence=sequence,
-        )
-
-
-def _places(records: bytes, *, sound: bool) -> Iterator[Place]:
-    """Yield what is in a chunk: at once where it is sound, else by a walk."""
-    messages, others, notes = index_messages([records], [0], EVERY_CHANNEL)
-    if not sound or notes:
-        yield from walk(records, 0, len(records), IN_CHUNK)
-        return
-    for at in others.tolist():
-        start = at + HEAD.size
-        yield Place(records[at], at, start, start + HEAD.unpack_from(records, at)[1])
-    head = HEAD.size + MESSAGE_HEAD.size
-    for start, end in zip(messages.start.tolist(), messages.end.tolist(), strict=True):
-        yield Place(Opcode.MESSAGE, start - head, start - MESSAGE_HEAD.size, end)

@@ -61,7 +61,9 @@ def test_the_same_messages_with_an_index_in_less_room(
         reader = make_reader(stream)
         summary = reader.get_summary()
         assert summary is not None
-        assert len(summary.chunk_indexes) == 1
+        sizes = [chunk.uncompressed_size for chunk in summary.chunk_indexes]
+        # a flipped bit costs one of them
+        assert 1 << 14 <= max(sizes) < 0.1 * sum(sizes)
         assert {it.name: it.data.decode() for it in reader.iter_attachments()} == ATTACHED
         (metadata,) = reader.iter_metadata()
     assert metadata.metadata == {'version': __version__, 'recording_id': 'r', 'part': '2'}

@@ -170,6 +170,7 @@ def test_memory_does_not_grow_with_the_bag(
 ) -> None:
     monkeypatch.setattr(run_module, 'BATCH', 256)
     monkeypatch.setattr(mcap_file, '_AHEAD_BYTES', 60_000)  # less than either bag holds
+    monkeypatch.setattr(mcap_file, '_WORTHWHILE_BYTES', 20_000)
     peaks = []
     for n in (8000, 40_000):
         block = Block.of(Channel.SHAFT, START_NS + np.arange(n) * 10**8, 1.0)
