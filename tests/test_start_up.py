@@ -18,7 +18,7 @@ SLOW = {
     'scipy.optimize',
     'scipy.special',
     'scipy.stats',
-    'shipdrag_ros.bags.salvage',
+    'shipdrag_ros.bags.check',
     'shipdrag_ros.diagnosis',
     'shipdrag_ros.importing',
     'shipdrag_ros.report',

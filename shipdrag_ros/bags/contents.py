@@ -235,9 +235,9 @@ def _by_walk(data: Buffer) -> Contents:
     for place in walk(data, len(MAGIC), len(data)):
         stray = stray or (place.damage is not None and bool(contents.compressions))
         if place.damage is not None:
+            name = place.name.replace('unknown', 'record')
             contents.warnings.append(
-                f'the {place.name} at byte {place.offset} is damaged ({place.damage.value}): '
-                'left out'
+                f'the {name} at byte {place.offset} is damaged ({place.damage.value}): left out'
             )
         elif place.opcode == Opcode.DATA_END:
             break

@@ -39,6 +39,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import UInt8
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
+IMPORT = 'make a bag of it with `shipdrag import SOURCE -o NEW.mcap`'
 # smaller chunks are unpacked and decoded together
 _WORTHWHILE_BYTES = 1 << 20
 # messages held back because earlier ones may follow in the file
@@ -189,7 +190,7 @@ def not_mcap(path: Path, head: bytes) -> str:
     """
     for magic, what in _FOREIGN.items():
         if head.startswith(magic):
-            return f'{str(path)!r} {what}; {CONVERT}'
+            return f'{str(path)!r} {what}; {IMPORT}'
     return (
         f'{str(path)!r} is no MCAP file, it begins with {head[:8]!r}; '
         'give a .mcap file or a rosbag2 directory'

@@ -228,6 +228,10 @@ def _damaged(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Place:
     start = at + HEAD.size
     known = opcode in kinds
     stop = start + length
+    if known and opcode != Opcode.MESSAGE:
+        by_fields = _fields_end(data, opcode, start, end)
+        if by_fields is not None and by_fields <= end and _goes_on(data, by_fields, end, kinds):
+            return Place(opcode, at, start, by_fields, DamageKind.LENGTH)
     if stop <= end and _goes_on(data, stop, end, kinds):
         # its length is right, and something else is not
         near = (opcode ^ 1 << bit for bit in range(8))
@@ -236,10 +240,6 @@ def _damaged(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Place:
             mended.remove(Opcode.MESSAGE)
         kind = DamageKind.OPCODE if mended or not known else DamageKind.CONTENT
         return Place([*mended, opcode if known else GARBAGE][0], at, start, stop, kind)
-    if known and opcode != Opcode.MESSAGE:
-        by_fields = _fields_end(data, opcode, start, end)
-        if by_fields is not None and by_fields <= end and _goes_on(data, by_fields, end, kinds):
-            return Place(opcode, at, start, by_fields, DamageKind.LENGTH)
     chunk = known and opcode == Opcode.CHUNK and _is_chunk(data, start)
     after = _next(data, at + 1, end, kinds - IN_CHUNK if chunk else kinds)
     cut_off = known and after == end < stop < start + _POSSIBLE_BYTES

@@ -35,6 +35,7 @@ from shipdrag_ros.bags.records import (
     IN_CHUNK,
     MAGIC,
     MESSAGE_HEAD,
+    TIME_LIMIT_NS,
     Buffer,
     Place,
     attachment_agrees,
@@ -408,6 +409,10 @@ class _Salvage:
 
     def _message(self, content: bytes, offset: int, bag: _Salvaged) -> None:
         channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(content)
+        if log_ns >= TIME_LIMIT_NS:  # no reader takes it
+            self.damages.add(offset, 'message', DamageKind.CONTENT, f'log time {log_ns}')
+            self.bytes_lost += HEAD.size + len(content)
+            return
         if channel not in self._declared.channels:
             bag = self._doubtful
             if channel not in bag.numbers:  # said once; a thousand messages may be of it

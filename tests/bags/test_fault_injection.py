@@ -9,28 +9,32 @@ the outcome is sound, and the damage is found.
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.records import Message as McapMessage
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from shipdrag_ros.bags import info, open_runs
+from shipdrag_ros.bags import BagWriter, info, open_runs
 from shipdrag_ros.bags.check import check
-from shipdrag_ros.bags.records import HEAD, MAGIC
+from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import encode, types
-from shipdrag_ros.samples import Block
+from shipdrag_ros.samples import Block, Channel
 
 WRITERS: dict[str, dict[str, Any]] = {
     'zstd': {'compression': CompressionType.ZSTD, 'chunk_size': 2048},
@@ -40,6 +44,7 @@ WRITERS: dict[str, dict[str, Any]] = {
     'unchunked': {'use_chunking': False},
 }
 MESSAGES = 120
+SMALL = [Channel.SHAFT, Channel.DEPTH]  # of few bytes a message
 
 
 class Message(NamedTuple):
@@ -339,6 +344,70 @@ def test_the_first_chunk_lost_its_topics_are_those_of_the_summary(
     assert saved.sound < sample.untouched(first)
     assert _numbers(saved) == _numbers_of(sample.untouched(first))
     assert {m.topic.rpartition('_')[0] for m in saved.doubtful} == {'/unknown_channel'}
+
+
+def growing(path: Path, block: Block) -> bytes:
+    file = LiveFile(path, recording_id='r', part=0, attachments={'ship.yaml': 'name: x'})
+    messages = list(encode(block))
+    for first in range(0, len(messages), 3):
+        file.append(messages[first : first + 3])
+    file.sync()
+    return path.read_bytes()
+
+
+def finished(path: Path, block: Block) -> bytes:
+    with BagWriter(path, chunk_bytes=250) as bag:
+        bag.attach('ship.yaml', 'name: x')
+        bag.write_samples(block)
+    return path.read_bytes()
+
+
+def inside(content: bytes) -> list[tuple[int, int, Counter[bytes]]]:
+    """Return where the chunks are, and the payloads in each."""
+    found = []
+    for place in walk(content, len(MAGIC), len(content)):
+        if place.opcode == Opcode.CHUNK:
+            stream = StreamReader(BytesIO(content[place.offset : place.end]), skip_magic=True)
+            payloads: Counter[bytes] = Counter()
+            with suppress(McapError):  # the end of the span
+                payloads.update(it.data for it in stream.records if isinstance(it, McapMessage))
+            found.append((place.offset, place.end, payloads))
+    return found
+
+
+@pytest.mark.parametrize('write', [growing, finished])
+def test_cut_at_every_offset_and_flipped_in_every_byte(
+    write: Callable[[Path, Block], bytes],
+    tmp_path: Path,
+    block: Block,
+    save: Callable[[bytes], Saved],
+    damage_of: Callable[[bytes], set[tuple[str, str]]],
+) -> None:
+    """A chunk that is whole is saved whole; nothing that is not is taken for sound."""
+    content = write(tmp_path / 'a.mcap', block[np.isin(block.channel, SMALL)][:12])
+    chunks = inside(content)
+    everything = sum((payloads for *_, payloads in chunks), Counter())
+    assert len(chunks) >= 4
+    rng = random.Random(5)
+    begin = chunks[0][0] - 60  # before it are long texts: of these some
+    places = [*range(120, begin, 197), *range(begin, len(content))]
+    for number, at in enumerate(places):
+        flipped = number % 2
+        damaged = bytearray(content[: None if flipped else at])
+        if flipped:
+            damaged[at] ^= 1 << rng.randrange(8)
+        saved = save(bytes(damaged))
+        sound = Counter(message.payload for message in saved.sound)
+        doubtful = Counter(message.payload for message in saved.doubtful)
+        hit = [payloads for start, end, payloads in chunks if start <= at < end]
+        if not flipped:
+            hit += [payloads for start, _, payloads in chunks if start > at]
+        whole = everything - sum(hit, Counter())
+        assert sound + doubtful >= whole, at
+        assert sound <= everything, at
+        if hit or not flipped:  # elsewhere it may be what the channels are called
+            assert sound >= whole, at
+        assert damage_of(bytes(damaged)), at
 
 
 def test_a_key_without_its_value_is_damage(samples: dict[str, Sample], tmp_path: Path) -> None:
