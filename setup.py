@@ -49,7 +49,6 @@ setup(
     version='0.2.0',
     description='Hydrodynamic resistance of a ship from its coastdowns, live and from bags',
     author='shipdrag_ros maintainers',
-    author_email='maintainers@shipdrag.example.org',
     license='Apache-2.0',
     python_requires='>=3.11',
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),

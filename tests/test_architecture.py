@@ -29,7 +29,7 @@ PICTURE = (
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
     ('bags', 'nmea'),
-    ('node', 'replay', 'importing'),
+    ('node', 'replay', 'sources'),
     ('fleet',),
     ('trend',),
     ('library',),
@@ -48,7 +48,7 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
                 'messages',
                 'nmea',
                 'replay',
-                'importing',
+                'sources',
                 'node',
                 'fleet',
                 'trend',
@@ -83,7 +83,7 @@ ROS = {
 FLEET = ('dask', 'distributed', 'pyarrow', 'fsspec', 's3fs')
 ONLY_IN = {
     'mcap': {'bags'},
-    'rosbags': {'messages', 'importing', 'bags'},  # a bag of ROS 1 is imported
+    'rosbags': {'messages', 'sources', 'bags'},  # a bag of ROS 1 is imported
     **{name: {'node'} for name in ROS},
     **{name: {'fleet', 'trend'} for name in FLEET},  # no other verb pays for them
 }

@@ -97,7 +97,14 @@ def test_package_xml_and_setup_agree() -> None:
     assert maintainer is not None
     email = maintainer.get('email', '')
     assert re.fullmatch(r'[\w.+-]+@[\w-]+(\.[\w-]+)+', email)
-    assert f"author_email='{email}'" in setup
+
+
+def test_no_address_is_made_up() -> None:
+    """`example.org` is somebody's; `.invalid` is nobody's and says so."""
+    names = ('setup.py', 'package.xml', 'CITATION.cff', 'SECURITY.md', 'CODE_OF_CONDUCT.md')
+    for path in (ROOT / name for name in names):
+        for host in re.findall(r'[\w.+-]+@([\w-]+(?:\.[\w-]+)+)', path.read_text('utf-8')):
+            assert host.endswith('.invalid'), f'{path.name}: {host}'
 
 
 def test_every_direct_dependency_is_pinned_with_a_hash() -> None:

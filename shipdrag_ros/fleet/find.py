@@ -280,9 +280,9 @@ def is_log(name: str, first: bytes) -> bool:
     first
         Its first bytes, packed with gzip or not.
     """
-    from shipdrag_ros.importing import formats  # where all names say what they are, not needed
-    from shipdrag_ros.importing.format import CERTAIN, Head
-    from shipdrag_ros.importing.opened import GZIP
+    from shipdrag_ros.sources import formats  # where all names say what they are, not needed
+    from shipdrag_ros.sources.format import CERTAIN, Head
+    from shipdrag_ros.sources.opened import GZIP
 
     if first.startswith(GZIP):
         try:

@@ -27,11 +27,11 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
 from shipdrag_ros.fleet.local import fetched
 from shipdrag_ros.fleet.rows import BagResult, Row, coastdown_row
-from shipdrag_ros.importing.reading import read_any
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
 from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship
+from shipdrag_ros.sources.reading import read_any
 
 UNNAMED = 'unnamed'
 _LONGEST_NAME = 80  # [bytes], and three times as long in the name of a folder

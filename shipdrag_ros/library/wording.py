@@ -15,7 +15,7 @@ from functools import cache, wraps
 from typing import ParamSpec, TypeVar
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.importing import formats
+from shipdrag_ros.sources import formats
 
 P = ParamSpec('P')
 R = TypeVar('R')
