@@ -173,7 +173,7 @@ def opened(path: Path, damages: DamageList) -> Iterator[Buffer]:
         yield data
 
 
-class Declared:
+class DeclaredTopics:
     """
     The schemas and channels of a file; of two that differ the better witnessed one counts.
 
@@ -255,7 +255,7 @@ class _Salvaged:
             self._writer = RecordWriter(self._part, profile=self.profile)
         return self._writer
 
-    def number(self, number: int, declared: Declared) -> int:
+    def number(self, number: int, declared: DeclaredTopics) -> int:
         """Return the number here of a channel of the source, known or not."""
         if number not in self.numbers:
             channel = declared.channels.get(number)
@@ -312,14 +312,14 @@ class _Salvage:
         self._doubtful = doubtful
         self._bag = bag
         self._progress = progress
-        self._declared = Declared()
+        self._declared = DeclaredTopics()
         for warning in bag.warnings:
             self.damages.add(0, 'file', DamageKind.MISSING, warning)
 
     def take(self, file: Path) -> None:
         """Write what can be saved of a file."""
         self.damages.file = file.name if len(self._bag.files) > 1 else ''
-        self._declared = Declared()
+        self._declared = DeclaredTopics()
         with opened(file, self.damages) as data:
             self.bytes_read += len(data)
             self._declared.add_all(data)
