@@ -3,8 +3,8 @@
 Error and coverage of r(v) beside other ways to differentiate, on the same simulated records.
 
 Prints Markdown; `--write` puts it into benchmarks/results/accuracy_beside_peers.md, and the short
-table into docs/figures.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps what is done,
-goes on from there, and with `--group` does a part only.
+table into docs/figures.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps
+what is done, goes on from there, and with `--group` does a part only.
 """
 
 from __future__ import annotations
