@@ -95,5 +95,9 @@ setup(
             f'shipdrag = {PACKAGE}.cli:main',
             f'coastdown_node = {PACKAGE}.node.main:main',
         ],
+        'shipdrag.papers': [
+            f'{name} = {PACKAGE}.studies.{name}:STUDY'
+            for name in ('cable', 'sensitivity', 'residual', 'surface')
+        ],
     },
 )
