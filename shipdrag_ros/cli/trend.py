@@ -15,6 +15,7 @@ from shipdrag_ros.cli.arguments import add_json, add_report, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
+from shipdrag_ros.imports import need
 from shipdrag_ros.library.trending import trends_of
 
 if TYPE_CHECKING:
@@ -71,6 +72,7 @@ def run(options: argparse.Namespace) -> int:
     """
     Show the trend of each ship.
     """
+    need('pyarrow')
     output = Output(options.json)
     if options.sql is not None:
         _answer(output, options.store, options.sql)
