@@ -16,6 +16,7 @@ from shipdrag_ros.samples import Block
 
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 OK, WARN, ERROR, STALE = range(4)
+READY_S = 600.0  # of steady sailing from which the noise is known well enough
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,16 @@ class Health:
         Return the status of a part.
         """
         return next((status for status in self.statuses if status.part == part), None)
+
+    @property
+    def lead(self) -> tuple[float, float] | None:
+        """How long the ship has been steady, and from when the record is ready [s]."""
+        state = self.of('state')
+        steady_s = None if state is None else state.number('steady lead')
+        most_s = None if state is None else state.number('steady lead used at most')
+        if steady_s is None or most_s is None:
+            return None
+        return steady_s, min(READY_S, most_s)
 
     @property
     def inputs(self) -> tuple[Status, ...]:

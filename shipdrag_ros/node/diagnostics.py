@@ -156,8 +156,9 @@ def input_status(state: InputState) -> DiagnosticStatus:
     """
     topic, health = state.topic, state.health
     values: dict[str, object] = {
-        'topic': topic.topic,
-        'type': topic.fed_by or topic.type or 'not yet known',
+        'topic': topic.topic if topic.fed is None else topic.fed.input,
+        'type': (topic.type if topic.fed is None else topic.fed.type) or 'not yet known',
+        **({'fed by': topic.fed_by} if topic.fed_by else {}),
         'publishers': sum(topic.publishers.values()),
         'published by': ', '.join(topic.senders) or 'none',
         'reliability': 'reliable' if topic.reliable else 'best effort',

@@ -33,7 +33,7 @@ from rclpy.qos import (
 from rclpy.subscription import Subscription
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.messages import Decoded
+from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.losses import Sequences
 
@@ -118,6 +118,8 @@ class InputTopic:
         Messages that gave no sample, by reason, and joints that have no place.
     fed_by
         What feeds the input instead of its topic, '' if nothing does.
+    fed
+        Topic and type under which that is published again; None without it.
     may_be_fed
         Whether something else than the topic could feed it.
     unstamped
@@ -152,6 +154,7 @@ class InputTopic:
         self.unstamped = 0
         self.unreadable: Counter[str] = Counter()
         self.fed_by = ''
+        self.fed: Source | None = None
         self.may_be_fed = False
         if fixed:
             self._subscribe(fixed, reliable=True)
@@ -185,11 +188,18 @@ class InputTopic:
         """Time since the last message [s, steady clock], None before the first."""
         return None if self._last_s is None else time.monotonic() - self._last_s
 
-    def feed(self, by: str) -> None:
+    def feed(self, by: str, source: Source) -> None:
         """
         Note a message that came another way than by the topic.
+
+        Parameters
+        ----------
+        by
+            What sends it.
+        source
+            Topic and type under which it is published again.
         """
-        self.fed_by = by
+        self.fed_by, self.fed = by, source
         self.received += 1
         self._last_s = time.monotonic()
 

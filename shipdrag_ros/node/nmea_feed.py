@@ -4,7 +4,8 @@ NMEA 0183 heard by the node, fed to the session as topics are.
 
 An input is fed by a topic or by NMEA, whichever was used first since the node
 was activated; NMEA waits some seconds before it feeds, so a topic that is there
-at the start has it. The other is counted and reported, and never mixed in.
+at the start has it. The other is counted and reported, and never mixed in. What feeds
+is published below `~/nmea`, for the page and whatever else looks on.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from contextlib import suppress
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 from shipdrag_ros.messages import Source
 from shipdrag_ros.nmea.address import Address, parse_addresses
@@ -24,7 +26,7 @@ from shipdrag_ros.nmea.listener import SourceCounts
 from shipdrag_ros.nmea.live import LiveNmea
 from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
 from shipdrag_ros.node.diagnostics import ERROR, OK, STALE, WARN, nmea_status
-from shipdrag_ros.node.inputs import InputTopic
+from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.judging import SILENT_S
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
@@ -73,6 +75,7 @@ class NmeaFeed:
         self._nmea_refused: Counter[str] = Counter()
         self._unused = 0
         self._problems: dict[str, str] = {}
+        self._published: dict[Source, Publisher] = {}
         self._live = LiveNmea(
             parse_addresses(settings.nmea),
             clock_ns=lambda: int(node.get_clock().now().nanoseconds),
@@ -97,6 +100,8 @@ class NmeaFeed:
         """
         self._live.close()
         self._node.destroy_guard_condition(self._guard)
+        for publisher in self._published.values():
+            self._node.destroy_publisher(publisher)
 
     def renew(self) -> None:
         """
@@ -108,7 +113,7 @@ class NmeaFeed:
         self._topic_refused.clear()
         self._nmea_refused.clear()
         for topic in self._topics.values():
-            topic.fed_by = ''
+            topic.fed_by, topic.fed = '', None
 
     def admits(self, topic: InputTopic) -> bool:
         """
@@ -179,10 +184,19 @@ class NmeaFeed:
                     self._nmea_refused[source.input] += 1
                     continue
                 self._fed_by_nmea.add(source.input)
-                topic.feed(f'NMEA {line.address}')
+                topic.feed(f'NMEA {line.address}', self._publish(source, message.payload))
                 session.receive(source, message.payload, now_ns, topic.count)
         if self._live.waiting:
             self._wake()
+
+    def _publish(self, source: Source, payload: bytes) -> Source:
+        """Show a reading to other processes; return topic and type."""
+        if source not in self._published:
+            self._published[source] = self._node.create_publisher(
+                message_class(source.type), f'~/nmea/{source.input}', 10
+            )
+        self._published[source].publish(payload)
+        return Source(self._published[source].topic_name, source.type)
 
     def _status(self, address: str, counts: SourceCounts) -> DiagnosticStatus:
         level, text = self._health(counts)

@@ -11,7 +11,7 @@ const FINE_S = 1800;
 const THIN_EVERY = 300; // rows
 const MODES = ['day', 'dusk', 'night'];
 const SIGNS = { good: '✓', act: '►', watch: '…', bad: '✕' };
-const HELD = { yes: ['✓', 'yes'], no: ['✕', 'no'], wait: ['…', 'not yet'], unknown: ['?', 'not measured'] };
+const HELD = { yes: ['✓', 'yes'], no: ['✕', 'no'], wait: ['…', 'not yet'], unknown: ['?', 'not measured'], silent: ['✕', 'no reading now'] };
 const LEVELS = [['✓', 'good'], ['!', 'look'], ['✕', 'fault'], ['✕', 'silent']];
 
 const el = id => document.getElementById(id);
@@ -137,6 +137,9 @@ function showFigures(part) {
   const mass = picture.ship?.mass_kg;
   const speed = part.speed_m_s == null ? '–' : units.toSpeed(part.speed_m_s).toFixed(units === SI ? 2 : 1);
   setFigure('figure-speed', speed, units.speed, '');
+  const old = part.speed_old_s != null;
+  el('figure-speed').classList.toggle('stale', old);
+  text('note-speed', `${part.speed_kind ?? 'not measured'}${old ? `, ${part.speed_old_s} s old` : ''}`);
   const { usual } = part;
   text('force-name', units === SI ? 'Specific resistance' : 'Resistance');
   if (!usual || (!mass && units !== SI)) {
