@@ -19,6 +19,8 @@ from shipdrag_ros.progress import PartDone
 CERTAIN, LIKELY, POSSIBLE, NO = 1.0, 0.7, 0.3, 0.0
 """Scores of `Format.score`; the highest of all formats is taken."""
 
+_TEXT_PER_ZERO = 100  # bytes
+
 
 @dataclass(frozen=True)
 class Head:
@@ -38,7 +40,8 @@ class Head:
     @cached_property
     def lines(self) -> tuple[str, ...]:
         """The first lines that are not blank, as text; none of a binary file."""
-        if b'\0' in self.raw:
+        # a serial line leaves a few zeros in a text when it is plugged
+        if self.raw.count(0) > len(self.raw) // _TEXT_PER_ZERO:
             return ()
         texts = self.raw.decode('utf-8', 'replace').removeprefix('\ufeff').splitlines()
         whole = texts if len(texts) == 1 else texts[:-1]  # the last one is cut

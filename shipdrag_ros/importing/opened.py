@@ -7,7 +7,7 @@ import gzip
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import BufferedReader
+from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import IO, cast
 
@@ -109,24 +109,29 @@ class Lines:
             self.damage = f'after line {self.number}: {error}'
 
     def _lines(self, raw: IO[bytes], file: IO[bytes]) -> Iterator[str]:
-        reader = cast(BufferedReader, file)
+        # a line ends with LF, CR or both; a serial adapter writes CR alone
+        text = TextIOWrapper(cast(BufferedReader, file), encoding='utf-8-sig', errors='replace')
         size = 0
-        while line := reader.readline(LINE_BYTES):
-            self.number += 1
-            size += len(line)
-            if file is not raw:
-                check_unpacked(self.path, size, raw.tell())
-            if self.number % 1000 == 0:
-                self.done_bytes = raw.tell()
-            if len(line) == LINE_BYTES and not line.endswith(b'\n'):
-                self.too_long += 1
-                while (line := reader.readline(LINE_BYTES)) and not line.endswith(b'\n'):
+        try:
+            while line := text.readline(LINE_BYTES):
+                self.number += 1
+                whole = line
+                while len(line) == LINE_BYTES and not line.endswith('\n'):
+                    line = text.readline(LINE_BYTES)
                     size += len(line)
                     if file is not raw:
                         check_unpacked(self.path, size, raw.tell())
-                continue
-            text = line.decode('utf-8', 'replace').strip()
-            yield text.removeprefix('\ufeff') if self.number == 1 else text
+                size += len(whole)
+                if file is not raw:
+                    check_unpacked(self.path, size, raw.tell())
+                if self.number % 1000 == 0:
+                    self.done_bytes = raw.tell()
+                if len(whole) == LINE_BYTES and not whole.endswith('\n'):
+                    self.too_long += 1
+                else:
+                    yield whole.strip()
+        finally:
+            text.detach()  # whoever opened the file closes it
 
 
 def check_unpacked(path: Path, size: int, packed: int) -> None:

@@ -12,11 +12,13 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BufferedReader, TextIOWrapper
+from itertools import takewhile
 from pathlib import Path
 from typing import IO, NamedTuple, cast
 
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.importing.formats.csv.names import role_and_unit
 from shipdrag_ros.importing.opened import check_unpacked, opened
 from shipdrag_ros.progress import PartDone
 
@@ -24,7 +26,7 @@ DELIMITERS = ',;\t|'
 BLANKS = ' '
 """Delimiter of a table whose columns stand apart by blanks alone."""
 
-_SAMPLE_LINES = 40
+_SAMPLE_LINES = 400
 _LINE = 1 << 20  # characters; no row of a table is as long
 _DATE = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d\d(:\d\d.*)?')
 UNITS = (
@@ -105,9 +107,7 @@ class LogTable:
                 f'{str(path)!r} holds no cell; give a table with a line a sample'
             )
         cells = [layout.cells[0].lstrip('# '), *layout.cells[1:]]
-        measured = [
-            bool(NUMBER.fullmatch(cell) or _DATE.fullmatch(cell)) for cell in cells if cell
-        ]
+        measured = [_is_measured(cell) for cell in cells if cell]
         self.header: tuple[str, ...] | None = None
         if 2 * sum(measured) < len(measured):
             self.header = tuple(cells)
@@ -137,15 +137,9 @@ class LogTable:
         best: tuple[tuple[int, int], _Layout] | None = None
         for mark in DELIMITERS:
             rows = [self._cells(line, mark) for line in lines]
-            # a title of a spreadsheet is followed by empty cells
-            start = next((i for i, row in enumerate(rows) if sum(map(bool, row)) > 1), None)
+            start = _first_row(rows)
             if start is None:
                 continue
-            rest = rows[start:]
-            usual = Counter(map(len, rest)).most_common(1)[0][0]
-            near = [len(row) > 1 and abs(len(row) - usual) <= 1 for row in rest]
-            if sum(near) < 0.6 * len(rest) or sum(near[:5]) < 0.7 * len(near[:5]):
-                continue  # as in a title with a comma
             score = (-start, len(rows[start]))
             if best is None or score > best[0]:
                 best = (score, _Layout(start, mark, rows[start]))
@@ -264,10 +258,37 @@ class LogTable:
                 yield raw, text
 
 
+def _first_row(rows: Sequence[Sequence[str]]) -> int | None:
+    """
+    Return where a table of several columns begins, None where the rows make none.
+
+    Its last rows show its width, whatever stands above; its first row is one of that
+    width of which most of those below are too.
+    """
+    below = rows[len(rows) // 2 :]
+    usual = Counter(map(len, below)).most_common(1)[0][0]
+    near = [len(row) > 1 and abs(len(row) - usual) <= 1 for row in rows]
+    for start, row in enumerate(rows):
+        # a title of a spreadsheet is followed by empty cells
+        if not near[start] or sum(map(bool, row)) < 2:
+            continue
+        rest = near[start:]
+        if sum(rest) >= 0.9 * len(rest) and sum(rest[:5]) >= 0.7 * len(rest[:5]):
+            above = list(takewhile(lambda row: not any(map(_is_measured, row)), rows[start:]))
+            # of lines of text the header is the one with names; of none the first
+            names = [sum(bool(role_and_unit(cell)[0]) for cell in row) for row in above]
+            return start + (names.index(max(names)) if names else 0)
+    return None
+
+
+def _is_measured(cell: str) -> bool:
+    return bool(NUMBER.fullmatch(cell) or _DATE.fullmatch(cell))
+
+
 def _units(cells: Sequence[str]) -> tuple[str, ...] | None:
     """Return the units of a line that holds nothing else; None of any other line."""
     found = [match[1].strip() if (match := _UNIT.fullmatch(cell)) else cell for cell in cells]
     known = sum(each.lower() in UNITS for each in found)
-    if not known or any(NUMBER.fullmatch(cell) or _DATE.fullmatch(cell) for cell in cells):
+    if not known or any(map(_is_measured, cells)):
         return None
     return tuple(found)

@@ -44,6 +44,7 @@ FORMAT_OF = {
     'actisense': 'n2k',
     'yacht_devices': 'n2k',
     'canboat': 'n2k',
+    'slcan': 'n2k',
     'signalk': 'signalk',
     'gpx': 'gpx',
     'ardupilot': 'ardupilot',
@@ -124,6 +125,42 @@ def test_a_packed_log_is_the_log(files: dict[str, Path], tmp_path: Path, kind: s
     plain, unpacked = block_of(files[kind]), block_of(packed)
     assert np.array_equal(plain.value, unpacked.value)
     assert np.array_equal(plain.stamp_ns, unpacked.stamp_ns)
+
+
+def test_lines_may_be_led_by_the_time_of_their_day(files: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / 'led.log'
+    per_row = len(made.n2k_messages(0))
+    bare = [line.split('R ')[1] for line in files['yacht_devices'].read_text().splitlines()]
+    path.write_text(
+        '\n'.join(
+            f'({made.when(k // per_row):%Y-%m-%d %H:%M:%S.%f})  can0  '
+            f'{line.split()[0]}   [8]  {" ".join(line.split()[1:])}'
+            for k, line in enumerate(bare)
+        )
+    )
+    led, plain = block_of(path), block_of(files['yacht_devices'])
+    assert np.array_equal(led.stamp_ns, plain.stamp_ns)
+    assert np.array_equal(led.value, plain.value)
+
+
+def test_a_log_of_a_serial_line_may_begin_with_zeros(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    path = tmp_path / 'capture.txt'
+    path.write_bytes(b'\0\0\0' + files['nmea'].read_bytes())
+    first = block_of(path)
+    assert np.array_equal(first.value, block_of(files['nmea']).value)
+
+
+def test_a_coordinate_may_have_thirty_decimals(tmp_path: Path) -> None:
+    path = tmp_path / 'track.gpx'
+    points = (
+        f'<trkpt lat="{54.5 + k * 5e-5:.28f}" lon="10.2519999991953372955322265625">'
+        f'<time>{made.when(k):%Y-%m-%dT%H:%M:%S.000Z}</time></trkpt>'
+        for k in range(20)
+    )
+    path.write_text(f'<gpx><trk><trkseg>{"".join(points)}</trkseg></trk></gpx>')
+    assert values(block_of(path), Channel.POSITION_GEODETIC)[:, 1] == pytest.approx(10.252)
 
 
 def test_engine_revolutions_are_the_shaft_only_with_a_gear(files: dict[str, Path]) -> None:

@@ -682,3 +682,28 @@ def test_a_measured_log_imports_whole() -> None:
     water = of(block, Channel.SPEED_THROUGH_WATER).value[:, 0]
     ground = of(block, Channel.SPEED_OVER_GROUND).value[:, 0]
     assert 0.92 < np.median(water[water > 2.0]) / np.median(ground[ground > 2.0]) < 0.97
+
+
+@pytest.mark.parametrize('written', ['{:%Y-%m-%dT%H:%M:%S.250} ', '{:%Y-%m-%d %H:%M:%S,250},'])
+def test_a_time_of_receipt_may_state_no_zone(written: str) -> None:
+    lines = [
+        f'{written.format(datetime.fromtimestamp(START_NS // SECOND + k, UTC))}{rmc(k)}'
+        for k in range(5)
+    ]
+    result, _ = run('\n'.join(lines))
+    assert 'line' not in result.rejected
+    assert not result.days_early
+
+
+def test_dates_before_a_rollover_are_said_where_receipts_are_of_today() -> None:
+    lines = [
+        f'{datetime.fromtimestamp(START_NS // SECOND + k, UTC):%Y-%m-%dT%H:%M:%SZ} '
+        f'{rmc(k, day="140704")}'
+        for k in range(5)
+    ]
+    result, _ = run('\n'.join(lines))
+    assert result.days_early == 7168
+    assert any('give --date 2024-02-28' in line for line in result.summary(Path('x')))
+    mended, block = run('\n'.join(lines), day=date(2024, 2, 28))
+    assert mended.start_ns == int(block.stamp_ns[0]) == START_NS
+    assert not any('--date' in line for line in mended.summary(Path('x')))

@@ -172,3 +172,34 @@ def test_a_long_cell_takes_no_long_time(tmp_path: Path, cell: str) -> None:
     path.write_text(f'time,STW [kn],SOG [kn]\n0,10,{cell}\n{cell},10,9\n1,10,9\n')
     code = f'from shipdrag_ros.importing.reading import read_any\nread_any([{str(path)!r}])'
     subprocess.run([sys.executable, '-c', code], check=True, timeout=60)
+
+
+def test_a_header_may_stand_on_line_38(tmp_path: Path) -> None:
+    titles = [f'# key {k}: value, with a comma, here' for k in range(37)]
+    rows = [f'2024-05-17T09:{s // 60:02d}:{s % 60:02d}Z,{SPEED},{SPEED}' for s in range(120)]
+    block, shown = read(tmp_path, '\n'.join([*titles, 'Time (UTC),STW [m/s],SOG [m/s]']), rows)
+    assert len(of(block, Channel.SPEED_THROUGH_WATER)) == 120
+    assert '37 line(s) above the table were left out' in shown
+    pairs = '\n'.join([*(f'Key{k},value{k}' for k in range(59)), 'Time (UTC),STW [m/s],SOG [m/s]'])
+    assert len(of(read(tmp_path, pairs, rows)[0], Channel.SPEED_OVER_GROUND)) == 120
+
+
+@pytest.mark.parametrize(
+    ('name', 'channel', 'factor'),
+    [
+        ('stw_mps', Channel.SPEED_THROUGH_WATER, 1.0),
+        ('stw_kn', Channel.SPEED_THROUGH_WATER, 1852.0 / 3600.0),
+        ('heading_rad', Channel.HEADING, 1.0),
+        ('rudder_rad', Channel.RUDDER, 1.0),
+        ('rudder_deg', Channel.RUDDER, math.pi / 180.0),
+        ('shaft_rad_s', Channel.SHAFT, 1.0),
+        ('propeller_rps', Channel.SHAFT, 2.0 * math.pi),
+    ],
+)
+def test_a_unit_may_stand_at_the_end_of_a_name(
+    tmp_path: Path, name: str, channel: Channel, factor: float
+) -> None:
+    rows = [f'{s},{SPEED},{0.5 + s / 1000}' for s in range(30)]
+    block, _ = read(tmp_path, f'time_s,sog_mps,{name}', rows)
+    expected = [(0.5 + s / 1000) * factor for s in range(30)]
+    assert of(block, channel)[:, 0] == pytest.approx(expected)

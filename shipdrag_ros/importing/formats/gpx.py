@@ -25,7 +25,7 @@ _DEEPEST = 32
 _LONGEST = 100  # characters of a time or a speed
 _POSITION = Origin(0, 'trkpt')
 _SPEED = Origin(0, 'speed', 'm/s')
-_NUMBER = re.compile(r'[-+]?\d{1,10}(\.\d{1,20})?([eE][-+]?\d{1,2})?')
+_NUMBER = re.compile(r'[-+]?\d{1,10}(\.\d{1,40})?([eE][-+]?\d{1,2})?')
 
 
 def _score(head: Head) -> float:

@@ -285,7 +285,12 @@ class _Guesser:
         if column is None:
             return
         largest = self._rows.largest(column.place)
-        if column.unit == 'deg' or (not column.unit and largest > _TURN):
+        if column.unit == 'rad' and column.key.lower() == 'heading_rad':
+            self._take('heading', [column], ['rad'])
+            self.found.notes.append(
+                f'{column.key!r} is taken as the input of this name, yaw from east to north.'
+            )
+        elif column.unit == 'deg' or (not column.unit and largest > _TURN):
             self._take('heading', [column], [COMPASS])
             self.found.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
         else:

@@ -71,7 +71,7 @@ UNITS: Mapping[str, str] = {
     **dict.fromkeys(('deg', '°', 'degree', 'degrees', 'grad'), 'deg'),
     **dict.fromkeys(('rpm', '1/min', 'min-1', 'r/min', 'u/min'), 'rpm'),
     **dict.fromkeys(('rps', 'rev/s', '1/s', 's-1', 'hz'), 'rev/s'),
-    'rad/s': 'rad/s',
+    **dict.fromkeys(('rad/s', 'rad s', 'radps', 'rads'), 'rad/s'),
     **dict.fromkeys(('m', 'metre', 'metres', 'meter', 'meters'), 'm'),
     'km': 'km',
     **dict.fromkeys(('ft', 'feet'), 'ft'),
@@ -116,7 +116,7 @@ def role_and_unit(name: str, below: str = '') -> tuple[str, str]:
         return ('shaft' if plain == 'rpm' else _ROLE_OF.get(plain, '')), ''
     if plain in _ROLE_OF and (unit or plain not in UNITS):
         return _ROLE_OF[plain], unit or UNITS.get(words[-1] if len(words) > 1 else '', '')
-    for length in (2, 1):  # `m_s` is two words
+    for length in (3, 2, 1):  # `m_s` is two words
         tail = ' '.join(words[-length:])
         if len(words) > length and tail in UNITS:
             return _ROLE_OF.get(' '.join(words[:-length]), ''), unit or UNITS[tail]

@@ -8,10 +8,10 @@ table of canboat; units are SI.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import date
-from itertools import islice, pairwise
+from itertools import chain, islice, pairwise
 from math import cos, pi, remainder, sin
 from typing import Any
 
@@ -19,12 +19,11 @@ from nmea2000 import backend
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.format import Job
-from shipdrag_ros.importing.formats.n2k.frames import N2kFrame, parse
+from shipdrag_ros.importing.formats.n2k.frames import DAY_NS, MINUTE_NS, N2kFrame, parse
 from shipdrag_ros.importing.opened import Lines
 from shipdrag_ros.importing.stream import Origin, Reading, Tally
 from shipdrag_ros.samples import SECOND_NS, SHAFTS, Channel
 
-_DAY_NS = 86_400 * SECOND_NS
 _BASE_NS = 946_684_800 * SECOND_NS  # 2000-01-01, for lines without a time
 _RELATIVE_BELOW_NS = 100_000_000 * SECOND_NS
 _SYSTEM_TIME, _GNSS = 126992, 129029
@@ -42,15 +41,15 @@ class FrameClock:
     ----------
     rate_hz
         Frames a second, where the lines state no time.
-    day
-        Days since 1970 of the first line, where the lines have times of day.
     base_ns
-        Added to times that count from the start of the log [ns].
+        Added to times that do not count from 1970 [ns].
+    notes
+        What was assumed, a sentence each.
     """
 
     rate_hz: float | None = None
-    day: int = 0
     base_ns: int = 0
+    notes: tuple[str, ...] = ()
 
 
 def clock_of(job: Job) -> FrameClock:
@@ -71,13 +70,13 @@ def clock_of(job: Job) -> FrameClock:
     if first is None:
         raise ImportDataError(f'{name} holds no frame of NMEA 2000')
     if rate_hz is not None:
-        return FrameClock(rate_hz, days or 0)
+        return FrameClock(rate_hz, days * DAY_NS if days else _BASE_NS)
     if first.time_ns is None:
         raise ImportDataError(
             f'{name}: its lines state no time; log with `candump -L`, or give --rate HZ, how '
             'many frames came in a second'
         )
-    if not first.of_day:
+    if not first.cycle_ns:
         if first.time_ns >= _RELATIVE_BELOW_NS:
             return FrameClock()
         times = [frame.time_ns for frame in islice(frames, 1000) if frame.time_ns is not None]
@@ -87,28 +86,57 @@ def clock_of(job: Job) -> FrameClock:
                 'do; log with `candump -L`, or give --rate HZ'
             )
         return FrameClock(base_ns=_BASE_NS)
-    if days is None:
-        days = _date_in(islice(frames, _DATED_FRAMES))
+    known_ns = _start_in(chain([first], islice(frames, _DATED_FRAMES)))
+    if first.cycle_ns == MINUTE_NS:
+        notes = ['The times of the frames count within a minute: a pause of a minute is not seen.']
+        if known_ns is None:
+            notes.append('No frame states the date; the times count from 2000-01-01.')
+        start_ns = _BASE_NS if days is None else days * DAY_NS
+        return FrameClock(base_ns=start_ns if known_ns is None else known_ns, notes=tuple(notes))
+    if days is None and known_ns is not None:
+        days = known_ns // DAY_NS
     if days is None:
         raise ImportDataError(
             f'{name} has times of day, and no date (no PGN 126992 or 129029 with one); give '
             '--date YYYY-MM-DD of its first time, in UTC'
         )
-    return FrameClock(None, days)
+    return FrameClock(base_ns=days * DAY_NS)
 
 
-def _date_in(frames: Iterator[N2kFrame]) -> int | None:
-    """Return the days since 1970 that a message shows, of the first that does."""
-    packets = _Packets()
+def _start_in(frames: Iterable[N2kFrame]) -> int | None:
+    """
+    Return when the cycle of the first frame began [ns since 1970], by a message with a date.
+    """
+    packets, unwrapped = _Packets(), _Unwrapped()
     for frame in frames:
+        since_ns = 0 if frame.time_ns is None else unwrapped.ns(frame.time_ns, frame.cycle_ns)
         if frame.pgn in (_SYSTEM_TIME, _GNSS):
             data = packets.whole(frame)
             place = 2 if frame.pgn == _SYSTEM_TIME else 1
             if data is not None and len(data) >= 8:
                 days = int.from_bytes(data[place : place + 2], 'little')
-                if 0 < days < 0xFFFD:
-                    return days
+                of_day = int.from_bytes(data[place + 2 : place + 6], 'little')  # [0.1 ms]
+                if 0 < days < 0xFFFD and of_day < 864_000_000:
+                    time_ns = days * DAY_NS + of_day * 100_000 - since_ns
+                    # a time of day is the line's own, to which the message gives its day
+                    return time_ns if frame.cycle_ns == MINUTE_NS else days * DAY_NS
     return None
+
+
+class _Unwrapped:
+    """Times that begin again after a cycle, counted on."""
+
+    def __init__(self) -> None:
+        self._cycles = 0
+        self._last_ns = 0
+
+    def ns(self, time_ns: int, cycle_ns: int) -> int:
+        if time_ns < self._last_ns - cycle_ns // 2:
+            self._cycles += 1
+        elif time_ns > self._last_ns + cycle_ns // 2 and self._cycles:
+            self._cycles -= 1  # a damaged time had passed for the next cycle's
+        self._last_ns = time_ns
+        return self._cycles * cycle_ns + time_ns
 
 
 class _Packets:
@@ -152,8 +180,7 @@ class N2kReader:
         self._transducer_m: float | None = options.get('transducer')
         self._packets = _Packets()
         self._frames = 0
-        self._midnights = 0
-        self._of_day_ns = 0
+        self._unwrapped = _Unwrapped()
         self._readers: dict[int, Callable[[N2kFields], N2kValue | str]] = {
             128259: _water,
             129026: _ground,
@@ -170,6 +197,8 @@ class N2kReader:
         """
         Yield the readings of a log.
         """
+        for text in self._clock.notes:
+            self._tally.note(text)
         lines = Lines(job.source)
         total = job.source.stat().st_size
         for line in lines:
@@ -217,18 +246,13 @@ class N2kReader:
     def _stamp_ns(self, frame: N2kFrame) -> int | None:
         self._frames += 1
         if self._clock.rate_hz is not None:
-            start_ns = self._clock.day * _DAY_NS or _BASE_NS
-            return start_ns + round((self._frames - 1) / self._clock.rate_hz * SECOND_NS)
+            since_s = (self._frames - 1) / self._clock.rate_hz
+            return self._clock.base_ns + round(since_s * SECOND_NS)
         if frame.time_ns is None:
             return None
-        if not frame.of_day:
+        if not frame.cycle_ns:
             return frame.time_ns + self._clock.base_ns
-        if frame.time_ns < self._of_day_ns - _DAY_NS // 2:
-            self._midnights += 1
-        elif frame.time_ns > self._of_day_ns + _DAY_NS // 2 and self._midnights:
-            self._midnights -= 1  # a damaged time had passed for the next day's
-        self._of_day_ns = frame.time_ns
-        return (self._clock.day + self._midnights) * _DAY_NS + frame.time_ns
+        return self._clock.base_ns + self._unwrapped.ns(frame.time_ns, frame.cycle_ns)
 
     def _heading(self, fields: N2kFields) -> N2kValue | str:
         heading, reference = fields['heading'].value, fields['reference'].value

@@ -24,7 +24,7 @@ GAP_NS = 10 * SECOND_NS
 _TIME = re.compile(r'(\d\d)(\d\d)(\d\d)(?:\.(\d+))?')
 _DATE = re.compile(r'(\d\d)(\d\d)(\d\d)')
 _CENTURY_TURNS = 80  # 80 to 99 are years of the 20th century
-_ROLLOVER_DAYS = 1024 * 7  # a week number of GPS has ten bits
+ROLLOVER_DAYS = 1024 * 7  # a week number of GPS has ten bits
 
 
 class SentenceTime:
@@ -111,7 +111,7 @@ def rollover_days(day: int, true: date) -> int | None:
     weeks early. None if the difference is no such number of weeks.
     """
     difference = days_of(true) - day
-    return difference if difference % _ROLLOVER_DAYS == 0 else None
+    return difference if difference % ROLLOVER_DAYS == 0 else None
 
 
 class SentenceClock:

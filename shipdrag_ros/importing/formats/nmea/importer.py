@@ -28,6 +28,7 @@ from shipdrag_ros.importing.bag import (
     Understood,
     new_bag,
 )
+from shipdrag_ros.importing.formats.nmea.clock import DAY_NS
 from shipdrag_ros.importing.formats.nmea.log import NmeaLog
 from shipdrag_ros.importing.formats.nmea.record import SentenceConverter
 from shipdrag_ros.importing.formats.nmea.survey import Survey
@@ -79,6 +80,8 @@ class NmeaResult:
         Whether the heading is magnetic, for want of a variation.
     shift_days
         Added to every date of the log, whole cycles of the GPS week.
+    days_early
+        Whole cycles of the GPS week that the dates are before the times of receipt.
     log_attached
         Whether the log is attached to the bag.
     damage
@@ -104,6 +107,7 @@ class NmeaResult:
     dates_put_right: int
     magnetic_heading: bool
     shift_days: int
+    days_early: int
     log_attached: bool
     damage: str
     checksums: bool
@@ -127,6 +131,12 @@ class NmeaResult:
         if self.shift_days:
             lines.append(
                 f'All dates were shifted by {self.shift_days} days, whole cycles of the GPS week.'
+            )
+        if self.days_early and not self.shift_days:
+            received = display.utc(self.start_ns + self.days_early * DAY_NS)[:10]
+            lines.append(
+                f'The dates of the receiver are {self.days_early} days, whole cycles of the GPS '
+                f'week, before the times of receipt: give --date {received} to shift them.'
             )
         if self.dates_put_right:
             lines.append(
@@ -293,6 +303,7 @@ def _result(
         dates_put_right=record.clock.dates_put_right,
         magnetic_heading=heading is not None and heading.detail == MAGNETIC,
         shift_days=record.clock.shift_days,
+        days_early=survey.days_early,
         log_attached=attached,
         damage=log.damage,
         checksums=log.checksum is Checksum.REQUIRED,

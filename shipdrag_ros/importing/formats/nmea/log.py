@@ -33,7 +33,8 @@ _TAGS = re.compile(f'(?:{_TAG.pattern})+')
 _TAG_TIME = re.compile(r'(?:^|,)c:(\d{9,14})(?:,|$)')
 _EPOCH = re.compile(r'\[?(\d{9,10}|\d{13})(\.\d+)?\]?[\s,;:]*')
 _ISO = re.compile(
-    r'(?:\w{1,40}\s+)?\[?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(\.\d+)?(Z|[+-]\d\d:?\d\d)\]?[\s,;:]*'
+    r'(?:\w{1,40}\s+)?\[?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d+))?'
+    r'(Z|[+-]\d\d:?\d\d)?\]?[\s,;:]*'
 )
 _MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past the year 5000
 
@@ -47,7 +48,7 @@ class NmeaLog:
     path
         File with a sentence a line. Before a sentence may stand a TAG block,
         or the time of its receipt: seconds or milliseconds since 1970, or ISO
-        8601 with the zone.
+        8601, taken as UTC without a zone.
     checksum
         Of the sentences.
 
@@ -181,10 +182,11 @@ def _receive_ns(prefix: str) -> int | None:
         receive_ns = _counted_ns(epoch[1], epoch[2] or '')
     elif iso := _ISO.fullmatch(prefix):
         try:
-            moment = datetime.fromisoformat(iso[1] + iso[3])
+            moment = datetime.fromisoformat(iso[1] + (iso[3] or 'Z'))
         except ValueError:
             raise ValueError('prefix not understood') from None
-        receive_ns = int(moment.timestamp()) * SECOND_NS + _fraction_ns(iso[2] or '', SECOND_NS)
+        fraction = f'.{iso[2]}' if iso[2] else ''
+        receive_ns = int(moment.timestamp()) * SECOND_NS + _fraction_ns(fraction, SECOND_NS)
     else:
         raise ValueError('prefix not understood')
     if not 0 <= receive_ns < LIMIT_NS:

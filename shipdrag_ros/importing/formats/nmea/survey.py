@@ -13,6 +13,7 @@ from datetime import date
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.importing.formats.nmea.clock import (
     DAY_NS,
+    ROLLOVER_DAYS,
     SentenceClock,
     SentenceTime,
     days_of,
@@ -42,6 +43,7 @@ class Survey:
         self._received = False
         self._timed = False
         self._first: SentenceTime | None = None
+        self._first_received_ns: int | None = None
         self.addresses: Counter[tuple[str, str]] = Counter()
         self.values: dict[Channel, Counter[SentenceSource]] = {}
 
@@ -52,12 +54,12 @@ class Survey:
         self.addresses[sentence.talker, sentence.kind] += 1
         self._received |= sentence.receive_ns is not None
         if sentence.kind in TIMED:
-            self._time(Fields(sentence.kind, sentence.fields))
+            self._time(Fields(sentence.kind, sentence.fields), sentence.receive_ns)
         for channel, source, _ in read_values(sentence, self._mounting):
             if source is not None:
                 self.values.setdefault(channel, Counter())[source] += 1
 
-    def _time(self, fields: Fields) -> None:
+    def _time(self, fields: Fields, receive_ns: int | None) -> None:
         if self._first is not None:
             return
         try:
@@ -66,7 +68,16 @@ class Survey:
             return
         self._timed = True
         if moment.trusted and moment.day is not None:
-            self._first = moment
+            self._first, self._first_received_ns = moment, receive_ns
+
+    @property
+    def days_early(self) -> int:
+        """Days that the receiver is before the receipt where these are whole cycles; or 0."""
+        if self._first is None or self._first.day is None or self._first_received_ns is None:
+            return 0
+        days = round(self._first_received_ns / DAY_NS) - self._first.day
+        cycles = round(days / ROLLOVER_DAYS)
+        return cycles * ROLLOVER_DAYS if abs(days - cycles * ROLLOVER_DAYS) <= 2 else 0
 
     def chosen(self) -> dict[Channel, SentenceSource]:
         """
