@@ -98,7 +98,7 @@ def lead_check(lead_s: float | None, ready_s: float | None) -> Check:
     """
     name = 'Steady lead'
     if lead_s is None or ready_s is None:
-        return Check(name, Held.UNKNOWN, 'not said by the node')
+        return Check(name, Held.UNKNOWN, 'no speed, or the node does not say')
     if lead_s >= ready_s:
         return Check(name, Held.YES, f'{clock(lead_s)}, at least {clock(ready_s)}')
     return Check(name, Held.WAIT, f'{clock(lead_s)} of {clock(ready_s)}')

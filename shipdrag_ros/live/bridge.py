@@ -165,7 +165,7 @@ class Bridge:
             ages = [self._age_s(name, now_s) for name in MOTION_INPUTS]
             age_s = min((age for age in ages if age is not None), default=None)
             return SpeedNow(self._speed.value, 'through water, estimated', age_s)
-        return min(measured, key=lambda each: (each.age_s or 0.0) > _OLD_S, default=None)
+        return min(measured, key=lambda each: max(each.age_s or 0.0, _OLD_S), default=None)
 
     def _age_s(self, name: str, now_s: float) -> float | None:
         """Return how long ago the node received an input; None where that is not known."""
@@ -391,6 +391,7 @@ class Bridge:
         speed_m_s = None if speed is None else speed.value_m_s
         second, coasting = self._now_s, now.coast_s is not None
         of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
+        lead_s = self._lead_at_stop if of_run else None if now.trouble else now.lead_s
         course = self._recent.direction(second)
         before = self._course_at_stop if coasting else None
         if before is None and self._courses:
@@ -399,7 +400,7 @@ class Bridge:
         depth = self._recent.mean(Channel.DEPTH, second)
         rudder = self._recent.mean(Channel.RUDDER, second)
         checks = [
-            acceptance.lead_check(self._lead_at_stop if of_run else now.lead_s, now.ready_s),
+            acceptance.lead_check(lead_s, now.ready_s),
             acceptance.wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
             acceptance.depth_check(depth and depth[0], speed_m_s, self._ship),
             acceptance.rudder_check(rudder and rudder[0]),

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from shipdrag_ros.display import printable
 from shipdrag_ros.messages import types
 from shipdrag_ros.samples import Block
 
@@ -142,12 +143,12 @@ def health_of(statuses: Iterable[Any]) -> list[Health]:
 
 
 def _read(status: Any) -> Status:
-    node, _, part = str(status.name).rpartition(': ')
+    node, _, part = printable(str(status.name)).rpartition(': ')
     level = status.level  # a byte of rclpy, a number elsewhere
     return Status(
         node=node,
         part=part,
         level=level[0] if isinstance(level, bytes) else int(level),
-        message=str(status.message),
-        values={str(item.key): str(item.value) for item in status.values},
+        message=printable(str(status.message)),
+        values={printable(str(item.key)): printable(str(item.value)) for item in status.values},
     )

@@ -119,6 +119,11 @@ def test_what_instruments_say_by_nmea_is_what_a_mate_reads(
     assert viewer.page.get_attribute('#state', 'data-tone') == 'bad'
     assert ' s old' in viewer.text('#note-speed')
     assert 'stale' in viewer.page.get_attribute('#figure-speed', 'class')
+    # no topic of the node itself is offered, and the last figures are not those of now
+    assert '/coastdown_node/nmea' not in viewer.text('#action')
+    assert viewer.text('#trace-say').startswith('Last: ')
+    assert viewer.text('#shaft-say').startswith('Last: 60 rpm')
+    assert 'over ground' in viewer.text('#note-speed')
     viewer.wait_for('#checks', 'no reading now')
     for name in ('Wind', 'Depth', 'Rudder', 'Course'):
         assert 'no reading now: no data for' in checklist(viewer)[name]
