@@ -5,9 +5,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+import reprlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
 
 M_S_PER_KNOT = 1852.0 / 3600.0
 _UNIT_RATIOS = {
@@ -244,3 +254,35 @@ def printable(text: str) -> str:
     'log\\\\x1b'
     """
     return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
+def short_repr(result: DataclassInstance) -> str:
+    """
+    Return a line for a dataclass that holds arrays; its `__repr__`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Curve:
+    ...     speed_m_s: object
+    ...     __repr__ = short_repr
+    >>> Curve(np.linspace(1.0, 8.0, 200))
+    Curve(speed_m_s=<200 float64, 1 to 8>)
+    """
+    parts = (f'{item.name}={_shown(getattr(result, item.name))}' for item in fields(result))
+    return f'{type(result).__name__}({", ".join(parts)})'
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        size = ' x '.join(map(str, value.shape)) or 'no axis,'
+        numbers = value.dtype.kind in 'if' and value.size and np.isfinite(value).any()
+        ends = f', {np.nanmin(value):.4g} to {np.nanmax(value):.4g}' if numbers else ''
+        return f'<{size} {value.dtype}{ends}>'
+    if is_dataclass(value) and not isinstance(value, type):
+        return f'{type(value).__name__}(...)'
+    if isinstance(value, tuple | list | Mapping) and len(value) > 1:
+        return f'<{len(value)} items>'
+    return _SHORT.repr(value)
