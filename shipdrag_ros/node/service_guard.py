@@ -96,6 +96,11 @@ def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> Non
     change = change_state.callback
 
     def refuse_or_change(request: Any, response: Any) -> Any:
+        label = request.transition.label
+        if not label.isprintable():  # rcl would print it as it is
+            warn(f'transition refused: no transition is named {printable(label)!r}')
+            response.success = False
+            return response
         try:
             return change(request, response)
         except rclpy_implementation.RCLError as error:
