@@ -244,6 +244,18 @@ def speed_text(speed_m_s: float, *, highest_m_s: float) -> str:
     return f'{speed_m_s:.{2 if highest_m_s >= 1.0 else 3}f}'
 
 
+def printable(text: str) -> str:
+    """
+    Return a text of a peer as a terminal may have it, control characters as escapes.
+
+    Examples
+    --------
+    >>> printable('log' + chr(27))
+    'log\\\\x1b'
+    """
+    return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
 def short_repr(result: DataclassInstance) -> str:
     """
     Return a line for a dataclass that holds arrays; its `__repr__`.
