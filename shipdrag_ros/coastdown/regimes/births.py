@@ -8,11 +8,12 @@ import math
 import numpy as np
 
 from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law
 from shipdrag_ros.coastdown.regimes.state import (
     A0, A_VAR, BEFORE, BRAKE, COUNT, DRIVEN, FIRST_A, GLIDE, GLIDE_TURN, GLIDED, KEPT, LEVEL, LIAR,
     LN_A, LN_U, OPEN, P0, P_VAR, POWER, RAMP_FROM, RAMP_S, REGIME, REVS, ROOM, SINCE, STATES,
-    SWITCHES, THE_LOG, THE_TRACK, TURN, UNSEEN, WEIGHT, Histories, Setting,
+    SWITCHES, THE_LOG, THE_TRACK, TURN, UNSEEN, WANDER, WEIGHT, Histories, Setting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
@@ -51,7 +52,9 @@ def _free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
 
 
 @compiled(uncounted=True)
-def _born(bank: Histories, i: int, now_s: float, share: float, regime: int, ramp_s: float) -> int:
+def _born(
+    bank: Histories, i: int, hull: HullPrior, now_s: float, share: float, regime: int, ramp_s: float
+) -> int:
     """Copy a history that switches now; return its slot, or -1 where there is no room."""
     j = bank.count[0]
     if j >= ROOM or not share > 0.0:
@@ -71,6 +74,9 @@ def _born(bank: Histories, i: int, now_s: float, share: float, regime: int, ramp
     bank.at[j, w[COUNT]], bank.what[j, w[COUNT]] = now_s, regime
     bank.ramp[j, w[COUNT]] = ramp_s
     w[COUNT] += 1
+    # how a log's filter bears a sudden change is not known
+    law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    bank.spread[j, WANDER, WANDER] += (n.LOG_LAG_SD_S * math.exp(law)) ** 2
     return int(j)
 
 
@@ -86,7 +92,7 @@ def _glides(bank: Histories, i: int, setting: Setting, now_s: float, chance: flo
                 share *= n.PITCH_UNSEEN if unseen else 1.0 - n.PITCH_UNSEEN
             if not under_way and k > 0:
                 continue
-            j = _born(bank, i, now_s, chance * (share if under_way else 1.0), GLIDE, ramp_s)
+            j = _born(bank, i, setting.hull, now_s, chance * (share if under_way else 1.0), GLIDE, ramp_s)
             if j < 0:
                 continue
             x, p = bank.mean[j], bank.spread[j]
@@ -112,7 +118,7 @@ def _levels(bank: Histories, i: int, setting: Setting, now_s: float, chance: flo
         for m in range(len(n.LEVEL_RAMP_S) if engaged else 1):
             share = chance * n.LEVELS_SHARE[k] / (len(n.LEVEL_RAMP_S) if engaged else 1)
             ramp_s = (n.LEVEL_RAMP_S[m] if engaged else n.ENGAGE_S) * setting.pace
-            j = _born(bank, i, now_s, share, LEVEL, ramp_s)
+            j = _born(bank, i, setting.hull, now_s, share, LEVEL, ramp_s)
             if j < 0:
                 continue
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
@@ -124,7 +130,7 @@ def _turns(
     bank: Histories, i: int, setting: Setting, now_s: float, chance: float, regime: int
 ) -> None:
     for k in range(len(n.TURNS)):
-        j = _born(bank, i, now_s, chance / len(n.TURNS), regime, 1.0)
+        j = _born(bank, i, setting.hull, now_s, chance / len(n.TURNS), regime, 1.0)
         if j >= 0:
             if regime == TURN:
                 bank.number[j, BEFORE] = bank.mean[i, OPEN]
@@ -132,9 +138,9 @@ def _turns(
 
 
 @compiled(uncounted=True)
-def _back(bank: Histories, i: int, now_s: float, chance: float) -> None:
+def _back(bank: Histories, i: int, setting: Setting, now_s: float, chance: float) -> None:
     """Let a turn end under the power of before."""
-    j = _born(bank, i, now_s, chance, LEVEL, 1.0)
+    j = _born(bank, i, setting.hull, now_s, chance, LEVEL, 1.0)
     if j >= 0:
         before = bank.number[i, BEFORE]
         bank.number[j, RAMP_FROM] = before
@@ -152,7 +158,7 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
 
 
 @compiled(uncounted=True)
-def bear(bank: Histories, setting: Setting, both: bool) -> None:
+def bear(bank: Histories, setting: Setting, both: bool, steered: bool) -> None:
     """
     Let every likely history switch at the beginning of this bin.
 
@@ -160,6 +166,8 @@ def bear(bank: Histories, setting: Setting, both: bool) -> None:
     ----------
     both
         Two instruments show the motion: either may lie from now on.
+    steered
+        The rate of turn is seen: without it a turn in a glide is any brake.
     """
     now_s = (bank.clock[0] - 1) * setting.step_s
     hours = setting.step_s / 3600.0
@@ -196,17 +204,18 @@ def bear(bank: Histories, setting: Setting, both: bool) -> None:
             _turns(bank, i, setting, now_s, turn * hours, TURN)
         elif regime == GLIDE:
             _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
-            _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+            if steered:
+                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
             for k in range(len(n.BRAKES)):
                 share = n.GLIDE_BRAKE * hours / len(n.BRAKES)
-                j = _born(bank, i, now_s, share, BRAKE, 1.0)
+                j = _born(bank, i, setting.hull, now_s, share, BRAKE, 1.0)
                 if j >= 0:
                     _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
         elif regime == BRAKE:
             _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
             _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
         elif regime == TURN:
-            _back(bank, i, now_s, n.TURN_OUT * hours)
+            _back(bank, i, setting, now_s, n.TURN_OUT * hours)
         else:
             _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
 

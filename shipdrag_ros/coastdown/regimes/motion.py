@@ -11,7 +11,7 @@ from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.state import (
     A0, A_VAR, ADVANCE, BRAKE, CURRENT, DRIVEN, FIRST_A, GLIDE, GLIDE_TURN, GROUND, GUST, HIGH,
-    LEVEL, LIAR, LN_A, LN_U, LOG, LOW, N_FIX, N_GROUND, N_GUST, N_LOG, N_RATE, N_WALK, N_WANDER,
+    LAG, LEVEL, LIAR, LN_A, LN_U, LOG, LOW, N_FIX, N_GROUND, N_GUST, N_LOG, N_RATE, N_WALK, N_WANDER,
     N_WANDER_S, OPEN, P0, P_VAR, POWER, RAMP_FROM, RAMP_S, RATE, REGIME, REVS, SINCE, STATES,
     THE_LOG, THE_TRACK, TURN, UNSEEN, WANDER, WAY, WEIGHT, BEFORE, Histories, Setting,
 )  # fmt: skip
@@ -93,6 +93,7 @@ def predict(
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
     keep_c = math.exp(-dt / (n.CURRENT_S * pace))
+    keep_f = math.exp(-dt / (_LAG_S * pace))
     c = work[STATES]
     slowing = 0.0
     for part in range(_PARTS):
@@ -113,9 +114,11 @@ def predict(
         for k in range(STATES):
             work[1, k] = p[LN_A, k] + power * (work[0, k] - p[LN_U, k]) + change * p[POWER, k]
             work[2, k] = p[WAY, k] + dt * (u * p[LN_U, k] + p[CURRENT, k])
+            work[3, k] = keep_f * p[LAG, k] - u * (work[0, k] - p[LN_U, k])
         l_l, l_a, l_o, l_g = c[LN_U], c[LN_A], c[OPEN], c[GUST]
         for k in range(STATES):
             p[LN_U, k], p[LN_A, k], p[WAY, k] = work[0, k], work[1, k], work[2, k]
+            p[LAG, k] = work[3, k]
             p[GUST, k] *= keep_g
             p[WANDER, k] *= keep_b
             p[CURRENT, k] *= keep_c
@@ -126,6 +129,7 @@ def predict(
             )  # fmt: skip
             old, way = p[k, LN_U], p[k, WAY] + dt * (u * p[k, LN_U] + p[k, CURRENT])
             p[k, LN_A] += power * (new - old) + change * p[k, POWER]
+            p[k, LAG] = keep_f * p[k, LAG] - u * (new - old)
             p[k, LN_U], p[k, WAY] = new, way
             p[k, GUST] *= keep_g
             p[k, WANDER] *= keep_b
@@ -141,7 +145,8 @@ def predict(
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
         x[WAY] += dt * (u + x[CURRENT])
-        x[LN_U] += change
+        x[LAG] = keep_f * x[LAG] - u * change
+        x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
         x[LN_A] += power * change
         x[GUST] *= keep_g
         x[WANDER] *= keep_b
@@ -249,12 +254,12 @@ def weigh(
         for j in range(STATES):
             h[j] = 0.0
         h[LN_U] = u
-        lag = half + pace * (_LAG_S if which == LOG else _GROUND_LAG_S)
+        lag = half + (0.0 if which == LOG else pace * _GROUND_LAG_S)
         expected = u - lag * slowing
         sd = noise[N_LOG]
         if which == LOG:
-            h[WANDER] = 1.0
-            expected += x[WANDER]
+            h[WANDER] = h[LAG] = 1.0
+            expected += x[WANDER] + x[LAG]
         else:
             h[CURRENT] = 1.0
             expected += x[CURRENT]
@@ -282,7 +287,7 @@ def weigh(
         several = setting.shafts > 1
         gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, several)
     f[WEIGHT] += gained
-    if regime == DRIVEN:
+    if regime == DRIVEN or regime == TURN:
         # at balance neither is seen, only the filter's own errors
         for which, mean, var in ((LN_A, f[A0], f[A_VAR]), (POWER, f[P0], f[P_VAR])):
             x[which] = mean

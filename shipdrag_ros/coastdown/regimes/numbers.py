@@ -53,7 +53,8 @@ def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float
 
 
 BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
-LOG_LAG_S = _number('LOG_LAG_S', 6.0, 's', 'middle of the filters of logs')
+LOG_LAG_S = _number('LOG_LAG_S', 5.0, 's', 'middle of the filters of logs')
+LOG_LAG_SD_S = _number('LOG_LAG_SD_S', 3.0, 's', 'how a log bears a sudden change')
 GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
 
 # the hull
@@ -65,7 +66,7 @@ RESISTANCE_FILE = _grid(
 )
 DRAGGED = _grid('DRAGGED', (0.15, 0.20), 'ln', 'more in a glide: a propeller that is dragged')
 KEPT_SD = _number('KEPT_SD', 0.15, 'ln', 'of a resistance learnt under power, taken to a glide')
-EXPONENT = _grid('EXPONENT', (0.45, 0.5), '1', 'over that of friction: mean, sd; waves have 4')
+EXPONENT = _grid('EXPONENT', (0.45, 0.6), '1', 'over that of friction: mean, sd; waves have 4')
 EXPONENT_FILE = _grid('EXPONENT_FILE', (0.1, 0.3), '1', 'over that of the baseline: mean, sd')
 EXPONENT_WALK = _number('EXPONENT_WALK', 0.4, '1', 'per root of ln u: no law is one power')
 NO_THRUST = _number('NO_THRUST', 1.8, '1', 'advance without thrust over that of service')

@@ -17,9 +17,9 @@ SWITCHES = 12  # that a history remembers
 
 # the state of a history: ln u, ln resistance over the curve of the hull, its exponent over that
 # of the curve, what the regime leaves open, gust [m/s^2], slow error of the log [m/s], current
-# [m/s], true way less the way as read [m]
-LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY = range(8)
-STATES = 8
+# [m/s], true way less the way as read [m], what the filter of the log lags behind [m/s]
+LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG = range(9)
+STATES = 9
 
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 
@@ -36,7 +36,8 @@ NOBODY, THE_LOG, THE_TRACK = range(3)
 
 # what a bin says; NaN where nothing
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
-SAID = 6
+SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
+SAID = 10
 
 # noise in use: gust over resistance, sd and time of the log's slow error, white noise of log,
 # speed over ground and fixes, their walk, sd of the rate of turn
