@@ -205,7 +205,10 @@ def _shaft(
             share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
             target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
         at = math.exp(min(target - log_first, 1.0))
-        density = _normal(nu - at, sd)
+        held, f[REVS] = f[REVS], nu if np.isnan(f[REVS]) else 0.7 * f[REVS] + 0.3 * nu
+        density = 0.5 * _normal(nu - at, sd)
+        if abs(at - nu) < 0.35:  # a governor, or the sea, holds them near it
+            density += 0.5 * (1.0 if np.isnan(held) else _normal(nu - held, sd))
         if several and regime == LEVEL:
             density = 0.5 * density + (0.5 if at - sd < nu < 1.0 + sd else 0.0)
     elif regime == TURN:
