@@ -373,7 +373,7 @@ class Monitor:
             cause = regimes.ended_by(one.after) if one.after >= 0 else EndedBy.SPEED
             events += self._running.end(cause, end_ns, None, self._final_estimator, _chosen(one))
             self._running = None
-        if not dated and self._reported_s < 0.0 and self._candidate.noticed:
+        if not dated and self._reported_s < 0.0 and regimes.doubted:
             reason, text = regimes.dismissal()
             start_ns, end_ns = self._candidate.start * SECOND_NS, (number + 1) * SECOND_NS
             events += self._dismissals.take(NotCoastdown(start_ns, end_ns, reason, text))

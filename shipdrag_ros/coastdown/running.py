@@ -130,9 +130,7 @@ class RunningCoastdown:
                     chosen.start_ns, end_ns, chosen.start_ns - before_ns * (not chosen.cuts)
                 )
                 start_ns = chosen.start_ns
-                found = estimate_kept(
-                    window, chosen.cuts, self._ship, self._parameters, estimator
-                )
+                found = estimate_kept(window, chosen.cuts, self._ship, self._parameters, estimator)
             cuts, final, failure, end_ns = found.cuts, found.estimate, found.failure, found.end_ns
             stretch = found.stretch
             if found.start_ns != window.start_ns:  # later too where an old part has rolled out

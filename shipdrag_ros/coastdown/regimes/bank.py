@@ -15,9 +15,40 @@ from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, weigh
 from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
 from shipdrag_ros.coastdown.regimes.state import (
-    A0, A_VAR, ADVANCE, BEFORE, BRAKE, COUNT, CURRENT, DRIVEN, FIRST_A, GLIDE, GLIDE_TURN, GLIDED,
-    GROUND, HIGH, LEVEL, LIAR, LN_A, LN_U, LOG, LOW, OPEN, P0, P_VAR, POWER, RAMP_S, RATE, REGIME,
-    SAID, SHAFTS, SINCE, STATES, TURN, WAY, WEIGHT, Histories, Setting,
+    A0,
+    A_VAR,
+    ADVANCE,
+    BEFORE,
+    BRAKE,
+    COUNT,
+    CURRENT,
+    DRIVEN,
+    FIRST_A,
+    GLIDE,
+    GLIDED,
+    GROUND,
+    HIGH,
+    LEVEL,
+    LIAR,
+    LN_A,
+    LN_U,
+    LOG,
+    LOW,
+    OPEN,
+    P0,
+    P_VAR,
+    POWER,
+    RAMP_S,
+    RATE,
+    REGIME,
+    SAID,
+    SHAFTS,
+    SINCE,
+    STATES,
+    WAY,
+    WEIGHT,
+    Histories,
+    Setting,
 )  # fmt: skip
 from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.samples import Float64
@@ -80,8 +111,8 @@ def _begin(bank: Bank, setting: Setting, speed: float, by_log: bool, both: bool)
                 chance *= n.LIES_FIRST
             if not chance > 0.0:
                 continue
-            j = all_.count[0]
-            all_.count[0] = j + 1
+            j = all_.used[0]
+            all_.used[0] = j + 1
             x, p, f, w = all_.mean[j], all_.spread[j], all_.number[j], all_.whole[j]
             for k in range(STATES):
                 x[k] = 0.0
@@ -142,7 +173,7 @@ def _sum_up(bank: Bank, setting: Setting) -> None:
     for k in range(FIT):
         out[k] = 0.0
     now_s = all_.clock[0] * setting.step_s
-    for i in range(all_.count[0]):
+    for i in range(all_.used[0]):
         share = math.exp(all_.number[i, WEIGHT])
         f, w = all_.number[i], all_.whole[i]
         regime = w[REGIME]
@@ -178,7 +209,7 @@ def step(bank: Bank, setting: Setting) -> None:
     log, ground, way = said[LOG], said[GROUND], said[ADVANCE]
     by_log = not np.isnan(log)
     both = by_log and not (np.isnan(ground) and np.isnan(way))
-    if all_.count[0] == 0:
+    if all_.used[0] == 0:
         speed = log if by_log else ground
         if np.isnan(speed):
             speed = way / setting.step_s
@@ -193,7 +224,7 @@ def step(bank: Bank, setting: Setting) -> None:
         bear(all_, setting, both, not np.isnan(said[RATE]))
     before = 0.0
     advance = 0.0 if np.isnan(way) else way
-    for i in range(all_.count[0]):
+    for i in range(all_.used[0]):
         slowing = predict(all_, i, setting, used, advance, bank.work)
         weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
     thin(all_, setting)

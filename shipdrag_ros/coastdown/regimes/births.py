@@ -11,12 +11,43 @@ from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.motion import hull_law
 from shipdrag_ros.coastdown.regimes.state import (
-    A0, A_VAR, BEFORE, BRAKE, COUNT, DRIVEN, FIRST_A, GLIDE, GLIDE_TURN, GLIDED, KEPT, LEVEL, LIAR,
-    LN_A, LN_U, OPEN, P0, P_VAR, POWER, RAMP_FROM, RAMP_S, REGIME, REVS, ROOM, SINCE, STATES,
-    SWITCHES, THE_LOG, THE_TRACK, TURN, UNSEEN, WANDER, WEIGHT, Histories, Setting,
+    A0,
+    A_VAR,
+    BEFORE,
+    BRAKE,
+    COUNT,
+    DRIVEN,
+    FIRST_A,
+    GLIDE,
+    GLIDE_TURN,
+    GLIDED,
+    KEPT,
+    LEVEL,
+    LIAR,
+    LN_A,
+    LN_U,
+    OPEN,
+    P0,
+    P_VAR,
+    POWER,
+    RAMP_FROM,
+    RAMP_S,
+    REGIME,
+    REVS,
+    ROOM,
+    SINCE,
+    STATES,
+    SWITCHES,
+    THE_LOG,
+    THE_TRACK,
+    TURN,
+    UNSEEN,
+    WANDER,
+    WEIGHT,
+    Histories,
+    Setting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
-from shipdrag_ros.samples import Float64
 
 _PARENTS = 7.0  # nats below the best: a history that still has children
 _LOST = 16.0  # and one that is dropped
@@ -53,14 +84,20 @@ def _free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
 
 @compiled(uncounted=True)
 def _born(
-    bank: Histories, i: int, hull: HullPrior, now_s: float, share: float, regime: int, ramp_s: float
+    bank: Histories,
+    i: int,
+    hull: HullPrior,
+    now_s: float,
+    share: float,
+    regime: int,
+    ramp_s: float,
 ) -> int:
     """Copy a history that switches now; return its slot, or -1 where there is no room."""
-    j = bank.count[0]
+    j = bank.used[0]
     if j >= ROOM or not share > 0.0:
         return -1
     _copy(bank, i, j)
-    bank.count[0] = j + 1
+    bank.used[0] = j + 1
     f, w = bank.number[j], bank.whole[j]
     f[WEIGHT] += math.log(share)
     f[SINCE], f[RAMP_S], f[REVS] = now_s, ramp_s, np.nan
@@ -92,7 +129,9 @@ def _glides(bank: Histories, i: int, setting: Setting, now_s: float, chance: flo
                 share *= n.PITCH_UNSEEN if unseen else 1.0 - n.PITCH_UNSEEN
             if not under_way and k > 0:
                 continue
-            j = _born(bank, i, setting.hull, now_s, chance * (share if under_way else 1.0), GLIDE, ramp_s)
+            j = _born(
+                bank, i, setting.hull, now_s, chance * (share if under_way else 1.0), GLIDE, ramp_s
+            )
             if j < 0:
                 continue
             x, p = bank.mean[j], bank.spread[j]
@@ -149,10 +188,10 @@ def _back(bank: Histories, i: int, setting: Setting, now_s: float, chance: float
 
 @compiled(uncounted=True)
 def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
-    j = bank.count[0]
+    j = bank.used[0]
     if j < ROOM:
         _copy(bank, i, j)
-        bank.count[0] = j + 1
+        bank.used[0] = j + 1
         bank.number[j, WEIGHT] += math.log(chance)
         bank.whole[j, LIAR] = liar
 
@@ -171,7 +210,7 @@ def bear(bank: Histories, setting: Setting, both: bool, steered: bool) -> None:
     """
     now_s = (bank.clock[0] - 1) * setting.step_s
     hours = setting.step_s / 3600.0
-    parents = bank.count[0]
+    parents = bank.used[0]
     best = -np.inf
     for i in range(parents):
         best = max(best, bank.number[i, WEIGHT])
@@ -188,7 +227,7 @@ def bear(bank: Histories, setting: Setting, both: bool, steered: bool) -> None:
             w[REGIME] = regime = DRIVEN
             f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
             f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
-        if regime == DRIVEN or regime == LEVEL:
+        if regime in (DRIVEN, LEVEL):
             if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
                 continue
             stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
@@ -226,15 +265,15 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
     w, v = bank.whole[i], bank.whole[j]
     last = w[COUNT] - 1
     if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[UNSEEN] != v[UNSEEN] or last < 0:
-        return w[COUNT] == v[COUNT] == 0 and w[LIAR] == v[LIAR]
+        return bool(w[COUNT] == 0 and v[COUNT] == 0 and w[LIAR] == v[LIAR])
     if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
         return False
     if abs(bank.at[i, last] - bank.at[j, last]) > _ALIKE_S * pace:
         return False
+    differ = 0
     for k in range(last + 1):
-        if bank.what[i, k] != bank.what[j, k]:
-            return False
-    return True
+        differ += bank.what[i, k] != bank.what[j, k]
+    return differ == 0
 
 
 @compiled(uncounted=True)
@@ -242,7 +281,7 @@ def thin(bank: Histories, setting: Setting) -> None:
     """
     Weigh against the best; merge and keep the likeliest now and then.
     """
-    count = bank.count[0]
+    count = bank.used[0]
     best = -np.inf
     for i in range(count):
         best = max(best, bank.number[i, WEIGHT])
@@ -260,17 +299,17 @@ def thin(bank: Histories, setting: Setting) -> None:
         if kept != i:
             _copy(bank, i, kept)
         kept += 1
-    bank.count[0] = kept
+    bank.used[0] = kept
     if not due:
         return
     _merge(bank, now_s, setting.pace)
-    if bank.count[0] > KEPT:
+    if bank.used[0] > KEPT:
         _keep_best(bank)
 
 
 @compiled(uncounted=True)
 def _merge(bank: Histories, now_s: float, pace: float) -> None:
-    count, kept = bank.count[0], 0
+    count, kept = bank.used[0], 0
     for i in range(count):
         into = -1
         for j in range(kept):
@@ -295,12 +334,12 @@ def _merge(bank: Histories, now_s: float, pace: float) -> None:
         bank.number[into, WEIGHT] = total
         if last >= 0:
             bank.at[into, last], bank.ramp[into, last] = at, ramp
-    bank.count[0] = kept
+    bank.used[0] = kept
 
 
 @compiled(uncounted=True)
 def _keep_best(bank: Histories) -> None:
-    count = bank.count[0]
+    count = bank.used[0]
     low, high = -_LOST - 1.0, 0.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -317,4 +356,4 @@ def _keep_best(bank: Histories) -> None:
             if kept != i:
                 _copy(bank, i, kept)
             kept += 1
-    bank.count[0] = kept
+    bank.used[0] = kept

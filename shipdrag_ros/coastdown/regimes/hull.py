@@ -50,7 +50,8 @@ class HullPrior(NamedTuple):
         """
         Take it from a ship file, with or without a baseline.
         """
-        log_u = np.linspace(*(math.log(float(ship.speed(each))) for each in _SPEEDS), _POINTS)
+        slow, fast = (math.log(float(ship.speed(each))) for each in _SPEEDS)
+        log_u = np.linspace(slow, fast, _POINTS)
         known = _baseline(ship, np.exp(log_u))
         curve, level, exponent = known or (
             _friction(ship, np.exp(log_u)),

@@ -10,10 +10,54 @@ import numpy as np
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.state import (
-    A0, A_VAR, ADVANCE, BRAKE, CURRENT, DRIVEN, FIRST_A, GLIDE, GLIDE_TURN, GROUND, GUST, HIGH,
-    LAG, LEVEL, LIAR, LN_A, LN_U, LOG, LOW, N_FIX, N_GROUND, N_GUST, N_LOG, N_RATE, N_WALK, N_WANDER,
-    N_WANDER_S, OPEN, P0, P_VAR, POWER, RAMP_FROM, RAMP_S, RATE, REGIME, REVS, SINCE, STATES,
-    THE_LOG, THE_TRACK, TURN, UNSEEN, WANDER, WAY, WEIGHT, BEFORE, Histories, Setting,
+    A0,
+    A_VAR,
+    ADVANCE,
+    BEFORE,
+    BRAKE,
+    CURRENT,
+    DRIVEN,
+    FIRST_A,
+    GLIDE,
+    GLIDE_TURN,
+    GROUND,
+    GUST,
+    HIGH,
+    LAG,
+    LEVEL,
+    LIAR,
+    LN_A,
+    LN_U,
+    LOG,
+    LOW,
+    N_FIX,
+    N_GROUND,
+    N_GUST,
+    N_LOG,
+    N_RATE,
+    N_WALK,
+    N_WANDER,
+    N_WANDER_S,
+    OPEN,
+    P0,
+    P_VAR,
+    POWER,
+    RAMP_FROM,
+    RAMP_S,
+    RATE,
+    REGIME,
+    REVS,
+    SINCE,
+    STATES,
+    THE_LOG,
+    THE_TRACK,
+    TURN,
+    UNSEEN,
+    WANDER,
+    WAY,
+    WEIGHT,
+    Histories,
+    Setting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
@@ -40,7 +84,7 @@ def _force(
     """Return net force per mass, its derivatives by ln u, ln a and the open one, and a."""
     a = math.exp(min(max(law + x[LN_A], -20.0), 5.0))
     left, by_u, by_open = 1.0, 0.0, 0.0  # of the resistance that nothing balances
-    if regime == DRIVEN or regime == LEVEL or regime == TURN:
+    if regime in (DRIVEN, LEVEL, TURN):
         target, share = x[OPEN], 1.0
         if regime == TURN:
             target, share = f[BEFORE], 0.0
@@ -53,7 +97,7 @@ def _force(
         left, by_u, by_open = 1.0 - thrust, steep, -steep * share
     elif regime == GLIDE:
         left = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-    if regime == TURN or regime == GLIDE_TURN:
+    if regime in (TURN, GLIDE_TURN):
         drag = math.exp(min(x[OPEN], 3.0))
         left, by_open = left + drag, drag
     net = -a * left + x[GUST]
@@ -136,9 +180,9 @@ def predict(
             p[k, CURRENT] *= keep_c
         p[LN_U, LN_U] += 1e-10
         p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
-        if regime == TURN or regime == GLIDE_TURN:
+        if regime in (TURN, GLIDE_TURN):
             p[OPEN, OPEN] += n.TURNS_SD**2 * dt / (60.0 * pace)
-        elif regime == DRIVEN or regime == LEVEL:
+        elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
         p[GUST, GUST] += (1.0 - keep_g * keep_g) * (noise[N_GUST] * a) ** 2
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
@@ -199,7 +243,7 @@ def _shaft(
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < -0.05:
         return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
-    if regime == DRIVEN or regime == LEVEL:
+    if regime in (DRIVEN, LEVEL):
         target = x[OPEN]
         if regime == LEVEL:
             share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
@@ -250,7 +294,7 @@ def weigh(
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
             continue
-        if which == LOG and liar == THE_LOG or which == GROUND and liar == THE_TRACK:
+        if (which == LOG and liar == THE_LOG) or (which == GROUND and liar == THE_TRACK):
             gained += math.log(bad)
             continue
         u = math.exp(x[LN_U])
@@ -281,7 +325,7 @@ def weigh(
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         wide = n.TURN_RATE * u / setting.hull.length_m + noise[N_RATE]
-        turning = regime == TURN or regime == GLIDE_TURN
+        turning = regime in (TURN, GLIDE_TURN)
         share = 0.9 if turning else n.STEADY_TURNS
         density = share * _normal(said[RATE], wide)
         density += (1.0 - share) * _normal(said[RATE], noise[N_RATE])
@@ -290,7 +334,7 @@ def weigh(
         several = setting.shafts > 1
         gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, several)
     f[WEIGHT] += gained
-    if regime == DRIVEN or regime == TURN:
+    if regime in (DRIVEN, TURN):
         # at balance neither is seen, only the filter's own errors
         for which, mean, var in ((LN_A, f[A0], f[A_VAR]), (POWER, f[P0], f[P_VAR])):
             x[which] = mean

@@ -11,8 +11,20 @@ import numpy as np
 from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.motion import hull_law
 from shipdrag_ros.coastdown.regimes.state import (
-    ADVANCE, GROUND, LOG, N_FIX, N_GROUND, N_GUST, N_LOG, N_RATE, N_WALK, N_WANDER, N_WANDER_S,
-    NOISES, RATE, Setting,
+    ADVANCE,
+    GROUND,
+    LOG,
+    N_FIX,
+    N_GROUND,
+    N_GUST,
+    N_LOG,
+    N_RATE,
+    N_WALK,
+    N_WANDER,
+    N_WANDER_S,
+    NOISES,
+    RATE,
+    Setting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64, Int64
@@ -84,9 +96,13 @@ def _parts(which: int, k: int) -> tuple[float, float, float, float, float]:
     gust = n.GUST[k % _GUSTS]
     k //= _GUSTS
     if which == 2:
-        return gust, float(n.CURRENT[1]), float(n.CURRENT_S), n.WHITE[k % _WHITES], n.TRACK_WALK[
-            k // _WHITES % _WALKS
-        ]
+        return (
+            gust,
+            float(n.CURRENT[1]),
+            float(n.CURRENT_S),
+            n.WHITE[k % _WHITES],
+            n.TRACK_WALK[k // _WHITES % _WALKS],
+        )
     white = n.WHITE[k % _WHITES]
     k //= _WHITES
     return gust, n.WANDER[k // _TIMES], n.WANDER_S[k % _TIMES], white, 0.0
@@ -158,7 +174,13 @@ def _start(x: Float64, p: Float64, speed: float) -> None:
 
 @compiled(uncounted=True)
 def _filter(
-    noise: NoiseFilters, setting: Setting, which: int, k: int, value: float, spread: float, a: float
+    noise: NoiseFilters,
+    setting: Setting,
+    which: int,
+    k: int,
+    value: float,
+    spread: float,
+    a: float,
 ) -> float:
     """Carry one filter over a bin; return the log density of the reading."""
     x, p, work = noise.mean[which, k], noise.spread[which, k], noise.work
@@ -206,7 +228,7 @@ def _filter(
         x[m] += gain[m] / total * off
         for j in range(_STATES):
             p[m, j] -= gain[m] * gain[j] / total
-    return density
+    return float(density)
 
 
 @compiled(uncounted=True)

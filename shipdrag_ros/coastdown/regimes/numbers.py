@@ -134,3 +134,19 @@ ANNOUNCE = _grid('ANNOUNCE', (0.7, 0.3), '1', 'P(gliding) above, and again below
 HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 EVEN = _grid('EVEN', (0.98, 120.0), '1, s', 'a ship that keeps so much so long glides no more')
+
+
+def table() -> str:
+    """
+    Return all numbers as a table of Markdown.
+    """
+    rows = [
+        f'| {each.name} | {", ".join(f"{value:g}" for value in each.values)} | {each.unit} | '
+        f'{each.source} |'
+        for each in NUMBERS
+    ]
+    return '\n'.join(['| number | value | unit | source |', '|---|---|---|---|', *rows])
+
+
+if __name__ == '__main__':
+    print(table())

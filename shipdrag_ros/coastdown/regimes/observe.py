@@ -12,7 +12,6 @@ from shipdrag_ros.coastdown.bins import (
     COUNT,
     PER_UNIT,
     SPEED,
-    TURNING_RAD_S,
     Bins,
     displacement,
     mean_place,

@@ -83,14 +83,12 @@ class _Stretches(NamedTuple):
 
 def _stretches(bank: Bank, setting: Setting) -> _Stretches:
     all_ = bank.histories
-    count = int(all_.count[0])
+    count = int(all_.used[0])
     now_s = int(all_.clock[0]) * setting.step_s
     weight = np.exp(all_.number[:count, WEIGHT])
     switches = all_.whole[:count, COUNT]
     at, what, ramp = all_.at[:count], all_.what[:count], all_.ramp[:count]
-    rows, columns = np.nonzero(
-        (np.arange(SWITCHES) < switches[:, np.newaxis]) & (what == GLIDE)
-    )
+    rows, columns = np.nonzero((np.arange(SWITCHES) < switches[:, np.newaxis]) & (what == GLIDE))
     last = columns + 1 >= switches[rows]
     following = np.minimum(columns + 1, SWITCHES - 1)
     end = np.where(last, now_s, at[rows, following])
@@ -133,9 +131,7 @@ def glides(bank: Bank, setting: Setting, speed: Float64) -> list[Glide]:
         peak = float(likely[first:last].max())
         if peak < n.HOLD[1]:
             continue
-        shared = np.minimum(found.end_s, last * step_s) - np.maximum(
-            found.begin_s, first * step_s
-        )
+        shared = np.minimum(found.end_s, last * step_s) - np.maximum(found.begin_s, first * step_s)
         one = shared > 0.5 * (last - first) * step_s
         if not one.any():
             continue
@@ -170,7 +166,7 @@ def _one(found: _Stretches, peak: float) -> Glide:
 def _median(value: Float64, share: Float64) -> float:
     order = np.argsort(value, kind='stable')
     place = np.searchsorted(np.cumsum(share[order]), 0.5)
-    return float(value[order[min(place, len(order) - 1)]])
+    return float(value[order[min(int(place), len(order) - 1)]])
 
 
 def _even_s(speed: Float64, glide: Glide, step_s: float) -> float:
@@ -191,7 +187,7 @@ def other_regime(bank: Bank) -> int:
     Return the likeliest regime now that is no glide: the reason of a dismissal.
     """
     all_ = bank.histories
-    count = int(all_.count[0])
+    count = int(all_.used[0])
     weight = np.exp(all_.number[:count, WEIGHT])
     regime = all_.whole[:count, 0]
     sums = [weight[regime == code].sum() for code in (LEVEL, BRAKE, TURN, GLIDE_TURN)]

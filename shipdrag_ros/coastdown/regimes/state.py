@@ -47,11 +47,11 @@ NOISES = 8
 
 class Histories(NamedTuple):
     """
-    The bank; slots from `count[0]` on hold nothing.
+    The bank; slots from `used[0]` on hold nothing.
 
     Attributes
     ----------
-    count, clock : (1,)
+    used, clock : (1,)
         Histories; bins since the start.
     mean, spread
         (ROOM, STATES) and (ROOM, STATES, STATES): state and covariance.
@@ -62,7 +62,7 @@ class Histories(NamedTuple):
     scratch : (ROOM,)
     """
 
-    count: Int64
+    used: Int64
     clock: Int64
     mean: Float64
     spread: Float64
@@ -115,7 +115,9 @@ class Setting(NamedTuple):
     glides: float
 
     @classmethod
-    def of(cls, hull: HullPrior, step_s: float, *, shafts: int = 0, glides: float = 0.0) -> Setting:
+    def of(
+        cls, hull: HullPrior, step_s: float, *, shafts: int = 0, glides: float = 0.0
+    ) -> Setting:
         """
         Return the setting of a bank with bins of `step_s`.
         """

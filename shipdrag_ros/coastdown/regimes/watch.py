@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shipdrag_ros.coastdown.bins import TURNING_RAD_S, Bins, newest_bin
+from shipdrag_ros.coastdown.bins import Bins, newest_bin
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy
-from shipdrag_ros.coastdown.regimes import numbers as n
 from shipdrag_ros.coastdown.regimes.bank import (
     OUT,
     P_EVEN,
@@ -34,7 +33,12 @@ _EVEN = 0.95
 _BINS_OF_WINDOW = 12  # bins in a slope window: smaller craft have shorter ones
 _RAN_DOWN_S = 15.0  # a run-down that is worth a word
 
-_ENDED = {LEVEL: EndedBy.ENGINE, BRAKE: EndedBy.BRAKE, TURN: EndedBy.TURN, GLIDE_TURN: EndedBy.TURN}
+_ENDED = {
+    LEVEL: EndedBy.ENGINE,
+    BRAKE: EndedBy.BRAKE,
+    TURN: EndedBy.TURN,
+    GLIDE_TURN: EndedBy.TURN,
+}
 _WHY = {
     LEVEL: (Dismissal.SETTLED, 'power was reduced, not cut'),
     BRAKE: (Dismissal.BRAKE, 'something but the water slowed her'),
@@ -126,6 +130,11 @@ class RegimeFilter:
         awake_s = self._next * self._width - self._woken
         return min(self._even_s, awake_s) > _ASLEEP_S * self._setting.pace
 
+    @property
+    def doubted(self) -> bool:
+        """Whether even power was ever unlikely since it woke."""
+        return any(float(out[P_EVEN]) < 0.5 for out in self._out)
+
     def glides(self) -> list[Dated]:
         """
         Return the coastdowns so far, in order.
@@ -170,5 +179,5 @@ class RegimeFilter:
         Return times since the epoch [s] and the probability of each regime at each.
         """
         table = np.array(self._out).reshape(len(self._out), -1)
-        time_s = (self._first + 1.0 + np.arange(len(table))) * self._width
+        time_s = np.asarray((self._first + 1.0 + np.arange(len(table))) * self._width, np.float64)
         return time_s, {name: table[:, k] for k, name in enumerate(OUT)} if len(table) else {}
