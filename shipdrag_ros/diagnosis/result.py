@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from shipdrag_ros.diagnosis.seen_runs import DOUBTED, SeenRun, WeighedEarlier
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
@@ -276,6 +276,8 @@ class DiagnosisResult:
     earlier
         Diagnoses of before that were given, with what of each counts.
     """
+
+    __repr__ = short_repr
 
     verdict: Verdict
     effects: tuple[EffectEstimate, ...]

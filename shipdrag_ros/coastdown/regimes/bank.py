@@ -48,7 +48,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     WAY,
     WEIGHT,
     Histories,
-    Setting,
+    BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.samples import Float64
@@ -100,7 +100,7 @@ class Bank(NamedTuple):
 
 
 @compiled(uncounted=True)
-def _begin(bank: Bank, setting: Setting, speed: float, by_log: bool, both: bool) -> None:
+def _begin(bank: Bank, setting: BankSetting, speed: float, by_log: bool, both: bool) -> None:
     """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
     all_ = bank.histories
     hull = setting.hull
@@ -167,7 +167,7 @@ def _shafts(bank: Bank, even: float, speed: float) -> None:
 
 
 @compiled(uncounted=True)
-def _sum_up(bank: Bank, setting: Setting) -> None:
+def _sum_up(bank: Bank, setting: BankSetting) -> None:
     """Add the weights of each regime."""
     out, all_ = bank.out, bank.histories
     for k in range(FIT):
@@ -194,14 +194,14 @@ def _sum_up(bank: Bank, setting: Setting) -> None:
         out[SPEED] += share * math.exp(all_.mean[i, LN_U])
 
 
-_SETTING = Setting(
+_SETTING = BankSetting(
     HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0, 0.0
 )  # its types are all that counts
 _SIGNATURE: Signature = types.void(typeof(Bank.fresh()), typeof(_SETTING))
 
 
 @compiled(_SIGNATURE, uncounted=True)
-def step(bank: Bank, setting: Setting) -> None:
+def step(bank: Bank, setting: BankSetting) -> None:
     """
     Take the bin in `bank.said`; the probabilities are then in `bank.out`.
     """

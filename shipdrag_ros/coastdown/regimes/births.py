@@ -45,7 +45,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     WANDER,
     WEIGHT,
     Histories,
-    Setting,
+    BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 
@@ -118,7 +118,7 @@ def _born(
 
 
 @compiled(uncounted=True)
-def _glides(bank: Histories, i: int, setting: Setting, now_s: float, chance: float) -> None:
+def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the thrust run down."""
     under_way = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
     for k in range(len(n.RUN_DOWN_S)):
@@ -148,7 +148,7 @@ def _glides(bank: Histories, i: int, setting: Setting, now_s: float, chance: flo
 
 
 @compiled(uncounted=True)
-def _levels(bank: Histories, i: int, setting: Setting, now_s: float, chance: float) -> None:
+def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the engine go to another level, or engage."""
     f = bank.number[i]
     engaged = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
@@ -166,7 +166,7 @@ def _levels(bank: Histories, i: int, setting: Setting, now_s: float, chance: flo
 
 @compiled(uncounted=True)
 def _turns(
-    bank: Histories, i: int, setting: Setting, now_s: float, chance: float, regime: int
+    bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float, regime: int
 ) -> None:
     for k in range(len(n.TURNS)):
         j = _born(bank, i, setting.hull, now_s, chance / len(n.TURNS), regime, 1.0)
@@ -177,7 +177,7 @@ def _turns(
 
 
 @compiled(uncounted=True)
-def _back(bank: Histories, i: int, setting: Setting, now_s: float, chance: float) -> None:
+def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let a turn end under the power of before."""
     j = _born(bank, i, setting.hull, now_s, chance, LEVEL, 1.0)
     if j >= 0:
@@ -197,7 +197,7 @@ def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
 
 
 @compiled(uncounted=True)
-def bear(bank: Histories, setting: Setting, both: bool, steered: bool) -> None:
+def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> None:
     """
     Let every likely history switch at the beginning of this bin.
 
@@ -277,7 +277,7 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
 
 
 @compiled(uncounted=True)
-def thin(bank: Histories, setting: Setting) -> None:
+def thin(bank: Histories, setting: BankSetting) -> None:
     """
     Weigh against the best; merge and keep the likeliest now and then.
     """

@@ -57,7 +57,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     WAY,
     WEIGHT,
     Histories,
-    Setting,
+    BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
@@ -126,7 +126,7 @@ def _rows(p: Float64, work: Float64, row: int, c: Float64) -> None:
 
 @compiled(uncounted=True)
 def predict(
-    bank: Histories, i: int, setting: Setting, noise: Float64, advance: float, work: Float64
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
 ) -> float:
     """
     Carry a history to the end of the bin; return its deceleration there [m/s^2].
@@ -277,7 +277,7 @@ def _shaft(
 
 @compiled(uncounted=True)
 def weigh(
-    bank: Histories, i: int, setting: Setting, noise: Float64, said: Float64, slowing: float,
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, said: Float64, slowing: float,
     log_first: float, work: Float64,
 ) -> None:  # fmt: skip
     """

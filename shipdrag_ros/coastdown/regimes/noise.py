@@ -24,7 +24,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     N_WANDER_S,
     NOISES,
     RATE,
-    Setting,
+    BankSetting,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64, Int64
@@ -109,7 +109,7 @@ def _parts(which: int, k: int) -> tuple[float, float, float, float, float]:
 
 
 @compiled(uncounted=True)
-def listen(noise: NoiseFilters, setting: Setting, said: Float64, driven: float) -> None:
+def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
     """
     Learn from a bin, by the probability that she was driven evenly, and age what is used.
     """
@@ -133,7 +133,9 @@ def listen(noise: NoiseFilters, setting: Setting, said: Float64, driven: float) 
 
 
 @compiled(uncounted=True)
-def _one(noise: NoiseFilters, setting: Setting, which: int, value: float, driven: float) -> None:
+def _one(
+    noise: NoiseFilters, setting: BankSetting, which: int, value: float, driven: float
+) -> None:
     step = setting.step_s
     speed = value / step if which == 2 else value
     count = noise.seen[which]
@@ -175,7 +177,7 @@ def _start(x: Float64, p: Float64, speed: float) -> None:
 @compiled(uncounted=True)
 def _filter(
     noise: NoiseFilters,
-    setting: Setting,
+    setting: BankSetting,
     which: int,
     k: int,
     value: float,
@@ -232,7 +234,7 @@ def _filter(
 
 
 @compiled(uncounted=True)
-def _average(noise: NoiseFilters, setting: Setting, out: Float64) -> None:
+def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
     """Average the filters of each instrument by their evidence; the gust is the log's first."""
     gusted = False
     for which in range(3):

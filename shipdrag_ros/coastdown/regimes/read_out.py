@@ -19,7 +19,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     SWITCHES,
     TURN,
     WEIGHT,
-    Setting,
+    BankSetting,
 )
 from shipdrag_ros.samples import Float64
 
@@ -44,7 +44,7 @@ class Path(NamedTuple):
     probability: float
 
 
-class Glide(NamedTuple):
+class SmoothedGlide(NamedTuple):
     """
     A stretch in which she probably glides.
 
@@ -81,7 +81,7 @@ class _Stretches(NamedTuple):
     after: NDArray[np.int64]
 
 
-def _stretches(bank: Bank, setting: Setting) -> _Stretches:
+def _stretches(bank: Bank, setting: BankSetting) -> _Stretches:
     all_ = bank.histories
     count = int(all_.used[0])
     now_s = int(all_.clock[0]) * setting.step_s
@@ -97,7 +97,7 @@ def _stretches(bank: Bank, setting: Setting) -> _Stretches:
     return _Stretches(at[rows, columns], begin, end, weight[rows], after)
 
 
-def gliding(bank: Bank, setting: Setting) -> Float64:
+def gliding(bank: Bank, setting: BankSetting) -> Float64:
     """
     Return P(gliding) in each bin since the start, given all that came.
     """
@@ -113,7 +113,7 @@ def _gliding(found: _Stretches, bins: int, step_s: float) -> Float64:
     return np.cumsum(edges)[:-1]
 
 
-def glides(bank: Bank, setting: Setting, speed: Float64) -> list[Glide]:
+def glides(bank: Bank, setting: BankSetting, speed: Float64) -> list[SmoothedGlide]:
     """
     Read the coastdowns out of all histories.
 
@@ -142,7 +142,7 @@ def glides(bank: Bank, setting: Setting, speed: Float64) -> list[Glide]:
     return all_of
 
 
-def _one(found: _Stretches, peak: float) -> Glide:
+def _one(found: _Stretches, peak: float) -> SmoothedGlide:
     """Take medians over the histories that hold one glide."""
     share = found.weight / found.weight.sum()
     stop, begin, end = (
@@ -160,7 +160,7 @@ def _one(found: _Stretches, peak: float) -> Glide:
         )
         for k in best
     )  # fmt: skip
-    return Glide(min(stop, begin), begin, end, sd, peak, after, paths)
+    return SmoothedGlide(min(stop, begin), begin, end, sd, peak, after, paths)
 
 
 def _median(value: Float64, share: Float64) -> float:
@@ -169,7 +169,7 @@ def _median(value: Float64, share: Float64) -> float:
     return float(value[order[min(int(place), len(order) - 1)]])
 
 
-def _even_s(speed: Float64, glide: Glide, step_s: float) -> float:
+def _even_s(speed: Float64, glide: SmoothedGlide, step_s: float) -> float:
     """Return when she begins to keep her speed; infinite where she does not."""
     part, length = n.EVEN
     ahead = round(float(length) / n.BIN_S)

@@ -92,7 +92,7 @@ class Histories(NamedTuple):
         )
 
 
-class Setting(NamedTuple):
+class BankSetting(NamedTuple):
     """
     What a bank is told once.
 
@@ -117,7 +117,7 @@ class Setting(NamedTuple):
     @classmethod
     def of(
         cls, hull: HullPrior, step_s: float, *, shafts: int = 0, glides: float = 0.0
-    ) -> Setting:
+    ) -> BankSetting:
         """
         Return the setting of a bank with bins of `step_s`.
         """

@@ -21,8 +21,8 @@ from shipdrag_ros.coastdown.regimes.bank import (
 )
 from shipdrag_ros.coastdown.regimes.hull import HullPrior
 from shipdrag_ros.coastdown.regimes.observe import observe
-from shipdrag_ros.coastdown.regimes.read_out import Glide, glides, other_regime
-from shipdrag_ros.coastdown.regimes.state import BRAKE, GLIDE_TURN, LEVEL, LOW, TURN, Setting
+from shipdrag_ros.coastdown.regimes.read_out import SmoothedGlide, glides, other_regime
+from shipdrag_ros.coastdown.regimes.state import BRAKE, GLIDE_TURN, LEVEL, LOW, TURN, BankSetting
 from shipdrag_ros.samples import SHAFTS, Float64
 from shipdrag_ros.ship import Ship
 
@@ -76,7 +76,7 @@ class RegimeFilter:
 
     def __init__(self, bins: Bins, ship: Ship, width: int, number: int) -> None:
         shafts = sum(newest_bin(bins, int(each)) > number - _LEAD_S for each in SHAFTS)
-        self._setting = Setting.of(HullPrior.of(ship), float(width), shafts=shafts)
+        self._setting = BankSetting.of(HullPrior.of(ship), float(width), shafts=shafts)
         self._bank = Bank.fresh()
         self._width = width
         self._next = (number - _LEAD_S) // width + 1
@@ -144,7 +144,7 @@ class RegimeFilter:
         speed = np.array([out[SPEED] for out in self._out])
         return [self._dated(each) for each in glides(self._bank, self._setting, speed)]
 
-    def _dated(self, glide: Glide) -> Dated:
+    def _dated(self, glide: SmoothedGlide) -> Dated:
         zero = self._first * self._width
         slow_s = glide.begin_s - glide.stop_s
         return Dated(
