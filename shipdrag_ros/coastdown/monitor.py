@@ -10,6 +10,7 @@ before the last `history_ns` of it.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,7 +34,6 @@ from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.regimes import numbers
-from shipdrag_ros.coastdown.regimes.watch import Dated, RegimeFilter
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
 from shipdrag_ros.coastdown.running import Chosen, RunningCoastdown, WindowEstimator
 from shipdrag_ros.coastdown.shafts import Drive
@@ -45,6 +45,9 @@ from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block
 from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:
+    from shipdrag_ros.coastdown.regimes.watch import Dated, RegimeFilter
 
 
 class Monitor:
@@ -275,6 +278,9 @@ class Monitor:
         watch.source[0] = source
         seen = OnsetCandidate(source, number, Drive(), noticed).knowing(self._memory.steadiness)
         if self._parameters.regimes == 'filter':
+            # compiled for whoever asks for it alone: that takes a while
+            from shipdrag_ros.coastdown.regimes.watch import RegimeFilter
+
             width = RegimeFilter.width(self._parameters.slope_window_s)
             self._regimes = RegimeFilter(bins, self._ship, width, number)
             self._candidate, self._reported_s = seen, -np.inf

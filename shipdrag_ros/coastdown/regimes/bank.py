@@ -47,8 +47,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     STATES,
     WAY,
     WEIGHT,
-    Histories,
     BankSetting,
+    Histories,
 )  # fmt: skip
 from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.samples import Float64

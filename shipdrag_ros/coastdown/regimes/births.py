@@ -44,8 +44,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     UNSEEN,
     WANDER,
     WEIGHT,
-    Histories,
     BankSetting,
+    Histories,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 

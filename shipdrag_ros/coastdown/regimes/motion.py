@@ -56,8 +56,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     WANDER,
     WAY,
     WEIGHT,
-    Histories,
     BankSetting,
+    Histories,
 )  # fmt: skip
 from shipdrag_ros.compiled import compiled
 from shipdrag_ros.samples import Float64
