@@ -6,7 +6,7 @@ from __future__ import annotations
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
@@ -163,6 +163,12 @@ class Run:
             shutil.copyfile(self.parts[0].path, out)
         except OSError as error:
             raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
+
+    def note(self, warnings: Iterable[str]) -> None:
+        """
+        Add to what is wrong with the run; what was said before is not repeated.
+        """
+        self._warnings += (text for text in warnings if text not in self._warnings)
 
     def inputs(self, *, start_ns: int = 0, end_ns: int = sys.maxsize) -> RunSamples:
         """
