@@ -18,7 +18,7 @@ SLOW = {
     'scipy.optimize',
     'scipy.special',
     'scipy.stats',
-    'shipdrag_ros.bags.salvage',
+    'shipdrag_ros.bags.check',
     'shipdrag_ros.diagnosis',
     'shipdrag_ros.sources',
     'shipdrag_ros.report',

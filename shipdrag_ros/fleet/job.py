@@ -195,8 +195,8 @@ def _hull(source: BagToRead, run: Run) -> _ShipInRun:
     attached, beside = run.attachments.get(SHIP_FILE, ''), source.beside.ship
     if not (attached or beside):
         raise BagError(
-            f'no {SHIP_FILE} is attached, and none lies beside it or in a folder above; put one '
-            'there'
+            f'no {SHIP_FILE} is attached, and none lies beside it or in a folder above, up to the '
+            'one given; put one there, or give the folder that holds it'
         )
     warnings: tuple[str, ...] = ()
     text, subject = beside or attached, f'{SHIP_FILE} {"above" if beside else "attached"}'

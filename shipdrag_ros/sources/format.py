@@ -205,8 +205,8 @@ def missing_library(job: Job, kind: str, library: str) -> ImportDataError:
     kind
         What the file is, with its article.
     library
-        One of the extra `flight`.
+        One of the extra `logs`.
     """
     return ImportDataError(
-        f"{str(job.source)!r} is {kind}, which needs {library}: pip install 'shipdrag_ros[flight]'"
+        f"{str(job.source)!r} is {kind}, which needs {library}: pip install 'shipdrag_ros[logs]'"
     )

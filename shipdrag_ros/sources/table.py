@@ -250,7 +250,11 @@ class LogTable:
     def _decoded(self) -> Iterator[tuple[IO[bytes], TextIOWrapper]]:
         with opened(self.path) as (raw, file):
             reader = cast(BufferedReader, file)
-            if reader.peek(2).startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            try:
+                start = reader.peek(2)
+            except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+                raise ImportDataError(f'{str(self.path)!r} cannot be unpacked: {error}') from error
+            if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
                 raise ImportDataError(f'{str(self.path)!r} is in UTF-16; save it as UTF-8')
             # a name that is not UTF-8 may still be given by its number
             with TextIOWrapper(reader, encoding='utf-8-sig', errors='replace', newline='') as text:

@@ -155,7 +155,7 @@ def test_a_frame_is_named_and_its_arguments_too(tmp_path: Path) -> None:
     for columns in (['log'], {'speed_through_water': 1}, {'speed_through_water': None}):
         with pytest.raises(sd.ShipdragError, match='give the column of each input'):
             sd.read(speed, columns=columns, rate_hz=1.0)  # type: ignore[arg-type]
-    with pytest.raises(sd.ShipdragError, match='cannot be (written|made)'):
+    with pytest.raises(sd.ShipdragError, match=r'cannot be (written|made)'):
         sd.read(speed, rate_hz=1.0, columns={'speed_through_water': '1'}).save(
             tmp_path / 'none' / 'a.mcap'
         )

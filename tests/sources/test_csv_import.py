@@ -24,6 +24,7 @@ from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.importer import BASE_NS, TableColumns, read_csv
 from shipdrag_ros.sources.formats.csv.result import TableResult
+from shipdrag_ros.sources.table import LogTable
 
 from .conftest import into_bag
 
@@ -355,6 +356,13 @@ def test_a_source_that_is_not_there_and_a_bag_that_is(tmp_path: Path) -> None:
     with pytest.raises(BagError, match='exists'):
         into_bag(read_csv, tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
     assert (tmp_path / 'a.mcap').read_text() == 'precious'
+
+
+@pytest.mark.parametrize('content', [b'\x1f\x8b', b'\x1f\x8b\x08' + bytes(20)])
+def test_a_packed_table_that_is_cut_is_an_error(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / 'a.csv').write_bytes(content)
+    with pytest.raises(ImportDataError, match='cannot be unpacked'):
+        LogTable(tmp_path / 'a.csv')
 
 
 @settings(

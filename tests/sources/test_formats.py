@@ -249,7 +249,7 @@ def test_a_library_that_is_not_there_is_named(
     for kind, library in (('ardupilot', 'pymavlink'), ('ulog', 'pyulog')):
         monkeypatch.setitem(sys.modules, library, None)
         monkeypatch.setitem(sys.modules, f'{library}.DFReader', None)
-        with pytest.raises(ImportDataError, match=r"pip install 'shipdrag_ros\[flight\]'"):
+        with pytest.raises(ImportDataError, match=r"pip install 'shipdrag_ros\[logs\]'"):
             read_any([files[kind]])
 
 

@@ -13,7 +13,10 @@ import pytest
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
+from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.sources import formats
+
+ROOT = Path(__file__).resolve().parents[2]
 
 KNOT = 1852.0 / 3600.0
 
@@ -199,7 +202,7 @@ def test_dates_and_checksums_that_a_log_lacks_are_given(
     assert '--date YYYY-MM-DD' in capsys.readouterr().err
 
 
-def test_a_format_is_one_module_and_is_found(
+def test_a_format_of_another_package_is_found_by_its_entry_point(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One more format, of lines `> seconds speed`, without a word of it anywhere else."""
@@ -221,7 +224,11 @@ def test_a_format_is_one_module_and_is_found(
         'head.lines[:1] and head.lines[0].startswith("> ") else NO, write,\n'
         '    (Option("--epoch", "S", "of time 0", float),))\n'
     )
-    monkeypatch.setattr(formats, '__path__', [*formats.__path__, str(tmp_path)])
+    about = tmp_path / 'arrows-1.0.dist-info'
+    about.mkdir()
+    (about / 'METADATA').write_text('Metadata-Version: 2.1\nName: arrows\nVersion: 1.0\n')
+    (about / 'entry_points.txt').write_text('[shipdrag.formats]\narrows = arrows:FORMAT\n')
+    monkeypatch.syspath_prepend(str(tmp_path))
     source, bag = tmp_path / 'a.log', tmp_path / 'a.mcap'
     source.write_text('> 0 8.0\n> 1 7.9\n> 2 7.8\n')
     assert main(['import', str(source), '-o', str(bag), '--epoch', '2e9']) == 0
@@ -236,3 +243,22 @@ def test_a_format_is_one_module_and_is_found(
     with pytest.raises(SystemExit):
         main(['import', str(other), '-o', str(tmp_path / 'b.mcap'), '--epoch', '1e9'])
     assert 'argument --epoch: of a log of arrows, and this is a CSV' in capsys.readouterr().err
+
+
+def test_a_format_that_cannot_be_loaded_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    about = tmp_path / 'broken-1.0.dist-info'
+    about.mkdir()
+    (about / 'METADATA').write_text('Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n')
+    (about / 'entry_points.txt').write_text('[shipdrag.formats]\nbroken = no_module:FORMAT\n')
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(ImportDataError, match="the format 'broken' of 'no_module:FORMAT'"):
+        formats.found()
+
+
+def test_the_entry_points_of_the_package_are_those_of_its_folder() -> None:
+    written = (ROOT / 'setup.py').read_text()
+    for point in formats.points():
+        place = point.value.removeprefix(f'{formats.__name__}.').removesuffix(':FORMAT')
+        assert f"'{point.name}': '{place}'" in written

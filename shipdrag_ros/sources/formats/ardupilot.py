@@ -100,7 +100,7 @@ FORMAT = Format(
     name='ardupilot',
     kind='a log of ArduPilot (.bin)',
     about='GPS, POS, ATT, ESC and RPM: position, speed over ground, heading, revolutions. Needs '
-    "pymavlink: pip install 'shipdrag_ros[flight]'.",
+    "pymavlink: pip install 'shipdrag_ros[logs]'.",
     score=_score,
     read=_open,
 )

@@ -136,7 +136,7 @@ FORMAT = Format(
     name='ulog',
     kind='an ULog (PX4)',
     about='GNSS position and speed, position of the estimator, heading, revolutions of motors. '
-    "Needs pyulog: pip install 'shipdrag_ros[flight]'.",
+    "Needs pyulog: pip install 'shipdrag_ros[logs]'.",
     score=_score,
     read=_open,
 )

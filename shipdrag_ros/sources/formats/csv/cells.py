@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from enum import Enum
 from math import cos, hypot, pi, remainder, sin
 
-from shipdrag_ros.display import NUMBER
+import numpy as np
 
+from shipdrag_ros.display import NUMBER
+from shipdrag_ros.samples import Float64
+
+_PLAIN = frozenset('0123456789+-.eE')
 _COMMA = re.compile(r'[-+]?(\d+,\d*|,\d+)([eE][-+]?\d{1,4})?')
 _SIDES = {'N': 1.0, 'E': 1.0, 'S': -1.0, 'W': -1.0}
 _DECIMAL = re.compile(r'([-+]?\d{1,3}(?:\.\d*)?)\s*°?\s*([NSEW])?')
@@ -166,15 +171,53 @@ def _checked(degrees: float, minutes: float, letter: str, side: str, cell: str) 
     return value - 360.0 if value > largest else value
 
 
-def combined(form: Form, values: list[float]) -> tuple[float, float]:
+def numbers(
+    cells: Sequence[str], read: Callable[[str], float], bad: dict[int, BadCell]
+) -> Float64:
     """
-    Return the two values of a sample from those of its columns, in SI units.
+    Return (n,) numbers of cells, NaN where there is none.
+
+    Parameters
+    ----------
+    cells
+        Of a column.
+    read
+        Reads one.
+    bad
+        Filled with why, by the place of the first column's cell that holds none.
     """
+    if read is number and _PLAIN.issuperset(''.join(cells)):
+        with suppress(ValueError):  # an empty cell for instance
+            found = np.array([float(cell) for cell in cells])
+            if np.isfinite(found).all():
+                return found
+    found = np.full(len(cells), np.nan)
+    for place, cell in enumerate(cells):
+        try:
+            found[place] = read(cell)
+        except BadCell as error:
+            bad.setdefault(place, error)
+    return found
+
+
+def combined(form: Form, values: Sequence[Float64]) -> tuple[Float64, Float64]:
+    """
+    Return the two values (n,) of samples from those of their columns, in SI units.
+    """
+    first = values[0]
+    nothing = np.zeros(len(first))
     if form is Form.COMPASS:
-        return remainder(pi / 2.0 - values[0], 2.0 * pi), 0.0
+        turns = [remainder(pi / 2.0 - each, 2.0 * pi) for each in _finite(first)]
+        return np.array(turns), nothing
     if form is Form.HYPOT:
-        return hypot(values[0], values[1]), 0.0
+        return np.array([*map(hypot, first, values[1])]), nothing
     if form is Form.POLAR:
-        speed, angle = values
-        return -speed * cos(angle), speed * sin(angle)
-    return values[0], values[1] if len(values) > 1 else 0.0
+        angle = _finite(values[1])
+        return -first * [*map(cos, angle)], first * [*map(sin, angle)]
+    return first, values[1] if len(values) > 1 else nothing
+
+
+def _finite(values: Float64) -> list[float]:
+    """Return numbers that the C library takes; what is none stays none."""
+    found: list[float] = np.where(np.isfinite(values), values, np.nan).tolist()
+    return found

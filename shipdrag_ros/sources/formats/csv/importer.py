@@ -11,13 +11,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
+
+import numpy as np
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel
+from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel, Int64
 from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
     are_in_minutes,
@@ -27,6 +29,7 @@ from shipdrag_ros.sources.formats.csv.cells import (
     minutes_of,
     number,
     number_with_comma,
+    numbers,
 )
 from shipdrag_ros.sources.formats.csv.columns import InputColumns, TimeColumn
 from shipdrag_ros.sources.formats.csv.result import TableResult
@@ -134,11 +137,9 @@ def read_csv(
         table.width,
     )
     log.attach(ATTACHMENT, _provenance(source, columns))
-    for row in table.rows(progress):
-        record.take(row)
-        if len(record) >= BATCH_SAMPLES:
-            log.write_samples(record.pop())
-    log.write_samples(record.pop())
+    rows = table.rows(progress)
+    while some := list(islice(rows, BATCH_SAMPLES)):
+        log.write_samples(record.take(some))
     return record.result(table, log)
 
 
@@ -165,7 +166,7 @@ class _RowSamples:
         self._where = where
         self._clock = clock
         self._time_places = time_places
-        self._too_fast: dict[Channel, int] = {}
+        self._too_fast: Counter[Channel] = Counter()
         self._used = {place for _, places, _ in inputs for place in places} | {*time_places}
         self._rows = 0
         self._left_out = 0
@@ -175,64 +176,93 @@ class _RowSamples:
         self._newest_ns = -1
         self._written: Counter[str] = Counter()
         self._rejected: dict[str, dict[str, Rejected]] = {}
-        self._samples: list[tuple[int, int, int, float, float]] = []
+        self._index = 0
         self._seen: dict[str, None] = {}  # a set that keeps the order
 
-    def __len__(self) -> int:
-        return len(self._samples)
-
-    def take(self, row: LogRow) -> None:
-        """Take the samples of one row."""
-        self._rows += 1
-        for place, text in self._where:
-            if _cell(row, place) != text:
-                if len(self._seen) < _FEW:
-                    self._seen[_cell(row, place)] = None
-                self._left_out += 1
-                return
-        try:
-            _check_width(row, self._width)
-            cell = row_text(row, self._time_places).strip()
-            time_ns = self._clock.time_ns(self._rows - self._left_out - 1, cell)
-        except BadCell as bad:
-            self._reject('time', row, bad)
-            return
+    def take(self, rows: Sequence[LogRow]) -> Block:
+        """Return the samples of some rows, a row after the other."""
+        rows = self._chosen(rows)
+        times, rows = self._times(rows)
+        n = len(rows)
+        if not n:
+            return Block.empty()
         if self._first_ns is None:
-            self._first_ns = time_ns
+            self._first_ns = int(times[0])
         # arrival never goes back, so that a replay sees the rows in their order
-        self._backward += time_ns < self._newest_ns
-        self._repeated += time_ns == self._newest_ns
-        self._newest_ns = max(self._newest_ns, time_ns)
-        for columns, places, readers in self._inputs:
-            try:
-                values = [
-                    read(_cell(row, place)) * factor
-                    for read, place, factor in zip(readers, places, columns.factors, strict=True)
-                ]
-            except BadCell as bad:
-                self._reject(columns.channel.input, row, bad)
-            else:
-                a, b = combined(columns.form, values)
-                if columns.channel in _SPEEDS and abs(a) > ABSURD_SPEED_M_S:
-                    self._too_fast[columns.channel] = self._too_fast.get(columns.channel, 0) + 1
-                self._samples.append((columns.channel, time_ns, self._newest_ns, a, b))
-                self._written[columns.channel.input] += 1
+        before = np.maximum.accumulate(np.r_[self._newest_ns, times])
+        self._backward += int(np.sum(times < before[:-1]))
+        self._repeated += int(np.sum(times == before[:-1]))
+        self._newest_ns = int(before[-1])
+        wide = [*zip_longest(*(row.cells for row in rows), fillvalue='')]
+        texts = dict(enumerate(wide))
+        nothing = [''] * n
+        value, known = np.zeros((n, len(self._inputs), 2)), np.zeros((n, len(self._inputs)), bool)
+        for k, (columns, places, readers) in enumerate(self._inputs):
+            bad: dict[int, BadCell] = {}
+            values = []
+            for read, place, factor in zip(readers, places, columns.factors, strict=True):
+                found = numbers(texts.get(place, nothing), read, bad)
+                values.append(found * factor)
+            for i in sorted(bad):
+                self._reject(columns.channel.input, rows[i], bad[i])
+            good = np.ones(n, np.bool_)
+            good[list(bad)] = False
+            made = combined(columns.form, values)
+            value[:, k, 0], value[:, k, 1] = made
+            known[:, k] = good
+            if columns.channel in _SPEEDS:
+                count = int(np.sum(np.abs(value[good, k, 0]) > ABSURD_SPEED_M_S))
+                if count:
+                    self._too_fast[columns.channel] = (
+                        self._too_fast.get(columns.channel, 0) + count
+                    )
+            self._written[columns.channel.input] += int(good.sum())
+        row, which = np.nonzero(known)
+        channel = np.array([columns.channel for columns, _, _ in self._inputs], np.uint8)
+        return Block(
+            channel[which],
+            times[row],
+            before[1:][row],
+            value[row, which],
+            np.full((len(row), 2), np.nan),
+        )
 
-    def pop(self) -> Block:
-        """Return the samples taken since the last time."""
-        samples, self._samples = self._samples, []
-        return Block.of_samples(samples)
+    def _chosen(self, rows: Sequence[LogRow]) -> Sequence[LogRow]:
+        """Leave out rows without the texts that were asked for."""
+        self._rows += len(rows)
+        for place, text in self._where:
+            kept = [row for row in rows if _cell(row, place) == text]
+            for row in rows if len(self._seen) < _FEW else ():
+                if _cell(row, place) != text and len(self._seen) < _FEW:
+                    self._seen[_cell(row, place)] = None
+            self._left_out += len(rows) - len(kept)
+            rows = kept
+        return rows
+
+    def _times(self, rows: Sequence[LogRow]) -> tuple[Int64, Sequence[LogRow]]:
+        """Return the times of rows, and the rows that have one."""
+        times, kept = [], []
+        for row in rows:
+            try:
+                _check_width(row, self._width)
+                cell = row_text(row, self._time_places).strip()
+                times.append(self._clock.time_ns(self._index, cell))
+                kept.append(row)
+            except BadCell as bad:
+                self._reject('time', row, bad)
+            self._index += 1
+        return np.array(times, np.int64), kept
 
     def result(self, table: LogTable, log: Log) -> TableResult:
         """Sum up; ImportDataError if there is nothing."""
-        if self._first_ns is None or not self._written:
+        if self._first_ns is None or not +self._written:
             raise ImportDataError(
                 f'{str(table.path)!r} gave no sample from {self._rows} row(s); {self._why_not()}'
             )
         return TableResult(
             rows=self._rows,
             left_out=self._left_out,
-            written=dict(self._written),
+            written=dict(+self._written),
             rejected=self._rejected,
             start_ns=self._first_ns,
             end_ns=self._newest_ns,
@@ -270,7 +300,7 @@ class _RowSamples:
                 'mark that is not closed does that.'
             )
         yield from self._clock.notes
-        for channel, count in self._too_fast.items():
+        for channel, count in (+self._too_fast).items():
             yield (
                 f'{channel.input}: {count} of {self._written[channel.input]} values are above '
                 f'{ABSURD_SPEED_M_S:g} m/s, faster than any displacement ship; is the unit right?'

@@ -19,11 +19,11 @@ from pynmeagps.nmeatypes_core import NMEA_TALKERS
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.nmea.clock import DAY_NS
 from shipdrag_ros.nmea.framing import Checksum
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import INPUTS, Channel
-from shipdrag_ros.sources.formats.nmea.clock import DAY_NS
 from shipdrag_ros.sources.formats.nmea.log import NmeaLog
 from shipdrag_ros.sources.formats.nmea.record import SentenceConverter
 from shipdrag_ros.sources.formats.nmea.survey import Survey

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from shipdrag_ros.nmea.clock import GAP_NS, SentenceClock, SentenceTime
 from shipdrag_ros.nmea.framing import Sentence
 from shipdrag_ros.nmea.sentences import (
     TIMED,
@@ -21,7 +22,6 @@ from shipdrag_ros.nmea.sentences import (
 )
 from shipdrag_ros.nmea.values import SentenceSource, read_values
 from shipdrag_ros.samples import Block, Channel
-from shipdrag_ros.sources.formats.nmea.clock import GAP_NS, SentenceClock, SentenceTime
 from shipdrag_ros.sources.log import Rejected
 
 _WAITING_SAMPLES = 16384  # in GAP_NS, of all inputs

@@ -11,11 +11,7 @@ from collections import Counter
 from datetime import date
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.nmea.framing import Sentence
-from shipdrag_ros.nmea.sentences import TIMED, Fields, Mounting, NoValue
-from shipdrag_ros.nmea.values import SentenceSource, best, read_values
-from shipdrag_ros.samples import Channel
-from shipdrag_ros.sources.formats.nmea.clock import (
+from shipdrag_ros.nmea.clock import (
     DAY_NS,
     ROLLOVER_DAYS,
     SentenceClock,
@@ -23,6 +19,10 @@ from shipdrag_ros.sources.formats.nmea.clock import (
     days_of,
     rollover_days,
 )
+from shipdrag_ros.nmea.framing import Sentence
+from shipdrag_ros.nmea.sentences import TIMED, Fields, Mounting, NoValue
+from shipdrag_ros.nmea.values import SentenceSource, best, read_values
+from shipdrag_ros.samples import Channel
 from shipdrag_ros.sources.formats.nmea.log import NmeaLog
 
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-When the sentences of a log were measured.
+When the sentences of a log, or of a wire, were measured.
 
 Few sentences state their time. The others have that of the last one that did;
 where an input speaks several times before the next, its samples are spread
@@ -11,15 +11,22 @@ since is measured instead, on its clock.
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from datetime import date
 
-from shipdrag_ros.nmea.sentences import Fields, NoValue, has_fix
+from shipdrag_ros.nmea.framing import Sentence
+from shipdrag_ros.nmea.sentences import TIMED, Fields, NoValue, has_fix
 from shipdrag_ros.samples import SECOND_NS
-from shipdrag_ros.sources.log import LIMIT_NS
 
 DAY_NS = 86_400 * SECOND_NS
 GAP_NS = 10 * SECOND_NS
 """A longer step of the time is a gap; what was measured inside it has no time."""
+
+BEHIND_NS = SECOND_NS
+"""A line that comes later than others by more waited somewhere: it is of a backlog."""
+
+_MEMORY_NS = 60 * SECOND_NS  # of the least delay; a clock that was set is known after it
+_LIMIT_NS = 2**31 * SECOND_NS  # of the stamp of a message
 
 _TIME = re.compile(r'(\d\d)(\d\d)(\d\d)(?:\.(\d+))?')
 _DATE = re.compile(r'(\d\d)(\d\d)(\d\d)')
@@ -91,7 +98,7 @@ def _day(fields: Fields) -> int | None:
         days = days_of(date(year, month, day))
     except (ValueError, OverflowError):
         raise NoValue('no possible date', f'{year}-{month}-{day}') from None
-    if not 0 <= days * DAY_NS < LIMIT_NS - DAY_NS:
+    if not 0 <= days * DAY_NS < _LIMIT_NS - DAY_NS:
         raise NoValue('no possible date', f'{year}-{month}-{day}')
     return days
 
@@ -197,3 +204,66 @@ class SentenceClock:
         if self._received_ns is None:
             return None
         return self.now_ns + receive_ns - self._received_ns
+
+
+class WireClock:
+    """
+    Knows a backlog on a wire: lines whose own times are further back than those of others.
+
+    A line that flows is stamped with its receipt: what it states holds the delay of its
+    source, and the difference of two clocks. The least difference between receipt and stated
+    time, of the last minute or two, is that of a line that flows; what exceeds it has waited,
+    after a stall of TCP for instance.
+    """
+
+    def __init__(self) -> None:
+        self._receivers: dict[str, _Receiver] = {}
+        self._behind_ns = 0
+        self._waited = False
+
+    def stamp_ns(self, sentence: Sentence, read_ns: int) -> int:
+        """
+        Return when a sentence was measured, by the clock of its receipt [ns since the epoch].
+
+        Parameters
+        ----------
+        sentence
+            One that states no time has waited as long as the last one that did.
+        read_ns
+            When its line was read [ns since the epoch].
+        """
+        if sentence.kind in TIMED:
+            with suppress(NoValue):
+                moment = SentenceTime(Fields(sentence.kind, sentence.fields))
+                if moment.trusted:
+                    receiver = self._receivers.setdefault(sentence.talker, _Receiver())
+                    self._behind_ns = receiver.behind_ns(moment.of_day_ns, read_ns)
+        # a backlog ends where its lines have caught up
+        self._waited = self._behind_ns > (BEHIND_NS // 10 if self._waited else BEHIND_NS)
+        return read_ns - self._behind_ns if self._waited else read_ns
+
+
+class _Receiver:
+    """The clock of one talker beside that of the receipt; the day does not count."""
+
+    def __init__(self) -> None:
+        self._least_ns: list[int] = []  # of this minute, then of the one before
+        self._since_ns = 0
+        self._stated_ns = -1
+        self._behind_ns = 0
+
+    def behind_ns(self, stated_ns: int, read_ns: int) -> int:
+        """Return how long a line that states a time of day has waited [ns]."""
+        if stated_ns == self._stated_ns:  # of the same fix, or of a clock that stands still
+            return self._behind_ns
+        self._stated_ns = stated_ns
+        difference_ns = read_ns - stated_ns
+        if not self._least_ns or not 0 <= read_ns - self._since_ns <= _MEMORY_NS:
+            self._least_ns, self._since_ns = [difference_ns, *self._least_ns[:1]], read_ns
+        self._least_ns[0] += min(_within_a_day(difference_ns - self._least_ns[0]), 0)
+        self._behind_ns = max(_within_a_day(difference_ns - each) for each in self._least_ns)
+        return max(self._behind_ns, 0)
+
+
+def _within_a_day(difference_ns: int) -> int:
+    return (difference_ns + DAY_NS // 2) % DAY_NS - DAY_NS // 2

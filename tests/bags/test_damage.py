@@ -47,7 +47,7 @@ def test_what_is_whole_in_a_file_cut_off_is_used_and_the_rest_told(
     assert 'was not closed, or it is cut off' in run.warnings[0]
     assert run.attachments == {'ship.yaml': 'name: x\n'}
     if fraction < 0.9:
-        assert 'is cut off: only what lies before is used' in run.warnings[1]
+        assert 'is damaged (truncated): left out' in run.warnings[1]
         assert len(block) < len(whole)
 
 
