@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.ship import Ship
 
@@ -27,8 +27,6 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         }
         for each in found.candidates
     ]
-    if found.verdict is Verdict.UNKNOWN:
-        candidates.insert(0, {'names': ['unknown'], 'probability': found.unnamed, 'effects': []})
     return {
         'verdict': str(found.verdict),
         'effects': [_sized(effect) for effect in found.effects],

@@ -104,7 +104,8 @@ def _runs(value: Any, path: str) -> tuple[SeenRun, ...]:
 
 def _candidates(value: Any) -> tuple[EarlierCandidate, ...]:
     found = []
-    for i, each in enumerate(_list(value, 'candidates')):
+    listed = _list(value, 'candidates')
+    for i, each in enumerate(listed):
         place = f'candidates[{i}]'
         candidate = _mapping(each, place)
         probability = _number(candidate.get('probability'), f'{place}.probability', 0.0, 1.0)
@@ -117,8 +118,8 @@ def _candidates(value: Any) -> tuple[EarlierCandidate, ...]:
             raise _Wrong(f'{place}: the names are {_shown(names)}, and the effects others')
         found.append(EarlierCandidate(probability, sizes))
     total = math.fsum(each.probability for each in found)
-    if not found or total > 1.0 + 1e-6:
-        raise _Wrong(f'candidates: {len(found)} of probability {total:g} in all')
+    if not listed or total > 1.0 + 1e-6:
+        raise _Wrong(f'candidates: {len(listed)} of probability {total:g} in all')
     return tuple(found)
 
 

@@ -25,7 +25,7 @@ from shipdrag_ros.diagnosis.direct import DirectModel, diagnosis_of_speeds, lear
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
 from shipdrag_ros.diagnosis.result import FORCE, DiagnosisResult, Where
-from shipdrag_ros.diagnosis.search import search
+from shipdrag_ros.diagnosis.search import search, with_unnamed
 from shipdrag_ros.diagnosis.speeds import CoastRun, MeanSpeeds
 from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.diagnosis.verdict import Judgement, judge
@@ -278,7 +278,7 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> DiagnosisResult:
     """
     seen = [MeanSpeeds.of(run) for run in runs]
     model = FormModel.learnt(ship, seen)
-    found = search(model)
+    found = with_unnamed(search(model))
     judged = judge(found)
     explained = found.best if judged.missing else found.nothing
     speeds = np.concatenate([coast.speed_m_s for coast in seen])

@@ -5,26 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 
 from shipdrag_ros.diagnosis.seen_runs import DOUBTED, SeenRun, WeighedEarlier
 from shipdrag_ros.display import Table
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.inference.decision import CERTAIN, Verdict, smallest_set
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.facts import Fact
 
 FORCE = 'force'  # on the ship, against her baseline
 LOG_TRACK = 'log_track'  # the log against the way over ground
-
-
-class Verdict(StrEnum):
-    """What is missing in the model."""
-
-    NONE = 'none'
-    NAMED = 'named'
-    ONE_OF = 'one_of'
-    UNKNOWN = 'unknown'
 
 
 @dataclass(frozen=True)
@@ -36,7 +27,7 @@ class EffectEstimate:
     ----------
     name
     probability
-        Of the hypothesis that it is part of.
+        Over all hypotheses that hold it; of a candidate, that of the candidate.
     parameters
         In their units.
     """
@@ -54,7 +45,7 @@ class Candidate:
     Attributes
     ----------
     names
-        Empty: nothing is missing.
+        Empty: nothing is missing; `UNKNOWN`: something without a name.
     probability
     effects
         The same with the sizes that they would have.
@@ -238,8 +229,7 @@ class DiagnosisResult:
     effects
         Of `named`, otherwise empty.
     candidates
-        The smallest set that holds 99 %, most probable first; empty names:
-        nothing is missing.
+        The smallest set that holds 99 %, most probable first.
     nothing, unnamed
         Probabilities that nothing, and that something without a name is missing.
     would_decide
@@ -300,6 +290,12 @@ class DiagnosisResult:
     estimates: tuple[Estimate, ...] = ()
     runs: tuple[SeenRun, ...] = ()
     earlier: tuple[WeighedEarlier, ...] = ()
+
+    @property
+    def held(self) -> tuple[Candidate, ...]:
+        """The smallest set that holds 90 %, most probable first."""
+        probability = {each.names: each.probability for each in self.candidates}
+        return self.candidates[: len(smallest_set(probability, CERTAIN))]
 
     def summary(self) -> tuple[str, ...]:
         """

@@ -19,7 +19,7 @@ from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, left_text
 from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
-from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
+from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs, with_unnamed
 from shipdrag_ros.diagnosis.units import asked
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
@@ -81,7 +81,7 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
     if outlier.any():
         legs = legs[np.flatnonzero(~outlier)]
         model = SailingModel.learnt(legs)
-    found = with_pairs(search(model))
+    found = with_unnamed(with_pairs(search(model)))
     judged = judge(found)
     return diagnosis_of_speeds(
         judged,

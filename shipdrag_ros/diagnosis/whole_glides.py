@@ -6,8 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from shipdrag_ros.diagnosis.result import DiagnosisResult, Verdict
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
+from shipdrag_ros.inference.decision import Verdict
 
 Diagnose = Callable[[], DiagnosisResult]
 
@@ -17,6 +18,7 @@ _SOUND_PART = (
     'So it is not known whether anything is missing; give the sound part alone with '
     '--window START END'
 )
+
 _APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 

@@ -16,6 +16,7 @@ from shipdrag_ros.diagnosis import (
 )
 from shipdrag_ros.diagnosis.seen_runs import WeighedEarlier
 from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
+from shipdrag_ros.inference.decision import NONE, UNKNOWN
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -29,7 +30,6 @@ _CHANNELS = {
 NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
 _LEAST = 0.001  # probability that is stated
-_WORTH_A_WORD = 0.01
 _LARGE_N = 1e4  # from here on a force is stated in kN
 
 
@@ -38,55 +38,60 @@ def sentence(found: DiagnosisResult) -> str:
     Return the verdict in a sentence.
     """
     match found.verdict:
-        case Verdict.NONE if found.nothing >= 0.5 and found.baseline == 'none':
+        case Verdict.NONE if found.baseline == 'none':
             return (
                 'Log and track agree: nothing is wrong between them that this record could show '
                 f'(probability {probability(found.nothing)}).'
             )
-        case Verdict.NONE if found.nothing >= 0.5:
+        case Verdict.NONE:
             return (
                 'Model and data agree: nothing is missing that these runs could show '
                 f'(probability {probability(found.nothing)}).'
-            )
-        case Verdict.NONE:
-            other, share = max(
-                (
-                    (each.words, each.probability)
-                    for each in answers(found)
-                    if each.words not in (NOTHING, NOTHING_BETWEEN)
-                ),
-                key=lambda answer: answer[1],
-            )
-            return (
-                f'No effect can be named: {other} is the likeliest ({probability(share)}), but a '
-                'baseline that is further off than stated would explain these runs as well '
-                f'({probability(found.nothing)}).'
             )
         case Verdict.NAMED if found.runs_differ:
             names = names_text([effect.name for effect in found.effects])
             return (
                 f'Missing in the model, and not alike in these runs: {names}; probability '
-                f'{probability(found.effects[0].probability)}.'
+                f'{_least_probable(found)}.{_besides(found)}'
             )
         case Verdict.NAMED:
             sizes = ' and '.join(_sized(effect) for effect in found.effects)
             return (
                 f'Missing in the model: {sizes}; probability '
-                f'{probability(found.effects[0].probability)}.'
+                f'{_least_probable(found)}.{_besides(found)}'
             )
         case Verdict.ONE_OF:
-            unnamed = f', or {UNNAMED} ({probability(found.unnamed)})'
-            return (
-                f'Missing is one of these: {_listed(found.candidates)}'
-                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot separate '
-                'them.'
-            )
+            held, rest = found.held, []
+            nothing = next((each for each in held if each.names == NONE), None)
+            if nothing is not None:
+                rest = [each for each in held if each is not nothing]
+                said = f'Nothing is missing ({probability(nothing.probability)}), or '
+            else:
+                rest, said = list(held), 'Missing is one of these: '
+            return f'{said}{_listed(found, rest)}. These runs cannot separate them.'
         case Verdict.UNKNOWN:
-            first = found.candidates[0]
-            why = ''
-            if first.names and found.unnamed < first.probability:
-                why = f' The likeliest of them, {names_text(first.names)}, leaves more than noise.'
-            return f'Something is missing that is none of the known effects, {place(found)}.{why}'
+            return (
+                f'Something is missing that is none of the known effects, {place(found)} '
+                f'(probability {probability(found.unnamed)}).'
+            )
+
+
+def _least_probable(found: DiagnosisResult) -> str:
+    """Return how probable the named effects are; of two the less probable."""
+    return probability(min(effect.probability for effect in found.effects))
+
+
+def _besides(found: DiagnosisResult) -> str:
+    """Say which effects may be there beside those that are named; '' where none is likely."""
+    named = {effect.name for effect in found.effects}
+    share: dict[str, float] = {}
+    for each in found.held:
+        for name in set(each.names) - named if named <= set(each.names) else ():
+            share[name] = share.get(name, 0.0) + each.probability
+    if not share:
+        return ''
+    listed = ', '.join(f'{names_text([name])} ({probability(p)})' for name, p in share.items())
+    return f' Beside it there may be: {listed}.'
 
 
 def differing(found: DiagnosisResult) -> str:
@@ -262,9 +267,11 @@ def answers(found: DiagnosisResult) -> tuple[Answer, ...]:
         Answer(names_text(each.names) if each.names else nothing, each.probability)
         for each in found.candidates
     ]
-    if all(each.names for each in found.candidates):
+    names = [each.names for each in found.candidates]
+    if NONE not in names:
         listed.append(Answer(nothing, found.nothing))
-    listed.append(Answer(UNNAMED, found.unnamed))
+    if UNKNOWN not in names:
+        listed.append(Answer(UNNAMED, found.unnamed))
     others = 1.0 - sum(each.probability for each in listed)
     return (*listed, Answer(OTHERS, others)) if others >= _LEAST else tuple(listed)
 
@@ -273,6 +280,8 @@ def names_text(names: Sequence[str]) -> str:
     """
     Name effects; none: nothing is missing.
     """
+    if names == UNKNOWN:
+        return UNNAMED
     return ' + '.join(name.replace('_', ' ') for name in names) or NOTHING
 
 
@@ -346,7 +355,7 @@ def _on_board(quantity: Parameter, found: Parameter) -> str:
     return text
 
 
-def _listed(candidates: Sequence[Candidate]) -> str:
+def _listed(found: DiagnosisResult, candidates: Sequence[Candidate]) -> str:
     return ', '.join(
         f'{names_text(each.names)} ({probability(each.probability)})' for each in candidates
     )

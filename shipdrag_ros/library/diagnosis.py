@@ -214,8 +214,6 @@ class Diagnosis(Shown):
                 for value in (effect.parameters[size.name],)
             ]
             rows += sized or [(names, each.probability, '', '', None, None, '')]
-        if self.found.unnamed:
-            rows.append(('unknown', self.found.unnamed, '', '', None, None, ''))
         heads = ('candidate', 'probability', 'effect', 'parameter', 'value', 'sd', 'unit')
         return {head: [row[place] for row in rows] for place, head in enumerate(heads)}
 
