@@ -82,12 +82,15 @@ class CoastModel(CoastSimulation):
                 'add `baseline` to its ship file, or learn one with `shipdrag baseline`'
             )
         ship = self.bare
-        stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
+        # as the file states it: a thrust that runs down otherwise is an effect
+        stated = ship.propulsion is not None
         baseline = BaselineTerm(
             ship,
             1.05 * max(run.speed_m_s for run in self.seen),
-            tuple(run.run_down_s - stated for run in self.seen),
-            max(run.run_down_sd_s for run in self.seen),
+            tuple(0.0 if stated else run.run_down_s for run in self.seen),
+            ship.propulsion.sd
+            if ship.propulsion
+            else max(run.run_down_sd_s for run in self.seen),
         )
         scatter = self.ship.baseline.run_scatter
         places = tuple(

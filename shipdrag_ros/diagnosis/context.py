@@ -32,7 +32,7 @@ _YAW_SD_RAD = 0.03  # of a mean over a bin: a ship yaws in the waves
 _SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and all of them
 _TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
-_FALL_RUN_DOWNS = 8.0  # after the stop; from then on the shaft speaks of the propeller
+_FALL_RUN_DOWNS = 4.0  # after the stop; from then on less is left than the shaft is known by
 
 
 @dataclass(frozen=True)
@@ -200,8 +200,8 @@ def _shaft(
     if window.before is None or len(window.before.shaft) == 0:
         return nothing
     steady = float(np.median(np.abs(window.before.shaft.value)))
-    run_down_s = ship.propulsion.run_down_s if ship.propulsion else _BIN_S
-    fallen_s = stop.lead_in_s + _FALL_RUN_DOWNS * max(run_down_s, stop.shaft_s)
+    run_down_s = ship.propulsion.run_down_s if ship.propulsion else max(_BIN_S, stop.shaft_s)
+    fallen_s = stop.lead_in_s + _FALL_RUN_DOWNS * run_down_s
     time_s, value = _binned(window, 'shaft', stop, edges)
     late = time_s > fallen_s
     if steady <= 0.0 or not late.any():

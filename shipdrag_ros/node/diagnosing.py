@@ -19,7 +19,7 @@ from enum import Enum
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -71,8 +71,8 @@ class DiagnosisStatus:
     @property
     def caveat(self) -> str:
         """What the diagnosis has not looked at, a sentence; '' where it saw all of a glide."""
-        braked = self.coastdown is not None and self.coastdown.braked
-        return f'{BRAKED[0].upper()}{BRAKED[1:]}. {_GOES_ON}' if braked else ''
+        said = '' if self.coastdown is None else self.coastdown.disturbed
+        return f'{said[0].upper()}{said[1:]}. {_GOES_ON}' if said else ''
 
 
 @dataclass(frozen=True)
