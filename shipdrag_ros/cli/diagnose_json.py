@@ -28,6 +28,7 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         for each in found.candidates
     ]
     return {
+        'question': found.question or None,
         'verdict': str(found.verdict),
         'effects': [_sized(effect) for effect in found.effects],
         'candidates': candidates,

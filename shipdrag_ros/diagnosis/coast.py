@@ -88,9 +88,7 @@ class CoastModel(CoastSimulation):
             ship,
             1.05 * max(run.speed_m_s for run in self.seen),
             tuple(0.0 if stated else run.run_down_s for run in self.seen),
-            ship.propulsion.sd
-            if ship.propulsion
-            else max(run.run_down_sd_s for run in self.seen),
+            ship.propulsion.sd if ship.propulsion else max(run.run_down_sd_s for run in self.seen),
         )
         scatter = self.ship.baseline.run_scatter
         places = tuple(

@@ -27,7 +27,7 @@ from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs, with
 from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.swinging import swing_notes, with_swinging
-from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
+from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import UNKNOWN, Verdict
@@ -134,7 +134,10 @@ def diagnose(
         place = where(model, as_stated, found.smooth)
     if place is not None and differ:  # a smooth error alike in all runs would pass for the log's
         place = replace(place, channel=FORCE)
-    return judged.diagnosis(
+    questions = [
+        f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
+    ]
+    found_all = judged.diagnosis(
         would_decide=would_decide,
         where=place,
         before=gap_of(model, as_stated.best),
@@ -151,6 +154,7 @@ def diagnose(
         runs=_seen_runs(seen),
         earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
     )
+    return waiting(found_all, '; '.join(questions))
 
 
 def _searched(
@@ -230,8 +234,13 @@ def _observed(
     if not seen:
         name, reason = next(iter(refused.items()))
         raise type(reason)(f'{name}: {reason}')
-    notes = [f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))]
-    notes += [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes = [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes += [
+        f'{run.name}: the shaft ran down in {run.context.stop.shaft_s:.2g} s, where the ship file '
+        f'says {ship.propulsion.run_down_s:.2g} ± {2.0 * ship.propulsion.sd:.2g} s'
+        for run in seen
+        if ship.propulsion is not None and run.context.stop.shaft_s > 0.0
+    ]
     notes += [
         f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
         'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '

@@ -84,8 +84,8 @@ def _diagnosis(document: Any, name: str) -> EarlierDiagnosis:
         given = _mapping(each, place)
         if given.get('used') is True:
             before += _runs(given.get('runs'), f'{place}.runs')
-    candidates = _candidates(whole.get('candidates'))
     of_force = whole.get('baseline') == 'stated'
+    candidates = _candidates(whole.get('candidates'), all_sized=of_force)
     return EarlierDiagnosis(
         name, called, length_m, runs, tuple(before), candidates, of_force, stated
     )
@@ -102,7 +102,7 @@ def _runs(value: Any, path: str) -> tuple[SeenRun, ...]:
     return tuple(found)
 
 
-def _candidates(value: Any) -> tuple[EarlierCandidate, ...]:
+def _candidates(value: Any, *, all_sized: bool) -> tuple[EarlierCandidate, ...]:
     found = []
     listed = _list(value, 'candidates')
     for i, each in enumerate(listed):
@@ -114,7 +114,8 @@ def _candidates(value: Any) -> tuple[EarlierCandidate, ...]:
         if names == [_UNKNOWN]:
             continue
         named = set() if names == [_NOTHING] else set(map(str, names))
-        if not names or named != set(sizes):
+        # without a baseline, an effect that could not be seen has no size
+        if not names or ((sizes or all_sized) and named != set(sizes)):
             raise _Wrong(f'{place}: the names are {_shown(names)}, and the effects others')
         found.append(EarlierCandidate(probability, sizes))
     total = math.fsum(each.probability for each in found)

@@ -143,6 +143,15 @@ class FormModel(DirectModel):
         ]
         return tuple(sorted(shown, key=lambda effect: effect.scope is Scope.SENSOR))
 
+    @property
+    def unseen(self) -> tuple[Effect, ...]:
+        """Those of the hull that the fitted form has taken up."""
+        return tuple(
+            effect
+            for effect in LIBRARY.values()
+            if effect.scope is Scope.HULL and effect not in self.effects
+        )
+
     @cached_property
     def inseparable(self) -> tuple[frozenset[str], ...]:
         """All that is a constant force; on one heading an error of the log as well."""
@@ -279,7 +288,7 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> DiagnosisResult:
     seen = [MeanSpeeds.of(run) for run in runs]
     model = FormModel.learnt(ship, seen)
     found = with_unnamed(search(model))
-    judged = judge(found)
+    judged = judge(found, {effect.name: effect.odds for effect in model.unseen})
     explained = found.best if judged.missing else found.nothing
     speeds = np.concatenate([coast.speed_m_s for coast in seen])
     times = np.concatenate([coast.time_s for coast in seen])

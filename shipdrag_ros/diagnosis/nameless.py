@@ -34,8 +34,10 @@ def with_nameless(found: SearchResult, model: CoastModel) -> SearchResult:
         The same where no effect of the kind is likely, alone or with another.
     """
     tried = [made for one in likely(found.posterior) if (made := _nameless(model, one))]
+    if not tried:
+        return found
     starts = [start(model, hypothesis, near.best) for hypothesis, near in tried]
-    fits = fit(model, [hypothesis for hypothesis, _ in tried], starts) if tried else []
+    fits = fit(model, [hypothesis for hypothesis, _ in tried], starts)
     return replace(found, fits=(*found.fits, *fits))
 
 

@@ -265,6 +265,8 @@ class DiagnosisResult:
         That it rests on.
     earlier
         Diagnoses of before that were given, with what of each counts.
+    question
+        That is to be answered before anything is judged, a sentence; '' for none.
     """
 
     verdict: Verdict
@@ -290,6 +292,7 @@ class DiagnosisResult:
     estimates: tuple[Estimate, ...] = ()
     runs: tuple[SeenRun, ...] = ()
     earlier: tuple[WeighedEarlier, ...] = ()
+    question: str = ''
 
     @property
     def held(self) -> tuple[Candidate, ...]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, left_tex
 from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
 from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs, with_unnamed
-from shipdrag_ros.diagnosis.units import asked
+from shipdrag_ros.diagnosis.units import asked, waiting
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
 from shipdrag_ros.errors import DiagnosisError
@@ -70,7 +69,7 @@ def diagnose_sailing(
         return zeros_alone(still, why=str(error), no_coastdown=no_coastdown)
     found = _diagnosed(legs, no_coastdown)
     units = asked(float(np.median(legs.log_m_s / legs.ground_m_s)))
-    return with_zeros(replace(found, notes=(units, *found.notes)) if units else found, still)
+    return waiting(with_zeros(found, still), units)
 
 
 def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:

@@ -115,7 +115,7 @@ def with_pairs(found: SearchResult, *, progress: Progress = silent) -> SearchRes
     SearchResult
     """
     pairs = _pairs(found.model, found.posterior, progress)
-    return replace(found, fits=(*found.fits, *pairs))
+    return replace(found, fits=(*found.fits, *pairs)) if pairs else found
 
 
 def with_unnamed(found: SearchResult) -> SearchResult:

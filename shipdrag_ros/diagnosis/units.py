@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A log that is off by the ratio of two units is asked about them."""
+"""A log that is off by the ratio of two units is asked about them, before anything is judged."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.display import mistaken_units
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
 
 
@@ -32,6 +36,21 @@ def asked(ratio: float) -> str:
         'one of them wrong? Import it again with its unit, as in '
         '--map speed_through_water=COLUMN:kn'
     )
+
+
+def waiting(found: DiagnosisResult, question: str) -> DiagnosisResult:
+    """
+    Return a diagnosis whose verdict waits for the answer to a question.
+
+    Parameters
+    ----------
+    found
+    question
+        A sentence; '' for none, and the diagnosis stays as it is.
+    """
+    if not question:
+        return found
+    return replace(found, question=question, verdict=Verdict.ONE_OF, effects=())
 
 
 def ratio_before_the_stop(seen: Observation) -> float:

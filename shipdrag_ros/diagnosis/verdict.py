@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,7 +16,7 @@ from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.inference.decision import UNKNOWN, Verdict, decide, mixture
+from shipdrag_ros.inference.decision import UNKNOWN, Names, Verdict, decide, mixture
 from shipdrag_ros.parameter import Parameter
 
 
@@ -25,6 +28,8 @@ class Judgement:
     Attributes
     ----------
     found
+    posterior
+        Of all hypotheses.
     verdict
     effects
         That are named.
@@ -32,14 +37,10 @@ class Judgement:
     """
 
     found: SearchResult
+    posterior: Posterior
     verdict: Verdict
     effects: tuple[EffectEstimate, ...]
     candidates: tuple[Candidate, ...]
-
-    @property
-    def posterior(self) -> Posterior:
-        """Of all hypotheses."""
-        return self.found.posterior
 
     @property
     def missing(self) -> bool:
@@ -73,7 +74,7 @@ class Judgement:
         )
 
 
-def judge(found: SearchResult) -> Judgement:
+def judge(found: SearchResult, unseen: Mapping[str, float] = MappingProxyType({})) -> Judgement:
     """
     Return the verdict on what a search found.
 
@@ -81,21 +82,31 @@ def judge(found: SearchResult) -> Judgement:
     ----------
     found
         With pairs, where they are looked for.
+    unseen
+        Prior odds of effects that these data cannot show: what is so without them is so with them.
 
     Returns
     -------
     Judgement
         The decision that the posterior probabilities alone make.
     """
-    posterior = found.posterior
+    fits = found.posterior.best
+    posterior = _with_unseen(found.posterior, unseen)
     decision = decide(posterior.probability, found.model.inseparable)
-    fits = posterior.best
     candidates = tuple(
-        Candidate(names, p, () if names == UNKNOWN else sized(fits[names], p))
+        Candidate(names, p, sized(fits[names], p) if names in fits and names != UNKNOWN else ())
         for names, p in decision.candidates
     )
     named = tuple(_named(posterior, name, p) for name, p in sorted(decision.effects.items()))
-    return Judgement(found, decision.verdict, named, candidates)
+    return Judgement(found, posterior, decision.verdict, named, candidates)
+
+
+def _with_unseen(posterior: Posterior, odds: Mapping[str, float]) -> Posterior:
+    """Return the posterior with effects whose evidence is that of nothing."""
+    total = 1.0 + posterior.nothing * math.fsum(odds.values())
+    both: dict[Names, float] = dict(posterior.probability)
+    both |= {(name,): posterior.nothing * each for name, each in odds.items()}
+    return Posterior(posterior.best, {names: p / total for names, p in both.items()})
 
 
 def _named(posterior: Posterior, name: str, probability: float) -> EffectEstimate:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
-from shipdrag_ros.inference.decision import Verdict
+from shipdrag_ros.inference.decision import NONE, Verdict
 
 Diagnose = Callable[[], DiagnosisResult]
 
@@ -73,9 +73,7 @@ def with_whole_glides(
     return replace(used, notes=(*held.notes, *notes, _HELD))
 
 
-def _not_followed(
-    alone: Diagnose, notes: Sequence[str], error: ShipdragError
-) -> DiagnosisResult:
+def _not_followed(alone: Diagnose, notes: Sequence[str], error: ShipdragError) -> DiagnosisResult:
     """Diagnose the coastdowns alone; what is cut from them is no sign of nothing."""
     why = f'all of each glide could not be held against the model: {error}'
     try:
@@ -85,6 +83,6 @@ def _not_followed(
     except (DiagnosisError, EstimationError) as failed:
         said = f'the coastdowns alone could not be diagnosed: {failed}'
         raise DiagnosisError(f'{"; ".join((*notes, said, why))}. {_SOUND_PART}') from error
-    if found.verdict is Verdict.NONE:
+    if found.candidates[0].names == NONE:
         raise DiagnosisError(f'{"; ".join((*notes, why))}. {_SOUND_PART}') from error
     return replace(found, notes=(*found.notes, *notes, why))

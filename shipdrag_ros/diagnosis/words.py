@@ -19,6 +19,7 @@ from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
 from shipdrag_ros.inference.decision import NONE, UNKNOWN
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
+from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
 from shipdrag_ros.simulation.effects import LIBRARY
 
 _CHANNELS = {
@@ -35,8 +36,17 @@ _LARGE_N = 1e4  # from here on a force is stated in kN
 
 def sentence(found: DiagnosisResult) -> str:
     """
-    Return the verdict in a sentence.
+    Return the verdict in a sentence; first a question, or that there is no clean hull.
     """
+    if found.question:
+        return f'{found.question}. The verdict waits for the answer.'
+    if found.baseline == 'fitted_here':
+        return f'{NO_CLEAN_HULL} {_verdict(found)}'
+    return _verdict(found)
+
+
+def _verdict(found: DiagnosisResult) -> str:
+    """Return the verdict on what was examined."""
     match found.verdict:
         case Verdict.NONE if found.baseline == 'none':
             return (
@@ -61,14 +71,24 @@ def sentence(found: DiagnosisResult) -> str:
                 f'{_least_probable(found)}.{_besides(found)}'
             )
         case Verdict.ONE_OF:
-            held, rest = found.held, []
-            nothing = next((each for each in held if each.names == NONE), None)
-            if nothing is not None:
-                rest = [each for each in held if each is not nothing]
-                said = f'Nothing is missing ({probability(nothing.probability)}), or '
-            else:
-                rest, said = list(held), 'Missing is one of these: '
-            return f'{said}{_listed(found, rest)}. These runs cannot separate them.'
+            fitted = found.baseline == 'fitted_here'  # some could not be seen, and have no size
+            seen = [
+                each
+                for each in found.held
+                if each.effects or not fitted or each.names in (NONE, UNKNOWN)
+            ]
+            rest = [each for each in seen if each.names != NONE]
+            if len(rest) == len(seen):
+                return (
+                    f'Missing is one of these: {_listed(rest)}. These runs cannot separate them.'
+                )
+            said = f'{"Nothing else" if fitted else "Nothing"} is missing'
+            said = f'{said} ({probability(found.nothing)})'
+            return (
+                f'{said}, or {_listed(rest)}. These runs cannot separate them.'
+                if rest
+                else f'{said}.'
+            )
         case Verdict.UNKNOWN:
             return (
                 f'Something is missing that is none of the known effects, {place(found)} '
@@ -355,7 +375,7 @@ def _on_board(quantity: Parameter, found: Parameter) -> str:
     return text
 
 
-def _listed(found: DiagnosisResult, candidates: Sequence[Candidate]) -> str:
+def _listed(candidates: Sequence[Candidate]) -> str:
     return ', '.join(
         f'{names_text(each.names)} ({probability(each.probability)})' for each in candidates
     )

@@ -24,7 +24,7 @@ from shipdrag_ros.diagnosis.result import (
     Gap,
     Where,
 )
-from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, decide
+from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names, Verdict, decide
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -182,18 +182,20 @@ def with_zeros(found: DiagnosisResult, still: StandsStill | None) -> DiagnosisRe
             effects[names] = () if names == UNKNOWN else (*each.effects, *more)
     decision = decide(probability)
     candidates = tuple(Candidate(names, p, effects[names]) for names, p in decision.candidates)
-    sizes = {effect.name: effect for each in reversed(candidates) for effect in each.effects}
+    named = dict(decision.effects)
+    if sure >= CERTAIN:  # whatever else there is, something without a name too
+        named[still.effect.name] = sure
+    both = (*(effect for each in reversed(candidates) for effect in each.effects), still.effect)
+    sizes = {effect.name: effect for effect in both}
     return replace(
         found,
         notes=(_note(still), *found.notes),
-        verdict=decision.verdict,
-        effects=tuple(
-            replace(sizes[name], probability=p) for name, p in sorted(decision.effects.items())
-        ),
+        verdict=Verdict.NAMED if named else decision.verdict,
+        effects=tuple(replace(sizes[name], probability=p) for name, p in sorted(named.items())),
         candidates=candidates,
         nothing=found.nothing * (1.0 - sure),
         best=candidates[0].effects,
-        where=found.where or _where(still),
+        where=found.where if found.candidates[0].names else _where(still),
     )
 
 

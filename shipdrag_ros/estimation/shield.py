@@ -8,7 +8,7 @@ import traceback
 from functools import wraps
 
 from shipdrag_ros.errors import EstimationError, ShipdragError
-from shipdrag_ros.estimation.estimator import Estimating
+from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 _logged: set[tuple[str, int]] = set()  # file and line of defects whose trace is in the log
 
 
-def shielded(estimator: Estimating) -> Estimating:
+def shielded(estimator: WindowEstimator) -> WindowEstimator:
     """
     Return an estimator whose every error is an `EstimationError`.
 

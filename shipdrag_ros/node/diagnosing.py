@@ -24,6 +24,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
 
 if TYPE_CHECKING:  # the process that diagnoses imports it, the node need not
     from shipdrag_ros.diagnosis import DiagnosisResult
@@ -107,8 +108,7 @@ class Diagnosing:
         if not enabled:
             self._status = DiagnosisStatus(DiagnosisState.OFF, 'the parameter diagnose is false')
         elif ship.baseline is None:
-            reason = 'the ship file has no baseline; add `baseline` to it'
-            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason)
+            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, NO_CLEAN_HULL)
         self._possible = self._status.state is DiagnosisState.NONE_YET
 
     @property

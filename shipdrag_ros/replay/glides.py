@@ -30,8 +30,8 @@ DISMISSED = (
     'no coastdown is taken from it'
 )
 _NOT_FOLLOWED = (
-    '{disturbed}; all of the glide is not held against the model, as {why}, and what is said rests '
-    'on the coastdown alone'
+    '{disturbed}; all of the glide is not held against the model, as {why}, and what is said '
+    'rests on the coastdown alone'
 )
 _ACTED = (Dismissal.BRAKE, Dismissal.TURN, Dismissal.RUDDER)
 _BIN_S = 10.0
