@@ -75,7 +75,7 @@ def share_needed(trial: Trial) -> float:
     """
     unnamed = {('unknown',)}
     found = [(names, p) for names, p in trial.answer.candidates if names not in unnamed]
-    total = sum(p for _, p in found) / SET
+    total = sum(p for _, p in found) / LISTED
     before = 0.0
     for names, probability in found:
         if names == trial.truth.names:
@@ -211,7 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     name = name_threshold(groups['a'], risk=options.risk)
     share_of_set = set_share(groups['a'], part=options.part)
     print(f'by risk control on a: names from {_or_none(name)}, in use {CERTAIN:g}')
-    print(f'by split conformal on a: sets of {_or_none(share_of_set)}, in use {SET:g}')
+    print(f'by split conformal on a: sets of {_or_none(share_of_set)}, in use {LISTED:g}')
     print_sure(groups['a'], risk=options.risk, part=options.part, confidence=options.confidence)
 
 

@@ -18,7 +18,7 @@ _UNIT_RATIOS = {
     if shown != meant
 }
 # relative, as a current and the error of a log are in a ratio too; and of the way to one unit
-_UNITS_NEAR, _UNITS_NEARER = 0.1, 0.25
+_UNITS_NEAR, _UNITS_NEARER = 0.1, 0.15
 # what `float` takes besides, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
@@ -218,7 +218,7 @@ def mistaken_units(ratio: float) -> str:
     Returns
     -------
     str
-        The units whose ratio is within 10 %, and a quarter of the way to one unit; each with its
+        The units whose ratio is within 10 %, and a seventh of the way to one unit; each with its
         ratio; '' where there are none.
     """
     if not ratio > 0.0:

@@ -145,6 +145,8 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))
     for line in (*weighed, *found.notes):
         output.say(line)
+    if found.question:
+        return
     output.heading('How probable')
     output.table(diagnosis_cells.probabilities(found))
     if found.effects:

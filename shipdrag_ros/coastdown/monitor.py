@@ -33,13 +33,14 @@ from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
-from shipdrag_ros.coastdown.running import RunningCoastdown, WindowEstimator
+from shipdrag_ros.coastdown.running import RunningCoastdown
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block

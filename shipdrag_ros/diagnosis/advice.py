@@ -31,7 +31,7 @@ from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.decision import CERTAIN, UNKNOWN, Hypothesis, Verdict, decide
+from shipdrag_ros.inference.decision import CERTAIN, UNKNOWN, Verdict, WeighedHypothesis, decide
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
@@ -88,7 +88,7 @@ def advice(
     """
     fits = _rivals(posterior)
     # the evidence of a fit holds the prior
-    rivals = [Hypothesis(names, one.log_evidence, 0.0) for names, one in fits.items()]
+    rivals = [WeighedHypothesis(names, one.log_evidence, 0.0) for names, one in fits.items()]
     found: list[Advice] = []
     tried = (*_RUNS, *_INSTRUMENTS)
     for done, measure in enumerate(tried):

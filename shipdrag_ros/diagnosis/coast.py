@@ -82,17 +82,23 @@ class CoastModel(CoastSimulation):
                 'add `baseline` to its ship file, or learn one with `shipdrag baseline`'
             )
         ship = self.bare
-        # as the file states it: a thrust that runs down otherwise is an effect
-        stated = ship.propulsion is not None
+        stated = ship.propulsion.run_down_s if ship.propulsion else 0.0
         baseline = BaselineTerm(
             ship,
             1.05 * max(run.speed_m_s for run in self.seen),
-            tuple(0.0 if stated else run.run_down_s for run in self.seen),
-            ship.propulsion.sd if ship.propulsion else max(run.run_down_sd_s for run in self.seen),
+            tuple(run.run_down_s - stated for run in self.seen),
+            max(run.run_down_sd_s for run in self.seen),
         )
         scatter = self.ship.baseline.run_scatter
         places = tuple(
-            RunNuisance(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None, scatter)
+            RunNuisance(
+                j,
+                run.heading_sd_rad,
+                run.stop_sd_s,
+                run.across is not None,
+                scatter,
+                stop_s=-run.stop_moved_s,
+            )
             for j, run in enumerate(self.seen)
         )
         given: list[Term] = [

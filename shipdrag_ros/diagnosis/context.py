@@ -34,7 +34,8 @@ _TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
 _FALL_RUN_DOWNS = 8.0  # after the stop; from then on the shaft speaks of the propeller
 _SHORTEST_S = 0.1  # fall of a shaft
-_RUN_DOWN_SD = 0.2  # relative: no shaft falls exactly as an exponential
+# of the logarithm: thrust is gone before or after its shaft stands, by the propeller and engine
+_RUN_DOWN_SD = 0.6
 
 
 @dataclass(frozen=True)

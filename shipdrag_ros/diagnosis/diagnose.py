@@ -112,7 +112,22 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    model, found, stated, notes = _searched(runs, ship, parameters, facts, earlier, progress)
+    still = {run.name: 0.0 for run in runs}
+    seen, notes = _observed(runs, ship, parameters, still, progress)
+    questions = [
+        f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
+    ]
+    if questions:
+        return waiting(
+            '; '.join(questions),
+            baseline='stated',
+            notes=notes,
+            coastdowns_used=len(seen),
+            runs=_seen_runs(seen),
+        )
+    model, found, stated, notes = _searched(
+        (seen, notes), runs, ship, parameters, facts, earlier, progress
+    )
     seen = model.seen
     found = with_swinging(found, model)
     found = with_pairs(with_differing(found, model), progress=progress)
@@ -134,10 +149,7 @@ def diagnose(
         place = where(model, as_stated, found.smooth)
     if place is not None and differ:  # a smooth error alike in all runs would pass for the log's
         place = replace(place, channel=FORCE)
-    questions = [
-        f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
-    ]
-    found_all = judged.diagnosis(
+    return judged.diagnosis(
         would_decide=would_decide,
         where=place,
         before=gap_of(model, as_stated.best),
@@ -154,10 +166,10 @@ def diagnose(
         runs=_seen_runs(seen),
         earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
     )
-    return waiting(found_all, '; '.join(questions))
 
 
 def _searched(
+    first: tuple[tuple[Observation, ...], tuple[str, ...]],
     runs: Sequence[CoastRun],
     ship: Ship,
     parameters: Parameters,
@@ -168,7 +180,11 @@ def _searched(
     """Search, and see the runs anew where that moves their stops; notes on them besides."""
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):
-        seen, notes = _observed(runs, ship, parameters, moved_s, progress)
+        seen, notes = (
+            _observed(runs, ship, parameters, moved_s, progress)
+            if any(moved_s.values())
+            else first
+        )
         stated = _stated(runs, seen, ship, facts)
         before = carried(earlier, ship, _seen_runs(seen), stated)
         model = CoastModel(ship, seen, seen[0].heading_rad, stated, before)

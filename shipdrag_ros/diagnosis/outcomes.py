@@ -24,8 +24,8 @@ from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
-from shipdrag_ros.inference.decision import Hypothesis as Rival
 from shipdrag_ros.inference.decision import Verdict, decide, probabilities
+from shipdrag_ros.inference.decision import WeighedHypothesis as Rival
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable

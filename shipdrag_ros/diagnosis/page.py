@@ -42,8 +42,7 @@ def write_diagnosis(
     """
     name = f' of {ship.name}' if ship is not None and ship.name else ''
     runs = ', '.join(trace.name for trace in found.traces)
-    sections = [
-        *_verdict(found, ship),
+    judged = [
         *_today(ship, found.estimates),
         *_sizes(found),
         _motions(found, ship),
@@ -51,6 +50,7 @@ def write_diagnosis(
         _known(found, ship),
         _trust(score if found.baseline == 'stated' else None),
     ]
+    sections = [*_verdict(found, ship), *(() if found.question else judged)]
     write_page(
         path,
         f'What is missing in the model{name}',
@@ -68,10 +68,12 @@ def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
         text=rest,
         pictures=[
             picture(
-                pictures.probability_picture(words.answers(found)),
+                pictures.probability_picture(answers),
                 'How probable each answer is. One long bar is a name; several of like length are '
                 'what these runs cannot separate.',
             )
+            for answers in (words.answers(found),)
+            if answers
         ],
     )
     if found.facts:

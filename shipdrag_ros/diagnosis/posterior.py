@@ -73,7 +73,7 @@ def posterior_of(fits: Sequence[Fit]) -> Posterior:
         if one.log_evidence >= modes.get(mode, (names, -math.inf))[1]:
             modes[mode] = names, one.log_evidence
     # the evidence of a fit holds the prior
-    ways = [decision.Hypothesis(names, log, 0.0) for names, log in modes.values()]
+    ways = [decision.WeighedHypothesis(names, log, 0.0) for names, log in modes.values()]
     return Posterior(best, decision.probabilities(ways))
 
 

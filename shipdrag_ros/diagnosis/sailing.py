@@ -67,9 +67,10 @@ def diagnose_sailing(
         if still is None:
             raise
         return zeros_alone(still, why=str(error), no_coastdown=no_coastdown)
-    found = _diagnosed(legs, no_coastdown)
-    units = asked(float(np.median(legs.log_m_s / legs.ground_m_s)))
-    return waiting(with_zeros(found, still), units)
+    question = asked(float(np.median(legs.log_m_s / legs.ground_m_s)))
+    if question:
+        return waiting(question, baseline='none', examined=(LOG_TRACK,), no_coastdown=no_coastdown)
+    return with_zeros(_diagnosed(legs, no_coastdown), still)
 
 
 def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from typing import Any
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.result import DiagnosisResult
+from shipdrag_ros.diagnosis.result import DiagnosisResult, Gap
 from shipdrag_ros.display import mistaken_units
 from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
@@ -38,19 +39,32 @@ def asked(ratio: float) -> str:
     )
 
 
-def waiting(found: DiagnosisResult, question: str) -> DiagnosisResult:
+def waiting(question: str, **rest: Any) -> DiagnosisResult:
     """
-    Return a diagnosis whose verdict waits for the answer to a question.
+    Return a diagnosis that waits for the answer to a question.
 
     Parameters
     ----------
-    found
     question
-        A sentence; '' for none, and the diagnosis stays as it is.
+        A sentence.
+    **rest
+        What else there is to be said, as in `DiagnosisResult`.
     """
-    if not question:
-        return found
-    return replace(found, question=question, verdict=Verdict.ONE_OF, effects=())
+    return DiagnosisResult(
+        verdict=Verdict.ONE_OF,
+        effects=(),
+        candidates=(),
+        nothing=0.0,
+        unnamed=0.0,
+        would_decide=(),
+        where=None,
+        before=Gap(None, None, math.nan),
+        after=None,
+        held_out_before=None,
+        held_out_after=None,
+        question=question,
+        **rest,
+    )
 
 
 def ratio_before_the_stop(seen: Observation) -> float:

@@ -281,7 +281,11 @@ class Answer:
 def answers(found: DiagnosisResult) -> tuple[Answer, ...]:
     """
     Return the candidates, then nothing and something unnamed, and what is left.
+
+    Nothing while the verdict waits.
     """
+    if found.question:
+        return ()
     nothing = NOTHING if found.baseline != 'none' else NOTHING_BETWEEN
     listed = [
         Answer(names_text(each.names) if each.names else nothing, each.probability)

@@ -31,7 +31,7 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class WeighedHypothesis:
     """
     One way in which something may be missing; ways exclude each other.
 
@@ -69,7 +69,7 @@ class Decision:
     candidates: tuple[tuple[Names, float], ...]
 
 
-def probabilities(hypotheses: Iterable[Hypothesis]) -> dict[Names, float]:
+def probabilities(hypotheses: Iterable[WeighedHypothesis]) -> dict[Names, float]:
     """
     Return the posterior probability of each set of names.
 
@@ -94,8 +94,8 @@ def probabilities(hypotheses: Iterable[Hypothesis]) -> dict[Names, float]:
 
     Examples
     --------
-    >>> nothing = Hypothesis(NONE, -3.0, 0.0)
-    >>> fouled = Hypothesis(('fouling',), 0.0, -2.0)
+    >>> nothing = WeighedHypothesis(NONE, -3.0, 0.0)
+    >>> fouled = WeighedHypothesis(('fouling',), 0.0, -2.0)
     >>> {names: round(p, 2) for names, p in probabilities([nothing, fouled]).items()}
     {('fouling',): 0.73, (): 0.27}
     """

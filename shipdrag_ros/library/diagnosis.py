@@ -219,7 +219,9 @@ class Diagnosis(Shown):
 
 
 def _first(found: DiagnosisResult) -> str:
-    """Name the most probable answer."""
+    """Name the most probable answer, or ask."""
+    if found.question:
+        return found.question
     answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 

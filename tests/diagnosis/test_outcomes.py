@@ -12,7 +12,7 @@ from scipy.special import ndtr
 
 from shipdrag_ros.diagnosis.outcomes import PredictedOutcome, probability_of_naming
 from shipdrag_ros.inference.decision import CERTAIN
-from shipdrag_ros.inference.decision import Hypothesis as Rival
+from shipdrag_ros.inference.decision import WeighedHypothesis as Rival
 
 DRAWN = 0.06  # twice the sd of a share of 300 draws
 NOTHING = Rival((), -60.0, 0.0)

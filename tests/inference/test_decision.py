@@ -14,9 +14,9 @@ from shipdrag_ros.inference.decision import (
     LISTED,
     NONE,
     UNKNOWN,
-    Hypothesis,
     Names,
     Verdict,
+    WeighedHypothesis,
     decide,
     marginals,
     mixture,
@@ -27,14 +27,15 @@ from shipdrag_ros.inference.decision import (
 A, B, BOTH = ('a',), ('b',), ('a', 'b')
 LOGS = st.floats(-40.0, 40.0)
 WAYS = st.lists(
-    st.builds(Hypothesis, st.sampled_from([NONE, UNKNOWN, A, B, BOTH]), LOGS, LOGS), min_size=1
+    st.builds(WeighedHypothesis, st.sampled_from([NONE, UNKNOWN, A, B, BOTH]), LOGS, LOGS),
+    min_size=1,
 )
 
 
 def test_probabilities_are_bayes_rule_to_the_digit() -> None:
     evidence = {NONE: -4.0, A: -1.5, BOTH: -1.0, UNKNOWN: -6.0}
     odds = {NONE: 0.0, A: -3.0, BOTH: -6.0, UNKNOWN: -4.0}
-    found = probabilities([Hypothesis(n, evidence[n], odds[n]) for n in evidence])
+    found = probabilities([WeighedHypothesis(n, evidence[n], odds[n]) for n in evidence])
     weight = {n: math.exp(evidence[n] + odds[n]) for n in evidence}
     for names, p in found.items():
         assert p == pytest.approx(weight[names] / sum(weight.values()), rel=1e-12)
@@ -42,22 +43,26 @@ def test_probabilities_are_bayes_rule_to_the_digit() -> None:
 
 def test_a_weak_effect_keeps_its_probability() -> None:
     # a Bayes factor of 4 is no strong evidence, and is evidence all the same
-    found = probabilities([Hypothesis(NONE, 0.0, 0.0), Hypothesis(A, math.log(4.0), 0.0)])
+    found = probabilities(
+        [WeighedHypothesis(NONE, 0.0, 0.0), WeighedHypothesis(A, math.log(4.0), 0.0)]
+    )
     assert found[A] == pytest.approx(0.8)
 
 
 def test_ways_of_the_same_names_add_up() -> None:
-    found = probabilities([Hypothesis(NONE, 0.0, 0.0), *[Hypothesis(A, 0.0, 0.0)] * 3])
+    found = probabilities(
+        [WeighedHypothesis(NONE, 0.0, 0.0), *[WeighedHypothesis(A, 0.0, 0.0)] * 3]
+    )
     assert found[A] == pytest.approx(0.75)
 
 
 def test_no_evidence_at_all_is_an_error() -> None:
     with pytest.raises(ValueError, match='nothing can be compared'):
-        probabilities([Hypothesis(NONE, -math.inf, 0.0)])
+        probabilities([WeighedHypothesis(NONE, -math.inf, 0.0)])
 
 
 @given(WAYS)
-def test_every_decision_follows_from_the_probabilities(ways: list[Hypothesis]) -> None:
+def test_every_decision_follows_from_the_probabilities(ways: list[WeighedHypothesis]) -> None:
     probability = probabilities(ways)
     assert math.fsum(probability.values()) == pytest.approx(1.0)
     found = decide(probability)
