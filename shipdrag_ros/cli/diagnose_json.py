@@ -35,6 +35,15 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
         'advice': [asdict(each) for each in found.would_decide],
+        'limits': {
+            name: {
+                'parameter': each.parameter,
+                each.bound: each.value,
+                'would_be_named': each.would_be_named,
+                'percent_of_r': each.percent_of_r,
+            }
+            for name, each in found.limits.items()
+        },
         'where': None if found.where is None else asdict(found.where),
         'gap': {
             'before': _gap(found.before),

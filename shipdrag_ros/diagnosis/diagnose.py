@@ -13,6 +13,7 @@ from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
+from shipdrag_ros.diagnosis.limits import limits_of
 from shipdrag_ros.diagnosis.nameless import with_nameless
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
@@ -165,6 +166,7 @@ def diagnose(
         runs_differ=differ,
         runs=_seen_runs(seen),
         earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
+        limits=limits_of(found, model, [effect.name for effect in judged.effects]),
     )
 
 

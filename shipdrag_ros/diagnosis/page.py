@@ -45,6 +45,7 @@ def write_diagnosis(
     judged = [
         *_today(ship, found.estimates),
         *_sizes(found),
+        *_limits(found),
         _motions(found, ship),
         *_left(found, ship),
         _known(found, ship),
@@ -130,6 +131,18 @@ def _sizes(found: DiagnosisResult) -> Iterator[Section]:
         lines=[f'{each.name}: {each.formula}. Source: {each.source}.' for each in declared],
         tables=[('In SI; sd is one standard deviation', sizes)],
     )
+
+
+def _limits(found: DiagnosisResult) -> Iterator[Section]:
+    """Show what can be missing all the same."""
+    if not found.limits:
+        return
+    caption = (
+        'Each size is that of 19 in 20, given that the effect is there; from the next size on '
+        'nine of ten such runs would have named it. - : no size is named, as another effect '
+        'leaves the same trace'
+    )
+    yield Section('What can be there all the same', tables=[(caption, tables.limits(found))])
 
 
 def _motions(found: DiagnosisResult, ship: Ship | None) -> Section:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from shipdrag_ros.diagnosis.seen_runs import DOUBTED, SeenRun, WeighedEarlier
 from shipdrag_ros.display import Table
@@ -54,6 +54,32 @@ class Candidate:
     names: tuple[str, ...]
     probability: float
     effects: tuple[EffectEstimate, ...] = ()
+
+
+@dataclass(frozen=True)
+class Limit:
+    """
+    How large an effect that is not named can be.
+
+    Attributes
+    ----------
+    parameter
+        Name of its size.
+    bound
+        `upper_95`, or `lower_95` of one that is the stronger the smaller its parameter is.
+    value
+        The bound, of the absolute size, given that the effect is there.
+    would_be_named
+        Size from which nine of ten such runs name it; None: from none.
+    percent_of_r
+        Of the resistance that the run shows, at the bound.
+    """
+
+    parameter: str
+    bound: str
+    value: float
+    would_be_named: float | None
+    percent_of_r: float
 
 
 @dataclass(frozen=True)
@@ -265,6 +291,8 @@ class DiagnosisResult:
         That it rests on.
     earlier
         Diagnoses of before that were given, with what of each counts.
+    limits
+        By name, of each effect that is not named.
     question
         That is to be answered before anything is judged, a sentence; '' for none.
     """
@@ -293,6 +321,7 @@ class DiagnosisResult:
     runs: tuple[SeenRun, ...] = ()
     earlier: tuple[WeighedEarlier, ...] = ()
     question: str = ''
+    limits: Mapping[str, Limit] = field(default_factory=dict)
 
     @property
     def held(self) -> tuple[Candidate, ...]:

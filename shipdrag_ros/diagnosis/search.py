@@ -21,6 +21,7 @@ from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
 from shipdrag_ros.diagnosis.posterior import Posterior, mode_of, posterior_of
 from shipdrag_ros.diagnosis.terms import EffectTerm, trial_z
+from shipdrag_ros.inference.limits import Sensitivity
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
@@ -173,20 +174,47 @@ def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -
     (hypotheses,)
         With the prior, less the constant that `Fit.log_evidence` leaves out.
     """
-    mean, precision = np.array([_amount(hypothesis.terms[-1]) for hypothesis in hypotheses]).T
-    responses = model.responses(base.best, hypotheses)
-    tables = np.hstack(base.best.tables)
-    matrix, _ = base.best.normal_equations
-    across = tables[1:] @ responses.T
-    given_way = np.linalg.lstsq(matrix, across, rcond=1e-13)[0]
-    own = np.einsum('ai,ai->a', responses, responses) - np.einsum('ia,ia->a', across, given_way)
-    own = np.maximum(own, 0.0) + precision
+    responses, known = sensitivity(model, base, hypotheses)
+    mean, precision = known.mean, known.precision
+    own = np.maximum(np.diag(known.information), 0.0) + precision
     # at the best fit of the base the residual is as good as square to all that it has
-    negative_gradient = responses @ tables[0] + precision * mean
+    residual = np.hstack(base.best.tables)[0]
+    negative_gradient = responses @ residual + precision * mean
     gain = 0.5 * (negative_gradient**2 / own - precision * mean**2) - 0.5 * np.log(own / precision)
     log_prior = np.array([hypothesis.log_prior for hypothesis in hypotheses])
     found: Float64 = base.log_likelihood + gain + log_prior
     return found
+
+
+def sensitivity(
+    model: Model, base: Fit, hypotheses: Sequence[Hypothesis]
+) -> tuple[Float64, Sensitivity]:
+    """
+    Return what a record says of one effect more, in parts of the size that is tried.
+
+    Parameters
+    ----------
+    model
+    base
+        What the hypotheses add to.
+    hypotheses
+        Their last term is the effect.
+
+    Returns
+    -------
+    responses : (hypotheses, rows)
+        Whitened.
+    known
+        The same with what the nuisances of the base take up left out.
+    """
+    mean, precision = np.array([_amount(hypothesis.terms[-1]) for hypothesis in hypotheses]).T
+    responses = model.responses(base.best, hypotheses)
+    matrix, _ = base.best.normal_equations
+    across = np.hstack(base.best.tables)[1:] @ responses.T
+    given_way = np.linalg.lstsq(matrix, across, rcond=1e-13)[0]
+    information = responses @ responses.T - across.T @ given_way
+    log_odds = np.array([each.log_odds - base.hypothesis.log_odds for each in hypotheses])
+    return responses, Sensitivity(information, mean, precision, log_odds)
 
 
 def _amount(term: EffectTerm) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from shipdrag_ros.diagnosis import (
     EffectEstimate,
     Verdict,
 )
+from shipdrag_ros.diagnosis.result import Limit
 from shipdrag_ros.diagnosis.seen_runs import WeighedEarlier
 from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
 from shipdrag_ros.inference.decision import NONE, UNKNOWN
@@ -31,6 +32,7 @@ _CHANNELS = {
 NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
 _LEAST = 0.001  # probability that is stated
+_MOST_LIMITS = 5
 _LARGE_N = 1e4  # from here on a force is stated in kN
 
 
@@ -56,7 +58,7 @@ def _verdict(found: DiagnosisResult) -> str:
         case Verdict.NONE:
             return (
                 'Model and data agree: nothing is missing that these runs could show '
-                f'(probability {probability(found.nothing)}).'
+                f'(probability {probability(found.nothing)}).{would_be_named(found)}'
             )
         case Verdict.NAMED if found.runs_differ:
             names = names_text([effect.name for effect in found.effects])
@@ -112,6 +114,43 @@ def _besides(found: DiagnosisResult) -> str:
         return ''
     listed = ', '.join(f'{names_text([name])} ({probability(p)})' for name, p in share.items())
     return f' Beside it there may be: {listed}.'
+
+
+def would_be_named(found: DiagnosisResult) -> str:
+    """
+    Say what would have been named, what shows best first; '' where no limits are known.
+    """
+    if not found.limits:
+        return ''
+    shown = [
+        (each.would_be_named, name, each)
+        for name, each in found.limits.items()
+        if each.would_be_named is not None
+    ]
+    shown.sort(key=lambda one: _effort(one[2]))
+    if not shown:
+        return ' No single effect of any size would have been named by these runs.'
+    sizes = ', '.join(
+        f'{names_text([name])} {_from(each)} {size(_quantity(name), Parameter(rounded, 0.0))}'
+        for least, name, each in shown[:_MOST_LIMITS]
+        for rounded in (float(f'{least:.2g}'),)
+    )
+    return f' These runs would have named, nine times in ten: {sizes}.'
+
+
+def _quantity(name: str) -> Parameter:
+    return LIBRARY[name].parameters[0]
+
+
+def _from(limit: Limit) -> str:
+    return 'up to' if limit.bound == 'lower_95' else 'from'
+
+
+def _effort(limit: Limit) -> float:
+    """Return how much of an effect is needed, over what is usual."""
+    assert limit.would_be_named is not None
+    needed = limit.would_be_named / limit.value
+    return 1.0 / needed if limit.bound == 'lower_95' else needed
 
 
 def differing(found: DiagnosisResult) -> str:

@@ -60,3 +60,16 @@ def test_without_a_clean_hull_that_is_said_first() -> None:
     assert words.sentence(found.found).startswith(NO_CLEAN_HULL)
     assert found.verdict == 'one_of'
     assert ('fouling',) in [each.names for each in found.found.candidates]
+
+
+def test_nothing_missing_is_followed_by_what_would_have_been_seen() -> None:
+    found = sd.diagnose(sd.simulate(SHIP, seed=3)).found
+    assert found.verdict == 'none'
+    assert 'These runs would have named, nine times in ten: ' in words.sentence(found)
+    fouling, depth = found.limits['fouling'], found.limits['shallow_water']
+    # 2 % friction and half a per cent of shape are known of the clean hull
+    assert 0.02 < fouling.value < 0.3
+    assert fouling.bound == 'upper_95'
+    assert 2.0 < fouling.percent_of_r < 25.0
+    assert depth.bound == 'lower_95'
+    assert found.limits['displacement'].would_be_named is None
