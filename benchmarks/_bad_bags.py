@@ -192,14 +192,14 @@ CASES = (
         _bytes(b'SQLite format 3\0' + bytes(4096)),
         1,
         'is a bag in sqlite3 storage',
-        'rosbags-convert',
+        'shipdrag import',
     ),
     _case(
         'a bag of ROS 1',
         _bytes(b'#ROSBAG V2.0\n' + bytes(4096)),
         1,
         'is a bag of ROS 1',
-        'rosbags-convert',
+        'shipdrag import',
     ),
     _case(
         'cut off in its first 20 bytes',
@@ -267,7 +267,7 @@ CASES = (
         _directory(metadata__yaml=_SQLITE),
         1,
         "'bag' is a bag in 'sqlite3' storage",
-        'rosbags-convert',
+        'shipdrag import',
     ),
     _case(
         'a metadata.yaml that is none',

@@ -156,6 +156,16 @@ def yacht_devices() -> bytes:
     return '\r\n'.join(lines).encode()
 
 
+def slcan() -> bytes:
+    """Frames of a serial CAN adapter, with its milliseconds of a minute."""
+    lines = []
+    for k in range(ROWS):
+        for pgn, data in n2k_messages(k):
+            clock = (30_000 + 1000 * k) % 60_000
+            lines.append(f'T{_can_id(pgn):08X}{len(data)}{data.hex().upper()}{clock:04X}')
+    return '\r'.join(lines).encode()
+
+
 def canboat() -> bytes:
     """Frames as canboat's plain format."""
     lines = []
@@ -353,6 +363,7 @@ TEXTS = {
     'actisense': ('actisense.txt', actisense),
     'yacht_devices': ('ydwg.raw', yacht_devices),
     'canboat': ('canboat.txt', canboat),
+    'slcan': ('slcan.txt', slcan),
     'signalk': ('signalk.jsonl', signalk),
     'gpx': ('track.gpx', gpx),
 }

@@ -5,9 +5,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+import reprlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
 
 M_S_PER_KNOT = 1852.0 / 3600.0
 _UNITS_M_S = {'m/s': 1.0, 'knots': M_S_PER_KNOT, 'km/h': 1.0 / 3.6, 'mph': 0.44704}
@@ -235,3 +245,35 @@ def speed_text(speed_m_s: float, *, highest_m_s: float) -> str:
     Return a speed without its unit; a model ship needs one digit more.
     """
     return f'{speed_m_s:.{2 if highest_m_s >= 1.0 else 3}f}'
+
+
+def short_repr(result: DataclassInstance) -> str:
+    """
+    Return a line for a dataclass that holds arrays; its `__repr__`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Curve:
+    ...     speed_m_s: object
+    ...     __repr__ = short_repr
+    >>> Curve(np.linspace(1.0, 8.0, 200))
+    Curve(speed_m_s=<200 float64, 1 to 8>)
+    """
+    parts = (f'{item.name}={_shown(getattr(result, item.name))}' for item in fields(result))
+    return f'{type(result).__name__}({", ".join(parts)})'
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        size = ' x '.join(map(str, value.shape)) or 'no axis,'
+        numbers = value.dtype.kind in 'if' and value.size and np.isfinite(value).any()
+        ends = f', {np.nanmin(value):.4g} to {np.nanmax(value):.4g}' if numbers else ''
+        return f'<{size} {value.dtype}{ends}>'
+    if is_dataclass(value) and not isinstance(value, type):
+        return f'{type(value).__name__}(...)'
+    if isinstance(value, tuple | list | Mapping) and len(value) > 1:
+        return f'<{len(value)} items>'
+    return _SHORT.repr(value)

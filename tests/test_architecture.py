@@ -24,13 +24,14 @@ PICTURE = (
     ('parameter',),
     ('parameters', 'ship', 'report'),
     ('inference',),
-    ('regression',),
-    ('estimation', 'simulation'),
+    ('regression', 'simulation'),
+    ('posterior',),
+    ('estimation',),
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
     ('bags', 'nmea'),
     ('bags.salvage',),
-    ('node', 'replay', 'importing'),
+    ('node', 'replay', 'sources'),
     ('fleet',),
     ('trend',),
     ('library',),
@@ -50,7 +51,7 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
                 'messages',
                 'nmea',
                 'replay',
-                'importing',
+                'sources',
                 'node',
                 'fleet',
                 'trend',
@@ -86,7 +87,7 @@ FILES = {'bags', 'bags.salvage'}
 FLEET = ('dask', 'distributed', 'pyarrow', 'fsspec', 's3fs')
 ONLY_IN = {
     'mcap': FILES,
-    'rosbags': {'messages', 'importing', *FILES},  # a bag of ROS 1 is imported
+    'rosbags': {'messages', 'sources', *FILES},  # a bag of ROS 1 is imported
     **{name: {'node'} for name in ROS},
     **{name: {'fleet', 'trend'} for name in FLEET},  # no other verb pays for them
 }

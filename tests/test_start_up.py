@@ -20,7 +20,7 @@ SLOW = {
     'scipy.stats',
     'shipdrag_ros.bags.salvage',
     'shipdrag_ros.diagnosis',
-    'shipdrag_ros.importing',
+    'shipdrag_ros.sources',
     'shipdrag_ros.report',
     'shipdrag_ros.simulation',
     'shipdrag_ros.studies.residual.fit',

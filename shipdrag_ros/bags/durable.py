@@ -68,13 +68,16 @@ class RecordingProgress:
     waiting
         Messages in memory only.
     lost
-        Messages that found no room in memory, or no disk until the end.
+        Messages that found no room in memory, or no disk until the end, or whose file
+        somebody removed.
     oldest_s
         How long the oldest of those in memory has been waiting [s].
     error
         Why nothing is written now, '' if it is.
     uncompacted
         Finished parts that could not be made compact; they are whole.
+    vanished
+        Files that somebody removed while they were written.
     """
 
     directory: Path
@@ -87,6 +90,7 @@ class RecordingProgress:
     oldest_s: float
     error: str
     uncompacted: int
+    vanished: int
 
 
 class DurableRecording:
@@ -144,7 +148,8 @@ class DurableRecording:
         self._oldest_s = self._taken_s = self._synced_s = monotonic()
         self._retry_s = 0.0
         self._error = ''
-        self._uncompacted: list[tuple[Path, int]] = []
+        self._uncompacted: list[LiveFile] = []
+        self._vanished = 0
         self._compactor: threading.Thread | None = None
         self._ending = threading.Event()
         self._tried = threading.Event()
@@ -216,15 +221,8 @@ class DurableRecording:
                 oldest_s=monotonic() - self._oldest_s if waiting else 0.0,
                 error=self._error,
                 uncompacted=len(self._uncompacted),
+                vanished=self._vanished,
             )
-
-    def files(self) -> set[Path]:
-        """
-        Return the files that are being written, or will be rewritten.
-        """
-        with self._lock:
-            open_now = set() if self._file is None else {self._file.path}
-        return open_now | {path for path, _ in tuple(self._uncompacted)}
 
     def _run(self) -> None:
         while True:
@@ -348,7 +346,7 @@ class DurableRecording:
             self._compactor.start()
 
     def _leave(self, file: LiveFile) -> None:
-        self._uncompacted.append((file.path, file.synced_messages))
+        self._uncompacted.append(file)
         self._file = None
         self._part += 1
 
@@ -357,7 +355,7 @@ class DurableRecording:
         file, self._file = self._file, None
         if file is not None:
             file.abandon()
-            if file.synced_messages:
+            if file.synced_messages and not self._gone(file):
                 self._leave(file)
         self._due = self._unsynced + self._due
         self._unsynced = []
@@ -379,12 +377,28 @@ class DurableRecording:
         if self._compactor is not None:
             self._compactor.join()
         self._compact()
+        for file in self._uncompacted:
+            file.release()
 
     def _compact(self) -> None:
-        for part in tuple(self._uncompacted):
+        for file in tuple(self._uncompacted):
             with suppress(BagError):  # it is tried again with the next part, and counted
-                compact(part[0], messages=part[1])
-                self._uncompacted.remove(part)
+                if not self._gone(file):
+                    compact(file.path, messages=file.synced_messages)
+                    file.release()
+                self._uncompacted.remove(file)
+
+    def _gone(self, file: LiveFile) -> bool:
+        """Say whether somebody removed a file; what was in it is lost, and counted."""
+        if not file.vanished():
+            return False
+        file.release()
+        with self._lock:
+            self._vanished += 1
+            self._lost += file.synced_messages
+            self._accepted -= file.synced_messages
+            self._safe -= file.synced_messages
+        return True
 
 
 def _held_bytes(messages: Iterable[EncodedMessage]) -> int:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from fcntl import LOCK_EX, LOCK_NB, flock
 from pathlib import Path
 
 from isal.isal_zlib import crc32
@@ -43,7 +44,7 @@ class NameTakenError(BagError):
 
 class LiveFile:
     """
-    An MCAP file that is safe up to its last `sync`.
+    An MCAP file that is safe up to its last `sync`, and locked until its `release`.
 
     Parameters
     ----------
@@ -82,6 +83,8 @@ class LiveFile:
         try:
             # unbuffered: what could not be written must not be tried again on closing
             self._file = open(path, 'xb', buffering=0, opener=private_opener)  # noqa: SIM115
+            with suppress(OSError):  # not every file system has locks
+                flock(self._file, LOCK_EX | LOCK_NB)
         except FileExistsError:
             raise NameTakenError(f'{str(path)!r} exists') from None
         except OSError as error:
@@ -135,12 +138,27 @@ class LiveFile:
         """
         try:
             os.fsync(self._file.fileno())
-            here, there = os.fstat(self._file.fileno()), self.path.stat()
+            if not self.in_place():
+                raise BagError(f'{str(self.path)!r} was removed or replaced by somebody else')
         except OSError as error:
             raise BagError(f'{str(self.path)!r}: {error.strerror}') from error
-        if (here.st_ino, here.st_dev) != (there.st_ino, there.st_dev):
-            raise BagError(f'{str(self.path)!r} was replaced by another file')
         self.synced_bytes, self.synced_messages = self.size_bytes, self._messages
+
+    def in_place(self) -> bool:
+        """
+        Say whether the name is still that of this file.
+        """
+        try:
+            there = self.path.stat()
+        except FileNotFoundError:
+            return False
+        return os.path.samestat(os.fstat(self._file.fileno()), there)
+
+    def vanished(self) -> bool:
+        """
+        Say whether nothing can open the file any more: it was removed, and not moved.
+        """
+        return os.fstat(self._file.fileno()).st_nlink == 0
 
     def close(self) -> None:
         """
@@ -153,7 +171,6 @@ class LiveFile:
         """
         self._write(as_bytes(DataEnd(0), Footer(0, 0, 0)) + MAGIC)
         self.sync()
-        self._file.close()
 
     def abandon(self) -> None:
         """
@@ -161,11 +178,18 @@ class LiveFile:
         """
         with suppress(OSError):
             self._file.truncate(self.synced_bytes)
-        with suppress(OSError):
-            self._file.close()
         if not self.synced_messages:
             with suppress(OSError):
-                self.path.unlink()
+                if self.in_place():
+                    self.path.unlink()
+            self.release()
+
+    def release(self) -> None:
+        """
+        Let others have the file.
+        """
+        with suppress(OSError):
+            self._file.close()
 
     def _declare(self, message: EncodedMessage) -> list[Schema | Channel]:
         """Return what must be said before this message can be understood."""

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from shipdrag_ros import strict_yaml
-from shipdrag_ros.bags.mcap_file import CONVERT
+from shipdrag_ros.bags.mcap_file import CONVERT, IMPORT
 from shipdrag_ros.errors import BagError
 
 _SUFFIXES = ('.mcap', '.mcap.zstd')
@@ -81,7 +81,8 @@ def _rosbag2(path: Path) -> BagFiles:
     about = _metadata(path / 'metadata.yaml')
     storage = about.get('storage_identifier')
     if storage != 'mcap':
-        raise BagError(f'{str(path)!r} is a bag in {storage!r} storage; {CONVERT}')
+        how = IMPORT if storage == 'sqlite3' else CONVERT
+        raise BagError(f'{str(path)!r} is a bag in {storage!r} storage; {how}')
     packed = str(about.get('compression_format') or '')
     mode = str(about.get('compression_mode') or '').lower()
     if packed not in ('', 'zstd'):
@@ -127,7 +128,7 @@ def _without_metadata(path: Path) -> list[BagFiles]:
     )
     if not files:
         if any(path.glob('*.db3')):
-            raise BagError(f'{str(path)!r} is a bag in sqlite3 storage; {CONVERT}')
+            raise BagError(f'{str(path)!r} is a bag in sqlite3 storage; {IMPORT}')
         raise BagError(f'{str(path)!r} holds no .mcap file; {_instead(path)}')
     stem = re.escape(path.name)
     if len(files) > 1 and all(re.fullmatch(rf'{stem}_\d+\.mcap.*', f.name) for f in files):

@@ -32,6 +32,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import UInt8
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
+IMPORT = 'make a bag of it with `shipdrag import SOURCE -o NEW.mcap`'
 # smaller chunks are read together: what a chunk costs beside its bytes is then small
 _WORTHWHILE_BYTES = 1 << 18
 # messages held back because earlier ones may follow in the file
@@ -163,7 +164,7 @@ class McapFile:
         if not head.startswith(MAGIC):
             for magic, what in _FOREIGN.items():
                 if head.startswith(magic):
-                    raise BagError(f'{str(self.path)!r} {what}; {CONVERT}')
+                    raise BagError(f'{str(self.path)!r} {what}; {IMPORT}')
             raise BagError(
                 f'{str(self.path)!r} is no MCAP file, it begins with {head[:8]!r}; '
                 'give a .mcap file or a rosbag2 directory'

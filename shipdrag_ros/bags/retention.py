@@ -3,16 +3,18 @@
 Which recordings are removed so that a disk never fills.
 
 The oldest parts go first. A part that holds a coastdown, and the one before it
-with its steady lead, is kept until nothing else is left.
+with its steady lead, is kept until nothing else is left, or for ever where nobody
+has said how much to keep. A file that any process writes is locked, and stays.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import stat
-from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass
+from fcntl import LOCK_EX, LOCK_NB, flock
 from pathlib import Path
 
 from shipdrag_ros.bags.mcap_file import McapFile
@@ -20,6 +22,7 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE
 
 DAY_S = 86_400.0
+SHARE = 0.5  # of the disk, where nobody has said how much
 _PART = re.compile(r'(coastdown_\d{8}T\d{6}Z)_\d{3,}(_\d+)?\.mcap')
 _BLOCK_BYTES = 4096  # what even an empty file costs
 
@@ -27,23 +30,40 @@ _BLOCK_BYTES = 4096  # what even an empty file costs
 @dataclass(frozen=True)
 class Keep:
     """
-    How much is kept; 0 is no limit.
+    How much is kept.
 
     Attributes
     ----------
     days
-        Age of a part, by its last change [d].
+        Age of a part, by its last change [d]; 0 is no limit.
     size_bytes
-        Of all parts together.
+        Of all parts together; those that hold a coastdown go last. 0: `share` instead.
+    share
+        Of the disk, for all parts together [1]; those that hold a coastdown stay. 0 is no limit.
     """
 
     days: float = 0.0
     size_bytes: int = 0
+    share: float = SHARE
 
     @property
     def everything(self) -> bool:
         """Whether nothing is ever removed."""
-        return not self.days and not self.size_bytes
+        return not self.days and not self.size_bytes and not self.share
+
+    @property
+    def text(self) -> str:
+        """One sentence for a log."""
+        if self.everything:
+            return 'no recording is ever removed'
+        if self.size_bytes:
+            most = f'{self.size_bytes * 1e-9:.3g} GB, those with a coastdown last'
+        else:
+            most = f'{self.share:.0%} of the disk, none that holds a coastdown (keep_bytes)'
+        limits = [f'beyond {most}'] if self.size_bytes or self.share else []
+        if self.days:
+            limits.append(f'older than {self.days:g} days, none that holds a coastdown')
+        return f'the oldest recordings are removed {"; and ".join(limits)}'
 
 
 @dataclass(frozen=True)
@@ -78,46 +98,63 @@ class Retention:
         Where the parts are; nothing else in it is touched, and no link followed.
     keep
         The limits.
+
+    Attributes
+    ----------
+    over_bytes
+        By how much the parts that may not be removed exceed the limit [bytes].
     """
 
     def __init__(self, directory: Path, keep: Keep) -> None:
         self._directory = directory
         self._keep = keep
         self._holds: dict[_BagPart, bool] = {}
+        self.over_bytes = 0
 
-    def tidy(self, *, busy: Collection[Path], now_s: float) -> list[Removed]:
+    def tidy(self, *, now_s: float) -> list[Removed]:
         """
-        Remove what is too old or too much.
+        Remove what is too old or too much, but for files that somebody still writes.
 
         Parameters
         ----------
-        busy
-            Files that are still written; never removed.
         now_s
             Present time [s since the epoch].
         """
         if self._keep.everything:
             return []
         parts = self._parts()
-        free = [part for part in parts if part.path not in busy]
         worth = self._worth_keeping(parts)
         removed = []
         if self._keep.days:
             limit_s = now_s - self._keep.days * DAY_S
-            for part in [it for it in free if it.changed_s < limit_s and it not in worth]:
+            for part in [it for it in parts if it.changed_s < limit_s and it not in worth]:
                 removed += self._remove(part, f'older than {self._keep.days:g} days', False)
-                free.remove(part)
-                parts.remove(part)
-        if self._keep.size_bytes:
+        limit = self._limit_bytes()
+        if limit:
+            gone = {each.path for each in removed}
+            parts = [part for part in parts if part.path not in gone]
             total = sum(part.size_bytes for part in parts)
-            order = [it for it in free if it not in worth] + [it for it in free if it in worth]
+            order = [it for it in parts if it not in worth]
+            if self._keep.size_bytes:  # somebody has said how much; a default takes no coastdown
+                order += [it for it in parts if it in worth]
             for part in order:
-                if total <= self._keep.size_bytes:
+                if total <= limit:
                     break
-                why = f'recordings take more than {self._keep.size_bytes} bytes'
-                removed += self._remove(part, why, part in worth)
-                total -= part.size_bytes
+                why = f'recordings take more than {limit} bytes'
+                done = self._remove(part, why, part in worth)
+                total -= part.size_bytes * len(done)
+                removed += done
+            self.over_bytes = max(total - limit, 0)
         return removed
+
+    def _limit_bytes(self) -> int:
+        if self._keep.size_bytes:
+            return self._keep.size_bytes
+        try:
+            disk = os.statvfs(self._directory)
+        except OSError:  # there is no recording yet
+            return 0
+        return int(self._keep.share * disk.f_blocks * disk.f_frsize)
 
     def _parts(self) -> list[_BagPart]:
         """Return the parts in the order of their recording."""
@@ -146,10 +183,16 @@ class Retention:
         return worth
 
     def _remove(self, part: _BagPart, why: str, coastdown: bool) -> list[Removed]:
-        with suppress(OSError):  # tried again the next time
+        # what cannot be locked is written by this node or another, or by nobody knows whom
+        with suppress(OSError), open(part.path, 'rb', opener=_no_link) as file:
+            flock(file, LOCK_EX | LOCK_NB)
             part.path.unlink()
             return [Removed(part.path, coastdown, why)]
         return []
+
+
+def _no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NOFOLLOW)
 
 
 def _recording(path: Path) -> str:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -148,6 +149,20 @@ class Run:
         for part in self.parts:
             found += (f'{part.path.name}: {warning}' for warning in part.contents.warnings)
         return tuple(found)
+
+    def save(self, out: Path) -> None:
+        """
+        Copy the one file of the run.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        try:
+            shutil.copyfile(self.parts[0].path, out)
+        except OSError as error:
+            raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
 
     def inputs(self, *, start_ns: int = 0, end_ns: int = sys.maxsize) -> RunSamples:
         """

@@ -19,7 +19,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import Help
 from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.imports import uncollected
+from shipdrag_ros.imports import uncollected, what_to_install
 from shipdrag_ros.studies import found
 
 
@@ -112,6 +112,11 @@ def _run(line: list[str]) -> int:
         return INTERRUPTED
     except ShipdragError as error:
         print(f'ERROR: {error}', file=sys.stderr)
+    except ModuleNotFoundError as error:
+        advice = what_to_install(error)
+        if advice is None:
+            raise
+        print(f'ERROR: `shipdrag {verb}` cannot do this: {advice}', file=sys.stderr)
     except BrokenPipeError:
         raise
     except OSError as error:

@@ -53,7 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number(0.0),
         metavar='N',
         help='remove the oldest recordings when all are larger together, those that hold a '
-        'coastdown last, for instance 2e10 (default: keep all)',
+        'coastdown last, for instance 2e10 (default: half of the disk, and none that holds a '
+        'coastdown; 1e15: keep all)',
     )
     parser.add_argument(
         '--network',

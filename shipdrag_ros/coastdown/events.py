@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from shipdrag_ros.display import short_repr
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 
@@ -123,6 +124,8 @@ class EndedCoastdown:
     withdrawn. Where there are any, `stretch` shows the whole of it: times [ns] and mean speeds
     [m/s].
     """
+
+    __repr__ = short_repr
 
     start_ns: int
     end_ns: int

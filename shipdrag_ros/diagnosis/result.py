@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from shipdrag_ros.diagnosis.seen_runs import DOUBTED, SeenRun, WeighedEarlier
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.inference.decision import CERTAIN, Verdict, smallest_set
 from shipdrag_ros.parameter import Parameter
@@ -296,6 +296,8 @@ class DiagnosisResult:
     question
         That is to be answered before anything is judged, a sentence; '' for none.
     """
+
+    __repr__ = short_repr
 
     verdict: Verdict
     effects: tuple[EffectEstimate, ...]

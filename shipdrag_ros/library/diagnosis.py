@@ -33,7 +33,7 @@ from shipdrag_ros.library.windowed import (
     refuse_overlaps,
     refuse_two_ships,
 )
-from shipdrag_ros.library.wording import in_python, says_it_in_python
+from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -121,12 +121,8 @@ class Diagnosis(Shown):
             )
         return with_effects(self.ship, self.found.effects)
 
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say the verdict, what was examined and where, and what would decide.
-        """
-        said = (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
-        return tuple(map(in_python, said))
+    def _lines(self) -> Sequence[str]:
+        return (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
 
     def table(self) -> Table:
         """

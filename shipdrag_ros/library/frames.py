@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A frame of pandas, polars or another library, written as a table that `importing` reads."""
+"""A frame of pandas, polars or another library, written as a table that `sources` reads."""
 
 from __future__ import annotations
 

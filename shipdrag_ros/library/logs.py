@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,15 +11,17 @@ from typing import Any
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing import formats
-from shipdrag_ros.importing.format import Format, Job, Option
-from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
-from shipdrag_ros.importing.join import import_joined
-from shipdrag_ros.importing.reading import ImportedRun, format_of, job_of
-from shipdrag_ros.importing.table import LogTable
 from shipdrag_ros.library.frames import NANOSECONDS, is_frame, write_table
 from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.sources import formats
+from shipdrag_ros.sources.format import Format, Job, Option
+from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
+from shipdrag_ros.sources.join import join
+from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.reading import format_of, job_of
+from shipdrag_ros.sources.run import run_of
+from shipdrag_ros.sources.table import LogTable
 
 _NEAR_NS = 600 * SECOND_NS  # logs that begin so soon after another one ends continue it
 _FRAME = 'frame'
@@ -175,6 +176,7 @@ class _Part:
     place: int
     declared: Format
     job: Job
+    log: Log
     run: Run
     dated: bool
 
@@ -209,24 +211,23 @@ def read_logs(
     notes: list[str] = []
     for place, source in enumerate(sources):
         place_of = (Path(folder.name), place, len(sources) == 1)
-        part, said = _part(source, place_of, how, attachments)
+        part, said = _part(source, place_of, how)
         parts.append(part)
         notes += said
     _refuse_missing(how, [part.job.source for part in parts])
     _refuse_foreign(how, [part.declared for part in parts])
     runs: list[Run] = []
-    for number, group in enumerate(_groups(parts)):
+    for group in _groups(parts):
         if len(group) == 1:
             runs.append(group[0].run)
             continue
-        bag = Path(folder.name) / f'joined-{number}.mcap'
-        joined = import_joined([(each.declared, each.job) for each in group], bag, attachments)
-        notes += joined.notes
-        whole = ImportedRun(bag, [each.job.source for each in group])
+        joined, said = join([(each.job.source.name, each.log) for each in group])
+        notes += said
+        whole = run_of(joined, [each.job.source for each in group])
         whole.name = ', '.join(each.run.name for each in group)
         runs.append(whole)
-    for run in runs:  # the folder stays as long as any run that reads from it
-        weakref.finalize(run, _let_go, folder)
+    for run in runs:
+        run.attachments |= attachments
     return runs, notes
 
 
@@ -248,7 +249,7 @@ def _refuse_foreign(how: ReadOptions, chosen: Sequence[Format]) -> None:
 
 
 def _part(
-    source: Any, place_of: tuple[Path, int, bool], how: ReadOptions, attachments: Mapping[str, str]
+    source: Any, place_of: tuple[Path, int, bool], how: ReadOptions
 ) -> tuple[_Part, list[str]]:
     """Read a source by itself; return it, and what of it was not used."""
     folder, place, alone = place_of
@@ -257,20 +258,20 @@ def _part(
         name, path = _FRAME, folder / f'{place}.csv'
         how = how.of_dates(write_table(source, path))
     options = how.options(path, alone=alone)
-    bag = folder / f'{place}.mcap'
+    log = Log()
     try:
         # a frame is a table, however few columns it has
         declared = how.format_of(path, {'map': (), **options} if is_frame(source) else options)
-        job = job_of(declared, path, bag, options, attachments)
-        found = declared.write(job)
+        job = job_of(declared, path, options)
+        found = declared.read(job, log)
     except ImportDataError as error:
         raise ImportDataError(str(error).replace(repr(str(path)), repr(name))) from error
-    run = ImportedRun(bag, [path])
+    run = run_of(log, [path])
     run.name = name
     notes = [*found.summary(path)[1:], *found.details()]
     dated = getattr(found, 'base_ns', None) is None
     said = [f'{name}: {in_python(note)}' for note in notes]
-    return _Part(place, declared, job, run, dated), said
+    return _Part(place, declared, job, log, run, dated), said
 
 
 def _groups(parts: Sequence[_Part]) -> list[list[_Part]]:
@@ -288,7 +289,3 @@ def _groups(parts: Sequence[_Part]) -> list[list[_Part]]:
     # effects of the earth are stated along the run that was given first
     found = [sorted(group, key=lambda part: part.place) for group in groups]
     return sorted(found, key=lambda group: group[0].place)
-
-
-def _let_go(folder: TemporaryDirectory[str]) -> None:
-    """Forget a folder, which goes when nobody holds it any more."""

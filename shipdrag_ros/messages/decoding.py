@@ -247,7 +247,9 @@ def _fix(extra: Float64) -> Float64:
     latitude, longitude, variance_north, variance_east, status, covariance_type = extra.T
     table = _table(latitude, longitude, variance_north, variance_east)
     table[covariance_type == _FIX.COVARIANCE_TYPE_UNKNOWN, 2:] = np.nan
-    table[status < _FIX_STATUS.STATUS_FIX] = np.nan
+    # a driver that leaves the status as it is by default, unknown, has not said that there is none
+    none = (status < _FIX_STATUS.STATUS_FIX) & (status != _FIX_STATUS.STATUS_UNKNOWN)
+    table[none] = np.nan
     return table
 
 

@@ -104,7 +104,8 @@ def match_inputs(
     topics
         (topic, type) pairs as recorded.
     remap
-        Recorded topic -> input, before any match by name.
+        Recorded topic -> input, before any match by name; also input -> topic, as ROS writes
+        a remapping, where the second is no input.
 
     Raises
     ------
@@ -114,7 +115,7 @@ def match_inputs(
     types_of: dict[str, list[str]] = {}
     for topic, type_name in topics:
         types_of.setdefault(_absolute(topic), []).append(type_name)
-    renamed = {_absolute(topic): name.strip('/') for topic, name in (remap or {}).items()}
+    renamed = dict(_topic_and_input(*each) for each in (remap or {}).items())
     problems = _remap_problems(renamed, types_of)
 
     heard: dict[tuple[str, str], Source] = {}
@@ -161,6 +162,12 @@ def _remap_problems(renamed: Mapping[str, str], types_of: Mapping[str, list[str]
         if name not in TOPICS
     ]
     return problems
+
+
+def _topic_and_input(one: str, other: str) -> tuple[str, str]:
+    if other.strip('/') not in TOPICS and one.strip('/') in TOPICS:
+        one, other = other, one
+    return _absolute(one), other.strip('/')
 
 
 def _absolute(topic: str) -> str:

@@ -215,6 +215,7 @@ def recording_status(status: RecordingStatus) -> DiagnosticStatus:
             'messages lost': status.lost,
             'parts left uncompacted': progress.uncompacted,
         }
+    values['quota'] = status.kept
     values['memory for a later start'] = 'too small' if status.ring_cut else 'sufficient'
     return _status('recording', level, status.text, values)
 

@@ -205,6 +205,7 @@ class NmeaFeed:
             ('no value', found.no_value),
             ('feeds', found.feeding()),
             ('used', found.used),
+            ('of a backlog, stamped by their own times', found.behind),
             ('not taken, of another source', found.not_taken),
             ('not used, a topic feeds', self._nmea_refused),
             ('messages of the topic not used, NMEA feeds', self._topic_refused),

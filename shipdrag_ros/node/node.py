@@ -235,7 +235,7 @@ class CoastdownNode(LifecycleNode):
             self._recorder.start()
         self._session.note_lifecycle('active', self._now_ns())
         recording = self._recorder.status()
-        self.get_logger().info(f'active; {recording.text}')
+        self.get_logger().info(f'active; {recording.text}; {recording.kept}')
         self._announcer.status(diagnostics.recording_status(recording))
 
     def _deactivate(self, why: str) -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from enum import Enum
@@ -32,7 +31,7 @@ BEGIN_S = 0.5  # an answer to a start waits so long for the disk
 CLOSE_S = 5.0
 SLOW_S = 2.0
 DEFAULT_LIMITS = PartLimits()
-EVERYTHING = Keep()
+EVERYTHING = Keep(share=0.0)
 EVERY_S = 60.0
 
 
@@ -46,13 +45,11 @@ class Housekeeping:
         Of the recordings.
     keep
         The limits; without any no thread is started.
-    busy
-        Returns the files that are still written.
     """
 
-    def __init__(self, directory: Path, keep: Keep, busy: Callable[[], Collection[Path]]) -> None:
+    def __init__(self, directory: Path, keep: Keep) -> None:
         self._retention = Retention(directory, keep)
-        self._busy = busy
+        self._keep = keep
         self._removed: deque[Removed] = deque(maxlen=1000)
         self._ending = threading.Event()
         # a disk that hangs must not keep the process
@@ -66,6 +63,17 @@ class Housekeeping:
         """
         return [self._removed.popleft() for _ in range(len(self._removed))]
 
+    @property
+    def text(self) -> str:
+        """What is removed, and whether what may not be is too much."""
+        over = self._retention.over_bytes
+        if not over:
+            return self._keep.text
+        return (
+            f'{self._keep.text}; those that are kept take {over * 1e-9:.3g} GB more than that: '
+            'move them ashore, or set keep_bytes'
+        )
+
     def close(self) -> None:
         """
         End; returns at once.
@@ -74,7 +82,7 @@ class Housekeeping:
 
     def _run(self) -> None:
         while True:
-            self._removed += self._retention.tidy(busy=self._busy(), now_s=time.time())
+            self._removed += self._retention.tidy(now_s=time.time())
             if self._ending.wait(EVERY_S):
                 return
 
@@ -101,12 +109,15 @@ class RecordingStatus:
     ring_cut
         Whether memory was too small to keep all that a recording started now should
         begin with; its replay may then differ from the live figures at first.
+    kept
+        What is removed to keep room on the disk.
     """
 
     state: RecordingState
     progress: RecordingProgress | None
     lost: int
     ring_cut: bool
+    kept: str
 
     @property
     def text(self) -> str:
@@ -114,6 +125,8 @@ class RecordingStatus:
         if self.progress is None:
             return 'not recording'
         lost = f'{self.lost} message(s) lost'
+        if self.progress.vanished:
+            lost += f'; somebody removed {self.progress.vanished} file(s) that were being written'
         if self.state is RecordingState.FAILED:
             return (
                 f'recording failed, {lost}, {self.progress.waiting} kept in memory: '
@@ -176,7 +189,7 @@ class Recorder:
         self._recording: DurableRecording | None = None
         self._ended: list[DurableRecording] = []
         self._lost = 0  # by recordings that are no longer kept
-        self._housekeeping = Housekeeping(self._directory, keep, self._files)
+        self._housekeeping = Housekeeping(self._directory, keep)
 
     def start(self) -> None:
         """
@@ -274,11 +287,7 @@ class Recorder:
             state = RecordingState.FAILED
         else:
             state = RecordingState.OFF if self._recording is None else RecordingState.RECORDING
-        return RecordingStatus(state, progress, lost, self._ring.cut)
-
-    def _files(self) -> set[Path]:
-        recordings = [*self._ended, *filter(None, [self._recording])]
-        return set().union(*(it.files() for it in recordings))
+        return RecordingStatus(state, progress, lost, self._ring.cut, self._housekeeping.text)
 
     def _begin(self) -> DurableRecording:
         stamp = datetime.now(UTC).strftime('%Y%m%dT%H%M%SZ')

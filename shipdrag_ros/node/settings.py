@@ -125,7 +125,7 @@ OWN: tuple[Setting, ...] = (
         'keep_bytes',
         0,
         'when all recordings are larger together, the oldest parts are removed, those that hold '
-        'a coastdown last; 0: no limit',
+        'a coastdown last; 0: half of the disk, and none that holds a coastdown; 1e15: no limit',
         unit='B',
         low=0,
         high=1e15,

@@ -197,10 +197,49 @@ def test_a_directory_that_vanishes_is_made_again(tmp_path: Path) -> None:
     wait_until(lambda: it.progress().messages == 1)
     shutil.rmtree(tmp_path / 'bags')
     it.put(message(1))
+    wait_until((tmp_path / 'bags').exists)
+    wait_until(lambda: it.progress().messages == 1)
+    progress = end(it)
+    # message 0 was in the file that is gone
+    assert (progress.messages, progress.lost, progress.vanished) == (1, 1, 1)
+    assert (progress.uncompacted, progress.error) == (0, '')
+    assert all_numbers(tmp_path / 'bags') == [1]
+
+
+def test_a_finished_part_that_is_removed_before_it_is_compact_is_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as disk:
+        disk.setattr(module, 'compact', _full)
+        it = recording(tmp_path, limits=PartLimits(size_bytes=10**9, duration_s=5.0))
+        for number in range(7):
+            it.put(message(number))
+        wait_until(lambda: it.progress().messages == 7)
+        wait_until(lambda: it.progress().uncompacted == 1)
+        (tmp_path / 'a_000.mcap').unlink()
+    progress = end(it)
+    assert (progress.messages, progress.lost, progress.vanished) == (1, 6, 1)
+    assert (progress.uncompacted, progress.error) == (0, '')
+    assert all_numbers(tmp_path) == [6]
+
+
+@pytest.mark.usefixtures('quick')
+def test_a_file_that_is_moved_is_not_lost(tmp_path: Path) -> None:
+    it = recording(tmp_path)
+    it.put(message(0))
+    wait_until(lambda: it.progress().messages == 1)
+    (tmp_path / 'a_000.mcap').rename(tmp_path / 'b.mcap')
+    it.put(message(1))
     wait_until(lambda: it.progress().messages == 2)
     progress = end(it)
-    assert (progress.part, progress.lost, progress.uncompacted) == (2, 0, 1)
-    assert all_numbers(tmp_path / 'bags') == [1]
+    assert (progress.messages, progress.lost, progress.vanished) == (2, 0, 0)
+    assert numbers(tmp_path / 'a_001.mcap') == [1]
+    (moved,) = open_runs([tmp_path / 'b.mcap'])
+    assert moved.topics[0].messages == 1
+
+
+def _full(path: Path, *, messages: int) -> None:
+    raise FULL
 
 
 def test_memory_is_bounded_and_what_finds_no_room_is_counted(tmp_path: Path) -> None:
@@ -219,10 +258,7 @@ def test_memory_is_bounded_and_what_finds_no_room_is_counted(tmp_path: Path) -> 
 def test_a_part_that_cannot_be_compacted_is_whole_and_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(path: Path, *, messages: int) -> None:
-        raise FULL
-
-    monkeypatch.setattr(module, 'compact', full)
+    monkeypatch.setattr(module, 'compact', _full)
     it = recording(tmp_path, earlier=map(message, range(10)))
     progress = end(it)
     assert (progress.lost, progress.uncompacted, progress.error) == (0, 1, '')

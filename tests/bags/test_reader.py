@@ -353,8 +353,8 @@ def test_a_path_that_is_not_there(tmp_path: Path, name: str) -> None:
     ('content', 'expected'),
     [
         (b'', 'is empty'),
-        (b'SQLite format 3\0 and more', 'sqlite3 storage; convert it with `rosbags-convert'),
-        (b'#ROSBAG V2.0\n', 'ROS 1; convert it with `rosbags-convert'),
+        (b'SQLite format 3\0 and more', 'sqlite3 storage; make a bag of it with `shipdrag import'),
+        (b'#ROSBAG V2.0\n', 'ROS 1; make a bag of it with `shipdrag import'),
         (b'time,speed\n1,2\n', "no MCAP file, it begins with b'time,spe'"),
         (b'\x89PNG\r\n\x1a\n' + bytes(100), 'no MCAP file'),
     ],
@@ -369,13 +369,13 @@ def test_files_that_are_no_bags(tmp_path: Path, content: bytes, expected: str) -
     ('files', 'expected'),
     [
         ({}, r'holds no \.mcap file'),
-        ({'bag_0.db3': 'x'}, 'sqlite3 storage; convert'),
+        ({'bag_0.db3': 'x'}, 'sqlite3 storage; make a bag of it with .shipdrag import'),
         ({'metadata.yaml': '{'}, 'is no metadata of rosbag2'),
         ({'metadata.yaml': 'a: 1'}, 'is no metadata of rosbag2'),
         ({'metadata.yaml': 'rosbag2_bagfile_information: 3'}, 'holds 3, expected'),
         (
             {'metadata.yaml': 'rosbag2_bagfile_information: {storage_identifier: sqlite3}'},
-            "'sqlite3' storage; convert",
+            "'sqlite3' storage; make a bag of it with .shipdrag import",
         ),
         (
             {

@@ -4,14 +4,18 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
+import pytest
+
+from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.bags.retention import DAY_S, Keep, Removed, Retention
 from shipdrag_ros.bags.writer import BagWriter
+from shipdrag_ros.messages import EncodedMessage
 from shipdrag_ros.messages.topics import RESISTANCE
 
 NOW_S = 1_800_000_000.0
-NO_ONE: frozenset[Path] = frozenset()
 
 
 def part(directory: Path, hour: int, number: int = 0, *, coastdown: bool = False) -> Path:
@@ -36,14 +40,14 @@ def test_the_oldest_go_first_and_coastdowns_last(tmp_path: Path) -> None:
     for hour in (1, 2, 3):
         part(tmp_path, hour)
     retention = Retention(tmp_path, Keep(size_bytes=2 * 4096))
-    removed = retention.tidy(busy=NO_ONE, now_s=NOW_S)
+    removed = retention.tidy(now_s=NOW_S)
     assert [(one.path.name[19:21], one.coastdown) for one in removed] == [
         ('01', False),
         ('02', False),
     ]
-    assert retention.tidy(busy=NO_ONE, now_s=NOW_S) == []
+    assert retention.tidy(now_s=NOW_S) == []
 
-    removed = Retention(tmp_path, Keep(size_bytes=1)).tidy(busy=NO_ONE, now_s=NOW_S)
+    removed = Retention(tmp_path, Keep(size_bytes=1)).tidy(now_s=NOW_S)
     assert [(one.path.name[19:21], one.coastdown) for one in removed] == [
         ('03', False),
         ('00', True),
@@ -57,14 +61,13 @@ def test_age_takes_no_coastdown_nor_its_steady_lead(tmp_path: Path) -> None:
     part(tmp_path, 0, 0)
     part(tmp_path, 2, 0)
     kept.append(part(tmp_path, 20))
-    removed = Retention(tmp_path, Keep(days=0.5)).tidy(busy=NO_ONE, now_s=NOW_S)
+    removed = Retention(tmp_path, Keep(days=0.5)).tidy(now_s=NOW_S)
     assert names(removed) == ['00_000', '02_000']
     assert sorted(tmp_path.iterdir()) == sorted(kept)
     assert 'older than 0.5 days' in removed[0].text
 
 
-def test_what_is_written_or_not_ours_is_never_touched(tmp_path: Path) -> None:
-    busy = part(tmp_path, 0)
+def test_what_is_not_ours_is_never_touched(tmp_path: Path) -> None:
     target = tmp_path / 'target'
     target.write_text('kept')
     link = tmp_path / 'coastdown_20260101T010000Z_000.mcap'
@@ -72,15 +75,53 @@ def test_what_is_written_or_not_ours_is_never_touched(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / 'coastdown_20260101T020000Z_000.mcap')
     damaged = tmp_path / 'coastdown_20260101T030000Z_000.mcap'
     damaged.write_text('no bag: what is in it is not known')
-    others = [target, link, tmp_path / 'coastdown_20260101T020000Z_000.mcap', busy]
+    others = [target, link, tmp_path / 'coastdown_20260101T020000Z_000.mcap']
     (tmp_path / 'notes.mcap').write_text('')
     others.append(tmp_path / 'notes.mcap')
-    removed = Retention(tmp_path, Keep(days=1e-9, size_bytes=1)).tidy(busy={busy}, now_s=2 * NOW_S)
+    removed = Retention(tmp_path, Keep(days=1e-9, size_bytes=1)).tidy(now_s=2 * NOW_S)
     assert [(one.path, one.coastdown) for one in removed] == [(damaged, True)]
     assert sorted(tmp_path.iterdir()) == sorted(others)
 
 
+@pytest.mark.parametrize('state', ['growing', 'closed, not yet compact'])
+def test_what_another_node_writes_in_the_same_folder_stays(tmp_path: Path, state: str) -> None:
+    path = tmp_path / 'coastdown_20260101T000000Z_000.mcap'
+    ready, writes = os.pipe()
+    child = os.fork()
+    if child == 0:
+        file = LiveFile(path, recording_id='r', part=0, attachments={})
+        file.append([EncodedMessage('/depth', 'sensor_msgs/msg/Range', b'reading', 1, 1)])
+        file.sync()
+        if state != 'growing':
+            file.close()
+        os.write(writes, b'x')
+        signal.pause()
+    retention = Retention(tmp_path, Keep(days=1e-9, size_bytes=1))
+    os.read(ready, 1)
+    removed = retention.tidy(now_s=2 * NOW_S)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    assert removed == []
+    # who wrote it is gone
+    assert names(retention.tidy(now_s=2 * NOW_S)) == ['00_000']
+
+
+def test_where_nobody_said_how_much_a_coastdown_is_never_removed(tmp_path: Path) -> None:
+    part(tmp_path, 0, coastdown=True)
+    for hour in (1, 2, 3):
+        part(tmp_path, hour)
+    disk = os.statvfs(tmp_path)
+    room = disk.f_blocks * disk.f_frsize
+    retention = Retention(tmp_path, Keep(share=2.5 * 4096 / room))
+    assert [one.path.name[19:21] for one in retention.tidy(now_s=NOW_S)] == ['01', '02']
+    assert retention.over_bytes == 0
+    retention = Retention(tmp_path, Keep(share=0.5 * 4096 / room))
+    assert [one.path.name[19:21] for one in retention.tidy(now_s=NOW_S)] == ['03']
+    assert retention.over_bytes == 2048
+    assert [path.name[19:21] for path in tmp_path.iterdir()] == ['00']
+
+
 def test_without_limits_everything_stays(tmp_path: Path) -> None:
     part(tmp_path, 0)
-    assert Retention(tmp_path, Keep()).tidy(busy=NO_ONE, now_s=1e12) == []
-    assert Retention(tmp_path / 'none', Keep(days=1)).tidy(busy=NO_ONE, now_s=1e12) == []
+    assert Retention(tmp_path, Keep(share=0.0)).tidy(now_s=1e12) == []
+    assert Retention(tmp_path / 'none', Keep(days=1)).tidy(now_s=1e12) == []

@@ -288,6 +288,9 @@ def test_a_fix_that_is_none_has_no_position(reference: Any) -> None:
     message.status.status = -1
     block = decode(source, [reference.serialize(source.type, message)], [0]).block
     assert np.isnan(block.value).all()
+    message.status.status = -2  # not set by the driver, as messages of Jazzy begin
+    block = decode(source, [reference.serialize(source.type, message)], [0]).block
+    assert block.value.tolist() == [[60.0, 5.0]]
     message.status.status = 0
     block = decode(source, [reference.serialize(source.type, message)], [0]).block
     assert block.variance.tolist() == [[9.0, 4.0]]  # north, east

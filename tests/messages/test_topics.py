@@ -68,6 +68,13 @@ def test_a_remapped_topic_is_heard_and_no_longer_under_its_own_name() -> None:
     assert list(matched.heard.values()) == [Source('speed_over_ground', TWIST)]
 
 
+def test_a_remap_takes_both_orders_where_one_side_is_an_input() -> None:
+    topics = [('/log/speed', TWIST), ('/speed_through_water', TWIST)]
+    ours = match_inputs(topics, remap={'/log/speed': 'speed_through_water'})
+    assert match_inputs(topics, remap={'speed_through_water': '/log/speed'}) == ours
+    assert list(ours.heard) == [('/log/speed', TWIST)]
+
+
 @pytest.mark.parametrize(
     ('remap', 'expected'),
     [

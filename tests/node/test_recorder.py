@@ -180,6 +180,20 @@ def test_old_recordings_make_room(tmp_path: Path) -> None:
     assert [part.path.name[10:25] for part in removed] == ['20260101T040000']
 
 
+def test_what_is_kept_and_what_somebody_removed_is_said(tmp_path: Path) -> None:
+    assert Keep().text.startswith('the oldest recordings are removed beyond 50% of the disk')
+    it = recorder(tmp_path, keep=Keep())
+    assert it.status().kept == Keep().text
+    it.start()
+    it.input(received(1))
+    wait_until(lambda: [it.messages for it in [it.status().progress] if it] == [1])
+    path_of(it).unlink()
+    it.input(received(2))
+    wait_until(lambda: it.status().lost == 1)
+    it.close()
+    assert 'somebody removed 1 file(s) that were being written' in it.status().text
+
+
 def test_never_overwrites(tmp_path: Path) -> None:
     it = recorder(tmp_path)
     for arrival_ns in range(3):
