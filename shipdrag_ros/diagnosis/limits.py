@@ -120,21 +120,23 @@ def _percent_of_r(
     found: SearchResult, model: CoastModel, bounds: dict[str, tuple[Effect, float, Fit]]
 ) -> dict[str, float]:
     """Return by how much of it each effect at its bound changes the resistance that is shown."""
-    added = []
-    for effect, bound, likeliest in bounds.values():
+    added, names = [], []
+    for name, (_, bound, likeliest) in bounds.items():
         for term, place in likeliest.hypothesis.parts:
-            if isinstance(term, EffectTerm) and term.effect is effect and not term.stated:
+            if isinstance(term, EffectTerm) and term.effect.name == name and not term.stated:
                 z = likeliest.best.z[place : place + len(term.unknowns)].tolist()
                 values = [u.prior.at(each) for u, each in zip(term.unknowns, z, strict=True)]
                 first = bound if values[0] >= 0.0 else -bound
                 added.append((term, [first] * term.sizes + values[term.sizes :]))
+                names.append(name)
                 break
     time_s, speeds = model.shown(0, found.nothing.best, added)
     late = time_s > _RUN_DOWNS * model.seen[0].run_down_s
     if late.sum() < 3:
         return dict.fromkeys(bounds, float('nan'))
     curves = [_shown_r(time_s[late], line[late]) for line in speeds]
-    return {name: _apart(curves[0], curve) for name, curve in zip(bounds, curves[1:], strict=True)}
+    apart = [_apart(curves[0], curve) for curve in curves[1:]]
+    return dict.fromkeys(bounds, float('nan')) | dict(zip(names, apart, strict=True))
 
 
 def _shown_r(time_s: Float64, speed_m_s: Float64) -> tuple[Float64, Float64]:
