@@ -251,15 +251,15 @@ class CoastSimulation:
         acting = self._acting(run, base.hypothesis, base.z)
         whole = sum((term.action(frame, run, values) for term, _, values in acting), _NOTHING)
         speed = float(base.z[len(base.hypothesis.unknowns) + run])
-        batch.add(whole, speed)
+        at = [batch.add(whole, speed)]  # what is alike shares a column
         for term, values in added:
             more = term.action(frame, run, values) if term.acts_in(run) else _NOTHING
-            batch.add(whole + more, speed)
+            at.append(batch.add(whole + more, speed))
         columns = self._simulate(run, batch)
         by_log = bool((seen.along.rows.kind == LOG).any())
         speeds = columns.log_m_s if by_log else columns.radar_speed_m_s
         after = columns.time_s > seen.lead_in_s
-        return columns.time_s[after] - seen.lead_in_s, speeds[:, after]
+        return columns.time_s[after] - seen.lead_in_s, speeds[at][:, after]
 
     def _simulate(self, run: int, batch: _Batch) -> Columns:
         frame = self.frames[run]
