@@ -124,6 +124,10 @@ setup(
             f'shipdrag = {PACKAGE}.cli:main',
             f'coastdown_node = {PACKAGE}.node.main:main',
         ],
+        'shipdrag.papers': [
+            f'{name} = {PACKAGE}.studies.{name}:STUDY'
+            for name in ('cable', 'sensitivity', 'residual', 'surface')
+        ],
         'shipdrag.formats': [
             f'{name} = {PACKAGE}.sources.formats.{place}:FORMAT' for name, place in FORMATS.items()
         ],

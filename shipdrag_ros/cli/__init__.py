@@ -31,7 +31,7 @@ class Verb(NamedTuple):
     summary: str
 
 
-VERBS = (
+_OWN = (
     Verb(
         'demo',
         '.demo',
@@ -60,7 +60,13 @@ VERBS = (
     Verb('info', '.info', 'what is in a bag'),
     Verb('check', '.check', 'is a bag sound'),
     Verb('recover', '.recover', 'save what is whole in a damaged bag'),
-    *(Verb(study.verb, f'{package}.face.verb', study.summary) for package, study in found()),
+)
+VERBS = (
+    *_OWN,
+    *(
+        Verb(study.verb, f'{package}.face.verb', study.summary)
+        for package, study in found(frozenset(verb.name for verb in _OWN))
+    ),
 )
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work

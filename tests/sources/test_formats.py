@@ -152,6 +152,14 @@ def test_a_log_of_a_serial_line_may_begin_with_zeros(
     assert np.array_equal(first.value, block_of(files['nmea']).value)
 
 
+def test_lines_of_a_serial_adapter_may_end_with_a_carriage_return(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    path = tmp_path / 'slcan.log'
+    path.write_bytes(files['slcan'].read_bytes().replace(b'\n', b'\r'))
+    assert np.array_equal(block_of(path).value, block_of(files['slcan']).value)
+
+
 def test_a_coordinate_may_have_thirty_decimals(tmp_path: Path) -> None:
     path = tmp_path / 'track.gpx'
     points = (

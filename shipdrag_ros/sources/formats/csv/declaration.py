@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, Format, Head, Job, Option
 from shipdrag_ros.sources.formats.csv.columns import SPEED_UNITS, parse_input, parse_time
 from shipdrag_ros.sources.formats.csv.dates import ORDERS, zone_of
@@ -29,19 +31,31 @@ def _score(head: Head) -> float:
 
 
 def _open(job: Job, log: Log) -> TableResult:
-    options = job.options
+    return read_table(LogTable(job.source), log, job.options, progress=job.progress)
+
+
+def read_table(
+    table: LogTable, log: Log, options: Mapping[str, Any], *, progress: PartDone | None = None
+) -> TableResult:
+    """
+    Read a table by its options, and what they leave open by its names and values.
+
+    Raises
+    ------
+    ImportDataError
+        If nothing that moves has a known unit, or the options do not go together.
+    """
     time, rate = options.get('time'), options.get('rate')
     if time is not None and rate is not None:
         raise ImportDataError('--time and --rate: both give the times of the rows; keep one')
     time = with_dates(time, options.get('date_order', ''), options.get('zone'))
-    table = LogTable(job.source)
     found = _inputs(table, time, options)
     time = with_dates(found.time, options.get('date_order', ''), options.get('zone'))
     result = read_csv(
-        job.source,
+        table,
         log,
         TableColumns(found.inputs, time, rate, options.get('where', ())),
-        progress=job.progress,
+        progress=progress,
     )
     doubts = tuple(f'Not used: {each}' for each in found.unclear)
     return replace(result, notes=(*found.notes, *result.notes, *doubts))

@@ -94,7 +94,7 @@ class TableColumns:
 
 
 def read_csv(
-    source: Path,
+    source: Path | LogTable,
     log: Log,
     columns: TableColumns,
     *,
@@ -120,7 +120,7 @@ def read_csv(
         If a column is not there, or nothing can be read.
     """
     columns.check()
-    table = LogTable(source)
+    table = source if isinstance(source, LogTable) else LogTable(source)
     time = columns.time
     places = [] if time is None else [table.column(name) for name in time.names]
     channels = [each for mapped in columns.inputs for each in mapped.by_channel()]
@@ -136,7 +136,7 @@ def read_csv(
         places,
         table.width,
     )
-    log.attach(ATTACHMENT, _provenance(source, columns))
+    log.attach(ATTACHMENT, _provenance(table.path, columns))
     rows = table.rows(progress)
     while some := list(islice(rows, BATCH_SAMPLES)):
         log.write_samples(record.take(some))
