@@ -119,7 +119,7 @@ class Run:
             for number, channel in part.contents.channels.items():
                 counts[_key(channel)] += part.contents.counts[number]
         try:
-            self._matched = match_inputs(counts, remap=remap)
+            self._matched = match_inputs(counts, remap=remap, own=_is_own(parts))
         except BagError as error:
             raise BagError(f'{self.name!r}: {error}') from None
         self.topics = tuple(_topic_info(key, counts[key], self._matched) for key in sorted(counts))
@@ -313,6 +313,11 @@ class RunSamples:
             for reason, number in reasons.items():
                 self.unreadable.setdefault(source.input, Counter())[reason.value] += number
         return block, kept
+
+
+def _is_own(parts: Sequence[McapFile]) -> bool:
+    """Whether a node of this package recorded it: each type that it holds was subscribed."""
+    return any('parameters.yaml' in part.contents.attachments for part in parts)
 
 
 def _key(channel: FileChannel) -> tuple[str, str]:

@@ -35,13 +35,15 @@ from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
-from shipdrag_ros.coastdown.running import Chosen, RunningCoastdown, WindowEstimator
+from shipdrag_ros.coastdown.running import Chosen, RunningCoastdown
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.estimator import WindowEstimator
+from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block
 from shipdrag_ros.ship import Ship
@@ -61,8 +63,8 @@ class Monitor:
     parameters
         All of them matter.
     estimate
-        The estimator; raises `EstimationError` where none is possible. None: there are no
-        estimates while a coastdown runs.
+        The estimator; what it raises is a failure with words. None: there are no estimates
+        while a coastdown runs.
     final
         An estimator of a coastdown that has ended, with the record before it.
 
@@ -99,8 +101,8 @@ class Monitor:
     ) -> None:
         self._ship = ship
         self._parameters = parameters
-        self._estimator = estimate
-        self._final_estimator = final
+        self._estimator = None if estimate is None else shielded(estimate)
+        self._final_estimator = shielded(final)
         slopes = Slopes.of(parameters)
         self._tuning = Tuning(
             Limits.of(parameters),

@@ -22,12 +22,12 @@ from shipdrag_ros.coastdown.onset import Doubt
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
 
-WindowEstimator = Callable[[Window, Ship, Parameters], Estimate]
 CutWindow = Callable[[int, int, int], Window]
 """From its first and last stamp, and the first of the record before it [ns]."""
 
