@@ -20,15 +20,15 @@ _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
 M_S_PER_KNOT = 1852.0 / 3600.0
+_UNITS_M_S = {'m/s': 1.0, 'knots': M_S_PER_KNOT, 'km/h': 1.0 / 3.6, 'mph': 0.44704}
 _UNIT_RATIOS = {
-    3600.0 / 1852.0: 'knots over m/s',
-    1852.0 / 3600.0: 'm/s over knots',
-    3.6: 'km/h over m/s',
-    1.0 / 3.6: 'm/s over km/h',
-    1.852: 'km/h over knots',
-    1.0 / 1.852: 'knots over km/h',
+    of / other: f'{shown} over {meant}'
+    for meant, of in _UNITS_M_S.items()
+    for shown, other in _UNITS_M_S.items()
+    if shown != meant
 }
-_UNITS_NEAR = 0.1  # relative; a current and the error of a log are in a ratio too
+# relative, as a current and the error of a log are in a ratio too; and of the way to one unit
+_UNITS_NEAR, _UNITS_NEARER = 0.1, 0.15
 # what `float` takes too, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
@@ -228,12 +228,15 @@ def mistaken_units(ratio: float) -> str:
     Returns
     -------
     str
-        The units whose ratio is within 10 %, each with it; '' where there are none.
+        The units whose ratio is within 10 %, and a seventh of the way to one unit; each with its
+        ratio; '' where there are none.
     """
+    if not ratio > 0.0:
+        return ''
     return ' and '.join(
         f'{words} ({each:.2f})'
         for each, words in _UNIT_RATIOS.items()
-        if abs(ratio / each - 1.0) < _UNITS_NEAR
+        if abs(math.log(ratio / each)) < min(_UNITS_NEAR, _UNITS_NEARER * abs(math.log(each)))
     )
 
 

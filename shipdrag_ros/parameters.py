@@ -181,6 +181,12 @@ class Parameters:
         'equation of motion; s1_...: the published problems',
         choices=ESTIMATORS,
     )
+    regimes: str = _parameter(
+        'rules',
+        'what judges a deceleration. rules: those of the onset, the shafts and the end; filter: '
+        'one model of driven, gliding, braked and turning, under trial',
+        choices=('rules', 'filter'),
+    )
     order_max: int = _parameter(
         20, 'largest number of coefficients that the order search tries', low=3, high=40
     )

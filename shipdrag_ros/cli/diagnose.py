@@ -145,6 +145,8 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))
     for line in (*weighed, *found.notes):
         output.say(line)
+    if found.question:
+        return
     output.heading('How probable')
     output.table(diagnosis_cells.probabilities(found))
     if found.effects:
@@ -153,6 +155,9 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     elif diagnosis_cells.sizes(found).rows:
         output.heading('How large, were it the one; sd is one standard deviation')
         output.table(diagnosis_cells.sizes(found))
+    if found.limits:
+        output.heading('Effects that are not named: how large they can be; sizes in SI')
+        output.table(diagnosis_cells.limits(found))
     if found.facts:
         output.heading('Facts that were given')
         output.table(diagnosis_cells.facts(found))

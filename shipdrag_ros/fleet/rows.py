@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.diagnosis.result import DiagnosisResult, EffectEstimate, Verdict
+from shipdrag_ros.diagnosis.result import DiagnosisResult, EffectEstimate
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -232,9 +232,6 @@ def _candidates(diagnosis: DiagnosisResult) -> str:
         }
         for each in diagnosis.candidates
     ]
-    if diagnosis.verdict is Verdict.UNKNOWN:
-        unnamed = {'names': ['unknown'], 'probability': diagnosis.unnamed, 'effects': []}
-        found.insert(0, unnamed)
     return _json(found)
 
 

@@ -210,14 +210,14 @@ class Diagnosis(Shown):
                 for value in (effect.parameters[size.name],)
             ]
             rows += sized or [(names, each.probability, '', '', None, None, '')]
-        if self.found.unnamed:
-            rows.append(('unknown', self.found.unnamed, '', '', None, None, ''))
         heads = ('candidate', 'probability', 'effect', 'parameter', 'value', 'sd', 'unit')
         return {head: [row[place] for row in rows] for place, head in enumerate(heads)}
 
 
 def _first(found: DiagnosisResult) -> str:
-    """Name the most probable answer."""
+    """Name the most probable answer, or ask."""
+    if found.question:
+        return found.question
     answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 

@@ -296,6 +296,7 @@ def diagnosis_status(status: DiagnosisStatus) -> DiagnosticStatus:
 def _figures(found: DiagnosisResult) -> dict[str, object]:
     """Return the figures of a diagnosis."""
     from shipdrag_ros.diagnosis.words import advice
+    from shipdrag_ros.inference.decision import NONE, UNKNOWN
     from shipdrag_ros.simulation.effects import LIBRARY
 
     values: dict[str, object] = {
@@ -304,7 +305,7 @@ def _figures(found: DiagnosisResult) -> dict[str, object]:
         'probability of something without a name [1]': found.unnamed,
     }
     for candidate in found.candidates:
-        if candidate.names:
+        if candidate.names not in (NONE, UNKNOWN):
             values[f'probability of {" + ".join(candidate.names)} [1]'] = candidate.probability
     sized = [(effect.name, effect) for effect in found.effects]
     if not sized:  # a set: what each would have

@@ -141,6 +141,9 @@ class Effect:
         How far what the effect does may depart from its formula, relative.
     odds
         That it is missing in a model, before any data.
+    size_power
+        Its trace grows about as this power of the first parameter; below 0, the smaller that is
+        the more there is of the effect.
     confounders
         Effects of nearly the same trace, and what decides from each; nothing:
         no record can.
@@ -178,6 +181,7 @@ class Effect:
     not_with: tuple[str, ...] = ()
     formula_sd: float = 0.0
     odds: float = 0.04
+    size_power: float = 1.0
     needs: tuple[str, ...] = ()
     errs_in: tuple[str, ...] = ()
     without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)
