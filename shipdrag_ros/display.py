@@ -29,7 +29,7 @@ _UNIT_RATIOS = {
 }
 # relative, as a current and the error of a log are in a ratio too; and of the way to one unit
 _UNITS_NEAR, _UNITS_NEARER = 0.1, 0.15
-# what `float` takes besides, 1_000 or nan or infinity, is no measured number
+# what `float` takes too, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
 """Below it a ship is stated in kg and N, above in t and kN."""

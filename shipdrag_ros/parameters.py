@@ -64,7 +64,7 @@ def _parameter(
 @dataclass(frozen=True)
 class Parameters:
     """
-    Everything that changes a result, besides the ship.
+    Everything that changes a result, apart from the ship.
 
     Raises
     ------

@@ -80,7 +80,7 @@ def add_remap(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=remap,
         metavar='FROM:=TO',
-        help='hear topic FROM of the bag as input TO; may be given more than once',
+        help='read topic FROM of the bag as input TO; may be given more than once',
     )
 
 

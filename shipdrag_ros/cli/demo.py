@@ -159,7 +159,7 @@ def _sail(
     if node.is_running:
         raise node.failed(f'the node did not end within {_END_S:g} s of SIGINT')
     if not rehearsal.estimates:
-        raise node.failed('no estimate was heard')
+        raise node.failed('no estimate was received')
 
 
 class _Live:
@@ -233,7 +233,7 @@ class _Node:
 
 @contextmanager
 def _node(ship_file: Path, recordings: Path, log: Path) -> Iterator[_Node]:
-    # nothing leaves this machine, and no other ROS on it hears or is heard
+    # nothing leaves this machine, and no other ROS on it is received or receives
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = str(_FIRST_DOMAIN + os.getpid() % _DOMAINS)
     os.environ.pop('ROS_STATIC_PEERS', None)

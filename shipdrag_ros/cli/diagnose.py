@@ -30,12 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.description = (
-        'Hold coastdowns against the baseline of the ship file and name the effect that is '
+        'Compare coastdowns with the baseline of the ship file and name the effect that is '
         'missing: a name only where the data decide, the smallest set and what would decide '
         'where they cannot, "unknown" with a place where it is none of them. Coastdowns of all '
         'bags are taken together; effects of the earth are stated along the first one. Without '
         'a baseline a form of the resistance is fitted to the runs. In a record without a '
-        'coastdown the log is held against the way over ground, for which neither baseline nor '
+        'coastdown the log is compared with the way over ground, for which neither baseline nor '
         'ship file is needed.'
     )
     parser.add_argument(

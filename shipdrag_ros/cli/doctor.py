@@ -184,8 +184,8 @@ def _discovery() -> CheckResult:
     return CheckResult(
         'ROS discovery',
         CheckState.FINE,
-        f'not set, domain {domain}: shipdrag node hears this machine alone',
-        'to hear the network: shipdrag node --network',
+        f'not set, domain {domain}: shipdrag node receives from this machine alone',
+        'to receive from the network: shipdrag node --network',
     )
 
 
@@ -196,7 +196,7 @@ def _compiled() -> CheckResult:
     if root is None:
         do = f'set {CACHE_DIR} to a folder that can be written'
         return CheckResult(
-            'compiled code', CheckState.LOOK, 'not kept: each start compiles anew', do
+            'compiled code', CheckState.LOOK, 'not kept: each start compiles again', do
         )
     modules = sum(each.is_dir() for each in root.iterdir())
     if not modules:

@@ -51,7 +51,7 @@ class Diagnosis(Shown):
     found
         All that the diagnosis says.
     ship
-        That the runs were held against; None where none is known.
+        That the runs were compared with; None where none is known.
     notes
         What was found on the way, a line each.
 
@@ -247,7 +247,7 @@ def diagnose(
         Of one ship, from `read` or `simulate`; all their coastdowns are taken together,
         and effects of the earth are stated along the first.
     ship
-        To hold them against; None: that of the records.
+        To compare them with; None: that of the records.
     facts
         What a log book knows of all runs: `no_towed_cable`, `shaft=locked`.
     earlier

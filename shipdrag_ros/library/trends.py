@@ -160,7 +160,7 @@ def trends(
     events: Mapping[str, Sequence[tuple[str, str]]] | None = None,
 ) -> Trends:
     """
-    Hold the added resistance of each ship against time, as `shipdrag trend` does.
+    Follow the added resistance of each ship over time, as `shipdrag trend` does.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ class WithoutBaseline(StrEnum):
     Attributes
     ----------
     LOG_TRACK
-        The log held against the track over ground, on many courses and at many
+        The log compared with the track over ground, on many courses and at many
         speeds. Such an effect acts alike on all ships.
     ZEROS
         Readings of exactly 0 while the ship moves, and right ones when she is faster.
@@ -166,7 +166,7 @@ class Effect:
         Values of parameters at which many other causes leave the same trace, so that it
         is no name.
     lasts_s
-        Time in which it goes unseen, to 1 - 1/e: repaired, cleaned, set anew [s]. 0:
+        Time in which it goes unseen, to 1 - 1/e: repaired, cleaned, set again [s]. 0:
         of its run or its day, so that it says nothing of another.
     """
 

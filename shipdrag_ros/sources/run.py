@@ -41,7 +41,11 @@ class LogPart:
         Its channels, how many messages each has, and attachments.
     span_ns
         First and last time of arrival [ns]; None without messages.
+    indexed
+        Whether its messages are known without reading it to its end.
     """
+
+    indexed = True
 
     def __init__(self, log: Log, path: Path) -> None:
         self.path = path
