@@ -12,7 +12,29 @@ ROS = [  # the edge: a node on a machine without ROS from apt
     'ros-jazzy-rmw-fastrtps-cpp',  # rclpy alone brings no middleware
     'ros-jazzy-common-interfaces',
 ]
-FLIGHT = ['pymavlink', 'pyulog']  # logs of ArduPilot and PX4 vessels
+REPORT = [  # pages and pictures: `--report`, `replay --out`, `demo`, `.plot()`
+    'matplotlib',
+    'Jinja2',  # with escaping
+]
+LOGS = [  # formats of log files beyond NMEA 0183, tables and bags
+    'nmea2000',  # NMEA 2000: fast packets and fields
+    'pymavlink',  # ArduPilot
+    'pyulog',  # PX4
+]
+WATCH = [  # the page on the bridge
+    *REPORT,
+    'starlette',  # routes, server-sent events
+    'uvicorn',  # its server
+]
+FLEET = [  # fleet, trend, `watch --store`
+    *REPORT,
+    'dask',  # a graph of bags
+    'distributed',  # its workers, here or elsewhere
+    'pyarrow',  # the store: Parquet
+    'duckdb',  # questions to the store
+    'fsspec',  # folders and object stores alike
+    's3fs',  # of those, S3
+]
 DOCS = [
     'mkdocs-material',  # the site, searched without a network
     'mkdocstrings[python]',  # its pages of the Python interface
@@ -43,13 +65,22 @@ DEVELOPMENT = [
     'colcon-python-setup-py',
     'setuptools',
 ]
+FORMATS = {  # of logs: name and module
+    'ardupilot': 'ardupilot',
+    'csv': 'csv.declaration',
+    'gpx': 'gpx',
+    'n2k': 'n2k.declaration',
+    'nmea': 'nmea.declaration',
+    'rosbag': 'rosbag',
+    'signalk': 'signalk',
+    'ulog': 'ulog',
+}
 
 setup(
     name=PACKAGE,
     version='0.2.0',
     description='Hydrodynamic resistance of a ship from its coastdowns, live and from bags',
     author='shipdrag_ros maintainers',
-    author_email='maintainers@shipdrag.example.org',
     license='Apache-2.0',
     python_requires='>=3.11',
     packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
@@ -66,7 +97,7 @@ setup(
         (f'share/{PACKAGE}/config', glob('config/*')),
     ],
     zip_safe=False,
-    install_requires=[
+    install_requires=[  # what the node needs, and no more
         'numpy',
         'scipy',  # PCHIP tables, ODE integration, statistical tests
         'numba',  # compiled per-sample kernels: validation, onset
@@ -76,25 +107,29 @@ setup(
         'rosbags',  # message definitions and CDR without ROS; rosbag2 directories
         'pynmeagps',  # NMEA 0183 sentences, checksums
         'rich',  # tables and progress bars in the terminal
-        'matplotlib',  # pictures of a report
-        'Jinja2',  # the report's page, with escaping
-        'starlette',  # the page on the bridge: routes, server-sent events
-        'uvicorn',  # its server
         'pyserial',  # NMEA 0183 from a serial line
-        'nmea2000',  # NMEA 2000: fast packets and fields
         'shtab',  # completion for bash, zsh and others
-        'dask',  # the fleet: a graph of bags
-        'distributed',  # its workers, here or elsewhere
-        'pyarrow',  # the fleet's store: Parquet
-        'duckdb',  # questions to the store
-        'fsspec',  # folders and object stores alike
-        's3fs',  # of those, S3
     ],
-    extras_require={'ros': ROS, 'flight': FLIGHT, 'docs': DOCS, 'dev': DEVELOPMENT},
+    extras_require={
+        'report': REPORT,
+        'watch': WATCH,
+        'fleet': FLEET,
+        'logs': LOGS,
+        'ros': ROS,
+        'docs': DOCS,
+        'dev': DEVELOPMENT,
+    },
     entry_points={
         'console_scripts': [
             f'shipdrag = {PACKAGE}.cli:main',
             f'coastdown_node = {PACKAGE}.node.main:main',
+        ],
+        'shipdrag.papers': [
+            f'{name} = {PACKAGE}.studies.{name}:STUDY'
+            for name in ('cable', 'sensitivity', 'residual', 'surface')
+        ],
+        'shipdrag.formats': [
+            f'{name} = {PACKAGE}.sources.formats.{place}:FORMAT' for name, place in FORMATS.items()
         ],
     },
 )

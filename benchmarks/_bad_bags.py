@@ -206,7 +206,7 @@ CASES = (
         lambda f: _bytes(_sound(f).read_bytes()[:20])(f),
         1,
         'holds no message',
-        'is cut off',
+        'is damaged (truncated): left out',
         'give another bag',
     ),
     _case(
@@ -214,7 +214,7 @@ CASES = (
         _cut(0.4),
         0,
         'Warning: bag.mcap: the file was not closed, or it is cut off',
-        'only what lies before is used',
+        'is damaged (truncated): left out',
     ),
     _case(
         'cut off before the last bytes',
@@ -227,14 +227,15 @@ CASES = (
         'zeros from the middle on, as a power cut leaves them',
         _cut(0.5, zeros=True),
         0,
-        'Warning: bag.mcap: no record at byte',
-        'only what lies before is used',
+        'Warning: bag.mcap: the record at byte',
+        'is damaged (garbage): left out',
     ),
     _case(
         'a bit flipped in the middle',
         _flip(_in_a_chunk),
         0,
         'Warning: bag.mcap: the chunk at byte',
+        'is damaged (checksum): left out',
         'messages are there where the index lists 1208',
     ),
     _case(

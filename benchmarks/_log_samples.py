@@ -163,7 +163,7 @@ def slcan() -> bytes:
         for pgn, data in n2k_messages(k):
             clock = (30_000 + 1000 * k) % 60_000
             lines.append(f'T{_can_id(pgn):08X}{len(data)}{data.hex().upper()}{clock:04X}')
-    return '\r'.join(lines).encode()
+    return '\n'.join(lines).encode()
 
 
 def canboat() -> bytes:

@@ -2,9 +2,9 @@
 """
 Error and coverage of r(v) beside other ways to differentiate, on the same simulated records.
 
-Prints Markdown; `--write` puts it into docs/accuracy_beside_peers.md, and the short table into
-docs/figures.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps what is done,
-goes on from there, and with `--group` does a part only.
+Prints Markdown; `--write` puts it into benchmarks/results/accuracy_beside_peers.md, and the short
+table into docs/figures.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps
+what is done, goes on from there, and with `--group` does a part only.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 
 ROOT = Path(__file__).parents[1]
-PAGE = ROOT / 'docs' / 'accuracy_beside_peers.md'
+PAGE = ROOT / 'benchmarks' / 'results' / 'accuracy_beside_peers.md'
 FIGURES = ROOT / 'docs' / 'figures.md'
 BEGIN, END = '<!-- beside peers -->', '<!-- end beside peers -->'
 HULLS = (CARGO, TANKER, YACHT)
@@ -427,7 +427,7 @@ def preface(runs: int) -> list[str]:
         '  package). A smaller or a fitting family, or a biased estimator, may lie below it.',
         '- What is expected of r beforehand was chosen, among some dozens of ways, in view of '
         'these three ships and seeds, so ours are flattered here; on hulls that',
-        '  nothing was chosen on: [accuracy.md](accuracy.md), Unseen hulls.',
+        '  nothing was chosen on: [accuracy.md](../../docs/accuracy.md), Unseen hulls.',
         '- Peers differentiate; r = -(1 + n_r) dv/dt with the true n_r, sorted by v. Chebyshev: '
         'degree by BIC. Savitzky-Golay: cubic, window by leave-one-out',
         '  on evenly spaced speeds. Spline: `make_smoothing_spline`. Kalman: log and position '

@@ -26,8 +26,8 @@ from pathlib import Path
 from _log_samples import TEXTS, samples
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.importing.reading import read_any
 from shipdrag_ros.samples import Block
+from shipdrag_ros.sources.reading import read_any
 
 PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'import.md'
 BEGIN, END = '<!-- bad_imports begin -->', '<!-- bad_imports end -->'

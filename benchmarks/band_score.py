@@ -144,7 +144,9 @@ class Score:
     cpu_s: float
 
 
-def replay(ship: Path, bag: Path, window: tuple[float, float] | None) -> dict[str, Any]:
+def replay(
+    ship: Path, bag: Path, window: tuple[float, float] | None, estimator: str = 'auto'
+) -> dict[str, Any]:
     """
     Replay a bag with the public command.
 
@@ -153,8 +155,12 @@ def replay(ship: Path, bag: Path, window: tuple[float, float] | None) -> dict[st
     ship, bag
     window
         Given start and end, s from the start of the bag; None to find them.
+    estimator
+        The parameter of that name.
     """
-    asked = ['replay', str(bag), '--ship', str(ship), '--json']
+    parameters = bag.parent / 'estimator.yaml'
+    parameters.write_text(f'estimator: {estimator}\n', encoding='utf-8')
+    asked = ['replay', str(bag), '--ship', str(ship), '--json', '--parameters', str(parameters)]
     if window is not None:
         asked += ['--window', *(f'{at:.3f}' for at in window)]
     written, said = io.StringIO(), io.StringIO()
@@ -226,7 +232,7 @@ def chosen(world: World, half: str, hidden: str, first: int, count: int) -> list
 
 
 def scored(
-    world: World, numbers: Sequence[int], given: bool
+    world: World, numbers: Sequence[int], given: bool, estimator: str = 'auto'
 ) -> Iterator[tuple[int, int, Score | None, str]]:
     """
     Yield case, run, score, and the error where the command failed.
@@ -243,7 +249,7 @@ def scored(
                 window = ((stop - begins) * 1e-9, (ends - begins) * 1e-9)
                 start = time.process_time()
                 try:
-                    found = replay(ship, bag, window if given else None)
+                    found = replay(ship, bag, window if given else None, estimator)
                     cpu_s = time.process_time() - start
                     yield number, run, score(world, number, run, found, cpu_s), ''
                 except RuntimeError as error:
@@ -314,13 +320,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--count', type=int, default=40, help='how many cases')
     parser.add_argument('--seed', type=int, default=cases_b.SEED, help='of world b')
     parser.add_argument('--given', action='store_true', help='the time of the stop is given')
+    parser.add_argument('--estimator', default='auto', help='the parameter of that name')
     parser.add_argument('--each', action='store_true', help='print each run')
     parser.add_argument('--out', type=Path, help='one line of JSON a run')
     options = parser.parse_args(arguments)
     world = World.a() if options.world == 'a' else World.b(options.seed)
     numbers = chosen(world, options.half, options.hidden, options.first, options.count)
     rows = []
-    for row in scored(world, numbers, options.given):
+    for row in scored(world, numbers, options.given, options.estimator):
         rows.append(row)
         number, run, found, error = row
         if options.each:

@@ -152,10 +152,15 @@ def diagnosis(
 
 
 def answer(
-    by: str, form: str, number: int, world: str = 'a', with_facts: bool = False
+    by: str,
+    form: str,
+    number: int,
+    world: str = 'a',
+    with_facts: bool = False,
+    once: bool = False,
 ) -> dict[str, Any]:
     """
-    Diagnose one case, and again with what the answer recommends.
+    Diagnose one case, and again with what the answer recommends, unless once is enough.
     """
     hidden = WORLDS[world]
     diagnose = diagnosis(by, form, number, world, with_facts)
@@ -167,7 +172,7 @@ def answer(
         'followed': None,
         'everything': None,
     }
-    if found['verdict'] == 'one_of':
+    if found['verdict'] == 'one_of' and not once:
         tried = scoring.parse(found).tried
         if tried is not None:
             row['followed'], _ = diagnose(hidden.observe(number, added=(tried.test,)))
@@ -175,7 +180,7 @@ def answer(
     return row
 
 
-def _answer(task: tuple[str, str, int, str, bool]) -> dict[str, Any]:
+def _answer(task: tuple[str, str, int, str, bool, bool]) -> dict[str, Any]:
     try:
         return answer(*task)
     except Exception as error:
@@ -249,6 +254,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--world', choices=tuple(WORLDS), default='a')
     parser.add_argument('--half', choices=tuple(HALVES), default='all', help='by number')
     parser.add_argument('--facts', action='store_true', help='say what a crew knows (world b)')
+    parser.add_argument(
+        '--once', action='store_true', help='without what the answers recommend: quicker'
+    )
     parser.add_argument('--processes', type=int, default=2)
     parser.add_argument('--out', type=Path, help='answers, one line of JSON a case')
     options = parser.parse_args(arguments)
@@ -264,7 +272,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
     kept = _kept(out)
     tasks = [
-        (options.by, options.form, number, options.world, options.facts)
+        (options.by, options.form, number, options.world, options.facts, options.once)
         for number in numbers
         if number not in kept
     ]

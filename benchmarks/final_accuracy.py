@@ -22,7 +22,8 @@ from rich.progress import track
 from rich.table import Table
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate, ode_fit
+from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation.estimators import named
 from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
 from shipdrag_ros.estimation.ode_fit.problem import Problem
 from shipdrag_ros.estimation.ode_fit.record import RunRows
@@ -188,6 +189,15 @@ def bound(case: Case, ship: Ship) -> tuple[float, float]:
     return float(np.sqrt(np.mean(sigma**2))) / largest, float(sigma[-1]) / largest
 
 
+def without_baseline(method: Callable[..., Estimate]) -> Callable[..., Estimate]:
+    """Return an estimator that is not shown the baseline of the ship file."""
+
+    def bare(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+        return method(window, replace(ship, baseline=None), parameters)
+
+    return bare
+
+
 def row(case: Case, runs: int, method: Callable[..., Estimate]) -> list[str]:
     """Run one case; return the cells of its row."""
     ship = ship_of(case)
@@ -237,6 +247,10 @@ def main() -> None:
     parser.add_argument(
         '--live', action='store_true', help='the estimator during the coastdown instead'
     )
+    parser.add_argument('--estimator', default='ode_fit', help='the parameter of that name')
+    parser.add_argument(
+        '--no-baseline', action='store_true', help='the ship file states length and volume alone'
+    )
     options = parser.parse_args()
     runs = options.runs
     table = Table(
@@ -259,7 +273,9 @@ def main() -> None:
         'failed',
     ):
         table.add_column(heading, justify='right')
-    method = estimate if options.live else ode_fit.estimate
+    method = estimate if options.live else named(options.estimator).estimate
+    if options.no_baseline:
+        method = without_baseline(method)
     for case in CASES:
         table.add_row(*row(case, runs, method))
     Console(width=140).print(table)

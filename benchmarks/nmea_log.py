@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.importing.formats.nmea.importer import NmeaResult, import_nmea
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
+from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
+from shipdrag_ros.sources.log import Log, new_bag
 
 LOG = 'psaros_lake_geneva.nmea.gz'
 KNOT = 1852.0 / 3600.0
@@ -42,7 +43,7 @@ def main() -> int:
     source = Path(os.environ['SHIPDRAG_DATA'], LOG)
     with tempfile.TemporaryDirectory() as folder:
         bag = Path(folder, 'log.mcap')
-        result = import_nmea(source, bag)
+        result = write(source, bag)
         show_counts(result)
         (run,) = open_runs([bag])
         block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
@@ -50,6 +51,17 @@ def main() -> int:
         show_replay(bag)
         show_cost(source, Path(folder))
     return 0
+
+
+def write(source: Path, out: Path) -> NmeaResult:
+    """
+    Make a bag of a log.
+    """
+    log = Log()
+    result = read_nmea(source, log)
+    with new_bag(out, {}) as bag:
+        log.copy_to(bag)
+    return result
 
 
 def show_counts(result: NmeaResult) -> None:
@@ -136,7 +148,7 @@ def show_cost(source: Path, folder: Path) -> None:
         path, bag = folder / f'{times}.nmea', folder / f'{times}.mcap'
         path.write_bytes(text * times)
         begin = time.process_time()
-        import_nmea(path, bag)
+        write(path, bag)
         costs.append(time.process_time() - begin)
         lines = text.count(b'\n') * times
         print(f'import of {lines} lines: {costs[-1]:.1f} s of a core, {lines / costs[-1]:.0f}/s')

@@ -37,9 +37,10 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from shipdrag_ros.bags import BagWriter, open_runs
+from shipdrag_ros.bags.check import check
 from shipdrag_ros.bags.live import LiveFile
-from shipdrag_ros.bags.records import MAGIC, Place, unpack_chunk, walk
-from shipdrag_ros.bags.salvage import check, recover
+from shipdrag_ros.bags.records import MAGIC, Place, unpack, walk
+from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode, types
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
@@ -100,7 +101,7 @@ def write(options: dict[str, Any]) -> Sound:
     spans = []
     for place in walk(content, len(MAGIC), len(content) - len(MAGIC)):
         if place.opcode == Opcode.CHUNK:
-            _, records = unpack_chunk(content, place)
+            records = unpack(content, place).records
             inside = frozenset(
                 _number(records, each)
                 for each in walk(records, 0, len(records))

@@ -136,7 +136,7 @@ def main() -> None:
         'three problems of the paper, certified against exact rational arithmetic',
         '(`tests/estimation/s1/test_s1.py`).',
         'They are kept as the reference; what is used by default, and by how much it is better: '
-        '[accuracy_beside_peers.md](accuracy_beside_peers.md).',
+        '`benchmarks/results/accuracy_beside_peers.md`.',
         '',
         '## The paper and what is found',
         '',

@@ -34,11 +34,10 @@ from diagnosis_score import trials
 from hidden.scoring import Share, Trial
 from scipy.stats import beta, binom
 
-from shipdrag_ros.diagnosis.posterior import CERTAIN
-from shipdrag_ros.diagnosis.verdict import SET
+from shipdrag_ros.inference.decision import CERTAIN, LISTED
 
 GRID = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.92, 0.94, 0.96, 0.98, 0.99, 0.995, 0.999)
-SHARES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, SET)
+SHARES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, LISTED)
 
 
 def named_from(done: Sequence[Trial], threshold: float) -> Share:
@@ -76,7 +75,7 @@ def share_needed(trial: Trial) -> float:
     """
     unnamed = {('unknown',)}
     found = [(names, p) for names, p in trial.answer.candidates if names not in unnamed]
-    total = sum(p for _, p in found) / SET
+    total = sum(p for _, p in found) / LISTED
     before = 0.0
     for names, probability in found:
         if names == trial.truth.names:
@@ -176,7 +175,7 @@ def print_sure(done: Sequence[Trial], *, risk: float, part: float, confidence: f
     holding = {limit: held_with(done, limit) for limit in SHARES}
     for what, by_limit, wanted, used in (
         ('names from', names, risk, CERTAIN),
-        ('sets of', holding, 1.0 - part, SET),
+        ('sets of', holding, 1.0 - part, LISTED),
     ):
         limit = sure_limit(by_limit, risk=wanted, confidence=confidence)
         print(f'with {confidence:.0%} confidence on a: {what} {_or_none(limit)}')
@@ -212,7 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     name = name_threshold(groups['a'], risk=options.risk)
     share_of_set = set_share(groups['a'], part=options.part)
     print(f'by risk control on a: names from {_or_none(name)}, in use {CERTAIN:g}')
-    print(f'by split conformal on a: sets of {_or_none(share_of_set)}, in use {SET:g}')
+    print(f'by split conformal on a: sets of {_or_none(share_of_set)}, in use {LISTED:g}')
     print_sure(groups['a'], risk=options.risk, part=options.part, confidence=options.confidence)
 
 

@@ -2,25 +2,30 @@
 """
 Write tables of the docs from the code.
 
-`python docs/tables.py` rewrites what stands between the markers in docs/ros.md and
-docs/effects.md; a test fails while the two differ.
+`python docs/tables.py` rewrites what stands between the markers in docs/ros.md,
+docs/effects.md and docs/model.md; a test fails while the two differ.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from shipdrag_ros.fields import keys_of
+from shipdrag_ros.inference import learning
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior import priors
+from shipdrag_ros.posterior.problem import families_declared
 from shipdrag_ros.simulation.effects import LIBRARY, confounders, discriminating_measurements
 
 DOCS = Path(__file__).resolve().parent
 ROS = DOCS / 'ros.md'
 EFFECTS = DOCS / 'effects.md'
+MODEL = DOCS / 'model.md'
 _INPUT_MEANING = {
     'speed_through_water': 'speed log, `linear.x` forward [m/s]',
     'speed_over_ground': 'radar or GNSS, `hypot(linear.x, linear.y)` [m/s], frame not trusted',
@@ -166,6 +171,38 @@ def effect_confounders() -> str:
     return _table(['effect', 'looks like', 'what decides'], rows)
 
 
+def model_priors() -> str:
+    """
+    Return the table of the priors of the one posterior.
+    """
+    rows = (
+        [f'`{each.letter}`', each.meaning, str(each.prior), each.unit or '-', each.source]
+        for each in priors.TABLE
+    )
+    return _table(['letter', 'meaning', 'prior', 'unit', 'source'], rows)
+
+
+def model_noise() -> str:
+    """
+    Return the table of the priors of the noise.
+    """
+    rows = (
+        [name, median, f'{math.exp(sd):.2g}', unit] for name, median, sd, unit in learning.DECLARED
+    )
+    return _table(['slow or white noise', 'median', 'within a factor', 'unit'], rows)
+
+
+def model_families() -> str:
+    """
+    Return the table of what a hull may differ by.
+    """
+    rows = (
+        [name, f'{chance:.3g}', friction, wave, size]
+        for name, chance, friction, wave, size in families_declared()
+    )
+    return _table(['hypothesis', 'probability', '`theta_f`', '`theta_w`', 'size of `s`'], rows)
+
+
 Tables = Mapping[str, Callable[[], str]]
 TABLES: Tables = {'inputs': inputs, 'outputs': outputs, 'parameters': parameters}
 PAGES: Mapping[Path, Tables] = {
@@ -174,6 +211,11 @@ PAGES: Mapping[Path, Tables] = {
         'effects': effects,
         'effect parameters': effect_parameters,
         'confounders': effect_confounders,
+    },
+    MODEL: {
+        'priors': model_priors,
+        'noise priors': model_noise,
+        'families': model_families,
     },
 }
 

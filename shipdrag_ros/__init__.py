@@ -68,11 +68,11 @@ def __getattr__(name: str) -> Any:
     """Import an exported name on its first use."""
     if name not in _HOME:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    found = getattr(import_module(f'{__name__}.{_HOME[name]}'), name)
-    globals()[name] = found
-    return found
+    door = getattr(import_module(f'{__name__}.{_HOME[name]}'), name)
+    globals()[name] = door
+    return door
 
 
 def __dir__() -> list[str]:
-    """List the exported names with what is here already."""
-    return sorted({*globals(), *__all__})
+    """List the doors alone, so that completion shows nothing else."""
+    return list(__all__)

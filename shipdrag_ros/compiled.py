@@ -295,7 +295,7 @@ def _file(module: str) -> str:
 
 @cache
 def _compiler() -> tuple[object, ...]:
-    """Return what besides source and processor the machine code depends on."""
+    """Return all else that the machine code depends on, after source and processor."""
     settings = sorted(
         f'{name}={value}'
         for name, value in os.environ.items()

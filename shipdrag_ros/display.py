@@ -5,21 +5,31 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+import reprlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
 
 M_S_PER_KNOT = 1852.0 / 3600.0
+_UNITS_M_S = {'m/s': 1.0, 'knots': M_S_PER_KNOT, 'km/h': 1.0 / 3.6, 'mph': 0.44704}
 _UNIT_RATIOS = {
-    3600.0 / 1852.0: 'knots over m/s',
-    1852.0 / 3600.0: 'm/s over knots',
-    3.6: 'km/h over m/s',
-    1.0 / 3.6: 'm/s over km/h',
-    1.852: 'km/h over knots',
-    1.0 / 1.852: 'knots over km/h',
+    of / other: f'{shown} over {meant}'
+    for meant, of in _UNITS_M_S.items()
+    for shown, other in _UNITS_M_S.items()
+    if shown != meant
 }
-_UNITS_NEAR = 0.1  # relative; a current and the error of a log are in a ratio too
-# what `float` takes besides, 1_000 or nan or infinity, is no measured number
+# relative, as a current and the error of a log are in a ratio too; and of the way to one unit
+_UNITS_NEAR, _UNITS_NEARER = 0.1, 0.15
+# what `float` takes too, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4
 """Below it a ship is stated in kg and N, above in t and kN."""
@@ -218,12 +228,15 @@ def mistaken_units(ratio: float) -> str:
     Returns
     -------
     str
-        The units whose ratio is within 10 %, each with it; '' where there are none.
+        The units whose ratio is within 10 %, and a seventh of the way to one unit; each with its
+        ratio; '' where there are none.
     """
+    if not ratio > 0.0:
+        return ''
     return ' and '.join(
         f'{words} ({each:.2f})'
         for each, words in _UNIT_RATIOS.items()
-        if abs(ratio / each - 1.0) < _UNITS_NEAR
+        if abs(math.log(ratio / each)) < min(_UNITS_NEAR, _UNITS_NEARER * abs(math.log(each)))
     )
 
 
@@ -232,3 +245,47 @@ def speed_text(speed_m_s: float, *, highest_m_s: float) -> str:
     Return a speed without its unit; a model ship needs one digit more.
     """
     return f'{speed_m_s:.{2 if highest_m_s >= 1.0 else 3}f}'
+
+
+def printable(text: str) -> str:
+    """
+    Return a text of a peer as a terminal may have it, control characters as escapes.
+
+    Examples
+    --------
+    >>> printable('log' + chr(27))
+    'log\\\\x1b'
+    """
+    return ''.join(each if each.isprintable() else repr(each)[1:-1] for each in text)
+
+
+def short_repr(result: DataclassInstance) -> str:
+    """
+    Return a line for a dataclass that holds arrays; its `__repr__`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Curve:
+    ...     speed_m_s: object
+    ...     __repr__ = short_repr
+    >>> Curve(np.linspace(1.0, 8.0, 200))
+    Curve(speed_m_s=<200 float64, 1 to 8>)
+    """
+    parts = (f'{item.name}={_shown(getattr(result, item.name))}' for item in fields(result))
+    return f'{type(result).__name__}({", ".join(parts)})'
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        size = ' x '.join(map(str, value.shape)) or 'no axis,'
+        numbers = value.dtype.kind in 'if' and value.size and np.isfinite(value).any()
+        ends = f', {np.nanmin(value):.4g} to {np.nanmax(value):.4g}' if numbers else ''
+        return f'<{size} {value.dtype}{ends}>'
+    if is_dataclass(value) and not isinstance(value, type):
+        return f'{type(value).__name__}(...)'
+    if isinstance(value, tuple | list | Mapping) and len(value) > 1:
+        return f'<{len(value)} items>'
+    return _SHORT.repr(value)

@@ -16,6 +16,8 @@ from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from os import PathLike
 from typing import Any
 
+import numpy as np
+
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.errors import ProblemsError
 from shipdrag_ros.plain_file import read_small_text
@@ -23,6 +25,7 @@ from shipdrag_ros.plain_file import read_small_text
 Problems = list[str]
 Reader = Callable[[object, str, Problems], Any]
 
+_NUMBERS = (int, float, np.integer, np.floating)
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 _SHORT.maxlevel = 2  # lists that hold themselves would fill pages
@@ -101,7 +104,9 @@ def number(low: float, high: float, unit: str = '') -> Kind:
     expectation = f'{low:g}..{high:g} {unit}'.rstrip()
 
     def read(value: object, path: str, problems: Problems) -> float | _Invalid:
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if isinstance(value, bool) or not isinstance(
+            value, int | float | np.integer | np.floating
+        ):
             hint = ' without quotes or unit' if isinstance(value, str) else ''
             problems.append(f'{path}: {show(value)}, expected a number{hint}, {expectation}')
             return INVALID

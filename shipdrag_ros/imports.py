@@ -1,19 +1,70 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Imports without the collector of garbage."""
+"""Imports: quick ones, and those that an extra of the package brings."""
 
 from __future__ import annotations
 
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
+
+EXTRA_OF = {
+    'matplotlib': 'report',
+    'jinja2': 'report',
+    'starlette': 'watch',
+    'uvicorn': 'watch',
+    'dask': 'fleet',
+    'distributed': 'fleet',
+    'pyarrow': 'fleet',
+    'duckdb': 'fleet',
+    'fsspec': 'fleet',
+    's3fs': 'fleet',
+    'nmea2000': 'logs',
+    'pymavlink': 'logs',
+    'pyulog': 'logs',
+    'rclpy': 'ros',
+}
+"""Module -> the extra of this package that installs it."""
+
+
+def need(*modules: str) -> None:
+    """
+    Refuse work at once whose result could not be written at its end.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        If one of the modules is not installed.
+    """
+    for name in modules:
+        if find_spec(name) is None:
+            raise ModuleNotFoundError(f'No module named {name!r}', name=name)
+
+
+def what_to_install(error: ModuleNotFoundError) -> str | None:
+    """
+    Say which extra brings a module that is missing; None of a module that none brings.
+    """
+    module = (error.name or '').partition('.')[0]
+    extra = EXTRA_OF.get(module)
+    if extra is None:
+        return None
+    return f'{module} is not installed: pip install {pip_name(extra)}'
+
+
+def pip_name(extra: str) -> str:
+    """
+    Return what pip installs with an extra.
+    """
+    return f"'shipdrag_ros[{extra}]'"
 
 
 @contextmanager
 def uncollected() -> Iterator[None]:
     """
-    Keep the collector of garbage away from a block of imports.
+    Disable the garbage collector during a block of imports.
 
-    What is imported stays. The collector would walk all of it a dozen times meanwhile, which is a
+    All that is imported stays. The collector would walk it a dozen times meanwhile, which is a
     tenth of the start.
     """
     was_on = gc.isenabled()

@@ -64,7 +64,7 @@ def _parameter(
 @dataclass(frozen=True)
 class Parameters:
     """
-    Everything that changes a result, besides the ship.
+    Everything that changes a result, apart from the ship.
 
     Raises
     ------
@@ -181,6 +181,12 @@ class Parameters:
         'equation of motion; s1_...: the published problems',
         choices=ESTIMATORS,
     )
+    regimes: str = _parameter(
+        'rules',
+        'what judges a deceleration. rules: those of the onset, the shafts and the end; filter: '
+        'one model of driven, gliding, braked and turning, under trial',
+        choices=('rules', 'filter'),
+    )
     order_max: int = _parameter(
         20, 'largest number of coefficients that the order search tries', low=3, high=40
     )
@@ -252,20 +258,42 @@ class Parameters:
         """
         Build from the text of a `parameters.yaml`.
         """
-        values = parse(text, subject=subject, error=ParameterError)
-        if values is None:
-            values = {}
-        if not isinstance(values, dict):
-            raise ParameterError(subject, [f'is {show(values)}, expected lines `name: value`'])
-        if any(isinstance(value, dict) and _SECTION in value for value in values.values()):
-            raise ParameterError(
-                subject,
-                [
-                    f'is a parameter file of the node, with {_SECTION}; '
-                    'give the lines `name: value` alone'
-                ],
-            )
-        return cls.from_mapping(values, subject=subject)
+        return cls.from_mapping(_values(text, subject=subject), subject=subject)
+
+    @classmethod
+    def of_bag(cls, text: str, *, subject: str) -> tuple[Parameters, tuple[str, ...]]:
+        """
+        Build from what a bag was recorded with, perhaps by another version.
+
+        Parameters
+        ----------
+        text
+            Of its `parameters.yaml`.
+        subject
+            Names the values in errors.
+
+        Returns
+        -------
+        parameters, dropped
+            Without the keys and values that this version does not have, and these, a
+            sentence each.
+
+        Raises
+        ------
+        ParameterError
+            If the text holds no parameters at all.
+        """
+        known = keys_of(cls)
+        accepted: dict[str, object] = {}
+        dropped: list[str] = []
+        for name, value in _values(text, subject=subject).items():
+            problems: list[str] = []
+            read = read_keys(known, {name: value}, '', problems)
+            if problems:
+                dropped.append(f'{subject}: {"; ".join(problems)}: not used')
+            else:
+                accepted |= read
+        return cls.from_mapping(accepted, subject=subject), tuple(dropped)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Parameters:
@@ -286,3 +314,20 @@ class Parameters:
         """
         values = {item.name: getattr(self, item.name) for item in fields(self)}
         return strict_yaml.dump(values)
+
+
+def _values(text: str, *, subject: str) -> dict[str, object]:
+    values = parse(text, subject=subject, error=ParameterError)
+    if values is None:
+        values = {}
+    if not isinstance(values, dict):
+        raise ParameterError(subject, [f'is {show(values)}, expected lines `name: value`'])
+    if any(isinstance(value, dict) and _SECTION in value for value in values.values()):
+        raise ParameterError(
+            subject,
+            [
+                f'is a parameter file of the node, with {_SECTION}; '
+                'give the lines `name: value` alone'
+            ],
+        )
+    return values

@@ -24,13 +24,13 @@ PICTURE = (
     ('parameter',),
     ('parameters', 'ship', 'report'),
     ('inference',),
-    ('regression',),
-    ('estimation', 'simulation'),
+    ('regression', 'simulation'),
+    ('posterior',),
+    ('estimation',),
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
     ('bags', 'nmea'),
-    ('bags.salvage',),
-    ('node', 'replay', 'importing'),
+    ('node', 'replay', 'sources'),
     ('fleet',),
     ('trend',),
     ('library',),
@@ -42,7 +42,6 @@ FLOORS = {room: number for number, floor in enumerate(PICTURE) for room in floor
 ESTIMATING = {'coastdown', 'estimation', 'diagnosis', 'simulation'}
 NEVER = {  # files estimate nothing, and no coastdown needs a study
     'bags': ESTIMATING | {'studies'},
-    'bags.salvage': ESTIMATING | {'studies'},
     **{
         name: {'studies'}
         for name in (
@@ -50,7 +49,7 @@ NEVER = {  # files estimate nothing, and no coastdown needs a study
                 'messages',
                 'nmea',
                 'replay',
-                'importing',
+                'sources',
                 'node',
                 'fleet',
                 'trend',
@@ -82,11 +81,10 @@ ROS = {
     'builtin_interfaces',
     'ament_index_python',
 }
-FILES = {'bags', 'bags.salvage'}
 FLEET = ('dask', 'distributed', 'pyarrow', 'fsspec', 's3fs')
 ONLY_IN = {
-    'mcap': FILES,
-    'rosbags': {'messages', 'importing', *FILES},  # a bag of ROS 1 is imported
+    'mcap': {'bags'},
+    'rosbags': {'messages', 'sources', 'bags'},  # a bag of ROS 1 is imported
     **{name: {'node'} for name in ROS},
     **{name: {'fleet', 'trend'} for name in FLEET},  # no other verb pays for them
 }
@@ -98,8 +96,6 @@ def room(name: str) -> str:
     parts = name.split('.')[1:]
     if 'face' in parts:
         return 'face'
-    if parts[:2] == ['bags', 'salvage']:
-        return 'bags.salvage'
     return parts[0] if parts else ''
 
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from hidden.cases import Truth
 LARGEST_SET = 3
 _BINS = 10
 _DRAWS = 200
+_LEAST = 0.003  # probability of an answer that is not listed
 Names = tuple[str, ...]
 UNKNOWN: Names = ('unknown',)
 
@@ -228,6 +230,9 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
                 if trial.answer.first is not None
             ]
         ),
+        'log probability of the truth, mean': float(
+            np.mean([math.log(_stated(trial)) for trial in trials])
+        ),
         'held-out chi^2 per sample, median': float(np.median(chi2)) if chi2 else float('nan'),
         'held-out chi^2 per sample <= 1.1': Share.over(value <= 1.1 for value in chi2),
         'parameters within 2 sd': Share.over(
@@ -242,6 +247,13 @@ def scores(trials: Sequence[Trial]) -> dict[str, Share | float]:
         'CPU s a case, median': float(np.median([trial.cpu_s for trial in trials])),
         'CPU s a case, 95 % are below': float(np.quantile([t.cpu_s for t in trials], 0.95)),
     }
+
+
+def _stated(trial: Trial) -> float:
+    """Return the probability of the truth; `_LEAST` where it is not listed."""
+    sought = _answer_sought(trial.truth)
+    listed = dict(trial.answer.candidates).get(sought, 0.0)
+    return min(max(listed, _LEAST), 1.0)
 
 
 def calibration_error(stated: Sequence[tuple[float, bool]]) -> float:

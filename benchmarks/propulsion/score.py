@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import in_arrival_order
 
 HELD_SHARE = 0.8
+REGIMES = os.environ.get('REGIMES', 'rules')  # which of the two judges, `rules` or `filter`
 DRIVEN_S = 10.0
 INPUTS: dict[str, tuple[str, ...]] = {
     'log': ('log',),
@@ -105,7 +107,7 @@ def score(case: Case, suites: dict[str, tuple[str, ...]], hours: float = 8.0) ->
 
 
 def _one(world: World, suite: str, instruments: tuple[str, ...]) -> Row:
-    monitor = Monitor(world.ship, Parameters(update_s=60.0))
+    monitor = Monitor(world.ship, Parameters(update_s=60.0, regimes=REGIMES))
     events = [
         *monitor.update(in_arrival_order(inputs(world, instruments))),
         *monitor.finish(),

@@ -3,7 +3,7 @@
 What is in an MCAP file and where: from its index, or from a walk through it.
 
 Both give the same `Contents`; the walk costs a pass over the file, needs no
-index, and goes on behind a damaged chunk.
+index, and goes on behind a damaged record.
 """
 
 from __future__ import annotations
@@ -11,31 +11,44 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from io import BytesIO
 from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    Footer,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
+from mcap.stream_reader import StreamReader
 
-from shipdrag_ros.bags.message_index import CHANNELS, index_messages
+from shipdrag_ros.bags.message_index import EVERY_CHANNEL, index_messages
 from shipdrag_ros.bags.records import (
-    FOOTER_BYTES,
+    HEAD,
     MAGIC,
+    MESSAGE_HEAD,
+    READ_ERRORS,
     TIME_LIMIT_NS,
     Buffer,
-    DamagedRecord,
     Place,
-    message_head,
-    parse,
-    release,
-    unpack_chunk,
+    attachment_agrees,
+    read,
+    unpack,
     walk,
 )
 
 _SEGMENT_BYTES = 1 << 20
-_FOOTER_CHECKSUM_BYTES = 4
+_FOOTER_BYTES = HEAD.size + 20
+_NOT_USED = 'read from its beginning, without an index'
 
 
 class FileChannel(NamedTuple):
@@ -68,6 +81,8 @@ class Contents:
 
     Attributes
     ----------
+    indexed
+        Whether that was found by the index of the file.
     channels
         By their number in the file.
     counts
@@ -79,11 +94,12 @@ class Contents:
     compressions
         Of the chunks, '' for none.
     segments
-        Where messages are.
+        Where messages are, in the order of their first times.
     warnings
         What is wrong with the file, a sentence each.
     """
 
+    indexed: bool = True
     channels: dict[int, FileChannel] = field(default_factory=dict)
     counts: Counter[int] = field(default_factory=Counter)
     attachments: dict[str, bytes] = field(default_factory=dict)
@@ -112,194 +128,184 @@ class Contents:
                 self.metadata[record.name] = record.metadata
 
 
-def read_index(data: Buffer) -> Contents | None:
+class _BadIndexError(Exception):
+    """Why an index cannot be used."""
+
+
+def contents_of(data: Buffer) -> Contents:
     """
-    Return the contents by the summary of a file.
-
-    None where the summary does not say all, as the format allows.
-
-    Raises
-    ------
-    DamagedRecord
-        If the file has no end, or its summary is damaged.
+    Return what is in a file; what is wrong with it is stated in `warnings`.
     """
-    footer_at = len(data) - FOOTER_BYTES
-    if footer_at < len(MAGIC) or data[-len(MAGIC) :] != MAGIC:
-        raise DamagedRecord('the file was not closed, or it is cut off')
-    place = _record_at(data, footer_at, len(data) - len(MAGIC))
-    if place.opcode != Opcode.FOOTER:
-        raise DamagedRecord('the footer is damaged')
-    footer = parse(data, place)
-    if footer.summary_start == 0:
-        return None
-    # the checksum covers the footer too, up to itself
-    summary = data[footer.summary_start : place.end - _FOOTER_CHECKSUM_BYTES]
-    if footer.summary_crc not in (0, crc32(summary)):
-        raise DamagedRecord('the index has a wrong checksum')
-
-    found: dict[int, list[Any]] = {}
-    for place in walk(data, footer.summary_start, footer_at):
-        if place.opcode in _SUMMARY:
-            found.setdefault(place.opcode, []).append(parse(data, place))
-    if not _indexes_all(found):
-        return None
-    contents = Contents()
-    for record in found.get(Opcode.SCHEMA, []) + found.get(Opcode.CHANNEL, []):
-        contents.add(record)
-    for index_opcode, opcode in _INDEXED.items():
-        for index in found.get(index_opcode, []):
-            place = _record_at(data, index.offset, footer_at)
-            if place.opcode != opcode:
-                raise DamagedRecord(f'record at byte {place.offset} is not what the index says')
-            contents.add(parse(data, place))
-    end = 0
-    for chunk in sorted(found.get(Opcode.CHUNK_INDEX, []), key=attrgetter('chunk_start_offset')):
-        start = chunk.chunk_start_offset
-        place = _record_at(data, start, footer_at)
-        late = max(chunk.message_start_time, chunk.message_end_time) >= TIME_LIMIT_NS
-        if place.opcode != Opcode.CHUNK or start < end or late:
-            raise DamagedRecord(f'record at byte {start} is not what the index says')
-        end = place.end
-        contents.compressions.add(chunk.compression)
-        contents.segments.append(
-            FileSegment(
-                chunk.message_start_time,
-                start,
-                end,
-                chunk.message_end_time,
-                frozenset(chunk.message_index_offsets),
-            )
-        )
-    contents.counts.update(found[Opcode.STATISTICS][0].channel_message_counts)
+    warnings = []
+    try:
+        contents = _by_index(data) or _by_walk(data)
+    except _BadIndexError as error:
+        warnings = [f'{error}: {_NOT_USED}']
+        contents = _by_walk(data)
+    contents.warnings[:0] = warnings
+    contents.segments.sort()
     return contents
 
 
-_INDEXED = {
-    Opcode.ATTACHMENT_INDEX: Opcode.ATTACHMENT,
-    Opcode.METADATA_INDEX: Opcode.METADATA,
-}
-_SUMMARY = {
-    Opcode.SCHEMA,
-    Opcode.CHANNEL,
-    Opcode.STATISTICS,
-    Opcode.CHUNK_INDEX,
-    Opcode.ATTACHMENT_INDEX,
-    Opcode.METADATA_INDEX,
-}
+def _by_index(data: Buffer) -> Contents | None:
+    """Return what the summary says; None where it does not say all, as the format allows."""
+    end = len(data) - len(MAGIC)
+    if end < len(MAGIC) + _FOOTER_BYTES or data[end:] != MAGIC:
+        raise _BadIndexError('the file was not closed, or it is cut off')
+    footer = read(data, Place(data[end - _FOOTER_BYTES], 0, end - 20, end))
+    if not isinstance(footer, Footer):
+        raise _BadIndexError('the footer is damaged')
+    if footer.summary_start == 0:
+        return None
+    # the checksum covers the footer too, up to itself
+    if footer.summary_crc not in (0, crc32(data[footer.summary_start : end - 4])):
+        raise _BadIndexError('the index has a wrong checksum')
+    summary: dict[type, list[Any]] = {}
+    try:
+        reader = StreamReader(BytesIO(data[footer.summary_start :]), skip_magic=True)
+        for record in reader.records:
+            summary.setdefault(type(record), []).append(record)
+    except READ_ERRORS as error:
+        raise _BadIndexError(f'the index is damaged ({error})') from error
+    if not _says_all(summary):
+        return None
+    contents = Contents()
+    for record in summary.get(Schema, []) + summary.get(Channel, []):
+        contents.add(record)
+    for kind, opcode in _INDEXED.items():
+        for index in summary.get(kind, []):
+            contents.add(_indexed(data, index.offset, opcode))
+    at = 0
+    for chunk in sorted(summary.get(ChunkIndex, []), key=attrgetter('chunk_start_offset')):
+        contents.segments.append(_segment(data, chunk, at))
+        contents.compressions.add(chunk.compression)
+        at = contents.segments[-1].end
+    contents.counts.update(summary[Statistics][0].channel_message_counts)
+    return contents
 
 
-def _indexes_all(summary: Mapping[int, list[Any]]) -> bool:
+_INDEXED = {AttachmentIndex: Opcode.ATTACHMENT, MetadataIndex: Opcode.METADATA}
+
+
+def _says_all(summary: Mapping[type, list[Any]]) -> bool:
     """Say whether everything that the statistics count is indexed."""
-    if Opcode.STATISTICS not in summary:
+    if Statistics not in summary:
         return False
-    statistics = summary[Opcode.STATISTICS][0]
-    expected = {
-        Opcode.SCHEMA: statistics.schema_count,
-        Opcode.CHANNEL: statistics.channel_count,
-        Opcode.CHUNK_INDEX: statistics.chunk_count,
-        Opcode.ATTACHMENT_INDEX: statistics.attachment_count,
-        Opcode.METADATA_INDEX: statistics.metadata_count,
+    statistics = summary[Statistics][0]
+    counts = {
+        Schema: statistics.schema_count,
+        Channel: statistics.channel_count,
+        ChunkIndex: statistics.chunk_count,
+        AttachmentIndex: statistics.attachment_count,
+        MetadataIndex: statistics.metadata_count,
     }
     # messages outside chunks have no index
     unchunked = statistics.chunk_count == 0 and statistics.message_count > 0
-    return not unchunked and all(
-        len(summary.get(opcode, [])) == count for opcode, count in expected.items()
-    )
+    return not unchunked and all(len(summary.get(it, [])) == n for it, n in counts.items())
 
 
-def _record_at(data: Buffer, offset: int, limit: int) -> Place:
-    for place in walk(data, offset, limit):
-        return place
-    raise DamagedRecord(f'the index points to byte {offset}, outside of the data')
+def _place(data: Buffer, offset: int, opcode: int) -> Place:
+    for place in walk(data, offset, len(data)):
+        if place.opcode == opcode and place.damage is None:
+            return place
+        break
+    raise _BadIndexError(f'the record at byte {offset} is not what the index says')
 
 
-def scan(data: Buffer) -> Contents:
-    """
-    Return the contents by a walk from the beginning of a file.
+def _indexed(data: Buffer, offset: int, opcode: int) -> Any:
+    place = _place(data, offset, opcode)
+    if opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place):
+        raise _BadIndexError(f'the attachment at byte {offset} has a wrong checksum')
+    return read(data, place)
 
-    What is damaged is left out and stated in `warnings`.
-    """
-    contents = Contents()
-    loose = _LooseMessages(contents)
-    try:
-        for place in walk(data, len(MAGIC), len(data)):
-            if place.opcode == Opcode.DATA_END:
-                break
-            try:
-                if place.opcode == Opcode.MESSAGE:
-                    loose.add(data, place)
-                    continue
-                loose.close()
-                if place.opcode == Opcode.CHUNK:
-                    _scan_chunk(data, place, contents)
-                elif place.opcode in _DECLARATIONS:
-                    contents.add(parse(data, place))
-            except DamagedRecord as damage:
-                loose.close()  # so that no segment holds what is damaged
-                contents.warnings.append(f'{damage}: left out')
-    except DamagedRecord as damage:
-        contents.warnings.append(f'{damage}: only what lies before is used')
-    loose.close()
-    strangers = sum(
-        n for channel, n in contents.counts.items() if channel not in contents.channels
-    )
+
+def _segment(data: Buffer, chunk: ChunkIndex, least: int) -> FileSegment:
+    offset, end = chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length
+    late = max(chunk.message_start_time, chunk.message_end_time) >= TIME_LIMIT_NS
+    if late or offset < least or _place(data, offset, Opcode.CHUNK).end != end:
+        raise _BadIndexError(f'the record at byte {offset} is not what the index says')
+    channels = frozenset(chunk.message_index_offsets)
+    return FileSegment(chunk.message_start_time, offset, end, chunk.message_end_time, channels)
+
+
+def _by_walk(data: Buffer) -> Contents:
+    """Return what is there; what is damaged is left out and stated in `warnings`."""
+    contents = Contents(indexed=False)
+    stray = False  # a message that is found in or behind a damaged chunk may be part of anything
+    for place in walk(data, len(MAGIC), len(data)):
+        stray = stray or (place.damage is not None and bool(contents.compressions))
+        if place.damage is not None:
+            name = place.name.replace('unknown', 'record')
+            contents.warnings.append(
+                f'the {name} at byte {place.offset} is damaged ({place.damage.value}): left out'
+            )
+        elif place.opcode == Opcode.DATA_END:
+            break
+        elif place.opcode == Opcode.MESSAGE and not stray:
+            _add_message(data, place, contents)
+        elif place.opcode == Opcode.CHUNK:
+            _add_chunk(data, place, contents)
+        elif place.opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place):
+            contents.warnings.append(
+                f'the attachment {getattr(read(data, place), "name", "")!r} has a wrong checksum: '
+                'left out'
+            )
+        elif place.opcode in _DECLARATIONS:
+            contents.add(read(data, place))
+    strangers = sum(n for number, n in contents.counts.items() if number not in contents.channels)
     if strangers:
         contents.warnings.append(f'{strangers} messages of topics that are not declared: left out')
     return contents
 
 
-_DECLARATIONS = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA}
+_DECLARATIONS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.ATTACHMENT, Opcode.METADATA)
 
 
-_EVERY_CHANNEL = np.ones(CHANNELS, np.uint8)
+def _add_message(data: Buffer, place: Place, contents: Contents) -> None:
+    """Lengthen the last segment by a message outside of chunks, or begin one."""
+    channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
+    if log_ns >= TIME_LIMIT_NS:
+        contents.warnings.append(
+            f'the message at byte {place.offset} has no possible log time: left out'
+        )
+        return
+    contents.counts[channel] += 1
+    segment = FileSegment(log_ns, place.offset, place.end, log_ns)
+    last = contents.segments[-1] if contents.segments else segment
+    if last.end == place.offset < last.offset + _SEGMENT_BYTES and not last.channels:
+        contents.segments.pop()
+        first_ns, end_ns = min(last.start_ns, log_ns), max(last.end_ns, log_ns)
+        segment = FileSegment(first_ns, last.offset, place.end, end_ns)
+    contents.segments.append(segment)
 
 
-def _scan_chunk(data: Buffer, chunk: Place, contents: Contents) -> None:
-    compression, unpacked = unpack_chunk(data, chunk)
+def _add_chunk(data: Buffer, place: Place, contents: Contents) -> None:
+    records, damage, _, compression = unpack(data, place)
+    if damage is not None:
+        contents.warnings.append(damaged_chunk(place.offset, damage.value))
+        return
     contents.compressions.add(compression)
-    messages, others, damage = index_messages([unpacked], [chunk.offset], _EVERY_CHANNEL)
-    kinds = np.frombuffer(unpacked, np.uint8)[others]
-    for offset in others[np.isin(kinds, list(_DECLARATIONS))]:
-        place = next(walk(unpacked, int(offset), len(unpacked)))
-        contents.add(parse(unpacked, place))
+    messages, others, notes = index_messages([records], [place.offset], EVERY_CHANNEL)
+    kinds = np.frombuffer(records, np.uint8)[others]
+    for offset in others[np.isin(kinds, _DECLARATIONS)].tolist():
+        end = offset + HEAD.size + HEAD.unpack_from(records, offset)[1]
+        contents.add(read(records, Place(records[offset], offset, offset + HEAD.size, end)))
     counts = np.bincount(messages.channel)
-    channels = np.flatnonzero(counts)
-    contents.counts.update(dict(zip(channels.tolist(), counts[channels].tolist(), strict=True)))
+    channels = np.flatnonzero(counts).tolist()
+    contents.counts.update({number: int(counts[number]) for number in channels})
     if len(messages):
         first, last = int(messages.log_ns.min()), int(messages.log_ns.max())
         contents.segments.append(
-            FileSegment(first, chunk.offset, chunk.end, last, frozenset(channels.tolist()))
+            FileSegment(first, place.offset, place.end, last, frozenset(channels))
         )
-    contents.warnings += damage
+    contents.warnings += notes
 
 
-class _LooseMessages:
-    """Gathers messages outside chunks into segments of a bounded size."""
-
-    def __init__(self, contents: Contents) -> None:
-        self._contents = contents
-        self._times: list[int] = []
-        self._offset = 0
-        self._end = 0
-
-    def add(self, data: Buffer, place: Place) -> None:
-        channel, log_ns = message_head(data, place)
-        if not self._times:
-            self._offset = place.offset
-        self._contents.counts[channel] += 1
-        self._times.append(log_ns)
-        self._end = place.end
-        if self._end - self._offset > _SEGMENT_BYTES:
-            offset = self._offset
-            self.close()
-            release(data, offset, self._end)
-
-    def close(self) -> None:
-        if self._times:
-            self._contents.segments.append(
-                FileSegment(min(self._times), self._offset, self._end, max(self._times))
-            )
-            self._times = []
+def damaged_chunk(offset: int, why: str) -> str:
+    """
+    Return the sentence of a warning.
+    """
+    return f'the chunk at byte {offset} is damaged ({why}): left out'
 
 
 def _full_name(type_name: str) -> str:

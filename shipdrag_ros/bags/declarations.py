@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from mcap.data_stream import RecordBuilder
-from mcap.records import Channel, Schema
+from mcap.records import Attachment, Channel, Schema
 
 from shipdrag_ros import __version__
 from shipdrag_ros.errors import BagError
@@ -41,11 +41,12 @@ def metadata(recording_id: str, part: int) -> dict[str, str]:
     return {'version': __version__, 'recording_id': recording_id, 'part': str(part)}
 
 
-def media_type(name: str) -> str:
+def attachment(name: str, text: str) -> Attachment:
     """
-    Return the media type of an attached text, by its name.
+    Return the record of an attached text.
     """
-    return 'application/yaml' if name.endswith('.yaml') else 'text/plain'
+    kind = 'application/yaml' if name.endswith('.yaml') else 'text/plain'
+    return Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
 
 
 def schema(number: int, type_name: str) -> Schema:

@@ -12,12 +12,12 @@ import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from fcntl import LOCK_EX, LOCK_NB, flock
+from itertools import starmap
 from pathlib import Path
 
 from isal.isal_zlib import crc32
 from mcap.data_stream import RecordBuilder
 from mcap.records import (
-    Attachment,
     Channel,
     Chunk,
     DataEnd,
@@ -96,7 +96,7 @@ class LiveFile:
                     Header(PROFILE, LIBRARY),
                     Metadata(METADATA, declarations.metadata(recording_id, part)),
                 )
-                + b''.join(_attachment(name, text) for name, text in attachments.items())
+                + as_bytes(*starmap(declarations.attachment, attachments.items()))
             )
             self.sync()
             sync_directory(path.parent)
@@ -246,15 +246,3 @@ def sync_directory(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _attachment(name: str, text: str) -> bytes:
-    return as_bytes(
-        Attachment(
-            create_time=0,
-            log_time=0,
-            name=name,
-            media_type=declarations.media_type(name),
-            data=text.encode(),
-        )
-    )

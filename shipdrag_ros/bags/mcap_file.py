@@ -8,33 +8,40 @@ whole in it is read; the damage is stated, not mended.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections import deque
-from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO
+from typing import IO, NamedTuple
 
 import numpy as np
 import zstandard
+from mcap.opcode import Opcode
 
-from shipdrag_ros.bags.ahead import unpacked
-from shipdrag_ros.bags.contents import Contents, FileSegment, read_index, scan
+from shipdrag_ros.bags.contents import FileSegment, contents_of, damaged_chunk
+from shipdrag_ros.bags.damage import DamageKind
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
+    HEAD,
     MAGIC,
-    DamagedRecord,
+    Place,
+    Unpacked,
+    release,
+    unpack,
 )
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import UInt8
 
 CONVERT = 'convert it with `rosbags-convert --src BAG --dst NEW --dst-storage mcap`'
 IMPORT = 'make a bag of it with `shipdrag import SOURCE -o NEW.mcap`'
-# smaller chunks are read together: what a chunk costs beside its bytes is then small
-_WORTHWHILE_BYTES = 1 << 18
+# smaller chunks are unpacked and decoded together
+_WORTHWHILE_BYTES = 1 << 20
 # messages held back because earlier ones may follow in the file
 _WAITING_LIMIT_BYTES = 1 << 29
 # of a packed file, by its size; logs of ships are packed to a tenth or so
@@ -43,6 +50,9 @@ _FOREIGN = {
     b'SQLite format 3\0': 'is a bag in sqlite3 storage',
     b'#ROSBAG V2.0': 'is a bag of ROS 1',
 }
+_THREADS = 3
+_PIECE_BYTES = 1 << 12  # of a packed file; little of it is lost at a damage
+_AHEAD_BYTES = 1 << 22  # unpacked, so that it is still in the cache of the processor
 
 
 class McapFile:
@@ -58,8 +68,6 @@ class McapFile:
     ----------
     contents
         What is in it; reading messages may add to its warnings.
-    indexed
-        Whether that was found by the index of the file.
 
     Raises
     ------
@@ -69,13 +77,12 @@ class McapFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.indexed = True
-        self._unpacked: IO[bytes] | None = None
-        if path.suffix == '.zstd':
-            self._unpacked = _unpack(path)
+        self._source = _unpacked_file(path) if path.suffix == '.zstd' else None
         with self._data() as data:
-            self.contents = self._read_contents(data)
-        self.contents.segments.sort()
+            head = data[:16]
+            if not head.startswith(MAGIC):
+                raise BagError(not_mcap(path, head))
+            self.contents = contents_of(data)
 
     @property
     def span_ns(self) -> tuple[int, int] | None:
@@ -89,7 +96,7 @@ class McapFile:
         self, channels: Collection[int], *, start_ns: int = 0, end_ns: int = sys.maxsize
     ) -> Iterator[Messages]:
         """
-        Yield messages in order of log time, then of place, a chunk at a time.
+        Yield messages in order of log time, then of place, some chunks at a time.
 
         Parameters
         ----------
@@ -102,16 +109,18 @@ class McapFile:
         in_time = [
             s for s in self.contents.segments if s.end_ns >= start_ns and s.start_ns <= end_ns
         ]
-        segments = deque(s for s in in_time if not s.channels or s.channels & wanted)
+        segments = [s for s in in_time if not s.channels or s.channels & wanted]
         table = np.zeros(CHANNELS, np.uint8)
         table[list(wanted)] = 1
-        found = 0
+        read = 0
         waiting: Messages | None = None
-        with self._data() as data, closing(unpacked(data, tuple(segments))) as records:
-            while segments:
+        with self._data() as data:
+            groups = deque(_grouped(data, segments))
+            unpacked = _unpacked_ahead(data, tuple(groups))
+            while groups:
                 # as much again as waits, so that what overlaps is not sorted over and over
-                loaded = self._load(records, segments, table, len(waiting.data) if waiting else 0)
-                found += len(loaded)
+                loaded = self._load(unpacked, groups, table, len(waiting.data) if waiting else 0)
+                read += len(loaded)
                 if (loaded.log_ns < start_ns).any() or (loaded.log_ns > end_ns).any():
                     loaded = loaded[(loaded.log_ns >= start_ns) & (loaded.log_ns <= end_ns)]
                 if waiting is not None:
@@ -119,67 +128,44 @@ class McapFile:
                     waiting = None
                 loaded = loaded.in_arrival_order()
                 ready = len(loaded)
-                if segments:  # the next may begin before this one ends
-                    ready = int(np.searchsorted(loaded.log_ns, segments[0].start_ns))
+                if groups:  # the next may begin before this one ends
+                    ready = int(np.searchsorted(loaded.log_ns, groups[0].segments[0].start_ns))
                 if ready < len(loaded):
                     waiting = loaded[ready:].packed()
                     if len(waiting.data) > _WAITING_LIMIT_BYTES:
                         raise BagError(
                             f'{str(self.path)!r}: more than {_WAITING_LIMIT_BYTES} bytes of '
-                            'messages are out of order; write it anew in order of arrival'
+                            'messages are out of order; write it again in order of arrival'
                         )
                 if ready:
                     yield loaded[:ready]
         expected = sum(self.contents.counts[channel] for channel in wanted)
-        if len(in_time) == len(self.contents.segments) and found != expected:
-            self._warn(f'{found} messages are there where the index lists {expected}')
+        if len(in_time) == len(self.contents.segments) and read != expected:
+            self._warn(f'{read} messages are there where the index lists {expected}')
 
     def _load(
         self,
-        records: Iterator[bytes | DamagedRecord],
-        segments: deque[FileSegment],
+        unpacked: Iterator[list[Unpacked]],
+        groups: deque[_Group],
         wanted: UInt8,
         least_bytes: int,
     ) -> Messages:
-        """Take segments off the queue, one or as many small ones as are worth it."""
-        least_bytes = max(least_bytes, _WORTHWHILE_BYTES)
+        """Take groups off the queue, one or as many as are worth it."""
         sound: list[bytes] = []
         offsets: list[int] = []
         size = 0
-        while segments and size < least_bytes:
-            segment, found = segments.popleft(), next(records)
-            if isinstance(found, DamagedRecord):
-                self._warn(f'{found}: left out')
-                continue
-            sound.append(found)
-            offsets.append(segment.offset)
-            size += len(found)
+        while groups and (not size or size < least_bytes):
+            for segment, chunk in zip(groups.popleft().segments, next(unpacked), strict=True):
+                size += 1 + len(chunk.records)
+                if chunk.damage is not None:
+                    self._warn(damaged_chunk(segment.offset, chunk.damage.value))
+                    continue
+                sound.append(chunk.records)
+                offsets.append(segment.offset)
         indexed = index_messages(sound, offsets, wanted)
         for text in indexed.damage:
             self._warn(text)
         return indexed.messages
-
-    def _read_contents(self, data: mmap) -> Contents:
-        head = data[:16]
-        if not head.startswith(MAGIC):
-            for magic, what in _FOREIGN.items():
-                if head.startswith(magic):
-                    raise BagError(f'{str(self.path)!r} {what}; {IMPORT}')
-            raise BagError(
-                f'{str(self.path)!r} is no MCAP file, it begins with {head[:8]!r}; '
-                'give a .mcap file or a rosbag2 directory'
-            )
-        warnings: list[str] = []
-        try:
-            contents = read_index(data)
-        except DamagedRecord as damage:
-            contents = None
-            warnings = [f'{damage}: read from its beginning, without an index']
-        if contents is None:
-            self.indexed = False
-            contents = scan(data)
-            contents.warnings[:0] = warnings
-        return contents
 
     def _warn(self, text: str) -> None:
         if text not in self.contents.warnings:  # a file may be read twice
@@ -191,27 +177,137 @@ class McapFile:
             with self.path.open('rb') as file:
                 if self.path.stat().st_size == 0:
                     raise BagError(f'{str(self.path)!r} is empty; nothing was recorded')
-                data = mmap((self._unpacked or file).fileno(), 0, access=ACCESS_READ)
+                data = mmap((self._source or file).fileno(), 0, access=ACCESS_READ)
         except OSError as error:
             raise BagError(f'{str(self.path)!r} cannot be read: {error.strerror}') from error
         with data:
             yield data
 
 
-def _unpack(path: Path) -> IO[bytes]:
+def not_mcap(path: Path, head: bytes) -> str:
+    """
+    Say what a file is that does not begin as MCAP does.
+    """
+    for magic, what in _FOREIGN.items():
+        if head.startswith(magic):
+            return f'{str(path)!r} {what}; {IMPORT}'
+    return (
+        f'{str(path)!r} is no MCAP file, it begins with {head[:8]!r}; '
+        'give a .mcap file or a rosbag2 directory'
+    )
+
+
+class _Group(NamedTuple):
+    """Segments that are unpacked together, and how many bytes they are then, as they say."""
+
+    segments: list[FileSegment]
+    size: int
+
+
+def _grouped(data: mmap, segments: Sequence[FileSegment]) -> Iterator[_Group]:
+    """Put small segments together: what each costs beside its bytes is then small."""
+    group: list[FileSegment] = []
+    size = 0
+    for segment in segments:
+        group.append(segment)
+        size += _stated_bytes(data, segment)
+        if size >= _WORTHWHILE_BYTES or segment is segments[-1]:
+            yield _Group(group, size)
+            group, size = [], 0
+
+
+def _stated_bytes(data: mmap, segment: FileSegment) -> int:
+    size = segment.end - segment.offset
+    if data[segment.offset] != Opcode.CHUNK:
+        return size
+    at = segment.offset + HEAD.size + 16
+    return max(size, int.from_bytes(data[at : at + 8], 'little'))
+
+
+def _unpacked_ahead(data: mmap, groups: Sequence[_Group]) -> Iterator[list[Unpacked]]:
+    """
+    Yield the records of each group in order, unpacked on other cores meanwhile.
+
+    Decompression and checksum leave Python's lock to others.
+    """
+    threads = min(len(os.sched_getaffinity(0)) - 1, _THREADS)
+    if threads < 1 or len(groups) < 2:
+        yield from (_records(data, group) for group in groups)
+        return
+    with ThreadPoolExecutor(threads, 'shipdrag-unpack') as pool:
+        ahead: deque[tuple[int, Future[list[Unpacked]]]] = deque()
+        waiting = 0
+        for group in groups:
+            while ahead and waiting + group.size > _AHEAD_BYTES:
+                done, future = ahead.popleft()
+                waiting -= done
+                yield future.result()
+            ahead.append((group.size, pool.submit(_records, data, group)))
+            waiting += group.size
+        while ahead:
+            yield ahead.popleft()[1].result()
+
+
+def _records(data: mmap, group: _Group) -> list[Unpacked]:
+    return [_unpacked(data, segment) for segment in group.segments]
+
+
+def _unpacked(data: mmap, segment: FileSegment) -> Unpacked:
+    if data[segment.offset] == Opcode.CHUNK:
+        start = segment.offset + HEAD.size
+        return unpack(data, Place(Opcode.CHUNK, segment.offset, start, segment.end))
+    records = data[segment.offset : segment.end]
+    release(data, segment.offset, segment.end)
+    return Unpacked(records, None, False, '')
+
+
+def _unpacked_file(path: Path) -> IO[bytes]:
+    def refuse(kind: DamageKind, text: str) -> None:
+        raise BagError(f'{str(path)!r} cannot be unpacked: {text}')
+
     unpacked = TemporaryFile(prefix='shipdrag_')  # noqa: SIM115 (kept while the bag is)
-    try:
-        with path.open('rb') as packed:
-            limit = max(CHUNK_LIMIT_BYTES, path.stat().st_size * _FILE_RATIO)
-            for piece in zstandard.ZstdDecompressor().read_to_iter(packed):
-                unpacked.write(piece)
-                if unpacked.tell() > limit:
-                    raise BagError(f'{str(path)!r} unpacks to more than {limit} bytes')
-    except OSError as error:
-        raise BagError(f'{str(path)!r} cannot be unpacked: {error.strerror}') from error
-    except zstandard.ZstdError as error:
-        raise BagError(f'{str(path)!r} cannot be unpacked: {error}') from error
-    unpacked.flush()
+    unpack_file(path, unpacked, refuse)
     if unpacked.tell() == 0:
         raise BagError(f'{str(path)!r} is empty; nothing was recorded')
     return unpacked
+
+
+def unpack_file(
+    path: Path, unpacked: IO[bytes], damaged: Callable[[DamageKind, str], object]
+) -> None:
+    """
+    Unpack a file that rosbag2 has packed as a whole, as far as it goes.
+
+    Parameters
+    ----------
+    path
+        `.mcap.zstd`.
+    unpacked
+        Where to.
+    damaged
+        Called with what is wrong with it.
+
+    Raises
+    ------
+    BagError
+        If it cannot be read or there is no room.
+    """
+    try:
+        with path.open('rb') as packed:
+            limit = max(CHUNK_LIMIT_BYTES, path.stat().st_size * _FILE_RATIO)
+            decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
+            while not decoder.eof:
+                piece = packed.read(_PIECE_BYTES)
+                if not piece:
+                    damaged(DamageKind.TRUNCATED, 'it is cut off')
+                    break
+                unpacked.write(decoder.decompress(piece))
+                if unpacked.tell() > limit:
+                    damaged(DamageKind.TOO_LARGE, f'it unpacks to more than {limit} bytes')
+                    break
+    except OSError as error:
+        raise BagError(f'{str(path)!r} cannot be unpacked: {error.strerror}') from error
+    except zstandard.ZstdError as error:
+        damaged(DamageKind.COMPRESSION, str(error))
+    finally:
+        unpacked.flush()

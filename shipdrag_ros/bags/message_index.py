@@ -19,6 +19,7 @@ from shipdrag_ros.compiled import Signature, compiled
 from shipdrag_ros.samples import Int64, UInt8
 
 CHANNELS = 1 << 16
+EVERY_CHANNEL = np.ones(CHANNELS, np.uint8)
 HEAD_BYTES = 9
 MESSAGE_HEAD_BYTES = 22
 _MESSAGE = 5

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The records of an MCAP file, read with every length checked.
+The records of an MCAP file that may be cut off or damaged anywhere.
 
-A file may be cut off or damaged anywhere: whatever does not fit is a
-`DamagedRecord` and never another exception.
+A walk never ends at a damage: what does not fit is a place with a `DamageKind`, and
+the walk goes on at the next record. Nothing is unpacked beyond a limit.
 """
 
 from __future__ import annotations
 
+import re
 import struct
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from io import BytesIO
 from mmap import MADV_DONTNEED, mmap
 from typing import Any, NamedTuple
@@ -18,141 +20,124 @@ from typing import Any, NamedTuple
 import lz4.frame
 import zstandard
 from isal.isal_zlib import crc32
-from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import (
-    Attachment,
-    AttachmentIndex,
-    Channel,
-    ChunkIndex,
-    DataEnd,
-    Footer,
-    Header,
-    MessageIndex,
-    Metadata,
-    MetadataIndex,
-    Schema,
-    Statistics,
-    SummaryOffset,
-)
+from mcap.stream_reader import StreamReader
+
+from shipdrag_ros.bags.damage import DamageKind
 
 MAGIC = b'\x89MCAP0\r\n'
 Buffer = bytes | mmap
 
-# an opcode and a length, then the content
 HEAD = struct.Struct('<BQ')
-_RELEASE_BYTES = 1 << 24
-FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
+"""Opcode and length; the content follows."""
 MESSAGE_HEAD = struct.Struct('<HIQQ')
 """Channel, sequence, log time [ns], publish time [ns]."""
 TIME_LIMIT_NS = 1 << 63
 """No log time is as late."""
 CHUNK_LIMIT_BYTES = 1 << 28
 """Unpacked; far above what any writer makes, far below what would take the memory away."""
-_CHUNK_HEAD = struct.Struct('<QQQI')  # first and last log time, unpacked bytes, their checksum
-_UINT32 = struct.Struct('<I')
-_UINT64 = struct.Struct('<Q')
-_PIECE_BYTES = 1 << 20
+GARBAGE = 0
+"""Stands for an opcode where nothing is a record."""
+IN_CHUNK = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
+"""Kinds of records that stand in a chunk."""
 
-_RECORDS: dict[int, Any] = {
-    Opcode.HEADER: Header,
-    Opcode.FOOTER: Footer,
-    Opcode.SCHEMA: Schema,
-    Opcode.CHANNEL: Channel,
-    Opcode.MESSAGE_INDEX: MessageIndex,
-    Opcode.CHUNK_INDEX: ChunkIndex,
-    Opcode.ATTACHMENT: Attachment,
-    Opcode.ATTACHMENT_INDEX: AttachmentIndex,
-    Opcode.STATISTICS: Statistics,
-    Opcode.METADATA: Metadata,
-    Opcode.METADATA_INDEX: MetadataIndex,
-    Opcode.SUMMARY_OFFSET: SummaryOffset,
-    Opcode.DATA_END: DataEnd,
+# fields of each kind: numbers of bytes, and texts led by their length in 4 or 8 bytes
+_SHORT, _LONG = -4, -8
+_FIELDS: dict[int, tuple[int, ...]] = {
+    Opcode.HEADER: (_SHORT, _SHORT),
+    Opcode.FOOTER: (20,),
+    Opcode.SCHEMA: (2, _SHORT, _SHORT, _SHORT),
+    Opcode.CHANNEL: (4, _SHORT, _SHORT, _SHORT),
+    Opcode.MESSAGE: (MESSAGE_HEAD.size,),  # then its payload, to the end
+    Opcode.CHUNK: (28, _SHORT, _LONG),
+    Opcode.MESSAGE_INDEX: (2, _SHORT),
+    Opcode.CHUNK_INDEX: (32, _SHORT, 8, _SHORT, 16),
+    Opcode.ATTACHMENT: (16, _SHORT, _SHORT, _LONG, 4),
+    Opcode.ATTACHMENT_INDEX: (40, _SHORT, _SHORT),
+    Opcode.STATISTICS: (42, _SHORT),
+    Opcode.METADATA: (_SHORT, _SHORT),
+    Opcode.METADATA_INDEX: (16, _SHORT),
+    Opcode.SUMMARY_OFFSET: (17,),
+    Opcode.DATA_END: (4,),
 }
-
-
-UNPACKING_ERRORS = (zstandard.ZstdError, RuntimeError, MemoryError, ValueError, EOFError)
-"""What the libraries raise on damaged bytes."""
-
-
-class _OfThread(threading.local):
-    """What takes longer to make than a chunk to unpack, and serves one thread."""
-
-    def __init__(self) -> None:
-        self.zstd = zstandard.ZstdDecompressor()
-
-
-_of_thread = _OfThread()
-
-
-class DamagedRecord(Exception):
-    """Bytes that are not what they should be."""
+KINDS = frozenset(_FIELDS)
+_PRIVATE = 0x80
+_POSSIBLE_BYTES = 1 << 32
+# a head: a known opcode, and a length below 2^32, as all but giants have
+_SOUGHT = re.compile(rb'[\x01-\x0f](?=.{4}\0{4})', re.DOTALL)
+_CHUNK_HEAD = struct.Struct('<QQQI')  # first and last log time, unpacked bytes, their checksum
+_COMPRESSIONS = (b'\0\0\0\0', b'\4\0\0\0zstd', b'\3\0\0\0lz4')
+_PIECE_BYTES = 256  # of a damaged chunk; so that little is lost at the damage
+_CRC_BYTES = 1 << 20
+_RELEASE_BYTES = 1 << 24
+READ_ERRORS = (McapError, ValueError, struct.error, OverflowError, MemoryError)
+"""What `mcap` raises on damaged records."""
+_UNPACKING_ERRORS = (zstandard.ZstdError, RuntimeError, MemoryError, ValueError, EOFError)
 
 
 class Place(NamedTuple):
-    """Where a record lies: its kind, its offset, and the span of its content."""
+    """
+    Where a record lies: its kind, its offset, and the span of its content.
+
+    With `damage` it is not as it should be; where it begins or ends, or of what kind it is,
+    was then inferred. A content that cannot be found begins at the offset.
+    """
 
     opcode: int
     offset: int
     start: int
     end: int
+    damage: DamageKind | None = None
+
+    @property
+    def readable(self) -> bool:
+        """Whether its content may be whole."""
+        inferred = (None, DamageKind.OPCODE, DamageKind.LENGTH)
+        return self.start > self.offset and self.damage in inferred and self.opcode in KINDS
+
+    @property
+    def name(self) -> str:
+        """Kind of the record, as in the specification."""
+        return Opcode(self.opcode).name.lower() if self.opcode in KINDS else 'unknown'
 
 
-def walk(data: Buffer, start: int, end: int) -> Iterator[Place]:
+def walk(data: Buffer, start: int, end: int, kinds: frozenset[int] = KINDS) -> Iterator[Place]:
     """
-    Yield the records between two offsets.
+    Yield what lies between two offsets, without a gap.
 
-    Raises
-    ------
-    DamagedRecord
-        At the first that is cut off, or is none.
+    Parameters
+    ----------
+    data
+        A file, or an unpacked chunk.
+    start, end
+        Span to walk over [bytes].
+    kinds
+        Opcodes that may stand there.
     """
     at = start
     while at < end:
-        if at + HEAD.size > end:
-            raise DamagedRecord(f'the record at byte {at} is cut off')
-        opcode, length = HEAD.unpack_from(data, at)
-        content = at + HEAD.size
-        if opcode == 0:
-            raise DamagedRecord(f'no record at byte {at}')
-        if length > end - content:
-            raise DamagedRecord(f'the record at byte {at} is cut off')
-        yield Place(opcode, at, content, content + length)
-        at = content + length
+        place = _whole(data, at, end, kinds)
+        if place is None:
+            place = _damaged(data, at, end, kinds)
+        elif not _goes_on(data, place.end, end, kinds):
+            place = _doubted(data, place, end, kinds)
+        yield place
+        at = place.end
+        release(data, place.offset, at)
 
 
-def parse(data: Buffer, place: Place) -> Any:
+def read(data: Buffer, place: Place) -> Any:
     """
-    Return the record of `mcap.records` at a place.
-
-    Raises
-    ------
-    DamagedRecord
-        If its content does not fit, or its checksum does not.
+    Return the record of `mcap.records` at a place; None where it does not fit.
     """
+    record = BytesIO(
+        HEAD.pack(place.opcode, place.end - place.start) + data[place.start : place.end]
+    )
     try:
-        record = read_record(data, place.opcode, place.start, place.end)
-    except (McapError, ValueError, struct.error, MemoryError, OverflowError) as error:
-        raise DamagedRecord(f'the record at byte {place.offset} is damaged') from error
-    if place.opcode == Opcode.ATTACHMENT and not attachment_agrees(data, place.start, place.end):
-        raise DamagedRecord(f'the attachment {record.name!r} has a wrong checksum')
-    return record
-
-
-def read_record(data: Buffer, opcode: int, start: int, end: int) -> Any:
-    """
-    Return the record of `mcap.records` whose fields are known to fit.
-    """
-    return _RECORDS[opcode].read(ReadDataStream(BytesIO(data[start:end])))
-
-
-def attachment_agrees(data: Buffer, start: int, end: int) -> bool:
-    """
-    Say whether an attachment has the checksum that it states, if any.
-    """
-    stated = int.from_bytes(data[end - _UINT32.size : end], 'little')
-    return stated in (0, checksum(data, start, end - _UINT32.size))
+        return next(StreamReader(record, skip_magic=True, emit_chunks=True).records)
+    except (*READ_ERRORS, StopIteration):
+        return None
 
 
 def checksum(data: Buffer, start: int, end: int) -> int:
@@ -160,98 +145,18 @@ def checksum(data: Buffer, start: int, end: int) -> int:
     Return the CRC-32 of a span of any size.
     """
     value = 0
-    for at in range(start, end, _PIECE_BYTES):
-        piece_end = min(at + _PIECE_BYTES, end)
-        value = crc32(data[at:piece_end], value)
-        release(data, at, piece_end)
+    for at in range(start, end, _CRC_BYTES):
+        value = crc32(data[at : min(at + _CRC_BYTES, end)], value)
+        release(data, at, min(at + _CRC_BYTES, end))
     return value
 
 
-def unpack_chunk(data: Buffer, place: Place) -> tuple[str, bytes]:
+def attachment_agrees(data: Buffer, place: Place) -> bool:
     """
-    Return compression and records of a chunk, their checksum tested.
-
-    Raises
-    ------
-    DamagedRecord
-        If the chunk is not as it was written.
+    Say whether an attachment has the checksum that it states, if any.
     """
-    try:
-        size, stated, compression, at, length = chunk_fields(data, place.start, place.end)
-        packed = data[at : min(at + length, place.end)]
-        release(data, place.offset, place.end)
-        records = decompress(compression, packed, size)
-    except UNPACKING_ERRORS as error:
-        raise DamagedRecord(f'the chunk at byte {place.offset} is damaged: {error}') from error
-    if stated and crc32(records) != stated:
-        raise DamagedRecord(f'the chunk at byte {place.offset} has a wrong checksum')
-    return compression, records
-
-
-def stated_bytes(data: Buffer, start: int, end: int) -> int:
-    """
-    Return how many bytes a record takes at most, packed or unpacked as it says itself.
-
-    Parameters
-    ----------
-    data
-        The file.
-    start, end
-        Where the record lies, or consecutive ones of which the first is no chunk.
-    """
-    if end - start < HEAD.size + _CHUNK_HEAD.size or data[start] != Opcode.CHUNK:
-        return end - start
-    return max(end - start, int(_CHUNK_HEAD.unpack_from(data, start + HEAD.size)[2]))
-
-
-def chunk_fields(data: Buffer, start: int, end: int) -> tuple[int, int, str, int, int]:
-    """
-    Return unpacked size, checksum, compression, and where its bytes lie.
-
-    Of the content of a chunk; start and length of the packed bytes are as
-    stated, be they there or not.
-
-    Raises
-    ------
-    ValueError
-        If the head is damaged.
-    """
-    try:
-        _, _, size, stated = _CHUNK_HEAD.unpack_from(data, start)
-        at = start + _CHUNK_HEAD.size
-        (length,) = _UINT32.unpack_from(data, at)
-        at += _UINT32.size
-        name_end = min(at + length, end)
-        compression = data[at:name_end].decode()
-        (packed,) = _UINT64.unpack_from(data, name_end)
-    except struct.error as error:
-        raise ValueError(str(error)) from None
-    return size, stated, compression, name_end + _UINT64.size, packed
-
-
-def decompress(compression: str, packed: bytes, size: int) -> bytes:
-    """
-    Unpack what has a stated size.
-
-    Raises
-    ------
-    One of UNPACKING_ERRORS
-        If it is damaged, or of another size.
-    """
-    if size > CHUNK_LIMIT_BYTES:
-        raise ValueError(f'{size} bytes are too many')
-    if compression == '':
-        records = packed
-    elif compression == 'zstd':
-        records = unpack_zstd(packed, size)
-    elif compression == 'lz4':
-        # one byte more is asked for, as what is not asked for is dropped in silence
-        records = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
-    else:
-        raise ValueError(f'unknown compression {compression!r}')
-    if len(records) != size:
-        raise ValueError('sizes disagree')
-    return records
+    stated = int.from_bytes(data[place.end - 4 : place.end], 'little')
+    return stated in (0, checksum(data, place.start, place.end - 4))
 
 
 def release(data: Buffer, start: int, end: int) -> None:
@@ -264,21 +169,221 @@ def release(data: Buffer, start: int, end: int) -> None:
         data.madvise(MADV_DONTNEED)
 
 
-def message_head(data: Buffer, place: Place) -> tuple[int, int]:
-    """
-    Return channel and log time [ns] of the message at a place.
+def _whole(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Place | None:
+    """Return the record at an offset, if one begins there and its fields fill it."""
+    if end - at < HEAD.size:
+        return None
+    opcode, length = HEAD.unpack_from(data, at)
+    start = at + HEAD.size
+    stop = start + length
+    if stop > end:
+        return None
+    if opcode in kinds:
+        sound = _fills(data, opcode, start, stop)
+    else:  # of a private one nothing is known but what follows
+        follows = stop < end and data[stop] in kinds and _whole(data, stop, end, kinds) is not None
+        sound = opcode >= _PRIVATE and (follows or data[stop:end] in (b'', MAGIC))
+    return Place(opcode, at, start, stop) if sound else None
 
-    Raises
-    ------
-    DamagedRecord
-        If it is too short or its time is none.
+
+def _fills(data: Buffer, opcode: int, start: int, stop: int) -> bool:
+    if opcode == Opcode.MESSAGE:
+        return stop - start >= MESSAGE_HEAD.size
+    return _fields_end(data, opcode, start, stop) == stop
+
+
+def _fields_end(data: Buffer, opcode: int, start: int, limit: int) -> int | None:
+    """Return where the fields of a record end by themselves; None if that cannot be read."""
+    at = start
+    for size in _FIELDS[opcode]:
+        if size > 0:
+            at += size
+        elif at - size > limit:
+            return None
+        else:
+            at += int.from_bytes(data[at : at - size], 'little') - size
+    return at
+
+
+def _goes_on(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> bool:
+    """Say whether a record follows, perhaps cut off or with a damaged content, or the end."""
+    closed = data[max(at, end - len(MAGIC)) : end] == MAGIC
+    if end - at < HEAD.size:
+        return at == end or closed or data[at] in kinds
+    if _whole(data, at, end, kinds) is not None:
+        return True
+    opcode, length = HEAD.unpack_from(data, at)
+    stop = at + HEAD.size + length
+    if stop > end:
+        return not closed and opcode in kinds and length < _POSSIBLE_BYTES
+    return opcode != GARBAGE and _whole(data, stop, end, kinds) is not None
+
+
+def _damaged(data: Buffer, at: int, end: int, kinds: frozenset[int]) -> Place:
+    """Say what lies at an offset where no sound record does."""
+    if end - at < HEAD.size:
+        ending = data[at:end] == MAGIC
+        return Place(GARBAGE, at, at, end, None if ending else DamageKind.TRUNCATED)
+    opcode, length = HEAD.unpack_from(data, at)
+    start = at + HEAD.size
+    known = opcode in kinds
+    stop = start + length
+    if known and opcode != Opcode.MESSAGE:
+        by_fields = _fields_end(data, opcode, start, end)
+        if by_fields is not None and by_fields <= end and _goes_on(data, by_fields, end, kinds):
+            return Place(opcode, at, start, by_fields, DamageKind.LENGTH)
+    if stop <= end and _goes_on(data, stop, end, kinds):
+        # its length is right, and something else is not
+        near = (opcode ^ 1 << bit for bit in range(8))
+        mended = [it for it in near if it in kinds and _fills(data, it, start, stop)]
+        if known and Opcode.MESSAGE in mended:  # which anything fills
+            mended.remove(Opcode.MESSAGE)
+        kind = DamageKind.OPCODE if mended or not known else DamageKind.CONTENT
+        return Place([*mended, opcode if known else GARBAGE][0], at, start, stop, kind)
+    chunk = known and opcode == Opcode.CHUNK and _is_chunk(data, start)
+    after = _next(data, at + 1, end, kinds - IN_CHUNK if chunk else kinds)
+    cut_off = known and after == end < stop < start + _POSSIBLE_BYTES
+    kind = DamageKind.TRUNCATED if cut_off else DamageKind.LENGTH
+    if not known:
+        return Place(GARBAGE, at, at, after, DamageKind.GARBAGE)
+    # part of a chunk may be unpacked
+    return Place(opcode, at, start if chunk and start < after else at, after, kind)
+
+
+def _doubted(data: Buffer, place: Place, end: int, kinds: frozenset[int]) -> Place:
+    """Say what a record is behind which no sound one follows: it, or the next, is damaged."""
+    chunk = place.opcode == Opcode.CHUNK
+    after = _next(data, place.offset + 1, end, kinds - IN_CHUNK if chunk else kinds)
+    if after >= place.end:
+        # the fields of others end where the record does; a message may be longer by a flipped bit
+        flipped = (place.end - place.start) ^ (after - place.start)
+        longer = place.opcode == Opcode.MESSAGE and flipped.bit_count() == 1
+        return place._replace(damage=DamageKind.LENGTH) if longer else place
+    start = place.start if chunk else place.offset
+    return Place(place.opcode, place.offset, start, after, DamageKind.LENGTH)
+
+
+def _next(data: Buffer, begin: int, end: int, kinds: frozenset[int]) -> int:
+    """Return the first place where something is a record without doubt, or the end."""
+    for match in _SOUGHT.finditer(data, begin, end):
+        at = match.start()
+        place = _whole(data, at, end, kinds)
+        if place is None:
+            # a chunk that is cut off still has its two lengths
+            start = at + HEAD.size
+            if data[at] == Opcode.CHUNK in kinds and start < end and _is_chunk(data, start):
+                stop = start + HEAD.unpack_from(data, at)[1]
+                if _fields_end(data, Opcode.CHUNK, start, end) == stop:
+                    return at
+        elif place.opcode == Opcode.CHUNK:
+            if _is_chunk(data, place.start):
+                return at
+        elif _goes_on(data, place.end, end, kinds):
+            return at
+    ending = end - len(MAGIC)
+    return ending if begin <= ending and data[ending:end] == MAGIC else end
+
+
+def _is_chunk(data: Buffer, start: int) -> bool:
+    """Say whether a compression that is known is named where that of a chunk stands."""
+    name = start + _CHUNK_HEAD.size
+    return data[name : name + 8].startswith(_COMPRESSIONS)
+
+
+class Unpacked(NamedTuple):
     """
-    if place.end - place.start < MESSAGE_HEAD.size:
-        raise DamagedRecord(f'the message at byte {place.offset} is too short')
-    channel, _, log_ns, _ = MESSAGE_HEAD.unpack_from(data, place.start)
-    if log_ns >= TIME_LIMIT_NS:
-        raise DamagedRecord(f'the message at byte {place.offset} has no possible log time')
-    return channel, log_ns
+    What came out of a chunk.
+
+    Attributes
+    ----------
+    records
+        Unpacked, as far as it goes.
+    damage
+        What is wrong with the chunk; None where nothing is.
+    verified
+        Whether its checksum was tested and is right; then it is whole,
+        whatever else is wrong.
+    compression
+        As stated; '' for none.
+    """
+
+    records: bytes
+    damage: DamageKind | None
+    verified: bool
+    compression: str
+
+
+class _OfThread(threading.local):
+    """What takes longer to make than a chunk to unpack, and serves one thread."""
+
+    def __init__(self) -> None:
+        self.zstd = zstandard.ZstdDecompressor()
+
+
+_of_thread = _OfThread()
+
+
+class _Packed(NamedTuple):
+    """What a chunk states of itself, and its packed bytes as far as they are there."""
+
+    size: int
+    checksum: int
+    compression: str
+    content: bytes
+    cut_off: bool
+
+
+def unpack(data: Buffer, place: Place) -> Unpacked:
+    """
+    Unpack a chunk that is whole; of another one nothing.
+    """
+    packed = _packed(data, place)
+    if packed is None:
+        return Unpacked(b'', DamageKind.CONTENT, False, '')
+    if packed.size > CHUNK_LIMIT_BYTES:
+        return Unpacked(b'', DamageKind.TOO_LARGE, False, packed.compression)
+    try:
+        records = _decompress(packed)
+    except _UNPACKING_ERRORS:
+        damage = DamageKind.TRUNCATED if packed.cut_off else DamageKind.COMPRESSION
+        return Unpacked(b'', damage, False, packed.compression)
+    return _judged(packed, records, None if len(records) == packed.size else DamageKind.SIZE)
+
+
+def unpack_partly(data: Buffer, place: Place) -> Unpacked:
+    """
+    Unpack as much of a chunk as can be, up to `CHUNK_LIMIT_BYTES`.
+    """
+    unpacked = unpack(data, place)
+    packed = _packed(data, place)
+    if unpacked.damage in (None, DamageKind.CHECKSUM) or packed is None:
+        return unpacked
+    records = _decompress_partly(packed)
+    if len(records) > CHUNK_LIMIT_BYTES:
+        return Unpacked(b'', DamageKind.TOO_LARGE, False, packed.compression)
+    return _judged(packed, records, unpacked.damage)
+
+
+def _packed(data: Buffer, place: Place) -> _Packed | None:
+    at = place.start + _CHUNK_HEAD.size
+    if at + 12 > place.end or not _is_chunk(data, place.start):
+        return None
+    _, _, size, stated = _CHUNK_HEAD.unpack_from(data, place.start)
+    name_end = at + 4 + int.from_bytes(data[at : at + 4], 'little')
+    start = name_end + 8
+    end = start + int.from_bytes(data[name_end:start], 'little')
+    content = data[start : min(end, place.end)]
+    release(data, place.offset, place.end)
+    return _Packed(size, stated, data[at + 4 : name_end].decode(), content, end > place.end)
+
+
+def _judged(packed: _Packed, records: bytes, damage: DamageKind | None) -> Unpacked:
+    verified = packed.checksum != 0 and crc32(records) == packed.checksum
+    if packed.cut_off:
+        damage = damage or DamageKind.TRUNCATED
+    if packed.checksum and not verified:
+        damage = damage or DamageKind.CHECKSUM
+    return Unpacked(records, damage, verified, packed.compression)
 
 
 def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:
@@ -290,7 +395,39 @@ def unpack_zstd(packed: bytes, limit_bytes: int) -> bytes:
     zstandard.ZstdError, ValueError
         If it is damaged or unpacks to more.
     """
-    # the library trusts the size that a frame states, and asks for that memory
+    # the library trusts the size that a frame states, and takes that memory
     if zstandard.frame_content_size(packed) > limit_bytes:
         raise ValueError(f'it unpacks to more than {limit_bytes} bytes')
     return _of_thread.zstd.decompress(packed, max_output_size=limit_bytes)
+
+
+def _decompress(packed: _Packed) -> bytes:
+    if packed.compression == 'zstd':
+        return unpack_zstd(packed.content, packed.size)
+    if packed.compression == 'lz4':
+        # one byte more than stated, so that a larger one is not cut off in silence
+        decoder = lz4.frame.LZ4FrameDecompressor()
+        return bytes(decoder.decompress(packed.content, max_length=packed.size + 1))
+    if len(packed.content) > CHUNK_LIMIT_BYTES:
+        raise ValueError('too large')
+    return packed.content
+
+
+def _decompress_partly(packed: _Packed) -> bytes:
+    """Unpack piece by piece, up to the damage or beyond the limit."""
+    decoder: Any
+    if packed.compression == 'zstd':
+        decoder = zstandard.ZstdDecompressor(max_window_size=CHUNK_LIMIT_BYTES).decompressobj()
+    elif packed.compression == 'lz4':
+        decoder = lz4.frame.LZ4FrameDecompressor()
+    else:
+        return packed.content[: CHUNK_LIMIT_BYTES + 1]
+    out: list[bytes] = []
+    size = 0
+    with suppress(*_UNPACKING_ERRORS):
+        for at in range(0, len(packed.content), _PIECE_BYTES):
+            if decoder.eof or size > CHUNK_LIMIT_BYTES:
+                break
+            out.append(decoder.decompress(packed.content[at : at + _PIECE_BYTES]))
+            size += len(out[-1])
+    return b''.join(out)

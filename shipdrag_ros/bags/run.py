@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
@@ -118,7 +119,7 @@ class Run:
             for number, channel in part.contents.channels.items():
                 counts[_key(channel)] += part.contents.counts[number]
         try:
-            self._matched = match_inputs(counts, remap=remap)
+            self._matched = match_inputs(counts, remap=remap, own=_is_own(parts))
         except BagError as error:
             raise BagError(f'{self.name!r}: {error}') from None
         self.topics = tuple(_topic_info(key, counts[key], self._matched) for key in sorted(counts))
@@ -148,6 +149,26 @@ class Run:
         for part in self.parts:
             found += (f'{part.path.name}: {warning}' for warning in part.contents.warnings)
         return tuple(found)
+
+    def save(self, out: Path) -> None:
+        """
+        Copy the one file of the run.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        try:
+            shutil.copyfile(self.parts[0].path, out)
+        except OSError as error:
+            raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
+
+    def note(self, warnings: Iterable[str]) -> None:
+        """
+        Add to what is wrong with the run; what was said before is not repeated.
+        """
+        self._warnings += (text for text in warnings if text not in self._warnings)
 
     def inputs(self, *, start_ns: int = 0, end_ns: int = sys.maxsize) -> RunSamples:
         """
@@ -292,6 +313,11 @@ class RunSamples:
             for reason, number in reasons.items():
                 self.unreadable.setdefault(source.input, Counter())[reason.value] += number
         return block, kept
+
+
+def _is_own(parts: Sequence[McapFile]) -> bool:
+    """Whether a node of this package recorded it: each type that it holds was subscribed."""
+    return any('parameters.yaml' in part.contents.attachments for part in parts)
 
 
 def _key(channel: FileChannel) -> tuple[str, str]:

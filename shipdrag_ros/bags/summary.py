@@ -96,7 +96,7 @@ def info(run: Run) -> BagInfo:
         end_ns=end_ns,
         messages=sum(topic.messages for topic in run.topics),
         compression=', '.join(sorted(kind or 'none' for kind in compressions)) or 'none',
-        indexed=all(part.indexed for part in run.parts),
+        indexed=all(part.contents.indexed for part in run.parts),
         topics=tuple(TopicRate(topic, _rate_hz(topic, duration_s)) for topic in run.topics),
         missing=tuple(name for name in TOPICS if name not in found),
         attachments={name: len(text.encode()) for name, text in run.attachments.items()},

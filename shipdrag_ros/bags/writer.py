@@ -9,29 +9,55 @@ publish time = stamp.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import struct
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from enum import Enum
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 from uuid import uuid4
 
-from mcap.writer import CompressionType, Writer
+import lz4.frame
+import numpy as np
+import zstandard
+from isal.isal_zlib import crc32
+from mcap.opcode import Opcode
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    Chunk,
+    ChunkIndex,
+    DataEnd,
+    Footer,
+    Header,
+    Metadata,
+    MetadataIndex,
+    Schema,
+    Statistics,
+)
 
 from shipdrag_ros.bags.declarations import (
     LIBRARY,
     PROFILE,
     as_bytes,
+    attachment,
     channel,
-    media_type,
     metadata,
     schema,
 )
+from shipdrag_ros.bags.records import HEAD, MAGIC, MESSAGE_HEAD
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
 from shipdrag_ros.samples import Block
 
+_NUMBERED = struct.Struct('<BQH')  # opcode, length, channel
+CHUNK_RANGE = 1 << 14, 1 << 20
+"""Least and most bytes of a chunk before it is packed."""
 METADATA = 'shipdrag_ros'
 """Name of the metadata record that says which recording a file is part of."""
 
@@ -56,16 +82,16 @@ class Compression(Enum):
     ZSTD = 'zstd'
 
 
-_MCAP_COMPRESSION = {
-    Compression.NONE: CompressionType.NONE,
-    Compression.LZ4: CompressionType.LZ4,
-    Compression.ZSTD: CompressionType.ZSTD,
+_PACKERS: dict[Compression, tuple[str, Callable[[bytes], bytes]]] = {
+    Compression.NONE: ('', bytes),
+    Compression.LZ4: ('lz4', lz4.frame.compress),
+    Compression.ZSTD: ('zstd', zstandard.compress),
 }
 
 
-class BagWriter:
+class RecordWriter:
     """
-    Writes one MCAP file; a context manager.
+    Writes an MCAP file with an index; a context manager.
 
     Parameters
     ----------
@@ -73,11 +99,11 @@ class BagWriter:
         File to make; one that exists is never overwritten.
     compression
         Of the chunks.
+    profile
+        Of the messages.
     chunk_bytes
-        Messages are written in chunks of this size [bytes], not before they are full.
-    recording_id, part
-        Files of one recording carry the same id and are numbered from 0; by
-        default the file is a recording of its own.
+        Size of each chunk before it is packed [bytes]; 0: a 64th of all so far, within
+        `CHUNK_RANGE`, so that a damage costs little and a long bag is read quickly.
 
     Raises
     ------
@@ -90,13 +116,20 @@ class BagWriter:
         path: Path,
         *,
         compression: Compression = Compression.ZSTD,
-        chunk_bytes: int = 1 << 20,
-        recording_id: str | None = None,
-        part: int = 0,
+        profile: str = PROFILE,
+        chunk_bytes: int = 0,
     ) -> None:
         self.path = Path(path)
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[tuple[str, str], int] = {}
+        self._compression = compression
+        self._chunk_bytes = chunk_bytes
+        self._room = chunk_bytes or CHUNK_RANGE[0]
+        self._chunk = bytearray()
+        self._times = [0, 0]  # first and last of the chunk [ns]
+        self._entries: dict[int, list[int]] = {}  # of its index: time and offset, by channel
+        self._declared: dict[bytes, Schema | Channel] = {}
+        self._indexes: list[ChunkIndex | AttachmentIndex | MetadataIndex] = []
+        self._counts: Counter[int] = Counter()
+        self._unpacked = self._at = 0
         try:
             self._file = open(self.path, 'xb', opener=private_opener)  # noqa: SIM115
         except FileExistsError:
@@ -106,24 +139,233 @@ class BagWriter:
                 f'{str(path)!r} cannot be made: {error.strerror}; '
                 'give a name in a folder that is there and may be written'
             ) from error
-        self._writer = Writer(
-            self._file, chunk_size=chunk_bytes, compression=_MCAP_COMPRESSION[compression]
+        self._write(MAGIC + as_bytes(Header(profile, LIBRARY)))
+
+    def declare(self, channel: Channel, schema: Schema | None) -> int:
+        """
+        Write a channel and its schema, unless they are there; return its number.
+
+        Parameters
+        ----------
+        channel, schema
+            Their own numbers do not count.
+        """
+        number = 0 if schema is None else self._number(replace(schema, id=0))
+        return self._number(replace(channel, id=0, schema_id=number))
+
+    def _number(self, record: Schema | Channel) -> int:
+        key = as_bytes(record)
+        if key not in self._declared:
+            same = [it for it in self._declared.values() if type(it) is type(record)]
+            self._declared[key] = replace(record, id=len(same) + 1)
+            # outside of chunks: any chunk may be damaged and the others sound
+            self._write(as_bytes(self._declared[key]))
+        return int(self._declared[key].id)
+
+    def add(
+        self, number: int, payload: bytes, *, log_ns: int, publish_ns: int, sequence: int = 0
+    ) -> None:
+        """
+        Write a message of a channel that was declared.
+
+        Parameters
+        ----------
+        number
+            Of the channel.
+        payload
+            CDR bytes.
+        log_ns, publish_ns
+            Time of arrival and of measurement [ns since the epoch].
+        sequence
+            Of the publisher.
+        """
+        head = MESSAGE_HEAD.pack(number, sequence, log_ns, publish_ns)
+        self.add_content(number, head + payload, log_ns=log_ns)
+
+    def add_content(self, number: int, content: bytes, *, log_ns: int) -> None:
+        """
+        Write a message as it stands in another file, but for the number of its channel.
+
+        Parameters
+        ----------
+        number
+            Of the channel here.
+        content
+            Of the record there.
+        log_ns
+            Its time of arrival [ns since the epoch].
+        """
+        chunk = self._chunk
+        if not chunk:
+            self._times = [log_ns, log_ns]
+        elif log_ns < self._times[0] or log_ns > self._times[1]:
+            self._times = [min(self._times[0], log_ns), max(self._times[1], log_ns)]
+        self._entries.setdefault(number, []).extend((log_ns, len(chunk)))
+        chunk += _NUMBERED.pack(Opcode.MESSAGE, len(content), number)
+        chunk += content[2:]
+        if len(chunk) >= self._room:
+            self._end_chunk()
+
+    def add_attachment(self, attached: Attachment) -> None:
+        """
+        Write an attachment, before the first message if it is to survive a crash.
+        """
+        about = attached.name, attached.media_type
+        times, record = (attached.log_time, attached.create_time), as_bytes(attached)
+        self._indexes.append(
+            AttachmentIndex(self._at, len(record), *times, len(attached.data), *about)
         )
-        self._writer.start(profile=PROFILE, library=LIBRARY)
-        self._writer.add_metadata(METADATA, metadata(recording_id or uuid4().hex, part))
+        self._write(record)
+
+    def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """
+        Write metadata.
+        """
+        record = as_bytes(Metadata(name, dict(values)))
+        self._indexes.append(MetadataIndex(self._at, len(record), name))
+        self._write(record)
+
+    def close(self) -> None:
+        """
+        Write the index and bring everything to the disk; again is harmless.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        if self._file.closed:
+            return
+        try:
+            self._end_chunk()
+            self._write(as_bytes(DataEnd(0)))
+            summary = as_bytes(*self._declared.values(), *self._indexes, self._statistics())
+            start = self._at
+            # its checksum covers the footer too, up to itself
+            covered = summary + as_bytes(Footer(start, 0, 0))[:-4]
+            self._write(covered + struct.pack('<I', crc32(covered)) + MAGIC)
+            with self._errors_named():
+                self._file.flush()
+                os.fsync(self._file.fileno())
+        finally:
+            with suppress(OSError):
+                self._file.close()
+
+    def _end_chunk(self) -> None:
+        if not self._chunk:
+            return
+        records = bytes(self._chunk)
+        at = self._at
+        name, pack = _PACKERS[self._compression]
+        first, last = self._times
+        packed = pack(records)
+        chunk = as_bytes(
+            Chunk(
+                compression=name,
+                data=packed,
+                message_end_time=last,
+                message_start_time=first,
+                uncompressed_crc=crc32(records),
+                uncompressed_size=len(records),
+            )
+        )
+        self._write(chunk)
+        offsets = {}
+        for number, entries in self._entries.items():
+            offsets[number] = self._at
+            listed = np.array(entries, '<u8').tobytes()
+            head = HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(listed))
+            self._write(head + struct.pack('<HI', number, len(listed)) + listed)
+            self._counts[number] += len(entries) // 2
+        self._indexes.append(
+            ChunkIndex(
+                chunk_length=len(chunk),
+                chunk_start_offset=at,
+                compression=name,
+                compressed_size=len(packed),
+                message_end_time=last,
+                message_index_length=self._at - at - len(chunk),
+                message_index_offsets=offsets,
+                message_start_time=first,
+                uncompressed_size=len(records),
+            )
+        )
+        self._unpacked += len(records)
+        least, most = CHUNK_RANGE
+        self._room = self._chunk_bytes or min(max(self._unpacked >> 6, least), most)
+        self._chunk.clear()
+        self._entries.clear()
+
+    def _statistics(self) -> Statistics:
+        kinds = Counter(map(type, chain(self._declared.values(), self._indexes)))
+        chunks = [it for it in self._indexes if isinstance(it, ChunkIndex)]
+        return Statistics(
+            attachment_count=kinds[AttachmentIndex],
+            channel_count=kinds[Channel],
+            channel_message_counts=dict(self._counts),
+            chunk_count=kinds[ChunkIndex],
+            message_count=self._counts.total(),
+            message_end_time=max((it.message_end_time for it in chunks), default=0),
+            message_start_time=min((it.message_start_time for it in chunks), default=0),
+            metadata_count=kinds[MetadataIndex],
+            schema_count=kinds[Schema],
+        )
+
+    def _write(self, data: bytes) -> None:
+        with self._errors_named():
+            self._file.write(data)
+        self._at += len(data)
+
+    @contextmanager
+    def _errors_named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class BagWriter(RecordWriter):
+    """
+    Writes a recording of types that are known.
+
+    Parameters
+    ----------
+    path, compression, chunk_bytes
+        As of `RecordWriter`.
+    recording_id, part
+        Files of one recording carry the same id and are numbered from 0; by
+        default the file is a recording of its own.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        compression: Compression = Compression.ZSTD,
+        chunk_bytes: int = 0,
+        recording_id: str | None = None,
+        part: int = 0,
+    ) -> None:
+        super().__init__(path, compression=compression, chunk_bytes=chunk_bytes)
+        self._channels: dict[tuple[str, str], int] = {}
+        self.add_metadata(METADATA, metadata(recording_id or uuid4().hex, part))
 
     def attach(self, name: str, text: str) -> None:
         """
         Write a text file into the bag, before the first message if it is to survive a crash.
         """
-        with self._errors_named():
-            self._writer.add_attachment(
-                create_time=0,
-                log_time=0,
-                name=name,
-                media_type=media_type(name),
-                data=text.encode(),
-            )
+        self.add_attachment(attachment(name, text))
 
     def register(self, topic: str, type_name: str) -> None:
         """
@@ -134,8 +376,7 @@ class BagWriter:
         BagError
             If the definition of the type is not known.
         """
-        with self._errors_named():
-            self._channel(topic, type_name)
+        self._channel(topic, type_name)
 
     def write(
         self, topic: str, type_name: str, payload: bytes, *, log_ns: int, publish_ns: int
@@ -159,14 +400,9 @@ class BagWriter:
         BagError
             If the type is not known or the file cannot be written.
         """
-        with self._errors_named():
-            self._writer.add_message(
-                self._channel(topic, type_name),
-                log_time=log_ns,
-                data=payload,
-                # a stamp before 1970 has no place here; the message itself keeps it
-                publish_time=max(publish_ns, 0),
-            )
+        # a stamp before 1970 has no place here; the message itself keeps it
+        number = self._channel(topic, type_name)
+        self.add(number, payload, log_ns=log_ns, publish_ns=max(publish_ns, 0))
 
     def write_samples(self, block: Block) -> None:
         """
@@ -186,61 +422,11 @@ class BagWriter:
                 publish_ns=message.publish_ns,
             )
 
-    def close(self) -> None:
-        """
-        Write the index and bring everything to the disk; again is harmless.
-
-        Raises
-        ------
-        BagError
-            If the disk does not take it.
-        """
-        if self._file.closed:
-            return
-        try:
-            with self._errors_named():
-                self._writer.finish()
-                self._file.flush()
-                os.fsync(self._file.fileno())
-        finally:
-            with suppress(OSError):
-                self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    @contextmanager
-    def _errors_named(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise BagError(f'{str(self.path)!r} cannot be written: {error.strerror}') from error
-
     def _channel(self, topic: str, type_name: str) -> int:
         key = (topic, type_name)
         if key not in self._channels:
-            schema_id = self._schema(type_name)
-            made = channel(len(self._channels) + 1, topic, type_name, schema_id=schema_id)
-            # outside of chunks too: the first chunk may be damaged and the others sound
-            self._file.write(as_bytes(made))
-            self._channels[key] = self._writer.register_channel(
-                made.topic, made.message_encoding, made.schema_id, made.metadata
+            described = schema(0, type_name)
+            self._channels[key] = self.declare(
+                channel(0, topic, type_name, schema_id=0), described
             )
         return self._channels[key]
-
-    def _schema(self, type_name: str) -> int:
-        if type_name not in self._schemas:
-            made = schema(len(self._schemas) + 1, type_name)
-            self._file.write(as_bytes(made))
-            self._schemas[type_name] = self._writer.register_schema(
-                made.name, made.encoding, made.data
-            )
-        return self._schemas[type_name]

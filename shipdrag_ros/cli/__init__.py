@@ -19,7 +19,7 @@ from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import Help
 from shipdrag_ros.cli.examples import epilog
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.imports import uncollected
+from shipdrag_ros.imports import uncollected, what_to_install
 from shipdrag_ros.studies import found
 
 
@@ -31,7 +31,7 @@ class Verb(NamedTuple):
     summary: str
 
 
-VERBS = (
+_OWN = (
     Verb(
         'demo',
         '.demo',
@@ -60,7 +60,13 @@ VERBS = (
     Verb('info', '.info', 'what is in a bag'),
     Verb('check', '.check', 'is a bag sound'),
     Verb('recover', '.recover', 'save what is whole in a damaged bag'),
-    *(Verb(study.verb, f'{package}.face.verb', study.summary) for package, study in found()),
+)
+VERBS = (
+    *_OWN,
+    *(
+        Verb(study.verb, f'{package}.face.verb', study.summary)
+        for package, study in found(frozenset(verb.name for verb in _OWN))
+    ),
 )
 
 # matrices here are small: threads that wait for each other cost up to twenty times the work
@@ -112,6 +118,11 @@ def _run(line: list[str]) -> int:
         return INTERRUPTED
     except ShipdragError as error:
         print(f'ERROR: {error}', file=sys.stderr)
+    except ModuleNotFoundError as error:
+        advice = what_to_install(error)
+        if advice is None:
+            raise
+        print(f'ERROR: `shipdrag {verb}` cannot do this: {advice}', file=sys.stderr)
     except BrokenPipeError:
         raise
     except OSError as error:

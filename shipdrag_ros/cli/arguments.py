@@ -8,7 +8,11 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+from shipdrag_ros.imports import need
+
 STDOUT = '-'
+REPORT = ('matplotlib', 'jinja2')
+"""Modules that a page with pictures needs."""
 
 
 class Help(argparse.ArgumentDefaultsHelpFormatter):
@@ -76,7 +80,7 @@ def add_remap(parser: argparse.ArgumentParser) -> None:
         default=[],
         type=remap,
         metavar='FROM:=TO',
-        help='hear topic FROM of the bag as input TO; may be given more than once',
+        help='read topic FROM of the bag as input TO; may be given more than once',
     )
 
 
@@ -112,6 +116,8 @@ def new_file(ending: str) -> Callable[[str], Path]:
         if path.suffix != ending:
             raise argparse.ArgumentTypeError(f'{text!r}, expected a name that ends in {ending}')
         _check_folder(path)
+        if ending == '.html':
+            need(*REPORT)
         return path
 
     return read

@@ -24,12 +24,14 @@ from typing import TYPE_CHECKING, NoReturn
 
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
+from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import number
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, write_results
 from shipdrag_ros.cli.replay_text import show_run
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.imports import need
 from shipdrag_ros.library import simulating
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.replay import words
@@ -90,6 +92,7 @@ def run(options: argparse.Namespace) -> int:
         from shipdrag_ros.node.rehearsal import Rehearsal
     except ModuleNotFoundError as error:
         raise no_ros(error) from error
+    need(*REPORT_MODULES)
     output = Output()
     out: Path = options.out
     recordings = out / 'recordings'
@@ -156,7 +159,7 @@ def _sail(
     if node.is_running:
         raise node.failed(f'the node did not end within {_END_S:g} s of SIGINT')
     if not rehearsal.estimates:
-        raise node.failed('no estimate was heard')
+        raise node.failed('no estimate was received')
 
 
 class _Live:
@@ -230,7 +233,7 @@ class _Node:
 
 @contextmanager
 def _node(ship_file: Path, recordings: Path, log: Path) -> Iterator[_Node]:
-    # nothing leaves this machine, and no other ROS on it hears or is heard
+    # nothing leaves this machine, and no other ROS on it is received or receives
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
     os.environ['ROS_DOMAIN_ID'] = str(_FIRST_DOMAIN + os.getpid() % _DOMAINS)
     os.environ.pop('ROS_STATIC_PEERS', None)

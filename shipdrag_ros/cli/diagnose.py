@@ -30,12 +30,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     Add the arguments of the verb.
     """
     parser.description = (
-        'Hold coastdowns against the baseline of the ship file and name the effect that is '
+        'Compare coastdowns with the baseline of the ship file and name the effect that is '
         'missing: a name only where the data decide, the smallest set and what would decide '
         'where they cannot, "unknown" with a place where it is none of them. Coastdowns of all '
         'bags are taken together; effects of the earth are stated along the first one. Without '
         'a baseline a form of the resistance is fitted to the runs. In a record without a '
-        'coastdown the log is held against the way over ground, for which neither baseline nor '
+        'coastdown the log is compared with the way over ground, for which neither baseline nor '
         'ship file is needed.'
     )
     parser.add_argument(
@@ -145,6 +145,8 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     weighed = (*diagnosis_words.facts(found), *diagnosis_words.earlier(found))
     for line in (*weighed, *found.notes):
         output.say(line)
+    if found.question:
+        return
     output.heading('How probable')
     output.table(diagnosis_cells.probabilities(found))
     if found.effects:
@@ -153,6 +155,9 @@ def _show(output: Output, found: DiagnosisResult, ship: Ship | None) -> None:
     elif diagnosis_cells.sizes(found).rows:
         output.heading('How large, were it the one; sd is one standard deviation')
         output.table(diagnosis_cells.sizes(found))
+    if found.limits:
+        output.heading('Effects that are not named: how large they can be; sizes in SI')
+        output.table(diagnosis_cells.limits(found))
     if found.facts:
         output.heading('Facts that were given')
         output.table(diagnosis_cells.facts(found))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.ship import Ship
 
@@ -27,15 +27,23 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         }
         for each in found.candidates
     ]
-    if found.verdict is Verdict.UNKNOWN:
-        candidates.insert(0, {'names': ['unknown'], 'probability': found.unnamed, 'effects': []})
     return {
+        'question': found.question or None,
         'verdict': str(found.verdict),
         'effects': [_sized(effect) for effect in found.effects],
         'candidates': candidates,
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
         'advice': [asdict(each) for each in found.would_decide],
+        'limits': {
+            name: {
+                'parameter': each.parameter,
+                each.bound: each.value,
+                'would_be_named': each.would_be_named,
+                'percent_of_r': each.percent_of_r,
+            }
+            for name, each in found.limits.items()
+        },
         'where': None if found.where is None else asdict(found.where),
         'gap': {
             'before': _gap(found.before),

@@ -19,20 +19,24 @@ from shipdrag_ros import __version__
 from shipdrag_ros.cli.arguments import add_json
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
+from shipdrag_ros.imports import EXTRA_OF, pip_name
 
 BROKEN = 1
 _PAGE_PORT = 8088
 _LITTLE_BYTES = 2e9  # a week of three inputs at 10 Hz
 _SYNCHRONISED = Path('/run/systemd/timesync/synchronized')
 _NEEDED = (
-    *('numpy', 'scipy', 'numba', 'ruamel.yaml', 'matplotlib'),
-    *('mcap', 'isal', 'rosbags', 'pynmeagps'),
+    *('numpy', 'scipy', 'numba', 'ruamel.yaml', 'rich'),
+    *('mcap', 'isal', 'rosbags', 'pynmeagps', 'serial'),
 )
 _OPTIONAL = {  # module: what does not work without it
     'rclpy': 'node, demo, and watch over a running node',
     'starlette': 'watch',
     'uvicorn': 'watch',
-    'serial': 'node --nmea serial:...',
+    'matplotlib': 'reports, pictures and demo',
+    'nmea2000': 'logs of NMEA 2000',
+    'pymavlink': 'logs of ArduPilot',
+    'pyulog': 'logs of PX4',
     'distributed': 'fleet',
     'pyarrow': 'fleet and trend',
     's3fs': 'fleet over s3://',
@@ -156,7 +160,10 @@ def _packages() -> Iterator[CheckResult]:
         if _is_there(name):
             yield CheckResult(name, CheckState.FINE, 'there')
         else:
-            do = 'pip install .[ros], or source ROS 2 Jazzy' if name == 'rclpy' else 'make env'
+            extra = EXTRA_OF.get(name)
+            do = f'pip install {pip_name(extra)}' if extra else 'make env'
+            if name == 'rclpy':
+                do += ', or source ROS 2 Jazzy'
             yield CheckResult(name, CheckState.LOOK, f'missing; does not work: {without}', do)
 
 
@@ -177,8 +184,8 @@ def _discovery() -> CheckResult:
     return CheckResult(
         'ROS discovery',
         CheckState.FINE,
-        f'not set, domain {domain}: shipdrag node hears this machine alone',
-        'to hear the network: shipdrag node --network',
+        f'not set, domain {domain}: shipdrag node receives from this machine alone',
+        'to receive from the network: shipdrag node --network',
     )
 
 
@@ -189,7 +196,7 @@ def _compiled() -> CheckResult:
     if root is None:
         do = f'set {CACHE_DIR} to a folder that can be written'
         return CheckResult(
-            'compiled code', CheckState.LOOK, 'not kept: each start compiles anew', do
+            'compiled code', CheckState.LOOK, 'not kept: each start compiles again', do
         )
     modules = sum(each.is_dir() for each in root.iterdir())
     if not modules:

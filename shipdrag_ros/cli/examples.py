@@ -62,8 +62,8 @@ EXAMPLES = {
         'shipdrag recover damaged.mcap -o saved.mcap',
         'shipdrag recover damaged.mcap -o again.mcap --json recover.json',
     ),
-    **{study.verb: study.examples for _, study in found()},
 }
+EXAMPLES |= {study.verb: study.examples for _, study in found(frozenset(EXAMPLES))}
 
 
 def epilog(verb: str) -> str:

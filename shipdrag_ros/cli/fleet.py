@@ -114,7 +114,11 @@ def _show(output: Output, store: Path, report: Report) -> None:
     if report.removed:
         output.say(f'{report.removed} bag(s) have changed; their former rows are removed.')
     for twin in report.twins[:_SHOWN]:
-        output.say(f'{twin.bag!r} has the content of {twin.same_as!r} and is counted once')
+        other = ', with another ship or run file beside it, which is not used,'
+        output.say(
+            f'{twin.bag!r} has the content of {twin.same_as!r}{other * twin.differs} and is '
+            'counted once'
+        )
     for note in report.notes:
         output.say(note)
     if report.skipped:

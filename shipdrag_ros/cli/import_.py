@@ -5,17 +5,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from shipdrag_ros.cli.arguments import add_json
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing import formats
-from shipdrag_ros.importing.format import Format, Job, Option, best_of, head_of
-from shipdrag_ros.importing.join import import_joined
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.sources import formats
+from shipdrag_ros.sources.format import Format, Option, best_of, head_of
+from shipdrag_ros.sources.join import read_joined
+from shipdrag_ros.sources.log import new_bag
+from shipdrag_ros.sources.reading import job_of
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -112,12 +114,16 @@ def run(options: argparse.Namespace) -> int:
     attachments = {}
     if options.ship is not None:
         attachments['ship.yaml'] = Ship.load(options.ship).to_yaml()
-    parts = []
-    for source, each in zip(options.sources, chosen, strict=True):
-        own = {key: value for key, value in given.items() if key in _keys(each)}
-        parts.append((each, Job(source, options.out, own, attachments)))
-    with output.progress(f'reading {options.sources[0]}') as progress:
-        found = import_joined(parts, options.out, attachments, progress)
+    with (
+        new_bag(options.out, attachments) as bag,
+        output.progress(f'reading {options.sources[0]}') as progress,
+    ):
+        parts = [
+            (each, replace(job_of(each, source, given), progress=progress))
+            for source, each in zip(options.sources, chosen, strict=True)
+        ]
+        found = read_joined(parts)
+        found.log.copy_to(bag)
     for source, each, result in zip(options.sources, chosen, found.results, strict=True):
         output.log(f'{source}: {each.kind}')
         for understood in result.understood:

@@ -62,7 +62,7 @@ def _show(output: Output, about: BagInfo) -> None:
     output.table(Table(('', ''), tuple(rows)))
     output.table(
         Table(
-            ('topic', 'type', 'messages', 'rate [Hz]', 'heard as'),
+            ('topic', 'type', 'messages', 'rate [Hz]', 'read as'),
             tuple(
                 (
                     each.topic.topic,

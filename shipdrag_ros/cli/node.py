@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='append',
         default=[],
         metavar='SOURCE',
-        help='hear NMEA 0183 besides topics: udp://ADDRESS:PORT, tcp://HOST:PORT or '
+        help='receive NMEA 0183 beside topics: udp://ADDRESS:PORT, tcp://HOST:PORT or '
         'serial:DEVICE:BAUD; may be given several times',
     )
     parser.add_argument(

@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.bags.salvage import Recovery, recover
+from shipdrag_ros.bags.recover import Recovery, recover
 from shipdrag_ros.cli.arguments import add_json, bag, new_file
 from shipdrag_ros.cli.check import damage_table
 from shipdrag_ros.cli.output import Output

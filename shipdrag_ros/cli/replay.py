@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from shipdrag_ros.cli import replay_json, replay_text
+from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number
 from shipdrag_ros.cli.output import Output, json_text
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.imports import need
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.hulls import Ranking, rank
@@ -84,6 +86,7 @@ def run(options: argparse.Namespace) -> int:
     if options.parameters is not None:
         parameters = Parameters.load(options.parameters)
     if options.out is not None:
+        need(*REPORT_MODULES)
         options.out.mkdir(parents=True, exist_ok=True)
     window = None if options.window is None else tuple(options.window)
     results = [

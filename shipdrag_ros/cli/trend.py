@@ -15,10 +15,17 @@ from shipdrag_ros.cli.arguments import add_json, add_report, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
+from shipdrag_ros.imports import need
 from shipdrag_ros.library.trending import trends_of
 
 if TYPE_CHECKING:
     from shipdrag_ros.trend import ShipTrend
+
+
+_CLOSED: dict[str, str | bool | int | float | list[str]] = {
+    'enable_external_access': 'false',
+    'python_enable_replacements': 'false',
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--sql',
         metavar='QUERY',
-        help='put a question to the store instead; its tables are coastdowns and bags',
+        help='put a question to the store instead: runs (date, added percent, kN, USD), ships '
+        '(the ranking), coastdowns and bags (docs/trend.md)',
     )
     parser.add_argument(
         '--csv',
@@ -64,6 +72,7 @@ def run(options: argparse.Namespace) -> int:
     """
     Show the trend of each ship.
     """
+    need('pyarrow')
     output = Output(options.json)
     if options.sql is not None:
         _answer(output, options.store, options.sql)
@@ -119,6 +128,7 @@ def _show(output: Output, trends: Sequence[ShipTrend], skipped: Sequence[tuple[s
     else:
         output.heading('Which hull first')
         output.table(words.ranking(trends))
+        output.say(words.ranked_by(trends))
     for trend in trends:
         output.heading(trend.series.name)
         for line in words.lines(trend):
@@ -139,21 +149,46 @@ def _answer(output: Output, store: Path, query: str) -> None:
     import duckdb
 
     from shipdrag_ros.fleet.store import read_bags, read_coastdowns
+    from shipdrag_ros.trend.export import run_table, ship_table
 
-    with duckdb.connect(':memory:', config={'enable_external_access': 'false'}) as database:
-        database.register('coastdowns', read_coastdowns(store))
-        database.register('bags', read_bags(store))
+    trends, _ = trends_of(output, store)
+    tables = {
+        'runs': run_table(trends),
+        'ships': ship_table(trends),
+        'coastdowns': read_coastdowns(store),
+        'bags': read_bags(store),
+    }
+    with duckdb.connect(':memory:', config=_CLOSED) as database:
+        for name, table in tables.items():
+            database.register(name, table)
         try:
-            found = database.execute(query)
-            columns = tuple(each[0] for each in found.description or ())
-            rows = found.fetchall()
+            database.execute("SET TimeZone = 'UTC'")
+            # as Arrow: a time with a zone needs no further package
+            found = database.sql(query)
+            answer = None if found is None else found.to_arrow_table()
         except duckdb.Error as error:
+            known = '; '.join(
+                f'{name} ({", ".join(table.column_names)})' for name, table in tables.items()
+            )
             raise FleetError(
-                f'the question cannot be answered: {error}; the tables are coastdowns and bags'
+                f'the question cannot be answered: {error}; the tables are {known}'
             ) from error
+    if answer is None:
+        raise FleetError('--sql: that is no question; begin with SELECT')
+    columns = tuple(answer.column_names)
+    rows = [tuple(row) for row in zip(*(column.to_pylist() for column in answer.columns))]
     output.table(Table(columns, tuple(tuple(_cell(value) for value in row) for row in rows)))
-    output.json({'columns': list(columns), 'rows': [list(row) for row in rows]})
+    output.json(
+        {'columns': list(columns), 'rows': [[_plain(cell) for cell in row] for row in rows]}
+    )
 
 
 def _cell(value: object) -> str:
     return '-' if value is None else f'{value:.6g}' if isinstance(value, float) else f'{value}'
+
+
+def _plain(value: object) -> object:
+    """Return what JSON can hold: dates, decimals and the like as text."""
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
+    return value if value is None or isinstance(value, str | int | float) else str(value)

@@ -62,6 +62,9 @@ def _ship(trend: ShipTrend) -> dict[str, Any]:
             }
             for event in trend.events
         ],
+        'costs': None
+        if trend.costs is None
+        else {name: _value(figure) for name, figure in vars(trend.costs).items()},
         'cleaning_pays_from': None if cleaning is None else display.day(cleaning),
         'scatter': trend.scatter,
         'rank': trend.rank,

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from shipdrag_ros.display import short_repr
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 
@@ -15,6 +16,8 @@ BRAKED = (
     'from the rest alone'
 )
 """What is said of a coastdown that is `braked`."""
+TURNED = 'the ship turned in a part of it; r(v) is from the rest alone'
+"""What is said of a coastdown that is `turned`."""
 
 
 class State(Enum):
@@ -122,6 +125,8 @@ class EndedCoastdown:
     [m/s].
     """
 
+    __repr__ = short_repr
+
     start_ns: int
     end_ns: int
     onset_detected_ns: int | None
@@ -144,6 +149,17 @@ class EndedCoastdown:
         return self.ended_by is EndedBy.BRAKE or any(
             cut.reason is Dismissal.BRAKE for cut in self.cuts
         )
+
+    @property
+    def turned(self) -> bool:
+        """Whether a turn ended it, or was cut from it."""
+        turns = (Dismissal.TURN, Dismissal.RUDDER)
+        return self.ended_by is EndedBy.TURN or any(cut.reason in turns for cut in self.cuts)
+
+    @property
+    def disturbed(self) -> str:
+        """What but the water acted in a part of it, a clause; '' where nothing did."""
+        return BRAKED if self.braked else TURNED if self.turned else ''
 
     @property
     def cut_at_start(self) -> bool:

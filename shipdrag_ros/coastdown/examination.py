@@ -129,6 +129,29 @@ def estimate_examined(
     )
 
 
+def estimate_kept(
+    window: Window,
+    cuts: tuple[NotCoastdown, ...],
+    ship: Ship,
+    parameters: Parameters,
+    estimator: Callable[[Window, Ship, Parameters], Estimate],
+) -> Examined:
+    """
+    Estimate r(v) from a window that the regimes have chosen already.
+
+    Parameters
+    ----------
+    cuts
+        What lies about it and is no coastdown.
+    """
+    estimate, failure = None, None
+    try:
+        estimate = estimator(window, ship, parameters)
+    except EstimationError as error:
+        failure = str(error)
+    return Examined(window.start_ns, window.end_ns, cuts, estimate, failure, False, ())
+
+
 def _shown(window: Window) -> tuple[tuple[int, float], ...]:
     """Return the speed of a whole window, for a picture."""
     time_s, speed = binned(*readings(window), _SHOWN)

@@ -10,6 +10,7 @@ before the last `history_ns` of it.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,17 +33,23 @@ from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_he
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
 from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
+from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
-from shipdrag_ros.coastdown.running import RunningCoastdown, WindowEstimator
+from shipdrag_ros.coastdown.running import Chosen, RunningCoastdown
 from shipdrag_ros.coastdown.shafts import Drive
 from shipdrag_ros.coastdown.steadiness import Slopes
 from shipdrag_ros.coastdown.tracking import HEADING_BEFORE_S, mean_heading
 from shipdrag_ros.coastdown.unit_ratios import unit_doubts
 from shipdrag_ros.coastdown.validate import NEVER, Limits, alive_ns, clock_set
 from shipdrag_ros.estimation import Window, estimate, estimate_final
+from shipdrag_ros.estimation.estimator import WindowEstimator
+from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS, Block
 from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:
+    from shipdrag_ros.coastdown.regimes.watch import Dated, RegimeFilter
 
 
 class Monitor:
@@ -56,8 +63,8 @@ class Monitor:
     parameters
         All of them matter.
     estimate
-        The estimator; raises `EstimationError` where none is possible. None: there are no
-        estimates while a coastdown runs.
+        The estimator; what it raises is a failure with words. None: there are no estimates
+        while a coastdown runs.
     final
         An estimator of a coastdown that has ended, with the record before it.
 
@@ -94,8 +101,8 @@ class Monitor:
     ) -> None:
         self._ship = ship
         self._parameters = parameters
-        self._estimator = estimate
-        self._final_estimator = final
+        self._estimator = None if estimate is None else shielded(estimate)
+        self._final_estimator = shielded(final)
         slopes = Slopes.of(parameters)
         self._tuning = Tuning(
             Limits.of(parameters),
@@ -110,6 +117,8 @@ class Monitor:
         self._history_ns = round(parameters.window_s * SECOND_NS) + self._seconds * SECOND_NS
         self._candidate: OnsetCandidate | None = None
         self._running: RunningCoastdown | None = None
+        self._regimes: RegimeFilter | None = None
+        self._reported_s = -np.inf  # until when glides were reported
         self._dismissals = Dismissals(round(parameters.steady_s * SECOND_NS))
 
     @property
@@ -270,6 +279,14 @@ class Monitor:
         source = int(watch.seen_source[0])
         watch.source[0] = source
         seen = OnsetCandidate(source, number, Drive(), noticed).knowing(self._memory.steadiness)
+        if self._parameters.regimes == 'filter':
+            # compiled for whoever asks for it alone: that takes a while
+            from shipdrag_ros.coastdown.regimes.watch import RegimeFilter
+
+            width = RegimeFilter.width(self._parameters.slope_window_s)
+            self._regimes = RegimeFilter(bins, self._ship, width, number)
+            self._candidate, self._reported_s = seen, -np.inf
+            return
         self._candidate = propose(bins, self._tuning, seen, number)
 
     def _judge(self) -> list[Event]:
@@ -277,6 +294,8 @@ class Monitor:
         bins, steadiness = self._memory.bins, self._memory.steadiness
         tuning, parameters = self._tuning, self._parameters
         number = int(bins.filling[self._candidate.source])
+        if self._regimes is not None:
+            return self._follow(self._regimes, number)
         if self._running is not None:
             end = end_of(self._candidate, bins, tuning, parameters, number)
             return [] if end is None else self._end_at(end, (end.last + 1) * SECOND_NS)
@@ -294,6 +313,80 @@ class Monitor:
         if found.decision is OnsetDecision.CONFIRMED:
             return [self._begin(self._candidate, number)]
         return []
+
+    # the same by the regimes
+
+    def _follow(self, regimes: RegimeFilter, number: int) -> list[Event]:
+        """Let the filter take what has come up to a second."""
+        events: list[Event] = []
+        while self._regimes is regimes and regimes.advance(self._memory.bins, number):
+            events += self._decide(regimes, number)
+        return events
+
+    def _decide(self, regimes: RegimeFilter, number: int) -> list[Event]:
+        announce, again = (float(each) for each in numbers.ANNOUNCE)
+        slow = regimes.slow < self._tuning.speed_min
+        if self._running is not None:
+            if not slow and regimes.gliding > again:
+                return []
+            events = self._end_glide(regimes, EndedBy.SPEED if slow else None)
+            return events + (self._rest(regimes, number) if slow else [])
+        if slow or regimes.asleep:
+            return self._rest(regimes, number)
+        if regimes.gliding < announce:
+            return []
+        dated = self._unreported(regimes)
+        return [self._begin_glide(dated[-1], number)] if dated else []
+
+    def _unreported(self, regimes: RegimeFilter) -> list[Dated]:
+        return [each for each in regimes.glides() if each.begin_s >= self._reported_s]
+
+    def _begin_glide(self, dated: Dated, number: int) -> Onset:
+        assert self._candidate is not None
+        candidate = replace(self._candidate, start=max(int(dated.begin_s), 1))
+        return self._begin(candidate, number)
+
+    def _end_glide(self, regimes: RegimeFilter, ended_by: EndedBy | None) -> list[Event]:
+        """End the coastdown that runs, as the histories have it now."""
+        assert self._running is not None
+        start_ns = self._running.onset.start_ns
+        after_s = start_ns / SECOND_NS - 0.5 * self._parameters.confirm_s
+        dated = [each for each in self._unreported(regimes) if each.end_s > after_s]
+        if not dated:
+            reason, text = regimes.dismissal()
+            end_ns = max(start_ns, int(self._memory.watch.seen[0]) * SECOND_NS)
+            events = self._running.end(
+                ended_by or EndedBy.ENGINE, end_ns, Doubt(reason, text), self._final_estimator
+            )
+        else:
+            one = dated[-1]
+            cause = ended_by or regimes.ended_by(one.after)
+            events = self._running.end(
+                cause, round(one.end_s * SECOND_NS), None, self._final_estimator, _chosen(one)
+            )
+            self._reported_s = one.end_s
+        self._running = None
+        self._memory.watch.update_ns[0] = ALWAYS
+        return events
+
+    def _rest(self, regimes: RegimeFilter, number: int) -> list[Event]:
+        """Report what was never announced, say what it was if nothing, and sleep."""
+        assert self._candidate is not None
+        events: list[Event] = []
+        dated = self._unreported(regimes)
+        for one in dated:
+            events.append(self._begin_glide(one, number))
+            assert self._running is not None
+            end_ns = round(one.end_s * SECOND_NS)
+            cause = regimes.ended_by(one.after) if one.after >= 0 else EndedBy.SPEED
+            events += self._running.end(cause, end_ns, None, self._final_estimator, _chosen(one))
+            self._running = None
+        if not dated and self._reported_s < 0.0 and regimes.doubted:
+            reason, text = regimes.dismissal()
+            start_ns, end_ns = self._candidate.start * SECOND_NS, (number + 1) * SECOND_NS
+            events += self._dismissals.take(NotCoastdown(start_ns, end_ns, reason, text))
+        self._stand_down()
+        return events
 
     def _dismiss(self, doubt: Doubt | None, end_ns: int) -> list[Event]:
         """Give a candidate up and say why."""
@@ -361,7 +454,11 @@ class Monitor:
             self._stand_down()
             return events
         end_ns = int(self._memory.guard.last_ns[self._candidate.source])
-        if self._running is not None:
+        if self._regimes is not None:
+            if self._running is not None:
+                events += self._end_glide(self._regimes, ended_by)
+            events += self._rest(self._regimes, end_ns // SECOND_NS)
+        elif self._running is not None:
             events += self._end_at(End(ended_by, end_ns // SECOND_NS - 1), end_ns)
         elif self._candidate.noticed:
             age_s = end_ns // SECOND_NS - self._candidate.start
@@ -394,4 +491,17 @@ class Monitor:
                 watch.held[:] = self._candidate.limits
             if not driven:
                 watch.armed[1] = 0
-        self._candidate = self._running = None
+        self._candidate = self._running = self._regimes = None
+
+
+def _chosen(dated: Dated) -> Chosen:
+    """Return where a glide begins, and the run-down before it if it was a long one."""
+    start_ns = round(dated.begin_s * SECOND_NS)
+    if not dated.slow_s:
+        return Chosen(start_ns, ())
+    text = (
+        f'the thrust ran down for {dated.slow_s:.0f} s, and was gone at the start '
+        f'± {dated.begin_sd_s:.0f} s'
+    )
+    first_ns = start_ns - round(dated.slow_s * SECOND_NS)
+    return Chosen(start_ns, (NotCoastdown(first_ns, start_ns, Dismissal.THRUST, text),))

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 from shipdrag_ros.coastdown.events import (
     EndedBy,
@@ -15,20 +16,27 @@ from shipdrag_ros.coastdown.events import (
     Onset,
     Update,
 )
-from shipdrag_ros.coastdown.examination import estimate_examined
+from shipdrag_ros.coastdown.examination import estimate_examined, estimate_kept
 from shipdrag_ros.coastdown.memory import ALWAYS
 from shipdrag_ros.coastdown.onset import Doubt
 from shipdrag_ros.coastdown.tracking import rep103_yaw
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
 
-WindowEstimator = Callable[[Window, Ship, Parameters], Estimate]
 CutWindow = Callable[[int, int, int], Window]
 """From its first and last stamp, and the first of the record before it [ns]."""
+
+
+class Chosen(NamedTuple):
+    """A start [ns] and the parts about it that are no coastdown, as the regimes have them."""
+
+    start_ns: int
+    cuts: tuple[NotCoastdown, ...]
 
 
 class RunningCoastdown:
@@ -88,7 +96,12 @@ class RunningCoastdown:
         return Update(stamp_ns, found)
 
     def end(
-        self, ended_by: EndedBy, end_ns: int, doubt: Doubt | None, estimator: WindowEstimator
+        self,
+        ended_by: EndedBy,
+        end_ns: int,
+        doubt: Doubt | None,
+        estimator: WindowEstimator,
+        chosen: Chosen | None = None,
     ) -> list[Event]:
         """
         Say what it was, as a whole.
@@ -101,13 +114,23 @@ class RunningCoastdown:
             Why it was none after all.
         estimator
             Of whole coastdowns.
+        chosen
+            What the regimes say of it; None: the rules examine it.
         """
         start_ns, final, failure = self.onset.start_ns, None, None
         cuts: tuple[NotCoastdown, ...] = ()
         stretch: tuple[tuple[int, float], ...] = ()
         if doubt is None:
-            window = self._window(end_ns)
-            found = estimate_examined(window, self._ship, self._parameters, estimator)
+            if chosen is None:
+                window = self._window(end_ns)
+                found = estimate_examined(window, self._ship, self._parameters, estimator)
+            else:
+                before_ns = round(self._parameters.steady_s * SECOND_NS)
+                window = self._cut(
+                    chosen.start_ns, end_ns, chosen.start_ns - before_ns * (not chosen.cuts)
+                )
+                start_ns = chosen.start_ns
+                found = estimate_kept(window, chosen.cuts, self._ship, self._parameters, estimator)
             cuts, final, failure, end_ns = found.cuts, found.estimate, found.failure, found.end_ns
             stretch = found.stretch
             if found.start_ns != window.start_ns:  # later too where an old part has rolled out

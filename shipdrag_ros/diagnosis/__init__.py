@@ -14,11 +14,11 @@ from shipdrag_ros.diagnosis.result import (
     EffectEstimate,
     Gap,
     RunTrace,
-    Verdict,
     Where,
 )
 from shipdrag_ros.diagnosis.sailing import diagnose_sailing
 from shipdrag_ros.diagnosis.speeds import CoastRun
+from shipdrag_ros.inference.decision import Verdict
 
 __all__ = [
     'FORCE',

@@ -21,18 +21,17 @@ from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.outcomes import (
     PredictedOutcome,
-    Rival,
     empty,
     of_another_run,
     of_instrument,
     probability_of_naming,
     with_known,
 )
-from shipdrag_ros.diagnosis.posterior import CERTAIN, UNNAMED, Posterior
-from shipdrag_ros.diagnosis.result import Advice, Candidate, Verdict
-from shipdrag_ros.diagnosis.verdict import decide
+from shipdrag_ros.diagnosis.posterior import Posterior
+from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.inference.decision import CERTAIN, UNKNOWN, Verdict, WeighedHypothesis, decide
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
@@ -85,13 +84,11 @@ def advice(
     Notes
     -----
     The probability is that something is named after the measurement, averaged over
-    what may be the truth; None where it is not simulated. Among the rivals are pairs
-    whose Bayes factor is below 10 as yet, which a measurement may bring up.
+    what may be the truth; None where it is not simulated.
     """
     fits = _rivals(posterior)
-    rivals = [
-        Rival(names, one.log_evidence, one.hypothesis.log_odds) for names, one in fits.items()
-    ]
+    # the evidence of a fit holds the prior
+    rivals = [WeighedHypothesis(names, one.log_evidence, 0.0) for names, one in fits.items()]
     found: list[Advice] = []
     tried = (*_RUNS, *_INSTRUMENTS)
     for done, measure in enumerate(tried):
@@ -125,8 +122,7 @@ def _facts(model: CoastModel, posterior: Posterior) -> dict[str, float]:
         return {}
 
     def names_one(after: Posterior) -> bool:
-        verdict, _ = decide(after, lacking=False, inseparable=model.inseparable)
-        return verdict is Verdict.NAMED
+        return decide(after.probability, model.inseparable).verdict is Verdict.NAMED
 
     found = model.facts.naming(posterior, names_one)
     return {name: named for name, named in found.items() if named >= _HARDLY}
@@ -167,6 +163,8 @@ def declared(candidates: Sequence[Candidate]) -> tuple[Advice, ...]:
 
 def _discriminating(one: Candidate, other: Candidate) -> list[Measure]:
     """Return what separates two candidates, by what they do not share."""
+    if UNKNOWN in (one.names, other.names):
+        return []
     own, others = set(one.names) - set(other.names), set(other.names) - set(one.names)
     return [
         measure
@@ -198,14 +196,14 @@ def _reach(
 
 
 def _rivals(posterior: Posterior) -> dict[tuple[str, ...], Fit]:
-    """Return the most probable fits, asked for or not, nothing and something unnamed too."""
+    """Return the most probable fits, nothing and something unnamed too."""
     # one that could not be fitted is none
     fitted = [names for names, one in posterior.best.items() if np.isfinite(one.covariance).all()]
     fitted.sort(key=lambda names: -posterior.best[names].log_evidence)
     return {
         names: posterior.best[names]
         for place, names in enumerate(fitted)
-        if place < _MOST or names in ((), UNNAMED)
+        if place < _MOST or names in ((), UNKNOWN)
     }
 
 

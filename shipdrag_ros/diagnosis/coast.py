@@ -91,7 +91,14 @@ class CoastModel(CoastSimulation):
         )
         scatter = self.ship.baseline.run_scatter
         places = tuple(
-            RunNuisance(j, run.heading_sd_rad, run.stop_sd_s, run.across is not None, scatter)
+            RunNuisance(
+                j,
+                run.heading_sd_rad,
+                run.stop_sd_s,
+                run.across is not None,
+                scatter,
+                stop_s=-run.stop_moved_s,
+            )
             for j, run in enumerate(self.seen)
         )
         given: list[Term] = [

@@ -257,6 +257,8 @@ class RunNuisance:
         Of the resistance from run to run, relative.
     fall_sd
         Of thrust beside an exponential fall, relative to the steady one.
+    stop_s
+        Where the stop was taken for at first, after where the run was seen to begin.
 
     Notes
     -----
@@ -272,6 +274,7 @@ class RunNuisance:
     has_positions: bool
     scatter: float = 0.0
     fall_sd: float = _FALL_SD
+    stop_s: float = 0.0
     place_of_stop: ClassVar[int] = 3  # among the unknowns
     one_size: ClassVar[Sequence[int]] = ()
 
@@ -284,7 +287,7 @@ class RunNuisance:
             free('ahead', place),
             free('to port', place),
             free('heading', normal(self.heading_sd_rad)),
-            free('stop', normal(self.stop_sd_s)),
+            free('stop', normal(self.stop_sd_s, mean=self.stop_s)),
             free('factor', normal(self.scatter)),
             free('log late', normal(_CLOCKS_SD_S if self.has_positions else 0.0)),
             *(free(f'fall {k}', normal(self.fall_sd)) for k in range(_FALLS)),

@@ -33,6 +33,9 @@ _SHAFT_SD, _SHAFT_OFF_SD = 0.03, 0.05  # of the steady shaft speed, each bin and
 _TURNS = 0.05  # of the shaft speed under power: a shaft that is slower stands
 _STANDS_SD = 2.0  # standard deviations by which a free propeller that stands is odd
 _FALL_RUN_DOWNS = 8.0  # after the stop; from then on the shaft speaks of the propeller
+_SHORTEST_S = 0.1  # fall of a shaft
+# of the logarithm: thrust is gone before or after its shaft stands, by the propeller and engine
+_RUN_DOWN_SD = 0.6
 
 
 @dataclass(frozen=True)
@@ -70,13 +73,15 @@ class Context:
     value : (c,)
         Air ahead and to port [m/s], logarithm of the depth in draughts, shaft
         speed over the steady one, whether it stands, yaw from the first heading
-        [rad].
+        [rad], and the logarithm of the time constant of the shaft's fall [s].
     whitener : (c, c)
         Lower triangular.
     at_wind, at_shaft, at_yaw
         Times of the observation that rows are nearest to.
     draught_m
         None where there is no row of depth.
+    run_down_s
+        Of the thrust as the ship file states it; None where there is no row of the fall.
     turns
         Whether the water is seen to turn the shaft.
     """
@@ -89,6 +94,7 @@ class Context:
     at_yaw: NDArray[np.intp]
     draught_m: float | None
     turns: bool
+    run_down_s: float | None = None
 
     @classmethod
     def of(cls, window: Window, ship: Ship, times: Float64, stop: Stop) -> Context:
@@ -129,6 +135,10 @@ class Context:
             blocks.append(np.eye(1))
         values.append(np.angle(np.exp(1j * (yaw[:, 0] - stop.heading_rad))))
         blocks.append(np.eye(len(yaw)) * _YAW_SD_RAD**2)
+        run_down_s = ship.propulsion.run_down_s if ship.propulsion and stop.shaft_s else None
+        if run_down_s is not None:
+            values.append(np.log([stop.shaft_s]))
+            blocks.append(np.array([[_RUN_DOWN_SD**2]]))
         last = len(times) - 1
         return cls(
             stop,
@@ -139,6 +149,7 @@ class Context:
             np.searchsorted(times, yaw_s).clip(max=last),
             draught_m,
             turns,
+            run_down_s,
         )
 
     def __len__(self) -> int:
@@ -175,7 +186,18 @@ class Context:
         for i, action in enumerate(actions):
             for turn in action.turns:
                 yaw[i] += turn.turned_rad(after)
-        return np.concatenate([*parts, yaw], axis=1)
+        parts.append(yaw)
+        if self.run_down_s is not None:
+            parts.append(np.array([[self._log_fall(self.run_down_s, each)] for each in actions]))
+        return np.concatenate(parts, axis=1)
+
+    @staticmethod
+    def _log_fall(run_down_s: float, action: Action) -> float:
+        """Return the logarithm of the time constant of the shaft's fall."""
+        fraction = action.residual_fraction
+        own = max(run_down_s + action.run_down_change_s, 0.0)
+        fall_s = (1.0 - fraction) * own + fraction * action.residual_decay_s
+        return math.log(max(fall_s, _SHORTEST_S))
 
     def _shafts(self, columns: Columns, actions: Sequence[Action]) -> list[Float64]:
         """Return shaft speeds over the steady one, and how odd it is that the shaft stands."""

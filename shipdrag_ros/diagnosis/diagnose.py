@@ -13,6 +13,7 @@ from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
+from shipdrag_ros.diagnosis.limits import limits_of
 from shipdrag_ros.diagnosis.nameless import with_nameless
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import (
@@ -21,22 +22,20 @@ from shipdrag_ros.diagnosis.result import (
     Advice,
     DiagnosisResult,
     EffectEstimate,
-    Verdict,
     Where,
 )
-from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
+from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs, with_unnamed
 from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.speeds import CoastRun
-from shipdrag_ros.diagnosis.swinging import swing_notes, swinging, with_swinging
-from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop
+from shipdrag_ros.diagnosis.swinging import swing_notes, with_swinging
+from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
+from shipdrag_ros.inference.decision import UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
-from shipdrag_ros.simulation.effect import Scope
-from shipdrag_ros.simulation.effects import find
 
 _NEAR_S = 4.0  # by which a stop may be moved without seeing the run anew
 _LOOKS = 3  # at a run
@@ -114,30 +113,41 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    model, found, stated, notes = _searched(runs, ship, parameters, facts, earlier, progress)
+    still = {run.name: 0.0 for run in runs}
+    seen, notes = _observed(runs, ship, parameters, still, progress)
+    questions = [
+        f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
+    ]
+    if questions:
+        return waiting(
+            '; '.join(questions),
+            baseline='stated',
+            notes=notes,
+            coastdowns_used=len(seen),
+            runs=_seen_runs(seen),
+        )
+    model, found, stated, notes = _searched(
+        (seen, notes), runs, ship, parameters, facts, earlier, progress
+    )
     seen = model.seen
     found = with_swinging(found, model)
     found = with_pairs(with_differing(found, model), progress=progress)
     found = with_nameless(found, model)
-    best = found.best
-    predicted = held_out(model, best) if found.alarm else None
-    # an instrument that errs before the stop has taught the noise what it should have shown
-    distrusted = any(run.log_ground_discrepancy for run in seen) and not _of_the_ship(found)
-    swings = swinging(model, best) if found.alarm else None
-    besides = () if swings is None else (swings,)
-    judged = judge(found, held_out=predicted, distrusted=distrusted, besides=besides)
+    found = with_unnamed(found)
+    best, judged = found.best, judge(found)
+    predicted = held_out(model, best) if judged.missing else None
     would_decide: tuple[Advice, ...] = ()
     if advise and judged.verdict is Verdict.ONE_OF:
         would_decide = advice(model, judged.posterior, judged.candidates, progress)
     as_stated = frozen(model)
     explained = best if judged.missing else found.nothing
     if judged.verdict is Verdict.UNKNOWN:
-        explained = max((*found.smooth, *besides), key=lambda one: one.log_likelihood)
+        explained = found.posterior.best[UNKNOWN]
         notes = (*notes, *swing_notes(explained, model))
     differ = runs_differ(found) if judged.missing else ()
     place: Where | None = None
     if judged.verdict is not Verdict.NONE:
-        place = _before_the_stop(seen) if distrusted else where(model, as_stated, found.smooth)
+        place = where(model, as_stated, found.smooth)
     if place is not None and differ:  # a smooth error alike in all runs would pass for the log's
         place = replace(place, channel=FORCE)
     return judged.diagnosis(
@@ -146,7 +156,7 @@ def diagnose(
         before=gap_of(model, as_stated.best),
         after=gap_of(model, best.best) if judged.missing else None,
         held_out_before=held_out(model, None),
-        held_out_after=predicted if judged.missing else None,
+        held_out_after=predicted,
         baseline='stated',
         notes=notes,
         traces=traces(model, as_stated.best, explained.best),
@@ -156,10 +166,12 @@ def diagnose(
         runs_differ=differ,
         runs=_seen_runs(seen),
         earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
+        limits=limits_of(found, model, [effect.name for effect in judged.effects]),
     )
 
 
 def _searched(
+    first: tuple[tuple[Observation, ...], tuple[str, ...]],
     runs: Sequence[CoastRun],
     ship: Ship,
     parameters: Parameters,
@@ -170,7 +182,11 @@ def _searched(
     """Search, and see the runs anew where that moves their stops; notes on them besides."""
     moved_s = {run.name: 0.0 for run in runs}
     for _ in range(_LOOKS):
-        seen, notes = _observed(runs, ship, parameters, moved_s, progress)
+        seen, notes = (
+            _observed(runs, ship, parameters, moved_s, progress)
+            if any(moved_s.values())
+            else first
+        )
         stated = _stated(runs, seen, ship, facts)
         before = carried(earlier, ship, _seen_runs(seen), stated)
         model = CoastModel(ship, seen, seen[0].heading_rad, stated, before)
@@ -236,8 +252,13 @@ def _observed(
     if not seen:
         name, reason = next(iter(refused.items()))
         raise type(reason)(f'{name}: {reason}')
-    notes = [f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))]
-    notes += [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes = [f'left out: {name}: {why}' for name, why in refused.items()]
+    notes += [
+        f'{run.name}: the shaft ran down in {run.context.stop.shaft_s:.2g} s, where the ship file '
+        f'says {ship.propulsion.run_down_s:.2g} ± {2.0 * ship.propulsion.sd:.2g} s'
+        for run in seen
+        if ship.propulsion is not None and run.context.stop.shaft_s > 0.0
+    ]
     notes += [
         f'{run.name}: log and way over ground wander apart by {run.along.water_m_s:.2f} m/s (one '
         'standard deviation) before the stop, as water seldom makes them; one of them is wrong, '
@@ -246,20 +267,6 @@ def _observed(
         if run.log_ground_discrepancy
     ]
     return tuple(seen), tuple(notes)
-
-
-def _of_the_ship(found: SearchResult) -> bool:
-    """Say whether what is missing acts on the ship, whatever water and instruments do."""
-    names = found.best.hypothesis.names
-    return bool(names) and {find(name).scope for name in names} <= {Scope.HULL, Scope.RUN}
-
-
-def _before_the_stop(seen: Sequence[Observation]) -> Where:
-    """Return that log and way over ground disagree before the stop already."""
-    runs = [run for run in seen if run.log_ground_discrepancy]
-    speeds = [run.speed_m_s for run in runs]
-    lead_in_s = max(run.lead_in_s for run in runs)
-    return Where('log_radar', (-lead_in_s, 0.0), (min(speeds), max(speeds)))
 
 
 def with_effects(ship: Ship, effects: Sequence[EffectEstimate]) -> Ship:

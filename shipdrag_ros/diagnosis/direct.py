@@ -20,9 +20,10 @@ from scipy.optimize import minimize
 from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Model
-from shipdrag_ros.diagnosis.result import DiagnosisResult, Gap, Verdict, Where
+from shipdrag_ros.diagnosis.result import DiagnosisResult, Gap, Where
 from shipdrag_ros.diagnosis.terms import trial_z
 from shipdrag_ros.diagnosis.verdict import Judgement
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.samples import Float64
 
 _STEP_Z = 1e-3

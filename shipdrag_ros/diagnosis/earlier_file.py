@@ -84,8 +84,8 @@ def _diagnosis(document: Any, name: str) -> EarlierDiagnosis:
         given = _mapping(each, place)
         if given.get('used') is True:
             before += _runs(given.get('runs'), f'{place}.runs')
-    candidates = _candidates(whole.get('candidates'))
     of_force = whole.get('baseline') == 'stated'
+    candidates = _candidates(whole.get('candidates'), all_sized=of_force)
     return EarlierDiagnosis(
         name, called, length_m, runs, tuple(before), candidates, of_force, stated
     )
@@ -102,9 +102,10 @@ def _runs(value: Any, path: str) -> tuple[SeenRun, ...]:
     return tuple(found)
 
 
-def _candidates(value: Any) -> tuple[EarlierCandidate, ...]:
+def _candidates(value: Any, *, all_sized: bool) -> tuple[EarlierCandidate, ...]:
     found = []
-    for i, each in enumerate(_list(value, 'candidates')):
+    listed = _list(value, 'candidates')
+    for i, each in enumerate(listed):
         place = f'candidates[{i}]'
         candidate = _mapping(each, place)
         probability = _number(candidate.get('probability'), f'{place}.probability', 0.0, 1.0)
@@ -113,12 +114,13 @@ def _candidates(value: Any) -> tuple[EarlierCandidate, ...]:
         if names == [_UNKNOWN]:
             continue
         named = set() if names == [_NOTHING] else set(map(str, names))
-        if not names or named != set(sizes):
+        # without a baseline, an effect that could not be seen has no size
+        if not names or ((sizes or all_sized) and named != set(sizes)):
             raise _Wrong(f'{place}: the names are {_shown(names)}, and the effects others')
         found.append(EarlierCandidate(probability, sizes))
     total = math.fsum(each.probability for each in found)
-    if not found or total > 1.0 + 1e-6:
-        raise _Wrong(f'candidates: {len(found)} of probability {total:g} in all')
+    if not listed or total > 1.0 + 1e-6:
+        raise _Wrong(f'candidates: {len(listed)} of probability {total:g} in all')
     return tuple(found)
 
 

@@ -14,9 +14,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from shipdrag_ros.diagnosis.model import Hypothesis
-from shipdrag_ros.diagnosis.posterior import UNNAMED, Posterior
+from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.terms import EffectTerm
+from shipdrag_ros.inference.decision import UNKNOWN
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
 from shipdrag_ros.simulation.effect import Effect
@@ -110,7 +111,7 @@ class Facts:
                     each.fact,
                     '' if each.run is None else runs[each.run],
                     math.fsum(shares.values()),
-                    () if against == UNNAMED else against,
+                    () if against == UNKNOWN else against,
                 )
             )
         return tuple(found)

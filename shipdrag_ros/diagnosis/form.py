@@ -25,7 +25,7 @@ from shipdrag_ros.diagnosis.direct import DirectModel, diagnosis_of_speeds, lear
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Part, start
 from shipdrag_ros.diagnosis.result import FORCE, DiagnosisResult, Where
-from shipdrag_ros.diagnosis.search import search
+from shipdrag_ros.diagnosis.search import search, with_unnamed
 from shipdrag_ros.diagnosis.speeds import CoastRun, MeanSpeeds
 from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
 from shipdrag_ros.diagnosis.verdict import Judgement, judge
@@ -142,6 +142,15 @@ class FormModel(DirectModel):
             and (self.by_log or effect.scope is not Scope.SENSOR)
         ]
         return tuple(sorted(shown, key=lambda effect: effect.scope is Scope.SENSOR))
+
+    @property
+    def unseen(self) -> tuple[Effect, ...]:
+        """Those of the hull that the fitted form has taken up."""
+        return tuple(
+            effect
+            for effect in LIBRARY.values()
+            if effect.scope is Scope.HULL and effect not in self.effects
+        )
 
     @cached_property
     def inseparable(self) -> tuple[frozenset[str], ...]:
@@ -278,8 +287,8 @@ def diagnose_fitted(runs: Sequence[CoastRun], ship: Ship) -> DiagnosisResult:
     """
     seen = [MeanSpeeds.of(run) for run in runs]
     model = FormModel.learnt(ship, seen)
-    found = search(model)
-    judged = judge(found)
+    found = with_unnamed(search(model))
+    judged = judge(found, {effect.name: effect.odds for effect in model.unseen})
     explained = found.best if judged.missing else found.nothing
     speeds = np.concatenate([coast.speed_m_s for coast in seen])
     times = np.concatenate([coast.time_s for coast in seen])

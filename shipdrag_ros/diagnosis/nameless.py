@@ -13,11 +13,8 @@ from dataclasses import replace
 from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, start
-from shipdrag_ros.diagnosis.posterior import QUIET
-from shipdrag_ros.diagnosis.search import SearchResult
+from shipdrag_ros.diagnosis.search import SearchResult, likely
 from shipdrag_ros.diagnosis.terms import EffectTerm
-
-_LIKELY = 0.05  # probability from which names are tried
 
 
 def with_nameless(found: SearchResult, model: CoastModel) -> SearchResult:
@@ -34,20 +31,13 @@ def with_nameless(found: SearchResult, model: CoastModel) -> SearchResult:
     Returns
     -------
     SearchResult
-        The same where nothing may be missing, or no effect of the kind is likely, alone or
-        with another.
+        The same where no effect of the kind is likely, alone or with another.
     """
-    posterior = found.posterior
-    if posterior.nothing >= QUIET:
+    tried = [made for one in likely(found.posterior) if (made := _nameless(model, one))]
+    if not tried:
         return found
-    tried = [
-        nameless
-        for names in posterior.named()
-        if posterior.probability[names] >= _LIKELY
-        and (nameless := _nameless(model, posterior.best[names]))
-    ]
     starts = [start(model, hypothesis, near.best) for hypothesis, near in tried]
-    fits = fit(model, [hypothesis for hypothesis, _ in tried], starts) if tried else []
+    fits = fit(model, [hypothesis for hypothesis, _ in tried], starts)
     return replace(found, fits=(*found.fits, *fits))
 
 

@@ -58,7 +58,7 @@ class Observation:
     stop_sd_s
         How well the time of the stop, at the end of the lead-in, is known.
     run_down_s, run_down_sd_s
-        Of the thrust.
+        Of the thrust: as the ship file states it, else as the shaft shows it.
     heading_rad, heading_sd_rad
         Direction through water in the lead-in, from east, anticlockwise.
     speed_m_s
@@ -70,6 +70,8 @@ class Observation:
         What is measured besides.
     ship
         As she was in this run, without effects.
+    stop_moved_s
+        By how much the end of the lead-in is later than the stop was taken for at first.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Observation:
     across: Measured | None
     context: Context
     ship: Ship
+    stop_moved_s: float = 0.0
 
     @property
     def duration_s(self) -> float:
@@ -171,8 +174,7 @@ class Observation:
             lead_in_s,
             times,
             run_down.stop_sd_s,
-            run_down.run_down_s,
-            run_down.run_down_sd_s,
+            *(_stated_run_down(ship) or (run_down.run_down_s, run_down.run_down_sd_s)),
             heading_rad,
             heading_sd,
             speed,
@@ -180,7 +182,13 @@ class Observation:
             noise.measured(across, times) if across else None,
             Context.of(window, ship, times, stop),
             replace(ship, effects=()),
+            stop_moved_s,
         )
+
+
+def _stated_run_down(ship: Ship) -> tuple[float, float] | None:
+    """Return the run-down of the thrust and its sd, where the ship file states it."""
+    return None if ship.propulsion is None else (ship.propulsion.run_down_s, ship.propulsion.sd)
 
 
 def _stopped(window: Window, run_down: RunDown, record: RunRows) -> RunDown:

@@ -22,16 +22,14 @@ from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.posterior import Posterior, prune_by_bayes_factor
-from shipdrag_ros.diagnosis.result import Verdict
 from shipdrag_ros.diagnosis.simulated import CoastSimulation
 from shipdrag_ros.diagnosis.terms import EffectTerm, scope_runs
-from shipdrag_ros.diagnosis.verdict import decide
+from shipdrag_ros.inference.decision import Verdict, decide, probabilities
+from shipdrag_ros.inference.decision import WeighedHypothesis as Rival
 from shipdrag_ros.samples import Float64
 
 _DRAWS = 300  # of all rivals, of each as many as it is probable
 _SEED = 0
-Names = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -81,25 +79,6 @@ class PredictedOutcome:
         squares = np.einsum('ai,ai->a', away, away)
         density: Float64 = 0.5 * (volume - squares + explained) + self.log_weight
         return density
-
-
-@dataclass(frozen=True)
-class Rival:
-    """
-    A hypothesis before a measurement.
-
-    Attributes
-    ----------
-    names
-    log_evidence
-        With the prior probability, less a constant that all rivals share.
-    log_odds
-        Of the names before the data, over nothing.
-    """
-
-    names: Names
-    log_evidence: float
-    log_odds: float
 
 
 def of_another_run(
@@ -259,7 +238,7 @@ def probability_of_naming(
     setting
         The way it is read where each rival is the truth.
     rivals
-        Nothing among them.
+        Each of other names.
     inseparable
         Effects that no record can separate.
 
@@ -269,11 +248,8 @@ def probability_of_naming(
         Averaged over the rivals by their probabilities; 300 draws of a fixed seed.
     """
     rng = np.random.default_rng(_SEED)
-    log_odds = {rival.names: rival.log_odds for rival in rivals}
-    probability = prune_by_bayes_factor(
-        {rival.names: rival.log_evidence for rival in rivals}, log_odds
-    )
-    share = np.array([probability.get(rival.names, 0.0) for rival in rivals])
+    probability = probabilities(rivals)
+    share = np.array([probability[rival.names] for rival in rivals])
     counts = np.diff(np.round(_DRAWS * np.concatenate([[0.0], np.cumsum(share)])).astype(int))
     named = 0
     for truth, (way, count) in enumerate(zip(setting, counts, strict=True)):
@@ -285,9 +261,10 @@ def probability_of_naming(
             for rival, ways in zip(rivals, settings[way], strict=True)
         ]
         for log in np.array(evidence).T.tolist():
-            after = prune_by_bayes_factor(dict(zip(log_odds, log, strict=True)), log_odds)
-            verdict, _ = decide(Posterior({}, after), lacking=False, inseparable=inseparable)
-            named += verdict is Verdict.NAMED
+            after = [
+                replace(rival, log_evidence=each) for rival, each in zip(rivals, log, strict=True)
+            ]
+            named += decide(probabilities(after), inseparable).verdict is Verdict.NAMED
     return named / int(counts.sum())
 
 

@@ -42,15 +42,16 @@ def write_diagnosis(
     """
     name = f' of {ship.name}' if ship is not None and ship.name else ''
     runs = ', '.join(trace.name for trace in found.traces)
-    sections = [
-        *_verdict(found, ship),
+    judged = [
         *_today(ship, found.estimates),
         *_sizes(found),
+        *_limits(found),
         _motions(found, ship),
         *_left(found, ship),
         _known(found, ship),
         _trust(score if found.baseline == 'stated' else None),
     ]
+    sections = [*_verdict(found, ship), *(() if found.question else judged)]
     write_page(
         path,
         f'What is missing in the model{name}',
@@ -68,10 +69,12 @@ def _verdict(found: DiagnosisResult, ship: Ship | None) -> Iterator[Section]:
         text=rest,
         pictures=[
             picture(
-                pictures.probability_picture(words.answers(found)),
+                pictures.probability_picture(answers),
                 'How probable each answer is. One long bar is a name; several of like length are '
                 'what these runs cannot separate.',
             )
+            for answers in (words.answers(found),)
+            if answers
         ],
     )
     if found.facts:
@@ -128,6 +131,18 @@ def _sizes(found: DiagnosisResult) -> Iterator[Section]:
         lines=[f'{each.name}: {each.formula}. Source: {each.source}.' for each in declared],
         tables=[('In SI; sd is one standard deviation', sizes)],
     )
+
+
+def _limits(found: DiagnosisResult) -> Iterator[Section]:
+    """Show what can be missing all the same."""
+    if not found.limits:
+        return
+    caption = (
+        'Each size is that of 19 in 20, given that the effect is there; from the next size on '
+        'nine of ten such runs would have named it. - : no size is named, as another effect '
+        'leaves the same trace'
+    )
+    yield Section('What can be there all the same', tables=[(caption, tables.limits(found))])
 
 
 def _motions(found: DiagnosisResult, ship: Ship | None) -> Section:

@@ -4,27 +4,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import StrEnum
+from dataclasses import dataclass, field
 
 from shipdrag_ros.diagnosis.seen_runs import DOUBTED, SeenRun, WeighedEarlier
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.inference.decision import CERTAIN, Verdict, smallest_set
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship.facts import Fact
 
 FORCE = 'force'  # on the ship, against her baseline
 LOG_TRACK = 'log_track'  # the log against the way over ground
-
-
-class Verdict(StrEnum):
-    """What is missing in the model."""
-
-    NONE = 'none'
-    NAMED = 'named'
-    ONE_OF = 'one_of'
-    UNKNOWN = 'unknown'
 
 
 @dataclass(frozen=True)
@@ -36,7 +27,7 @@ class EffectEstimate:
     ----------
     name
     probability
-        Of the hypothesis that it is part of.
+        Over all hypotheses that hold it; of a candidate, that of the candidate.
     parameters
         In their units.
     """
@@ -54,7 +45,7 @@ class Candidate:
     Attributes
     ----------
     names
-        Empty: nothing is missing.
+        Empty: nothing is missing; `UNKNOWN`: something without a name.
     probability
     effects
         The same with the sizes that they would have.
@@ -63,6 +54,32 @@ class Candidate:
     names: tuple[str, ...]
     probability: float
     effects: tuple[EffectEstimate, ...] = ()
+
+
+@dataclass(frozen=True)
+class Limit:
+    """
+    How large an effect that is not named can be.
+
+    Attributes
+    ----------
+    parameter
+        Name of its size.
+    bound
+        `upper_95`, or `lower_95` of one that is the stronger the smaller its parameter is.
+    value
+        The bound, of the absolute size, given that the effect is there.
+    would_be_named
+        Size from which nine of ten such runs name it; None: from none.
+    percent_of_r
+        Of the resistance that the run shows, at the bound.
+    """
+
+    parameter: str
+    bound: str
+    value: float
+    would_be_named: float | None
+    percent_of_r: float
 
 
 @dataclass(frozen=True)
@@ -238,8 +255,7 @@ class DiagnosisResult:
     effects
         Of `named`, otherwise empty.
     candidates
-        The smallest set that holds 99 %, most probable first; empty names:
-        nothing is missing.
+        The smallest set that holds 99 %, most probable first.
     nothing, unnamed
         Probabilities that nothing, and that something without a name is missing.
     would_decide
@@ -275,7 +291,13 @@ class DiagnosisResult:
         That it rests on.
     earlier
         Diagnoses of before that were given, with what of each counts.
+    limits
+        By name, of each effect that is not named.
+    question
+        That is to be answered before anything is judged, a sentence; '' for none.
     """
+
+    __repr__ = short_repr
 
     verdict: Verdict
     effects: tuple[EffectEstimate, ...]
@@ -300,6 +322,14 @@ class DiagnosisResult:
     estimates: tuple[Estimate, ...] = ()
     runs: tuple[SeenRun, ...] = ()
     earlier: tuple[WeighedEarlier, ...] = ()
+    question: str = ''
+    limits: Mapping[str, Limit] = field(default_factory=dict)
+
+    @property
+    def held(self) -> tuple[Candidate, ...]:
+        """The smallest set that holds 90 %, most probable first."""
+        probability = {each.names: each.probability for each in self.candidates}
+        return self.candidates[: len(smallest_set(probability, CERTAIN))]
 
     def summary(self) -> tuple[str, ...]:
         """

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -19,8 +18,8 @@ from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, left_text
 from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Where
 from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
-from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs
-from shipdrag_ros.diagnosis.units import asked
+from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs, with_unnamed
+from shipdrag_ros.diagnosis.units import asked, waiting
 from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
 from shipdrag_ros.errors import DiagnosisError
@@ -68,9 +67,10 @@ def diagnose_sailing(
         if still is None:
             raise
         return zeros_alone(still, why=str(error), no_coastdown=no_coastdown)
-    found = _diagnosed(legs, no_coastdown)
-    units = asked(float(np.median(legs.log_m_s / legs.ground_m_s)))
-    return with_zeros(replace(found, notes=(units, *found.notes)) if units else found, still)
+    question = asked(float(np.median(legs.log_m_s / legs.ground_m_s)))
+    if question:
+        return waiting(question, baseline='none', examined=(LOG_TRACK,), no_coastdown=no_coastdown)
+    return with_zeros(_diagnosed(legs, no_coastdown), still)
 
 
 def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
@@ -81,7 +81,7 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
     if outlier.any():
         legs = legs[np.flatnonzero(~outlier)]
         model = SailingModel.learnt(legs)
-    found = with_pairs(search(model))
+    found = with_unnamed(with_pairs(search(model)))
     judged = judge(found)
     return diagnosis_of_speeds(
         judged,

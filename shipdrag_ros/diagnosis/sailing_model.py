@@ -41,7 +41,7 @@ _EVALUATIONS = 400
 _SAILED = (Measure.OTHER_SPEED, Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE)
 # what log and track show acts alike on all ships, so that any will do
 _ANY_SHIP = Ship(
-    length_m=1.0, displaced_volume_m3=1.0, added_mass=ConstantAddedMass(value=0.0, sd=0.0)
+    length_m=10.0, displaced_volume_m3=10.0, added_mass=ConstantAddedMass(value=0.07, sd=0.0)
 )
 
 

@@ -10,6 +10,7 @@ takes hundreds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,8 +19,9 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.model import Hypothesis, Model, start
-from shipdrag_ros.diagnosis.posterior import QUIET, Posterior, mode_of, posterior_of
+from shipdrag_ros.diagnosis.posterior import Posterior, mode_of, posterior_of
 from shipdrag_ros.diagnosis.terms import EffectTerm, trial_z
+from shipdrag_ros.inference.limits import Sensitivity
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64
@@ -28,6 +30,8 @@ from shipdrag_ros.simulation.effects import find
 _PAIRED = 4  # most probable names that pairs are tried with
 _PAIRS = 12  # that are fitted
 _STARTS = 2  # of each hypothesis that are fitted
+_NEGLIGIBLE = math.log(1e-3)  # probability of a pair by its screening score
+_LIKELY = 0.05  # probability of names that may not explain all of what is missing
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 
 
@@ -56,26 +60,15 @@ class SearchResult:
 
     @property
     def smooth(self) -> tuple[Fit, ...]:
-        """Fits with something unnamed instead, one a channel."""
-        return tuple(one for one in self.fits if one.hypothesis.discrepancy)
+        """Fits with something unnamed and nothing else."""
+        return tuple(
+            one for one in self.fits if one.hypothesis.discrepancy and not one.hypothesis.names
+        )
 
     @property
     def best(self) -> Fit:
         """The most probable of what has a name, or is nothing."""
         return self.posterior.best[self.posterior.named()[0]]
-
-    @property
-    def alarm(self) -> bool:
-        """Whether something is missing, and has a name."""
-        return self.posterior.nothing < QUIET and bool(self.best.hypothesis.names)
-
-    def with_discrepancy(self) -> tuple[Fit, ...]:
-        """Return fits of something smooth besides the best, one a channel."""
-        model, best = self.model, self.best
-        if not best.hypothesis.names:
-            return self.smooth
-        more = [model.with_discrepancy(best.hypothesis, channel) for channel in model.channels]
-        return tuple(fit(model, more, [start(model, one, best.best) for one in more]))
 
 
 def search(model: Model, *, progress: Progress = silent) -> SearchResult:
@@ -106,10 +99,10 @@ def search(model: Model, *, progress: Progress = silent) -> SearchResult:
 
 def with_pairs(found: SearchResult, *, progress: Progress = silent) -> SearchResult:
     """
-    Fit pairs of effects besides, where something is missing.
+    Fit pairs of effects besides.
 
-    Pairs are of the most probable names with all others; confounders that nothing
-    separates are no pair.
+    Pairs are of the most probable names with all others, where the linear response says that they
+    may count; confounders that nothing separates are no pair.
 
     Parameters
     ----------
@@ -121,12 +114,47 @@ def with_pairs(found: SearchResult, *, progress: Progress = silent) -> SearchRes
     Returns
     -------
     SearchResult
-        The same where nothing may be missing.
     """
-    if found.posterior.nothing >= QUIET:
-        return found
     pairs = _pairs(found.model, found.posterior, progress)
-    return replace(found, fits=(*found.fits, *pairs))
+    return replace(found, fits=(*found.fits, *pairs)) if pairs else found
+
+
+def with_unnamed(found: SearchResult) -> SearchResult:
+    """
+    Fit likely names with something smooth besides, which has none.
+
+    Parameters
+    ----------
+    found
+        From `search`, with pairs where they are looked for.
+
+    Returns
+    -------
+    SearchResult
+        A name that leaves more than noise has such a rival.
+    """
+    model = found.model
+    tried = [
+        (model.with_discrepancy(base.hypothesis, channel), base)
+        for base in likely(found.posterior)
+        for channel in model.channels
+    ]
+    starts = [start(model, one, base.best) for one, base in tried]
+    fits = fit(model, [one for one, _ in tried], starts)
+    return replace(found, fits=(*found.fits, *fits))
+
+
+def likely(posterior: Posterior) -> list[Fit]:
+    """
+    Return the fits of likely names, most probable first.
+
+    Parameters
+    ----------
+    posterior
+        Of a search.
+    """
+    names = [names for names in posterior.named() if names]
+    return [posterior.best[each] for each in names if posterior.probability[each] >= _LIKELY]
 
 
 def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -> Float64:
@@ -146,20 +174,47 @@ def screening_score(model: Model, base: Fit, hypotheses: Sequence[Hypothesis]) -
     (hypotheses,)
         With the prior, less the constant that `Fit.log_evidence` leaves out.
     """
-    mean, precision = np.array([_amount(hypothesis.terms[-1]) for hypothesis in hypotheses]).T
-    responses = model.responses(base.best, hypotheses)
-    tables = np.hstack(base.best.tables)
-    matrix, _ = base.best.normal_equations
-    across = tables[1:] @ responses.T
-    given_way = np.linalg.lstsq(matrix, across, rcond=1e-13)[0]
-    own = np.einsum('ai,ai->a', responses, responses) - np.einsum('ia,ia->a', across, given_way)
-    own = np.maximum(own, 0.0) + precision
+    responses, known = sensitivity(model, base, hypotheses)
+    mean, precision = known.mean, known.precision
+    own = np.maximum(np.diag(known.information), 0.0) + precision
     # at the best fit of the base the residual is as good as square to all that it has
-    negative_gradient = responses @ tables[0] + precision * mean
+    residual = np.hstack(base.best.tables)[0]
+    negative_gradient = responses @ residual + precision * mean
     gain = 0.5 * (negative_gradient**2 / own - precision * mean**2) - 0.5 * np.log(own / precision)
     log_prior = np.array([hypothesis.log_prior for hypothesis in hypotheses])
     found: Float64 = base.log_likelihood + gain + log_prior
     return found
+
+
+def sensitivity(
+    model: Model, base: Fit, hypotheses: Sequence[Hypothesis]
+) -> tuple[Float64, Sensitivity]:
+    """
+    Return what a record says of one effect more, in parts of the size that is tried.
+
+    Parameters
+    ----------
+    model
+    base
+        What the hypotheses add to.
+    hypotheses
+        Their last term is the effect.
+
+    Returns
+    -------
+    responses : (hypotheses, rows)
+        Whitened.
+    known
+        The same with what the nuisances of the base take up left out.
+    """
+    mean, precision = np.array([_amount(hypothesis.terms[-1]) for hypothesis in hypotheses]).T
+    responses = model.responses(base.best, hypotheses)
+    matrix, _ = base.best.normal_equations
+    across = np.hstack(base.best.tables)[1:] @ responses.T
+    given_way = np.linalg.lstsq(matrix, across, rcond=1e-13)[0]
+    information = responses @ responses.T - across.T @ given_way
+    log_odds = np.array([each.log_odds - base.hypothesis.log_odds for each in hypotheses])
+    return responses, Sensitivity(information, mean, precision, log_odds)
 
 
 def _amount(term: EffectTerm) -> tuple[float, float]:
@@ -191,6 +246,8 @@ def _likeliest_starts(
 def _pairs(model: Model, posterior: Posterior, progress: Progress) -> list[Fit]:
     """Fit pairs of the likeliest names with all others."""
     first = [names for names in posterior.named() if names][:_PAIRED]
+    top = next(iter(posterior.probability))
+    least = posterior.best[top].log_evidence - math.log(posterior.probability[top]) + _NEGLIGIBLE
     tried: list[tuple[float, Hypothesis, Fit]] = []
     for names in first:
         base = posterior.best[names]
@@ -206,8 +263,8 @@ def _pairs(model: Model, posterior: Posterior, progress: Progress) -> list[Fit]:
             tried += [(score, one, base) for score, one in zip(scores, hypotheses, strict=True)]
     tried.sort(key=lambda one: -one[0])
     kept: dict[tuple[object, ...], tuple[Hypothesis, Fit]] = {}
-    for _, hypothesis, base in tried:
-        if len(kept) < _PAIRS:
+    for score, hypothesis, base in tried:
+        if len(kept) < _PAIRS and score > least:
             kept.setdefault(mode_of(hypothesis), (hypothesis, base))
     starts = [start(model, hypothesis, base.best) for hypothesis, base in kept.values()]
     hypotheses = [hypothesis for hypothesis, _ in kept.values()]

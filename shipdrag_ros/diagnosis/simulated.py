@@ -225,6 +225,42 @@ class CoastSimulation:
         columns = self._simulate(run, batch)
         return _predicted(self.seen[run], columns).of(plan.base)
 
+    def shown(
+        self, run: int, base: Linear, added: Sequence[tuple[Term, Sequence[float]]]
+    ) -> tuple[Float64, Float64]:
+        """
+        Return the speed that a run would show, with each of some terms besides.
+
+        Parameters
+        ----------
+        run
+            Its place among the runs.
+        base
+            Of a hypothesis, at its best fit.
+        added
+            Terms and the values of their parameters.
+
+        Returns
+        -------
+        time_s : (m,)
+            After the stop.
+        speed_m_s : (1 + added, m)
+            By the log where there is one; the first line is of nothing besides.
+        """
+        batch, frame, seen = _Batch(), self.frames[run], self.seen[run]
+        acting = self._acting(run, base.hypothesis, base.z)
+        whole = sum((term.action(frame, run, values) for term, _, values in acting), _NOTHING)
+        speed = float(base.z[len(base.hypothesis.unknowns) + run])
+        at = [batch.add(whole, speed)]  # what is alike shares a column
+        for term, values in added:
+            more = term.action(frame, run, values) if term.acts_in(run) else _NOTHING
+            at.append(batch.add(whole + more, speed))
+        columns = self._simulate(run, batch)
+        by_log = bool((seen.along.rows.kind == LOG).any())
+        speeds = columns.log_m_s if by_log else columns.radar_speed_m_s
+        after = columns.time_s > seen.lead_in_s
+        return columns.time_s[after] - seen.lead_in_s, speeds[at][:, after]
+
     def _simulate(self, run: int, batch: _Batch) -> Columns:
         frame = self.frames[run]
         return simulate_columns(

@@ -55,6 +55,25 @@ def sizes(found: DiagnosisResult) -> Table:
     return Table(heads, tuple(rows))
 
 
+def limits(found: DiagnosisResult) -> Table:
+    """
+    Show how large each effect that is not named can be, and from what size on it would be named.
+    """
+    rows = [
+        (
+            words.names_text([name]),
+            quantity.name,
+            f'{"at least" if each.bound == "lower_95" else "at most"} {each.value:.2g}',
+            '-' if each.would_be_named is None else f'{each.would_be_named:.2g}',
+            '-' if math.isnan(each.percent_of_r) else f'{each.percent_of_r:.1f} %',
+        )
+        for name, each in found.limits.items()
+        for quantity in LIBRARY[name].parameters[:1]
+    ]
+    heads = ('effect', 'parameter', 'if it is there, 95 %', 'would be named from', 'of r')
+    return Table(heads, tuple(rows))
+
+
 def _parameter(quantity: Parameter, effect: EffectEstimate) -> tuple[str, ...]:
     """Return name, value, sd and meaning of a parameter."""
     value, sd = _figures(quantity, effect.parameters[quantity.name])

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from shipdrag_ros.diagnosis.result import DiagnosisResult, Verdict
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.diagnosis.words import names_text, probability, sentence
+from shipdrag_ros.inference.decision import Verdict
 
 
 def with_log_track(force: DiagnosisResult, log_track: DiagnosisResult) -> DiagnosisResult:

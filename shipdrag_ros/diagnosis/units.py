@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A log that is off by the ratio of two units is asked about them."""
+"""A log that is off by the ratio of two units is asked about them, before anything is judged."""
 
 from __future__ import annotations
+
+import math
+from typing import Any
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.result import DiagnosisResult, Gap
 from shipdrag_ros.display import mistaken_units
+from shipdrag_ros.inference.decision import Verdict
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION
 
 
@@ -31,6 +36,34 @@ def asked(ratio: float) -> str:
         f'the log reads {ratio:.2f} times the way over ground, near {units}: is the unit of '
         'one of them wrong? Import it again with its unit, as in '
         '--map speed_through_water=COLUMN:kn'
+    )
+
+
+def waiting(question: str, **rest: Any) -> DiagnosisResult:
+    """
+    Return a diagnosis that waits for the answer to a question.
+
+    Parameters
+    ----------
+    question
+        A sentence.
+    **rest
+        What else there is to be said, as in `DiagnosisResult`.
+    """
+    return DiagnosisResult(
+        verdict=Verdict.ONE_OF,
+        effects=(),
+        candidates=(),
+        nothing=0.0,
+        unnamed=0.0,
+        would_decide=(),
+        where=None,
+        before=Gap(None, None, math.nan),
+        after=None,
+        held_out_before=None,
+        held_out_after=None,
+        question=question,
+        **rest,
     )
 
 

@@ -1,34 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""
-From a posterior to a verdict: a name only where the data decide.
-
-Evidence names; a smooth discrepancy that a name does not explain takes the name
-back; what nothing in a record can separate stays a set.
-"""
+"""From the posterior of a search to what is answered, with sizes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.model import Part
-from shipdrag_ros.diagnosis.posterior import CERTAIN, QUIET, Posterior
-from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis.posterior import Posterior
+from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate
 from shipdrag_ros.diagnosis.search import SearchResult
 from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.parameter import Parameter, Shape
-
-SET = 0.99  # of what has a name, in the candidates
-_LACK_NATS = 5.0  # of evidence that something smooth besides must gain: a factor of 150
-_SHAPE_SD = 2.5  # prior sd of a shape parameter of an effect: 1 in 80 is beyond
-_FORM_SD = 3.5  # of its four departures from its formula, together: 1 in 60 is beyond
-_SIZE_SD = 5.0  # of the logarithm of a size: 32 times the median where its sd is a factor of 2
-_LACK_SD, _LACK_SLACK = 4.0, 0.2  # of chi^2 a row above 1: the noise is not known better
+from shipdrag_ros.inference.decision import UNKNOWN, Names, Verdict, decide, mixture
+from shipdrag_ros.parameter import Parameter
 
 
 @dataclass(frozen=True)
@@ -40,15 +29,17 @@ class Judgement:
     ----------
     found
     posterior
-        Where the verdict is doubted, something unnamed is in it as probable as one
-        must be to be named.
+        Of all hypotheses.
     verdict
+    effects
+        That are named.
     candidates
     """
 
     found: SearchResult
     posterior: Posterior
     verdict: Verdict
+    effects: tuple[EffectEstimate, ...]
     candidates: tuple[Candidate, ...]
 
     @property
@@ -74,7 +65,7 @@ class Judgement:
         """
         return DiagnosisResult(
             verdict=self.verdict,
-            effects=self.best if self.verdict is Verdict.NAMED else (),
+            effects=self.effects,
             candidates=self.candidates,
             nothing=self.posterior.nothing,
             unnamed=self.posterior.unnamed,
@@ -83,13 +74,7 @@ class Judgement:
         )
 
 
-def judge(
-    found: SearchResult,
-    *,
-    held_out: Gap | None = None,
-    distrusted: bool = False,
-    besides: Sequence[Fit] = (),
-) -> Judgement:
+def judge(found: SearchResult, unseen: Mapping[str, float] = MappingProxyType({})) -> Judgement:
     """
     Return the verdict on what a search found.
 
@@ -97,36 +82,48 @@ def judge(
     ----------
     found
         With pairs, where they are looked for.
-    held_out
-        Of runs predicted from others with the most probable hypothesis; None
-        without.
-    distrusted
-        The measurements themselves are known to be wrong.
-    besides
-        Fits of the most probable hypothesis with something more that has no name.
+    unseen
+        Prior odds of effects that these data cannot show: what is so without them is so with them.
 
     Returns
     -------
     Judgement
-        Of verdict unknown where the best hypothesis leaves more than noise.
+        The decision that the posterior probabilities alone make.
     """
-    best, posterior = found.best, found.posterior
-    doubted = distrusted or (
-        found.alarm
-        and (
-            has_residual_structure(best, (*found.with_discrepancy(), *besides))
-            or outside_prior(best)
-            or (held_out is not None and exceeds_noise(held_out.chi2_per_sample, best.best.rows))
-        )
+    fits = found.posterior.best
+    posterior = _with_unseen(found.posterior, unseen)
+    decision = decide(posterior.probability, found.model.inseparable)
+    candidates = tuple(
+        Candidate(names, p, sized(fits[names], p) if names in fits and names != UNKNOWN else ())
+        for names, p in decision.candidates
     )
-    if doubted:
-        posterior = posterior.doubted()
-    verdict, candidates = decide(posterior, lacking=doubted, inseparable=found.model.inseparable)
-    fits = posterior.best
-    with_sizes = tuple(
-        replace(each, effects=sized(fits[each.names], each.probability)) for each in candidates
-    )
-    return Judgement(found, posterior, verdict, with_sizes)
+    named = tuple(_named(posterior, name, p) for name, p in sorted(decision.effects.items()))
+    return Judgement(found, posterior, decision.verdict, named, candidates)
+
+
+def _with_unseen(posterior: Posterior, odds: Mapping[str, float]) -> Posterior:
+    """Return the posterior with effects whose evidence is that of nothing."""
+    total = 1.0 + posterior.nothing * math.fsum(odds.values())
+    both: dict[Names, float] = dict(posterior.probability)
+    both |= {(name,): posterior.nothing * each for name, each in odds.items()}
+    return Posterior(posterior.best, {names: p / total for names, p in both.items()})
+
+
+def _named(posterior: Posterior, name: str, probability: float) -> EffectEstimate:
+    """Return an effect with its sizes over all hypotheses that hold it."""
+    holding = [
+        (p, effect)
+        for names, p in posterior.probability.items()
+        if name in names and names != UNKNOWN
+        for effect in sized(posterior.best[names], p)
+        if effect.name == name
+    ]
+    _, first = max(holding, key=lambda each: each[0])
+    sizes = {}
+    for key in first.parameters:
+        parts = [(p, effect.parameters[key]) for p, effect in holding]
+        sizes[key] = Parameter(*mixture((p, size.value, size.sd) for p, size in parts))
+    return EffectEstimate(name, probability, sizes)
 
 
 def sized(fit: Fit, probability: float) -> tuple[EffectEstimate, ...]:
@@ -158,134 +155,3 @@ def sized(fit: Fit, probability: float) -> tuple[EffectEstimate, ...]:
         ordered = {q.name: values[q.name] for q in part.effect.parameters}
         found.append(EffectEstimate(part.effect.name, probability, ordered))
     return tuple(sorted(found, key=lambda effect: effect.name))
-
-
-def has_residual_structure(fit: Fit, with_discrepancy: Sequence[Fit]) -> bool:
-    """
-    Say whether a hypothesis leaves more than noise.
-
-    Parameters
-    ----------
-    fit
-        Of the hypothesis.
-    with_discrepancy
-        The same with something smooth besides.
-
-    Returns
-    -------
-    bool
-        By chi^2, or where something smooth gains 5 nats of evidence.
-    """
-    if exceeds_noise(fit.chi2_per_row, fit.best.rows):
-        return True
-    limit = fit.log_likelihood + _LACK_NATS
-    return any(more.log_likelihood > limit for more in with_discrepancy)
-
-
-def outside_prior(fit: Fit) -> bool:
-    """
-    Say whether an effect is there in a way that its prior hardly holds.
-
-    However large it is, a turn that hardly changes the heading, or is over in some seconds, is
-    something else: a shape parameter beyond 2.5 prior sd. So is one that follows its formula
-    only with departures beyond 3.5 sd together, and a size whose logarithm is beyond 5. Sizes
-    of either sign, and components of one, are no shape.
-
-    Parameters
-    ----------
-    fit
-        Of the hypothesis.
-
-    Returns
-    -------
-    bool
-        Of any effect that is not stated in the ship file.
-    """
-    for part, place in fit.hypothesis.parts:
-        z = np.abs(fit.best.z[place : place + len(part.unknowns)])
-        if any(part is error for error in fit.hypothesis.model_errors):
-            if float(np.linalg.norm(z)) > _FORM_SD:
-                return True
-        elif any(each > _most_sd(part, i) for i, each in enumerate(z)):
-            return True
-    return False
-
-
-def _most_sd(part: Part, place: int) -> float:
-    """Return the prior standard deviations beyond which an unknown of an effect is odd."""
-    if not isinstance(part, EffectTerm) or part.stated or part.kept or place in part.one_size:
-        return math.inf
-    unknown = part.unknowns[place]
-    if unknown.name != part.effect.parameters[0].name:
-        return _SHAPE_SD
-    return _SIZE_SD if unknown.prior.shape is Shape.LOG_NORMAL else math.inf
-
-
-def exceeds_noise(chi2_per_row: float, rows: int) -> bool:
-    """
-    Say whether what is left is more than noise, as well as that is known.
-
-    Parameters
-    ----------
-    chi2_per_row
-        Mean square of the whitened residuals.
-    rows
-        Their number.
-
-    Returns
-    -------
-    bool
-        More than 4 sd and 0.2 above 1.
-    """
-    return chi2_per_row > 1.0 + _LACK_SD * math.sqrt(2.0 / rows) + _LACK_SLACK
-
-
-def decide(
-    posterior: Posterior, *, lacking: bool, inseparable: Sequence[frozenset[str]]
-) -> tuple[Verdict, tuple[Candidate, ...]]:
-    """
-    Return verdict and candidates.
-
-    Parameters
-    ----------
-    posterior
-        Of hypotheses.
-    lacking
-        Something is left that no name explains.
-    inseparable
-        Effects that no record can separate.
-
-    Returns
-    -------
-    verdict : Verdict
-        Named only from a probability of 0.9.
-    candidates : tuple of Candidate
-        The fewest that hold 99 % of what has a name.
-    """
-    candidates = _smallest(posterior)
-    first = posterior.named()[0]
-    if lacking:
-        return Verdict.UNKNOWN, candidates
-    if posterior.nothing >= QUIET:
-        return Verdict.NONE, candidates
-    if posterior.unnamed > 0.5:
-        return Verdict.UNKNOWN, candidates
-    alone = not any(set(first) & group for group in inseparable)
-    if alone and posterior.probability[first] >= CERTAIN:
-        return Verdict.NAMED, candidates
-    if posterior.unnamed > 1.0 - CERTAIN and len(candidates) == 1:
-        return Verdict.UNKNOWN, candidates
-    return Verdict.ONE_OF, candidates
-
-
-def _smallest(posterior: Posterior) -> tuple[Candidate, ...]:
-    """Return the fewest names that hold almost all of what has a name."""
-    total = 1.0 - posterior.unnamed
-    found: list[Candidate] = []
-    held = 0.0
-    for names in posterior.named():
-        found.append(Candidate(names, posterior.probability[names]))
-        held += posterior.probability[names]
-        if held >= SET * total:
-            break
-    return tuple(found)

@@ -6,17 +6,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from shipdrag_ros.diagnosis.result import DiagnosisResult, Verdict
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.errors import DiagnosisError, EarlierError, EstimationError, ShipdragError
+from shipdrag_ros.inference.decision import NONE, Verdict
 
 Diagnose = Callable[[], DiagnosisResult]
 
 _HELD = 'all of each glide is held against the model, such parts with the rest'
-_AGREES = 'all of each glide, held against the model, shows nothing more'
 _SOUND_PART = (
     'So it is not known whether anything is missing; give the sound part alone with '
     '--window START END'
 )
+
 _APART = 'what is named rests on the coastdowns alone, and need not explain such parts'
 
 
@@ -24,7 +25,7 @@ def with_whole_glides(
     alone: Diagnose, whole: Diagnose | None, notes: Sequence[str], *, coastdowns: int
 ) -> DiagnosisResult:
     """
-    Diagnose with the parts that are no coastdown though no instrument shows why.
+    Diagnose with the parts that are no coastdown.
 
     Parameters
     ----------
@@ -40,8 +41,8 @@ def with_whole_glides(
     Returns
     -------
     DiagnosisResult
-        Of the coastdowns where they give a name, or where the whole shows nothing or cannot be
-        followed; else of the whole.
+        Of the whole; of the coastdowns where the whole cannot be followed, or has no name though
+        they have one.
 
     Raises
     ------
@@ -51,35 +52,37 @@ def with_whole_glides(
     EstimationError
         If there is no such part, and no run has enough samples.
     """
-    found: DiagnosisResult | None = None
-    failed: tuple[str, ...] = ()
-    try:
+    if whole is None:
         found = alone()
-    except EarlierError:  # it counts for no part of a glide either
-        raise
-    except (DiagnosisError, EstimationError) as error:
-        if whole is None:
-            raise
-        if coastdowns:
-            failed = (f'the coastdowns alone could not be diagnosed: {error}',)
-    if found is not None and (whole is None or found.verdict is Verdict.NAMED):
-        more = () if whole is None else (_APART,)
-        return replace(found, notes=(*found.notes, *notes, *more))
-    assert whole is not None
+        return replace(found, notes=(*found.notes, *notes))
     try:
         held = whole()
-    except EarlierError:
+    except EarlierError:  # it counts for no part of a glide either
         raise
     except ShipdragError as error:  # a glide that is like none may not be followed
-        why = f'all of each glide could not be held against the model: {error}'
-        if found is None or found.verdict is Verdict.NONE:
-            raise DiagnosisError(f'{"; ".join((*notes, *failed, why))}. {_SOUND_PART}') from error
-        return replace(found, notes=(*found.notes, *notes, why))
-    if found is not None and held.verdict is Verdict.NONE:
-        return replace(found, notes=(*found.notes, *notes, _AGREES))
-    before = () if found is None else found.notes
-    return replace(
-        held,
-        notes=tuple(dict.fromkeys((*before, *held.notes, *notes, _HELD, *failed))),
-        coastdowns_used=coastdowns if found is None else found.coastdowns_used,
-    )
+        return _not_followed(alone, notes, error)
+    used = replace(held, coastdowns_used=coastdowns)
+    if held.verdict is Verdict.UNKNOWN and coastdowns:
+        try:
+            found = alone()
+        except (DiagnosisError, EstimationError) as error:
+            why = f'the coastdowns alone could not be diagnosed: {error}'
+            return replace(used, notes=(*held.notes, *notes, _HELD, why))
+        if found.verdict is Verdict.NAMED:
+            return replace(found, notes=(*found.notes, *notes, _APART))
+    return replace(used, notes=(*held.notes, *notes, _HELD))
+
+
+def _not_followed(alone: Diagnose, notes: Sequence[str], error: ShipdragError) -> DiagnosisResult:
+    """Diagnose the coastdowns alone; what is cut from them is no sign of nothing."""
+    why = f'all of each glide could not be held against the model: {error}'
+    try:
+        found = alone()
+    except EarlierError:
+        raise
+    except (DiagnosisError, EstimationError) as failed:
+        said = f'the coastdowns alone could not be diagnosed: {failed}'
+        raise DiagnosisError(f'{"; ".join((*notes, said, why))}. {_SOUND_PART}') from error
+    if found.candidates[0].names == NONE:
+        raise DiagnosisError(f'{"; ".join((*notes, why))}. {_SOUND_PART}') from error
+    return replace(found, notes=(*found.notes, *notes, why))

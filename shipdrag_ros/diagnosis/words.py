@@ -14,10 +14,13 @@ from shipdrag_ros.diagnosis import (
     EffectEstimate,
     Verdict,
 )
+from shipdrag_ros.diagnosis.result import Limit
 from shipdrag_ros.diagnosis.seen_runs import WeighedEarlier
 from shipdrag_ros.display import M_S_PER_KNOT, plus_minus, utc
+from shipdrag_ros.inference.decision import NONE, UNKNOWN
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import CoefficientBaseline, Ship
+from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
 from shipdrag_ros.simulation.effects import LIBRARY
 
 _CHANNELS = {
@@ -29,64 +32,125 @@ _CHANNELS = {
 NOTHING_BETWEEN = 'nothing between log and track'
 NOTHING, UNNAMED, OTHERS = 'nothing is missing', 'something without a name', 'all others together'
 _LEAST = 0.001  # probability that is stated
-_WORTH_A_WORD = 0.01
+_MOST_LIMITS = 5
 _LARGE_N = 1e4  # from here on a force is stated in kN
 
 
 def sentence(found: DiagnosisResult) -> str:
     """
-    Return the verdict in a sentence.
+    Return the verdict in a sentence; first a question, or that there is no clean hull.
     """
+    if found.question:
+        return f'{found.question}. The verdict waits for the answer.'
+    if found.baseline == 'fitted_here':
+        return f'{NO_CLEAN_HULL} {_verdict(found)}'
+    return _verdict(found)
+
+
+def _verdict(found: DiagnosisResult) -> str:
+    """Return the verdict on what was examined."""
     match found.verdict:
-        case Verdict.NONE if found.nothing >= 0.5 and found.baseline == 'none':
+        case Verdict.NONE if found.baseline == 'none':
             return (
                 'Log and track agree: nothing is wrong between them that this record could show '
                 f'(probability {probability(found.nothing)}).'
             )
-        case Verdict.NONE if found.nothing >= 0.5:
+        case Verdict.NONE:
             return (
                 'Model and data agree: nothing is missing that these runs could show '
-                f'(probability {probability(found.nothing)}).'
-            )
-        case Verdict.NONE:
-            other, share = max(
-                (
-                    (each.words, each.probability)
-                    for each in answers(found)
-                    if each.words not in (NOTHING, NOTHING_BETWEEN)
-                ),
-                key=lambda answer: answer[1],
-            )
-            return (
-                f'No effect can be named: {other} is the likeliest ({probability(share)}), but a '
-                'baseline that is further off than stated would explain these runs as well '
-                f'({probability(found.nothing)}).'
+                f'(probability {probability(found.nothing)}).{would_be_named(found)}'
             )
         case Verdict.NAMED if found.runs_differ:
             names = names_text([effect.name for effect in found.effects])
             return (
                 f'Missing in the model, and not alike in these runs: {names}; probability '
-                f'{probability(found.effects[0].probability)}.'
+                f'{_least_probable(found)}.{_besides(found)}'
             )
         case Verdict.NAMED:
             sizes = ' and '.join(_sized(effect) for effect in found.effects)
             return (
                 f'Missing in the model: {sizes}; probability '
-                f'{probability(found.effects[0].probability)}.'
+                f'{_least_probable(found)}.{_besides(found)}'
             )
         case Verdict.ONE_OF:
-            unnamed = f', or {UNNAMED} ({probability(found.unnamed)})'
+            fitted = found.baseline == 'fitted_here'  # some could not be seen, and have no size
+            seen = [
+                each
+                for each in found.held
+                if each.effects or not fitted or each.names in (NONE, UNKNOWN)
+            ]
+            rest = [each for each in seen if each.names != NONE]
+            if len(rest) == len(seen):
+                return (
+                    f'Missing is one of these: {_listed(rest)}. These runs cannot separate them.'
+                )
+            said = f'{"Nothing else" if fitted else "Nothing"} is missing'
+            said = f'{said} ({probability(found.nothing)})'
             return (
-                f'Missing is one of these: {_listed(found.candidates)}'
-                f'{unnamed if found.unnamed >= _WORTH_A_WORD else ""}. These runs cannot separate '
-                'them.'
+                f'{said}, or {_listed(rest)}. These runs cannot separate them.'
+                if rest
+                else f'{said}.'
             )
         case Verdict.UNKNOWN:
-            first = found.candidates[0]
-            why = ''
-            if first.names and found.unnamed < first.probability:
-                why = f' The likeliest of them, {names_text(first.names)}, leaves more than noise.'
-            return f'Something is missing that is none of the known effects, {place(found)}.{why}'
+            return (
+                f'Something is missing that is none of the known effects, {place(found)} '
+                f'(probability {probability(found.unnamed)}).'
+            )
+
+
+def _least_probable(found: DiagnosisResult) -> str:
+    """Return how probable the named effects are; of two the less probable."""
+    return probability(min(effect.probability for effect in found.effects))
+
+
+def _besides(found: DiagnosisResult) -> str:
+    """Say which effects may be there beside those that are named; '' where none is likely."""
+    named = {effect.name for effect in found.effects}
+    share: dict[str, float] = {}
+    for each in found.held:
+        for name in set(each.names) - named if named <= set(each.names) else ():
+            share[name] = share.get(name, 0.0) + each.probability
+    if not share:
+        return ''
+    listed = ', '.join(f'{names_text([name])} ({probability(p)})' for name, p in share.items())
+    return f' Beside it there may be: {listed}.'
+
+
+def would_be_named(found: DiagnosisResult) -> str:
+    """
+    Say what would have been named, what shows best first; '' where no limits are known.
+    """
+    if not found.limits:
+        return ''
+    shown = [
+        (each.would_be_named, name, each)
+        for name, each in found.limits.items()
+        if each.would_be_named is not None
+    ]
+    shown.sort(key=lambda one: _effort(one[2]))
+    if not shown:
+        return ' No single effect of any size would have been named by these runs.'
+    sizes = ', '.join(
+        f'{names_text([name])} {_from(each)} {size(_quantity(name), Parameter(rounded, 0.0))}'
+        for least, name, each in shown[:_MOST_LIMITS]
+        for rounded in (float(f'{least:.2g}'),)
+    )
+    return f' These runs would have named, nine times in ten: {sizes}.'
+
+
+def _quantity(name: str) -> Parameter:
+    return LIBRARY[name].parameters[0]
+
+
+def _from(limit: Limit) -> str:
+    return 'up to' if limit.bound == 'lower_95' else 'from'
+
+
+def _effort(limit: Limit) -> float:
+    """Return how much of an effect is needed, over what is usual."""
+    assert limit.would_be_named is not None
+    needed = limit.would_be_named / limit.value
+    return 1.0 / needed if limit.bound == 'lower_95' else needed
 
 
 def differing(found: DiagnosisResult) -> str:
@@ -256,15 +320,21 @@ class Answer:
 def answers(found: DiagnosisResult) -> tuple[Answer, ...]:
     """
     Return the candidates, then nothing and something unnamed, and what is left.
+
+    Nothing while the verdict waits.
     """
+    if found.question:
+        return ()
     nothing = NOTHING if found.baseline != 'none' else NOTHING_BETWEEN
     listed = [
         Answer(names_text(each.names) if each.names else nothing, each.probability)
         for each in found.candidates
     ]
-    if all(each.names for each in found.candidates):
+    names = [each.names for each in found.candidates]
+    if NONE not in names:
         listed.append(Answer(nothing, found.nothing))
-    listed.append(Answer(UNNAMED, found.unnamed))
+    if UNKNOWN not in names:
+        listed.append(Answer(UNNAMED, found.unnamed))
     others = 1.0 - sum(each.probability for each in listed)
     return (*listed, Answer(OTHERS, others)) if others >= _LEAST else tuple(listed)
 
@@ -273,6 +343,8 @@ def names_text(names: Sequence[str]) -> str:
     """
     Name effects; none: nothing is missing.
     """
+    if names == UNKNOWN:
+        return UNNAMED
     return ' + '.join(name.replace('_', ' ') for name in names) or NOTHING
 
 

@@ -16,16 +16,15 @@ import numpy as np
 from scipy.special import betaln, expit, logsumexp
 
 from shipdrag_ros.diagnosis.legs import SailingRecord, Stretches
-from shipdrag_ros.diagnosis.posterior import CERTAIN
 from shipdrag_ros.diagnosis.result import (
     LOG_TRACK,
     Candidate,
     DiagnosisResult,
     EffectEstimate,
     Gap,
-    Verdict,
     Where,
 )
+from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names, Verdict, decide
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
@@ -34,7 +33,6 @@ from shipdrag_ros.simulation.effects import LIBRARY
 
 _MOVES_M_S = 0.1  # slower is at rest, as positions show it
 _SCATTER_M_S = 0.08  # of the way over ground while the log reads 0, that no drift explains
-_SURE = 0.99  # probability from which it is part of an answer that holds something else
 _LEAST = 3  # stretches at 0 while the ship moves, and as many that are not
 _APART = 3.0  # stretches in which a wheel sticks once: neighbours are no new evidence
 _LAPSES = (0.01, 0.05)  # readings that are otherwise than the speed says
@@ -167,37 +165,37 @@ def with_zeros(found: DiagnosisResult, still: StandsStill | None) -> DiagnosisRe
     Returns
     -------
     Diagnosis
-        The effect is part of the answer from a probability of 0.99; below that a
-        note says it.
+        Of both, as independent of each other.
     """
     if still is None:
         return found
-    found = replace(found, notes=(_note(still), *found.notes))
     sure = still.effect.probability
-    if sure < _SURE or found.verdict is Verdict.UNKNOWN:
-        return found
-    effects = (*found.effects, still.effect)
-    candidates = tuple(
-        Candidate(
-            tuple(sorted((*each.names, still.effect.name))),
-            sure * each.probability,
-            (*each.effects, still.effect),
-        )
-        for each in found.candidates
-    )
-    verdict = found.verdict
-    if verdict is Verdict.NONE:
-        verdict, effects = Verdict.NAMED, (replace(still.effect, probability=sure),)
-        candidates = (Candidate((still.effect.name,), sure, effects),)
+    probability: dict[Names, float] = {}
+    effects: dict[Names, tuple[EffectEstimate, ...]] = {}
+    for each in found.candidates:
+        with_it = each.names
+        if with_it != UNKNOWN:
+            with_it = tuple(sorted((*each.names, still.effect.name)))
+        ways = ((each.names, 1.0 - sure, ()), (with_it, sure, (still.effect,)))
+        for names, share, more in ways:
+            probability[names] = probability.get(names, 0.0) + share * each.probability
+            effects[names] = () if names == UNKNOWN else (*each.effects, *more)
+    decision = decide(probability)
+    candidates = tuple(Candidate(names, p, effects[names]) for names, p in decision.candidates)
+    named = dict(decision.effects)
+    if sure >= CERTAIN:  # whatever else there is, something without a name too
+        named[still.effect.name] = sure
+    both = (*(effect for each in reversed(candidates) for effect in each.effects), still.effect)
+    sizes = {effect.name: effect for effect in both}
     return replace(
         found,
-        verdict=verdict,
-        effects=effects if verdict is Verdict.NAMED else (),
+        notes=(_note(still), *found.notes),
+        verdict=Verdict.NAMED if named else decision.verdict,
+        effects=tuple(replace(sizes[name], probability=p) for name, p in sorted(named.items())),
         candidates=candidates,
         nothing=found.nothing * (1.0 - sure),
-        unnamed=found.unnamed * sure,
-        best=(*found.best, still.effect),
-        where=found.where or _where(still),
+        best=candidates[0].effects,
+        where=found.where if found.candidates[0].names else _where(still),
     )
 
 
@@ -214,12 +212,12 @@ def zeros_alone(still: StandsStill, *, why: str, no_coastdown: str) -> Diagnosis
         For the reader.
     """
     sure = still.effect.probability
-    named = sure >= CERTAIN
     candidate = Candidate((still.effect.name,), sure, (still.effect,))
+    decision = decide({candidate.names: sure, NONE: 1.0 - sure})
     return DiagnosisResult(
-        verdict=Verdict.NAMED if named else Verdict.ONE_OF,
-        effects=(still.effect,) if named else (),
-        candidates=(candidate, Candidate((), 1.0 - sure)),
+        verdict=decision.verdict,
+        effects=(still.effect,) if decision.effects else (),
+        candidates=(candidate, Candidate(NONE, 1.0 - sure)),
         nothing=1.0 - sure,
         unnamed=0.0,
         would_decide=(),

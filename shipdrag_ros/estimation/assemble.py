@@ -64,3 +64,18 @@ def assembled(
         last_sigma_m_s2=end.sigma_m_s2,
         **others,
     )
+
+
+def log_scale_note(scale: float, sd: float) -> str:
+    """
+    Say by how much a log is off, and that the band holds it.
+
+    Parameters
+    ----------
+    scale, sd
+        Mean and standard deviation of reading / speed - 1.
+    """
+    return (
+        f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard deviations): '
+        'taken out, and in the band'
+    )

@@ -3,27 +3,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
+WindowEstimator = Callable[[Window, Ship, Parameters], Estimate]
+"""
+From one window to r(v): a pure function, without memory, random numbers or clock.
 
-class Estimating(Protocol):
-    """A pure function: no memory, no random numbers, no clock."""
-
-    def __call__(self, window: Window, ship: Ship, parameters: Parameters) -> Estimate:
-        """
-        Estimate r(v) from one window.
-
-        Raises
-        ------
-        EstimationError
-            If the window does not hold a coastdown that can be estimated.
-        """
+It raises `EstimationError` if the window does not hold a coastdown that can be estimated.
+"""
 
 
 @dataclass(frozen=True)
@@ -49,7 +42,7 @@ class Estimator:
 
     name: str
     meaning: str
-    estimate: Estimating
+    estimate: WindowEstimator
     learns_noise: bool = False
     constant_order: int | None = None
     caveat: str = ''

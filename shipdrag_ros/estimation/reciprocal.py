@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from shipdrag_ros.display import short_repr
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
@@ -48,6 +49,8 @@ class Combined:
         Velocity of the water along the heading of the first run; None where
         the runs do not show it.
     """
+
+    __repr__ = short_repr
 
     speed_m_s: Float64
     resistance_m_s2: Float64

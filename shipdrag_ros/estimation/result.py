@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.samples import Float64, Int64
 
 if TYPE_CHECKING:
@@ -43,6 +43,8 @@ class ResistanceCurve:
     slope, slope_sigma : (m,)
         dr/dFr and its standard deviation [m/s^2].
     """
+
+    __repr__ = short_repr
 
     speed_m_s: Float64
     resistance_m_s2: Float64
@@ -141,6 +143,8 @@ class Estimate:
     notes
         What a reader must know to judge the figures, a sentence each.
     """
+
+    __repr__ = short_repr
 
     estimator: str
     start_ns: int

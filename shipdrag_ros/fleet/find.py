@@ -41,7 +41,7 @@ class Beside:
     Attributes
     ----------
     ship
-        The nearest `ship.yaml` upwards; '' without one.
+        The nearest `ship.yaml` upwards, not above the folder that was given; '' without one.
     events
         `events.csv` beside that.
     ship_name
@@ -153,6 +153,7 @@ class _Search:
     def __init__(self, tree: Tree, without: str | None) -> None:
         self._tree = tree
         self._without = without
+        self._top = tree.root
         self._ships: dict[str, Beside] = {}
         self.skipped: list[Skipped] = []
         self.left_alone = 0
@@ -209,6 +210,8 @@ class _Search:
         """Yield a directory of rosbag2 as one bag."""
         files = tuple(e for e in folder.files if e.name.endswith((_METADATA, *_BAGS, '.db3')))
         bag = _text('/'.join(folder.parts) or self._tree.name)
+        if folder.path == self._tree.root:  # the bag itself was given: what lies beside it counts
+            self._top = posixpath.dirname(self._tree.root)
         beside = f'../{posixpath.basename(folder.path)}.{RUN_FILE}'
         yield from self._source(
             folder, bag, files, (RUN_FILE, beside, f'../{RUN_FILE}'), folder_bag=True
@@ -244,17 +247,16 @@ class _Search:
         return ''
 
     def _beside(self, path: str) -> Beside:
-        """Return the nearest ship file in a folder or above it, and its events."""
+        """Return the nearest ship file from a folder up to the one given, and its events."""
         if path not in self._ships:
             ship = self._tree.text(posixpath.join(path, SHIP_FILE))
-            parent = posixpath.dirname(path)
             if ship is not None:
                 events = self._events(posixpath.join(path, EVENTS_FILE))
                 self._ships[path] = Beside(ship, events, _text(posixpath.basename(path)))
-            elif parent in ('', path):
+            elif path == self._top:  # above it may lie the file of any ship
                 self._ships[path] = Beside()
             else:
-                self._ships[path] = self._beside(parent)
+                self._ships[path] = self._beside(posixpath.dirname(path))
         return self._ships[path]
 
     def _events(self, path: str) -> str:
@@ -280,9 +282,9 @@ def is_log(name: str, first: bytes) -> bool:
     first
         Its first bytes, packed with gzip or not.
     """
-    from shipdrag_ros.importing import formats  # where all names say what they are, not needed
-    from shipdrag_ros.importing.format import CERTAIN, Head
-    from shipdrag_ros.importing.opened import GZIP
+    from shipdrag_ros.sources import formats  # where all names say what they are, not needed
+    from shipdrag_ros.sources.format import CERTAIN, Head
+    from shipdrag_ros.sources.opened import GZIP
 
     if first.startswith(GZIP):
         try:

@@ -27,11 +27,11 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
 from shipdrag_ros.fleet.local import fetched
 from shipdrag_ros.fleet.rows import BagResult, Row, coastdown_row
-from shipdrag_ros.importing.reading import read_any
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
 from shipdrag_ros.replay.warnings import run_warnings
 from shipdrag_ros.ship import Fact, RunSheet, Ship
+from shipdrag_ros.sources.reading import read_any
 
 UNNAMED = 'unnamed'
 _LONGEST_NAME = 80  # [bytes], and three times as long in the name of a folder
@@ -195,8 +195,8 @@ def _hull(source: BagToRead, run: Run) -> _ShipInRun:
     attached, beside = run.attachments.get(SHIP_FILE, ''), source.beside.ship
     if not (attached or beside):
         raise BagError(
-            f'no {SHIP_FILE} is attached, and none lies beside it or in a folder above; put one '
-            'there'
+            f'no {SHIP_FILE} is attached, and none lies beside it or in a folder above, up to the '
+            'one given; put one there, or give the folder that holds it'
         )
     warnings: tuple[str, ...] = ()
     text, subject = beside or attached, f'{SHIP_FILE} {"above" if beside else "attached"}'

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.diagnosis.result import DiagnosisResult, EffectEstimate, Verdict
+from shipdrag_ros.diagnosis.result import DiagnosisResult, EffectEstimate
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -107,6 +107,43 @@ def coastdown_row(
     }
 
 
+def same_time(rows: Sequence[Mapping[str, Any]]) -> dict[int, int]:
+    """
+    Return which coastdowns of one ship were recorded at the same time as another.
+
+    A copied folder, a part of a bag and two recorders aboard give one run several rows.
+
+    Parameters
+    ----------
+    rows
+        Of one ship.
+
+    Returns
+    -------
+    dict
+        Place of a row to the place of the one that stands for it: the longest, then one that
+        is not damaged, then the one of which most is known.
+    """
+    start = np.array([row['time_ns'] for row in rows], np.int64)
+    end = np.array([row.get('end_ns') or row['time_ns'] for row in rows], np.int64)
+    known = [
+        sum(row.get(name) is not None for name in ('water_temperature_c', 'verdict', 'draught_m'))
+        - 9 * ('damaged' in (row.get('flags') or ()))
+        for row in rows
+    ]
+    order = sorted(range(len(rows)), key=lambda n: (start[n] - end[n], -known[n], rows[n]['bag']))
+    kept: list[int] = []
+    found = {}
+    for number in order:
+        together = np.minimum(end[kept], end[number]) - np.maximum(start[kept], start[number])
+        at_once = np.flatnonzero((together > 0) | (start[kept] == start[number]))
+        if len(at_once):
+            found[number] = kept[int(at_once[0])]
+        else:
+            kept.append(number)
+    return found
+
+
 def clean(ship: Ship) -> Float64 | None:
     """
     Return r of the clean hull on the grid [m/s^2]; NaN outside the baseline's table.
@@ -195,9 +232,6 @@ def _candidates(diagnosis: DiagnosisResult) -> str:
         }
         for each in diagnosis.candidates
     ]
-    if diagnosis.verdict is Verdict.UNKNOWN:
-        unnamed = {'names': ['unknown'], 'probability': diagnosis.unnamed, 'effects': []}
-        found.insert(0, unnamed)
     return _json(found)
 
 

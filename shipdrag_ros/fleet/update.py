@@ -10,18 +10,20 @@ from __future__ import annotations
 import hashlib
 import posixpath
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
 from shipdrag_ros.fleet.engine import DIED, Engine, Lost
-from shipdrag_ros.fleet.events import read_events, write_events
+from shipdrag_ros.fleet.events import HullEvent, read_events, write_events
 from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
 from shipdrag_ros.fleet.job import BagJob, work
 from shipdrag_ros.fleet.local import Identity, content_hash, identify
-from shipdrag_ros.fleet.rows import BagResult
-from shipdrag_ros.fleet.store import Done, Store
+from shipdrag_ros.fleet.rows import BagResult, same_time
+from shipdrag_ros.fleet.store import Done, Store, read_coastdowns
 from shipdrag_ros.progress import Progress
 
 
@@ -30,6 +32,8 @@ class Twin(NamedTuple):
 
     bag: str
     same_as: str
+    differs: bool = False
+    """Whether another ship file or run file lies beside it, which is not used."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,7 @@ def update(found: FoundBags, store: Store, engine: Engine, progress: Progress) -
         store.write(_unread(each))
     after = store.done()
     bags = {key: after[key] for key in jobs}
-    notes = [*found.notes, *_keep_ships(store, jobs, bags, texts)]
+    notes = [*found.notes, *_keep_ships(store, jobs, bags, texts), *_at_once(store)]
     gone = sum((done.root, done.bag) not in names for key, done in before.items())
     gone -= sum((done.root, done.bag) not in names for key, done in before.items() if key in jobs)
     if gone:
@@ -132,16 +136,39 @@ def _jobs(
             reason = found.reason if isinstance(found, Lost) else found
             unread.append(Skipped(items[key].root, items[key].bag, reason))
         progress('reading the bags', len(known) + len(unread), len(items))
+    copies: dict[tuple[str, ...], list[tuple[BagToRead, ...]]] = defaultdict(list)
+    for numbers in _recordings(sources, known):
+        digests = tuple(known[number].digest for number in numbers)
+        copies[digests].append(tuple(sources[number] for number in numbers))
     jobs: dict[str, BagJob] = {}
     twins: list[Twin] = []
-    for numbers in _recordings(sources, known):
-        parts = tuple(sources[number] for number in numbers)
-        digest = content_hash([known[number].digest for number in numbers], parts[0])
-        if digest in jobs:
-            twins.append(Twin(parts[0].bag, jobs[digest].sources[0].bag))
-        else:
-            jobs[digest] = BagJob(parts, digest)
+    for digests, same in copies.items():
+        parts = max(same, key=lambda each: bool(each[0].run))  # the first that says most
+        digest = content_hash(digests, parts[0])
+        jobs[digest] = BagJob(parts, digest)
+        for other in same:
+            if other is not parts:
+                differs = (other[0].beside.ship, other[0].run) != (
+                    parts[0].beside.ship,
+                    parts[0].run,
+                )
+                twins.append(Twin(other[0].bag, parts[0].bag, differs))
     return jobs, twins, unread
+
+
+def _at_once(store: Store) -> Iterator[str]:
+    """Say which runs are there twice by their time, of each ship."""
+    table = read_coastdowns(store.path).to_pylist()
+    rows = [row for row in table if not row['error']]
+    for name, group in groupby(rows, key=itemgetter('ship')):
+        own = list(group)
+        twice = same_time(own)
+        for number, other in list(twice.items())[:1]:
+            yield (
+                f'{len(twice)} coastdown(s) of {name!r} were recorded at the same time as '
+                f'another, {own[number]["bag"]!r} and {own[other]["bag"]!r} for one; the trend '
+                'counts a run once: remove what is a copy'
+            )
 
 
 def _recordings(sources: Sequence[BagToRead], known: Mapping[int, Identity]) -> list[list[int]]:
@@ -226,9 +253,12 @@ def _keep_ships(
                 f'{len(files)} different ship files are of {name!r}; each bag is replayed with '
                 f'its own, and {SHIP_FILE} of the last one is kept in the store'
             )
-        events, problems = read_events('\n'.join(event_files[name]))
-        notes += [f'{name}: {problem}' for problem in problems]
-        kept = {EVENTS_FILE: write_events(events) if events else ''}
+        events: set[HullEvent] = set()
+        for text in event_files[name]:
+            read, problems = read_events(text)
+            events.update(read)
+            notes += [f'{name}: {problem}' for problem in problems]
+        kept = {EVENTS_FILE: write_events(sorted(events)) if events else ''}
         if files:
             kept[SHIP_FILE] = files[-1]
         store.keep_ship(name, kept)

@@ -12,6 +12,7 @@ import os
 import posixpath
 import stat
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -127,7 +128,10 @@ class Tree:
             yield folder
             if self.only or len(parts) >= _AT_MOST:
                 continue
-            waiting += [(child, (*parts, _name(child))) for child in sorted(inside, reverse=True)]
+            waiting += [
+                (child, (*parts, posixpath.basename(child)))
+                for child in sorted(inside, reverse=True)
+            ]
 
     def text(self, path: str) -> str | None:
         """
@@ -180,43 +184,34 @@ class Tree:
     def _read(self, path: str, parts: tuple[str, ...]) -> tuple[list[str], Folder]:
         """Return the folders in a folder, and itself."""
         try:
-            listed = self._local(path) if self.protocol == LOCAL else self._remote(path)
+            # not `fs.walk`: it follows no link, and drops what it cannot list below the top
+            listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)
         except Exception as error:  # each file system has errors of its own
             why = getattr(error, 'strerror', None) or error
             return [], Folder(path, parts, (), f'cannot be read: {why}')
-        folders = [entry for entry, is_folder in listed if is_folder]
-        files = [entry for entry, is_folder in listed if not is_folder]
-        if self.only:
-            files = [entry for entry in files if entry.name == self.only]
-        files.sort(key=lambda entry: entry.name)
-        return [entry.path for entry in folders], Folder(path, parts, tuple(files))
+        folders, files = [], []
+        for about in listed:
+            place = about['name'].rstrip('/')
+            if place == path.rstrip('/'):  # an object store lists a folder made by hand in it
+                continue
+            entry, is_folder = self._entry(place, about)
+            if is_folder:
+                folders.append(place)
+            elif self.only in ('', entry.name):
+                files.append(entry)
+        return folders, Folder(path, parts, tuple(sorted(files, key=lambda each: each.name)))
 
-    def _remote(self, path: str) -> list[tuple[Entry, bool]]:
-        listed: list[dict[str, Any]] = self._fs.ls(path, detail=True, refresh=True)
-        return [
-            (
-                Entry(each['name'], _name(each['name']), int(each.get('size') or 0)),
-                each['type'] == 'directory',
-            )
-            for each in listed
-            # an object store lists the folder itself where someone has made it by hand
-            if each['name'].rstrip('/') != path.rstrip('/')
-        ]
-
-    def _local(self, path: str) -> list[tuple[Entry, bool]]:
-        found = []
-        with os.scandir(path) as listed:
-            for each in listed:
-                place = posixpath.join(path, each.name)
-                try:
-                    about = os.stat(place)
-                except OSError as error:
-                    found.append((Entry(place, each.name, 0, _broken(error)), False))
-                    continue
-                problem = '' if stat.S_ISREG(about.st_mode) else _irregular(about.st_mode)
-                entry = Entry(place, each.name, about.st_size, problem)
-                found.append((entry, stat.S_ISDIR(about.st_mode)))
-        return found
+    def _entry(self, place: str, about: dict[str, Any]) -> tuple[Entry, bool]:
+        """Return an entry of a folder, and whether it is a folder, too; links are followed."""
+        name = posixpath.basename(place)
+        if about.get('islink'):
+            try:
+                about = self._fs.info(place)
+            except OSError as error:
+                return Entry(place, name, 0, f'cannot be read: {error.strerror}'), False
+        kind = about['type']
+        problem = '' if kind in ('file', 'directory') else _irregular(about.get('mode', 0))
+        return Entry(place, name, int(about.get('size') or 0), problem), kind == 'directory'
 
 
 def _file_system(place: str) -> tuple[AbstractFileSystem, str]:
@@ -239,39 +234,19 @@ def _file_system(place: str) -> tuple[AbstractFileSystem, str]:
     return fs, str(path).rstrip('/')
 
 
-class _reached:
+@contextmanager
+def _reached(place: str) -> Iterator[None]:
     """Turn whatever a file system raises into an error that a user can mend."""
-
-    def __init__(self, place: str) -> None:
-        self._place = place
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
-        if isinstance(error, Exception):
-            raise FleetError(
-                f'{self._place!r} cannot be reached: {str(error) or type(error).__name__}; check '
-                'the address, and for s3:// the usual AWS variables (AWS_ACCESS_KEY_ID, '
-                'AWS_ENDPOINT_URL)'
-            ) from error
-
-
-def _name(path: str) -> str:
-    return path.rstrip('/').rpartition('/')[2]
-
-
-def _broken(error: OSError) -> str:
-    return f'cannot be read: {error.strerror}'
+    try:
+        yield
+    except Exception as error:
+        raise FleetError(
+            f'{place!r} cannot be reached: {str(error) or type(error).__name__}; check the '
+            'address, and for s3:// the usual AWS variables (AWS_ACCESS_KEY_ID, AWS_ENDPOINT_URL)'
+        ) from error
 
 
 def _irregular(mode: int) -> str:
-    for is_kind, kind in (
-        (stat.S_ISFIFO, 'a pipe'),
-        (stat.S_ISSOCK, 'a socket'),
-        (stat.S_ISCHR, 'a device'),
-        (stat.S_ISBLK, 'a device'),
-    ):
-        if is_kind(mode):
-            return f'is {kind} and no file; it may have no end'
-    return 'is no regular file'
+    kinds = {stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a socket'}
+    kind = kinds.get(stat.S_IFMT(mode), 'a device')
+    return f'is {kind} and no file; it may have no end'

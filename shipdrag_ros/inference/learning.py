@@ -40,6 +40,27 @@ _WATER_M_S, _WATER_SPEED_M_S, _WATER_S = 0.02, 5.0, 600.0  # less where a craft 
 _LOG_OF_WHITE, _LOG_OF_SPEED, _LOG_S = 0.3, 1e-3, 40.0
 _PLACE_OF_SPEED_S, _PLACE_S = 0.1, 80.0
 
+DECLARED = (
+    ('gust', f'{_GUST_OF_R:g} r(u_0)', _SD_OF_SIZE[0], 'm/s^2'),
+    ('gust, time', f'{_GUST_S:g} / sqrt(damping)', _SD_OF_TIME[0], 's'),
+    ('water', f'{_WATER_M_S:g}, less below {_WATER_SPEED_M_S:g} m/s', _SD_OF_SIZE[1], 'm/s'),
+    ('water, time', f'{_WATER_S:g}', _SD_OF_TIME[1], 's'),
+    (
+        'log',
+        f'{_LOG_OF_WHITE:g} of white, at least {_LOG_OF_SPEED:g} u_0',
+        _SD_OF_SIZE[2],
+        'm/s',
+    ),
+    ('log, time', f'{_LOG_S:g}', _SD_OF_TIME[2], 's'),
+    ('place', f'white of a mean, at least {_PLACE_OF_SPEED_S:g} s u_0', _SD_OF_SIZE[3], 'm'),
+    ('place, time', f'{_PLACE_S:g}', _SD_OF_TIME[3], 's'),
+    ('white of log', f'{_WHITE[0]:g} of its scatter', _SD_OF_WHITE[0], '-'),
+    ('white over ground', f'{_WHITE[1]:g} of its scatter', _SD_OF_WHITE[1], '-'),
+    ('white of places', f'{_WHITE[2]:g} of its scatter', _SD_OF_WHITE[2], '-'),
+    ('hold of the engine', f"{_TYPICAL_HOLD:g} of the hull's damping", _SD_OF_HOLD, '-'),
+)
+"""Each prior: what of, median, standard deviation of the logarithm, unit."""
+
 
 def of_steady(rows: Rows, variance: Float64, damping_1_s: float, inertia: float) -> Seen:
     """

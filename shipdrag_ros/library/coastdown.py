@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,6 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
 from shipdrag_ros.library.shown import ShownResistance
-from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.ship import Ship
@@ -98,11 +97,8 @@ class Coastdown(ShownResistance):
             )
         return self.event.estimate.valid_curve
 
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say what it gave, in the engineer's units, then in SI; or why nothing.
-        """
-        return tuple(map(in_python, words.summary(self.event, self.ship)))
+    def _lines(self) -> Sequence[str]:
+        return words.summary(self.event, self.ship)
 
     def table(self) -> Table:
         """

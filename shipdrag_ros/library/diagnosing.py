@@ -145,11 +145,11 @@ def _of_coastdowns(
 def _with_log_track(
     found: DiagnosisResult, runs: Sequence[WindowedRun], progress: Progress
 ) -> DiagnosisResult:
-    """Hold the logs against the ways over ground besides; a note says why not."""
+    """Compare the logs with the ways over ground too; a note says why not."""
     try:
         return with_log_track(found, _sailing(runs, '', progress))
     except DiagnosisError as error:
-        why = f'the log was not held against the way over ground: {str(error).strip()}'
+        why = f'the log was not compared with the way over ground: {str(error).strip()}'
         return replace(found, notes=(*found.notes, why))
 
 
@@ -167,7 +167,7 @@ def _unused(
 def _sailing(
     runs: Sequence[WindowedRun], no_coastdown: str, progress: Progress
 ) -> DiagnosisResult:
-    """Hold the logs against the ways over ground."""
+    """Compare the logs with the ways over ground."""
     read = []
     for done, (run, _) in enumerate(runs):
         progress(f'reading {run.name}', done, len(runs))

@@ -33,7 +33,7 @@ from shipdrag_ros.library.windowed import (
     refuse_overlaps,
     refuse_two_ships,
 )
-from shipdrag_ros.library.wording import in_python, says_it_in_python
+from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -51,7 +51,7 @@ class Diagnosis(Shown):
     found
         All that the diagnosis says.
     ship
-        That the runs were held against; None where none is known.
+        That the runs were compared with; None where none is known.
     notes
         What was found on the way, a line each.
 
@@ -121,12 +121,8 @@ class Diagnosis(Shown):
             )
         return with_effects(self.ship, self.found.effects)
 
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say the verdict, what was examined and where, and what would decide.
-        """
-        said = (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
-        return tuple(map(in_python, said))
+    def _lines(self) -> Sequence[str]:
+        return (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)
 
     def table(self) -> Table:
         """
@@ -214,14 +210,14 @@ class Diagnosis(Shown):
                 for value in (effect.parameters[size.name],)
             ]
             rows += sized or [(names, each.probability, '', '', None, None, '')]
-        if self.found.unnamed:
-            rows.append(('unknown', self.found.unnamed, '', '', None, None, ''))
         heads = ('candidate', 'probability', 'effect', 'parameter', 'value', 'sd', 'unit')
         return {head: [row[place] for row in rows] for place, head in enumerate(heads)}
 
 
 def _first(found: DiagnosisResult) -> str:
-    """Name the most probable answer."""
+    """Name the most probable answer, or ask."""
+    if found.question:
+        return found.question
     answer = max(diagnosis_words.answers(found), key=lambda each: each.probability)
     return f'{answer.words} ({diagnosis_words.probability(answer.probability)})'
 
@@ -251,7 +247,7 @@ def diagnose(
         Of one ship, from `read` or `simulate`; all their coastdowns are taken together,
         and effects of the earth are stated along the first.
     ship
-        To hold them against; None: that of the records.
+        To compare them with; None: that of the records.
     facts
         What a log book knows of all runs: `no_towed_cable`, `shaft=locked`.
     earlier

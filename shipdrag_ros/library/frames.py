@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A frame of pandas, polars or another library, written as a table that `importing` reads."""
+"""A frame of pandas, polars or another library, as a table that `sources` reads."""
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.progress import PartDone
+from shipdrag_ros.sources.table import LogRow, LogTable
 
 NANOSECONDS = 'ns'
+FRAME = 'frame'
+_ROWS = 1 << 14  # made text at a time
 INDEX = 'time'
 """Column of a frame's own dates, where its index has no name."""
 
@@ -25,9 +28,9 @@ def is_frame(source: object) -> bool:
     return hasattr(source, 'columns') and hasattr(source, '__getitem__')
 
 
-def write_table(frame: Any, path: Path) -> tuple[str, ...]:
+class FrameTable(LogTable):
     """
-    Write a frame as CSV: numbers to their last digit, dates in ns since the epoch.
+    A frame as a table: numbers to their last digit, dates in ns since the epoch.
 
     Parameters
     ----------
@@ -35,12 +38,10 @@ def write_table(frame: Any, path: Path) -> tuple[str, ...]:
         With `columns` and, for each, something that `to_numpy()` or numpy can turn
         into an array. Dates without a zone are UTC. An index of dates becomes the
         first column, of its name where no other column has it.
-    path
-        File to make.
 
-    Returns
-    -------
-    tuple of str
+    Attributes
+    ----------
+    dates
         Columns of dates, of which the index is first.
 
     Raises
@@ -48,25 +49,39 @@ def write_table(frame: Any, path: Path) -> tuple[str, ...]:
     ImportDataError
         If the frame has no row, or is a lazy one.
     """
-    if callable(getattr(frame, 'collect', None)):
-        raise ImportDataError('a lazy frame holds no values yet; give frame.collect()')
-    named = [(str(name), frame[name]) for name in frame.columns]
-    index = getattr(frame, 'index', None)
-    if str(getattr(index, 'dtype', '')).startswith('datetime64'):
-        named.insert(0, (_free(str(getattr(index, 'name', None) or INDEX), named), index))
-    dates, columns = [], []
-    for name, values in named:
-        array = _array(values)
-        if array.dtype.kind == 'M':
-            dates.append(name)
-        columns.append(list(_cells(array)))
-    if not columns or not columns[0]:
-        raise ImportDataError('the frame holds no row or no column; give one with a row a sample')
-    with path.open('w', encoding='utf-8', newline='') as file:
-        writer = csv.writer(file)
-        writer.writerow([name for name, _ in named])
-        writer.writerows(zip(*columns, strict=True))
-    return tuple(dates)
+
+    def __init__(self, frame: Any) -> None:
+        if callable(getattr(frame, 'collect', None)):
+            raise ImportDataError('a lazy frame holds no values yet; give frame.collect()')
+        named = [(str(name), frame[name]) for name in frame.columns]
+        index = getattr(frame, 'index', None)
+        if str(getattr(index, 'dtype', '')).startswith('datetime64'):
+            named.insert(0, (_free(str(getattr(index, 'name', None) or INDEX), named), index))
+        self._arrays = [_array(values) for _, values in named]
+        if not self._arrays or not len(self._arrays[0]):
+            raise ImportDataError(
+                'the frame holds no row or no column; give one with a row a sample'
+            )
+        self.path = Path(FRAME)
+        self.delimiter = ','
+        self.header = tuple(name.strip() for name, _ in named)
+        self.units = None
+        self.titles = ()
+        self.width = len(named)
+        self.joined_lines = 0
+        self.dates = tuple(
+            name for (name, _), array in zip(named, self._arrays) if array.dtype.kind == 'M'
+        )
+
+    def rows(self, progress: PartDone | None = None) -> Iterator[LogRow]:
+        """
+        Yield the rows; those without any value are skipped.
+        """
+        for first in range(0, len(self._arrays[0]), _ROWS):
+            some = [_cells(array[first : first + _ROWS]) for array in self._arrays]
+            for number, cells in enumerate(zip(*some, strict=True), start=first + 1):
+                if any(cells):
+                    yield LogRow(number, cells)
 
 
 def _free(name: str, named: Sequence[tuple[str, Any]]) -> str:
@@ -84,13 +99,13 @@ def _array(values: Any) -> NDArray[Any]:
     return np.asarray(values.to_numpy() if hasattr(values, 'to_numpy') else values)
 
 
-def _cells(array: NDArray[Any]) -> Iterable[str]:
-    """Yield the text of each value; nothing where there is none."""
+def _cells(array: NDArray[Any]) -> list[str]:
+    """Return the text of each value; nothing where there is none."""
     if array.dtype.kind == 'M':
         stamps = array.astype('datetime64[ns]')
-        return (
-            '' if missing else f'{stamp}'
-            for missing, stamp in zip(np.isnat(stamps), stamps.astype(np.int64).tolist())
-        )
+        missing = np.isnat(stamps).tolist()
+        texts = map(str, stamps.astype(np.int64).tolist())
+        return ['' if none else text for none, text in zip(missing, texts)]
     # the shortest text that reads back as the same number; NaN is no value
-    return ('' if value is None or value != value else str(value) for value in array.tolist())
+    found = ['' if value is None or value != value else str(value) for value in array.tolist()]
+    return found if array.dtype.kind in 'fiub' else [text.strip() for text in found]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who hears what happens while something long is done: a terminal, or nobody."""
+"""Receivers of progress and lines during long work: a terminal, or a list."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from shipdrag_ros.progress import PartDone
 
 
 class Listener(Protocol):
-    """Hears what is worth a line, and how far the work is."""
+    """Receives lines, and how far the work is."""
 
     def log(self, text: str) -> None:
         """
@@ -19,7 +19,7 @@ class Listener(Protocol):
 
     def progress(self, text: str) -> AbstractContextManager[PartDone]:
         """
-        Hear how far the work is that `text` names.
+        Receive how far the work is that `text` names.
         """
 
 

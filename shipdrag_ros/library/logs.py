@@ -3,27 +3,28 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.importing import formats
-from shipdrag_ros.importing.format import Format, Job, Option
-from shipdrag_ros.importing.formats.csv.columns import parse_input, parse_time
-from shipdrag_ros.importing.join import import_joined
-from shipdrag_ros.importing.reading import ImportedRun, format_of, job_of
-from shipdrag_ros.importing.table import LogTable
-from shipdrag_ros.library.frames import NANOSECONDS, is_frame, write_table
+from shipdrag_ros.library.frames import FRAME, NANOSECONDS, FrameTable, is_frame
 from shipdrag_ros.library.wording import in_python
 from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.sources import formats
+from shipdrag_ros.sources.format import Format, ImportResult, Option
+from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
+from shipdrag_ros.sources.formats.csv.declaration import FORMAT as TABLE
+from shipdrag_ros.sources.formats.csv.declaration import read_table
+from shipdrag_ros.sources.join import join
+from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.reading import format_of, job_of
+from shipdrag_ros.sources.run import run_of
+from shipdrag_ros.sources.table import LogTable
 
 _NEAR_NS = 600 * SECOND_NS  # logs that begin so soon after another one ends continue it
-_FRAME = 'frame'
 _FORMAT = 'format'
 _COLUMNS = "give the column of each input, {'speed_through_water': 'log:kn'} for instance"
 _OWN = {'map': 'columns', 'time': 'time', 'rate': 'rate_hz'}  # options that are arguments
@@ -81,7 +82,7 @@ class ReadOptions:
             for name, columns in (self.columns or {}).items()
         )
 
-    def options(self, source: Path, *, alone: bool) -> dict[str, Any]:
+    def options(self, source: Path | LogTable, *, alone: bool) -> dict[str, Any]:
         """
         Return the options of `shipdrag import` for a file.
 
@@ -157,10 +158,10 @@ def _value(option: Option, value: Any) -> Any:
     return [option.read(str(each)) for each in several]
 
 
-def _is_in(text: str, source: Path) -> bool:
+def _is_in(text: str, source: Path | LogTable) -> bool:
     """Say whether a file is a table that has the columns of an input."""
     try:
-        table = LogTable(source)
+        table = source if isinstance(source, LogTable) else LogTable(source)
         for name in parse_input(text).names:
             table.column(name)
     except ImportDataError:
@@ -174,7 +175,8 @@ class _Part:
 
     place: int
     declared: Format
-    job: Job
+    source: Path | LogTable
+    log: Log
     run: Run
     dated: bool
 
@@ -204,33 +206,30 @@ def read_logs(
     ImportDataError
         If one cannot be read.
     """
-    folder = TemporaryDirectory(prefix='shipdrag-')
     parts: list[_Part] = []
     notes: list[str] = []
     for place, source in enumerate(sources):
-        place_of = (Path(folder.name), place, len(sources) == 1)
-        part, said = _part(source, place_of, how, attachments)
+        part, said = _part(source, place, how, alone=len(sources) == 1)
         parts.append(part)
         notes += said
-    _refuse_missing(how, [part.job.source for part in parts])
+    _refuse_missing(how, [part.source for part in parts])
     _refuse_foreign(how, [part.declared for part in parts])
     runs: list[Run] = []
-    for number, group in enumerate(_groups(parts)):
+    for group in _groups(parts):
         if len(group) == 1:
             runs.append(group[0].run)
             continue
-        bag = Path(folder.name) / f'joined-{number}.mcap'
-        joined = import_joined([(each.declared, each.job) for each in group], bag, attachments)
-        notes += joined.notes
-        whole = ImportedRun(bag, [each.job.source for each in group])
+        joined, said = join([(each.run.paths[0].name, each.log) for each in group])
+        notes += said
+        whole = run_of(joined, [each.run.paths[0] for each in group])
         whole.name = ', '.join(each.run.name for each in group)
         runs.append(whole)
-    for run in runs:  # the folder stays as long as any run that reads from it
-        weakref.finalize(run, _let_go, folder)
+    for run in runs:
+        run.attachments |= attachments
     return runs, notes
 
 
-def _refuse_missing(how: ReadOptions, sources: Sequence[Path]) -> None:
+def _refuse_missing(how: ReadOptions, sources: Sequence[Path | LogTable]) -> None:
     """Refuse columns that none of the sources has."""
     for text in how.maps:
         if not any(_is_in(text, source) for source in sources):
@@ -247,30 +246,30 @@ def _refuse_foreign(how: ReadOptions, chosen: Sequence[Format]) -> None:
             raise ImportDataError(f'options {key!r}: {kinds} has no use for it; leave it out')
 
 
-def _part(
-    source: Any, place_of: tuple[Path, int, bool], how: ReadOptions, attachments: Mapping[str, str]
-) -> tuple[_Part, list[str]]:
+def _part(source: Any, place: int, how: ReadOptions, *, alone: bool) -> tuple[_Part, list[str]]:
     """Read a source by itself; return it, and what of it was not used."""
-    folder, place, alone = place_of
-    name, path = str(source), source
+    log = Log()
     if is_frame(source):
-        name, path = _FRAME, folder / f'{place}.csv'
-        how = how.of_dates(write_table(source, path))
-    options = how.options(path, alone=alone)
-    bag = folder / f'{place}.mcap'
-    try:
+        name, path = FRAME, Path(FRAME)
+        source = FrameTable(source)
+        how = how.of_dates(source.dates)
+        options = how.options(source, alone=alone)
         # a frame is a table, however few columns it has
-        declared = how.format_of(path, {'map': (), **options} if is_frame(source) else options)
-        job = job_of(declared, path, bag, options, attachments)
-        found = declared.write(job)
-    except ImportDataError as error:
-        raise ImportDataError(str(error).replace(repr(str(path)), repr(name))) from error
-    run = ImportedRun(bag, [path])
+        declared = how.format_of(path, {'map': (), **options})
+        if declared.name != TABLE.name:
+            raise ImportDataError(f'a frame is a table, and not {declared.kind}; leave format out')
+        found: ImportResult = read_table(source, log, job_of(declared, path, options).options)
+    else:
+        name, path = str(source), source
+        options = how.options(path, alone=alone)
+        declared = how.format_of(path, options)
+        found = declared.read(job_of(declared, path, options), log)
+    run = run_of(log, [path])
     run.name = name
     notes = [*found.summary(path)[1:], *found.details()]
     dated = getattr(found, 'base_ns', None) is None
     said = [f'{name}: {in_python(note)}' for note in notes]
-    return _Part(place, declared, job, run, dated), said
+    return _Part(place, declared, source, log, run, dated), said
 
 
 def _groups(parts: Sequence[_Part]) -> list[list[_Part]]:
@@ -288,7 +287,3 @@ def _groups(parts: Sequence[_Part]) -> list[list[_Part]]:
     # effects of the earth are stated along the run that was given first
     found = [sorted(group, key=lambda part: part.place) for group in groups]
     return sorted(found, key=lambda group: group[0].place)
-
-
-def _let_go(folder: TemporaryDirectory[str]) -> None:
-    """Forget a folder, which goes when nobody holds it any more."""

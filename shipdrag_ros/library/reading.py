@@ -91,8 +91,6 @@ def read(
     if not isinstance(ship, Ship | str | PathLike | None):
         raise BagError(f'ship={ship!r}: expected a Ship, or the path of a ship file')
     given = ship if ship is None or isinstance(ship, Ship) else Ship.load(ship)
-    if isinstance(ship, Ship):
-        Ship.from_yaml(ship.to_yaml(), subject='ship=')  # made in Python, it is not checked yet
     alone = isinstance(source, str | PathLike) or is_frame(source)
     several = source if not alone and isinstance(source, Iterable) else [source]
     sources = [each if is_frame(each) else _path(each) for each in several]

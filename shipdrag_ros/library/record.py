@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from os import PathLike
@@ -59,7 +58,7 @@ class Record(Shown):
     >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)
     >>> record
     <Record: Vitus Bering, 1 run, 5204 messages>
-    >>> print(record.summary()[1])
+    >>> print(record.summary().splitlines()[1])
     simulated, seed 0: 1300 s (22 min) from 2026-06-01 08:00:00 UTC
     >>> [coastdown.ended_by for coastdown in record.coastdowns()]
     ['record_end']
@@ -127,16 +126,10 @@ class Record(Shown):
             raise BagError(f'the record has {len(files)} files and is not one bag; copy those')
         if out.exists():
             raise BagError(f'{str(out)!r} exists; choose another name or remove it')
-        try:
-            shutil.copyfile(files[0], out)
-        except OSError as error:
-            raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
+        self.runs[0].save(out)
         return out
 
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say which ship it is, what each run holds, and what could not be used.
-        """
+    def _lines(self) -> Sequence[str]:
         ship = self.ship
         known = 'no ship is known: give one with ship=' if ship is None else ship.summary()
         runs = [f'{run.name}: {_when(run)}' for run in self.runs]

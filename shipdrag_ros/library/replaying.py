@@ -5,16 +5,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from shipdrag_ros.bags import Run
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.library.listener import Listener
 from shipdrag_ros.library.windowed import WindowSpan
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import replay
+from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
 _LATE_S = 10.0
+_MOVING_M_S = 0.5
 
 
 def replay_run(
@@ -37,6 +41,10 @@ def replay_run(
         result = RunResult.of(
             replay(each, ship=ship, parameters=parameters, window=window, progress=progress)
         )
+    if not result.coastdowns:
+        astern = _astern(each)
+        if astern:
+            result = replace(result, warnings=(*result.warnings, astern))
     if window is not None:
         for coastdown in result.coastdowns:
             if coastdown.estimate is None:
@@ -48,6 +56,21 @@ def replay_run(
         if beyond:
             result = replace(result, warnings=(*result.warnings, beyond))
     return result
+
+
+def _astern(run: Run) -> str:
+    """Say that a log reads astern most of the time, which a wrong sign makes too."""
+    block, _ = accepted_samples(run)
+    speeds = block.value[block.channel == Channel.SPEED_THROUGH_WATER, 0]
+    moving = speeds[np.abs(speeds) > _MOVING_M_S]
+    share = float(np.mean(moving < 0.0)) if len(moving) else 0.0
+    if share <= 0.5:
+        return ''
+    return (
+        f'speed_through_water is negative in {share:.0%} of the samples under way (median '
+        f'{np.median(moving):.2f} m/s), as if the ship went astern; if she sailed ahead, the sign '
+        'of the log is wrong: give the speed forward as positive'
+    )
 
 
 def _beyond(run: Run, end_s: float) -> str:

@@ -19,7 +19,7 @@ from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.library.shown import ShownResistance, writing
 from shipdrag_ros.library.windowed import WindowSpan
-from shipdrag_ros.library.wording import in_python, says_it_in_python
+from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
 from shipdrag_ros.replay.run_result import RunResult
@@ -95,12 +95,9 @@ class Resistance(ShownResistance):
                 f'{len(usable)} coastdowns have no r(v) together: {whole.why_not}; take the curve '
                 'of each of `coastdowns`'
             )
-        raise EstimationError(' '.join(self.summary()))
+        raise EstimationError(' '.join(self.summary().splitlines()))
 
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say what each coastdown gave, or why there is none, and what all gave together.
-        """
+    def _lines(self) -> Sequence[str]:
         lines = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]
         whole = together(self.runs)
         if whole.why_not:
@@ -110,7 +107,7 @@ class Resistance(ShownResistance):
             place = force.near(tables.common_speed_m_s(self.runs))
             lines.append(f'{whole.combined.runs} coastdowns together. {force.at(place)}')
             lines += words.combined_notes(whole.combined)
-        return tuple(map(in_python, lines))
+        return lines
 
     def table(self) -> Table:
         """
@@ -126,7 +123,7 @@ class Resistance(ShownResistance):
 
         usable = [each for each in self.coastdowns if each.estimate is not None]
         if not usable:
-            raise EstimationError(' '.join(self.summary()))
+            raise EstimationError(' '.join(self.summary().splitlines()))
         if len(usable) == 1:
             return usable[0]._drawing()
         dated = [(utc(each.start_ns), each.curve) for each in usable]

@@ -15,12 +15,27 @@ import numpy as np
 
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.library.wording import in_python
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
 
 _SIZE = (6.4, 4.2)  # of a picture [inches]
+
+
+class Text(str):
+    """
+    A text that shows its lines wherever it is shown: printed, at a prompt, in a notebook.
+    """
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        return ''.join(f'<p>{escape(line)}</p>' for line in self.splitlines())
 
 
 class Shown(ABC):
@@ -31,11 +46,15 @@ class Shown(ABC):
     notebook, `to_frame()` in pandas and `plot()` in matplotlib.
     """
 
+    def summary(self) -> Text:
+        """
+        Return the result in sentences, a line each, to be printed.
+        """
+        return Text('\n'.join(map(in_python, self._lines())))
+
     @abstractmethod
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say what was found, a paragraph each.
-        """
+    def _lines(self) -> Sequence[str]:
+        """Return the sentences, in the words of the command line."""
 
     @abstractmethod
     def table(self) -> Table:
@@ -66,7 +85,7 @@ class Shown(ABC):
         return f'<{type(self).__name__}: {self._title()}>'
 
     def _repr_html_(self) -> str:
-        return html_of(self._title(), self.summary(), self.table())
+        return html_of(self._title(), self.summary().splitlines(), self.table())
 
 
 class ShownResistance(Shown):

@@ -37,7 +37,7 @@ NAME = 'simulated'
 
 class Sensing(TypedDict, total=False):
     """
-    What a simulation may be given besides.
+    Further settings of a simulation.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ def simulate(
     ship
         With a baseline.
     effects
-        What acts besides, by name: `{'fouling': 0.2}` for the first parameter, or
+        What acts in addition, by name: `{'fouling': 0.2}` for the first parameter, or
         `{'current': {'along_track_m_s': 0.4}}`. docs/effects.md has all, in SI.
     speed_m_s
         Steady speed through water before the stop [m/s]; None: 0.8 of the highest
@@ -132,7 +132,7 @@ def simulate(
     unknown = set(more) - set(Sensing.__annotations__)
     if unknown:
         raise SimulationError(
-            f'{", ".join(sorted(unknown))}: not known; besides the arguments by name there are '
+            f'{", ".join(sorted(unknown))}: not known; beside the arguments by name there are '
             f'{", ".join(Sensing.__annotations__)}'
         )
     known = {'lead_in_s': 600.0, 'rate_hz': 1.0, 'noise': 1.0, **more}

@@ -16,7 +16,7 @@ from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.resistance import Resistance
 from shipdrag_ros.library.shown import Shown, drawing, time_column, writing
 from shipdrag_ros.library.trending import trends_of
-from shipdrag_ros.library.wording import in_python, says_it_in_python
+from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
 
 if TYPE_CHECKING:
@@ -77,16 +77,12 @@ class Trends(Shown):
         known = ', '.join(repr(each.series.name) for each in self.ships) or 'none'
         raise FleetError(f'no ship is called {ship!r}; there are: {known}')
 
-    def summary(self) -> tuple[str, ...]:
-        """
-        Say what is known of each ship, and what could not be used.
-        """
+    def _lines(self) -> Sequence[str]:
         lines = [
             f'{trend.series.name}: {line}' for trend in self.ships for line in words.lines(trend)
         ]
         lines += [f'{bag} could not be used: {reason}' for bag, reason in self.skipped]
-        said = (*(lines or ['No coastdown was given: no trend.']), *self.notes)
-        return tuple(map(in_python, said))
+        return (*(lines or ['No coastdown was given: no trend.']), *self.notes)
 
     def table(self) -> Table:
         """
@@ -164,7 +160,7 @@ def trends(
     events: Mapping[str, Sequence[tuple[str, str]]] | None = None,
 ) -> Trends:
     """
-    Hold the added resistance of each ship against time, as `shipdrag trend` does.
+    Follow the added resistance of each ship over time, as `shipdrag trend` does.
 
     Parameters
     ----------

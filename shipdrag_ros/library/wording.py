@@ -15,7 +15,8 @@ from functools import cache, wraps
 from typing import ParamSpec, TypeVar
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.importing import formats
+from shipdrag_ros.imports import what_to_install
+from shipdrag_ros.sources import formats
 
 P = ParamSpec('P')
 R = TypeVar('R')
@@ -104,5 +105,10 @@ def says_it_in_python(door: Callable[P, R]) -> Callable[P, R]:
                 in_python(each) if isinstance(each, str) else each for each in error.args
             )
             raise
+        except ModuleNotFoundError as error:
+            advice = what_to_install(error)
+            if advice is None:
+                raise
+            raise ShipdragError(advice) from error
 
     return speaking

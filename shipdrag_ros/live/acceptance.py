@@ -15,7 +15,7 @@ from enum import StrEnum
 import numpy as np
 
 from shipdrag_ros.display import M_S_PER_KNOT
-from shipdrag_ros.live.headline import READY_S, clock, heading
+from shipdrag_ros.live.headline import clock, heading
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
 
@@ -33,6 +33,7 @@ class Held(StrEnum):
     NO = 'no'
     WAIT = 'wait'
     UNKNOWN = 'unknown'
+    SILENT = 'silent'
 
 
 @dataclass(frozen=True)
@@ -91,17 +92,16 @@ class Recent:
         return math.atan2(float(np.sin(rows).mean()), float(np.cos(rows).mean()))
 
 
-def lead_check(lead_s: float | None, full_s: float | None) -> Check:
+def lead_check(lead_s: float | None, ready_s: float | None) -> Check:
     """
     Say whether there was enough steady sailing.
     """
     name = 'Steady lead'
-    if lead_s is None or full_s is None:
-        return Check(name, Held.UNKNOWN, 'not said by the node')
-    enough = lead_s >= min(READY_S, full_s)
-    return Check(
-        name, Held.YES if enough else Held.WAIT, f'{clock(lead_s)} of {full_s / 60.0:.0f} min'
-    )
+    if lead_s is None or ready_s is None:
+        return Check(name, Held.UNKNOWN, 'no speed, or the node does not say')
+    if lead_s >= ready_s:
+        return Check(name, Held.YES, f'{clock(lead_s)}, at least {clock(ready_s)}')
+    return Check(name, Held.WAIT, f'{clock(lead_s)} of {clock(ready_s)}')
 
 
 def wind_check(apparent: tuple[float, float] | None, speed_m_s: float | None) -> Check:
@@ -155,7 +155,7 @@ def course_check(turned_rad: float | None, *, coasting: bool) -> Check:
     """
     name = 'Course'
     if turned_rad is None:
-        return Check(name, Held.UNKNOWN, 'no heading heard')
+        return Check(name, Held.UNKNOWN, 'keep the heading')
     swung = abs(math.degrees(math.remainder(turned_rad, 2.0 * math.pi)))
     held = swung < math.degrees(COURSE_RAD)
     since = 'from the stop' if coasting else 'in 5 min'

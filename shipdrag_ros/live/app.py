@@ -15,6 +15,7 @@ from typing import Any
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import (
     FileResponse,
@@ -219,7 +220,7 @@ class LivePage:
             self._source.control(str(asked['action']), float(asked.get('value', 0)))
         except ShipdragError as error:
             return PlainTextResponse(f'{error}\n', 400)
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
             return PlainTextResponse('expected {"action": ..., "value": number}\n', 400)
         return JSONResponse(self._source.player())
 
@@ -300,5 +301,5 @@ async def _body(request: Request) -> bytes:
     async for piece in request.stream():
         body += piece
         if len(body) > LARGEST_BODY:
-            raise ValueError('too long')
+            raise HTTPException(413, 'too long')
     return body

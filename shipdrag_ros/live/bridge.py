@@ -8,10 +8,12 @@ Plain figures in SI units; the page turns them into knots, kN and kW.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass, replace
 from typing import Any
 
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance, verdicts
+from shipdrag_ros.live.acceptance import Check, Held
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.figures import (
     PagePart,
@@ -28,6 +30,7 @@ from shipdrag_ros.live.verdicts import VerdictView
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event
 from shipdrag_ros.messages.heard import (
     ERROR,
+    OK,
     STALE,
     Health,
     Heard,
@@ -35,14 +38,29 @@ from shipdrag_ros.messages.heard import (
     Samples,
     ShipFile,
 )
-from shipdrag_ros.samples import Channel
+from shipdrag_ros.samples import MOTION_INPUTS, Channel
 from shipdrag_ros.ship import Ship
 
 PAST_RUNS = 50  # that are listed
 _MESSAGES = 20
 _COURSE_S = 300
+_OLD_S = 5.0  # a speed that is older is not that of now
+_SPEEDS = (
+    ('speed_through_water', 'through water'),
+    ('speed_over_ground', 'over ground'),
+)  # with the columns of the trace
+_CHECKED = {'Wind': 'wind_apparent', 'Depth': 'depth', 'Rudder': 'rudder', 'Course': 'heading'}
 
 _AnyPart = PagePart | list[Any] | None
+
+
+@dataclass(frozen=True)
+class SpeedNow:
+    """The ship's speed, what kind of speed it is, and how old [s; None: not known]."""
+
+    value_m_s: float
+    kind: str
+    age_s: float | None
 
 
 class Bridge:
@@ -129,15 +147,33 @@ class Bridge:
         """The ship's time: the latest stamp, 0 before the first [ns]."""
         return self._now_ns
 
-    @property
-    def speed_m_s(self) -> float | None:
-        """The ship's speed: estimated while she coasts, else as measured."""
-        if self._coast_ns is None or self._speed is None:
-            for row in (self.trace.current, self.trace.latest):
-                measured = [value for value in (row or ())[1:3] if value is not None]
-                if measured:
-                    return measured[0]
-        return None if self._speed is None else self._speed.value
+    def speed(self, now_s: float) -> SpeedNow | None:
+        """
+        Return the ship's speed: estimated while she coasts, else as measured.
+
+        Parameters
+        ----------
+        now_s
+            On the clock of `hear`.
+        """
+        measured = [
+            SpeedNow(value, kind, self._age_s(name, now_s))
+            for column, (name, kind) in enumerate(_SPEEDS)
+            if (value := self.trace.newest(column)) is not None
+        ]
+        if self._coast_ns is not None and self._speed is not None:
+            ages = [self._age_s(name, now_s) for name in MOTION_INPUTS]
+            age_s = min((age for age in ages if age is not None), default=None)
+            return SpeedNow(self._speed.value, 'through water, estimated', age_s)
+        return min(measured, key=lambda each: max(each.age_s or 0.0, _OLD_S), default=None)
+
+    def _age_s(self, name: str, now_s: float) -> float | None:
+        """Return how long ago the node received an input; None where that is not known."""
+        status = None if self._health is None else self._health.of(f'input {name}')
+        age_s = None if status is None else status.number('age')
+        if age_s is None or self._heard_s is None:
+            return None
+        return age_s + now_s - self._heard_s
 
     @property
     def ship(self) -> Ship | None:
@@ -235,10 +271,10 @@ class Bridge:
         return {
             'headline': {'tone': said.tone.value, 'text': said.text, 'action': said.action},
             'ship': ship_part(self._ship),
-            'figures': self._figures(),
+            'figures': self._figures(now_s),
             'curve': curve_part(self._curve),
             'inputs': self._inputs(now.silent_s or 0.0),
-            'checks': self._checks(now),
+            'checks': self._checks(now, now_s),
             'verdict': self._verdict_part(),
             'past': [past_part(run, self._ship) for run in self.past[-PAST_RUNS:]],
             'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
@@ -250,23 +286,31 @@ class Bridge:
         coast_s = None
         if self._coast_ns is not None and self._now_s:
             coast_s = max(self._now_s - self._coast_ns * 1e-9, 0.0)
-        trouble = ''
-        if state is not None and state.level >= ERROR and values.get('monitor') != 'coastdown':
-            trouble = state.message
-        lead_s = None if state is None else state.number('steady lead')
+        trouble = state.message if state is not None and state.level >= ERROR else ''
+        lead = None if self._health is None else self._health.lead
         return Situation(
             silent_s=None if self._heard_s is None else now_s - self._heard_s,
             lifecycle=values.get('lifecycle', ''),
             monitor=values.get('monitor', ''),
             trouble=trouble,
-            lead_s=lead_s,
-            lead_full_s=None if state is None else state.number('steady lead used at most'),
+            doubt=self._doubt(),
+            lead_s=None if lead is None else lead[0],
+            ready_s=None if lead is None else lead[1],
             coast_s=coast_s,
             band=self._bands[-1][1] if self._bands else None,
             to_go_s=to_go_s(self._bands, GOAL),
             ended=self._ended(),
             steer_deg=self._steer_deg(),
             paired=self._is_paired,
+        )
+
+    def _doubt(self) -> str:
+        """Say which sources of the motion are not well; '' where all are."""
+        inputs = () if self._health is None else self._health.inputs
+        return '; '.join(
+            f'{status.input.replace("_", " ")}: {status.message}'
+            for status in inputs
+            if status.input in MOTION_INPUTS and status.level != OK and status.number('messages')
         )
 
     def _ended(self) -> Ended | None:
@@ -292,8 +336,16 @@ class Bridge:
             return None  # another day, another current
         return self.past[-1].reciprocal_deg
 
-    def _figures(self) -> _AnyPart:
-        figures: dict[str, Any] = {'speed_m_s': self.speed_m_s}
+    def _figures(self, now_s: float) -> _AnyPart:
+        speed = self.speed(now_s)
+        figures: dict[str, Any] = {'speed_m_s': None}
+        if speed is not None:
+            old = speed.age_s is not None and speed.age_s > _OLD_S
+            figures = {
+                'speed_m_s': speed.value_m_s,
+                'speed_kind': speed.kind,
+                'speed_old_s': int(speed.age_s or 0.0) if old else None,
+            }
         if self._resistance is not None:
             figures |= {'r': self._resistance.value, 'r_sigma': self._resistance.sigma}
         ended = [run for run in self.past if run.curve is not None]
@@ -334,9 +386,12 @@ class Bridge:
             )
         return rows
 
-    def _checks(self, now: Situation) -> _AnyPart:
+    def _checks(self, now: Situation, now_s: float) -> _AnyPart:
+        speed = self.speed(now_s)
+        speed_m_s = None if speed is None else speed.value_m_s
         second, coasting = self._now_s, now.coast_s is not None
         of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
+        lead_s = self._lead_at_stop if of_run else None if now.trouble else now.lead_s
         course = self._recent.direction(second)
         before = self._course_at_stop if coasting else None
         if before is None and self._courses:
@@ -345,16 +400,22 @@ class Bridge:
         depth = self._recent.mean(Channel.DEPTH, second)
         rudder = self._recent.mean(Channel.RUDDER, second)
         checks = [
-            acceptance.lead_check(self._lead_at_stop if of_run else now.lead_s, now.lead_full_s),
-            acceptance.wind_check(
-                self._recent.mean(Channel.WIND_APPARENT, second), self.speed_m_s
-            ),
-            acceptance.depth_check(depth and depth[0], self.speed_m_s, self._ship),
+            acceptance.lead_check(lead_s, now.ready_s),
+            acceptance.wind_check(self._recent.mean(Channel.WIND_APPARENT, second), speed_m_s),
+            acceptance.depth_check(depth and depth[0], speed_m_s, self._ship),
             acceptance.rudder_check(rudder and rudder[0]),
             acceptance.course_check(turned, coasting=coasting),
             acceptance.reciprocal_check(now.steer_deg, paired=self._is_paired, coasting=coasting),
         ]
+        checks = [self._unless_silent(check) for check in checks]
         return [{'name': c.name, 'held': c.held.value, 'text': c.text} for c in checks]
+
+    def _unless_silent(self, check: Check) -> Check:
+        name = _CHECKED.get(check.name, '')
+        status = None if self._health is None else self._health.of(f'input {name}')
+        if status is None or status.level != STALE:
+            return check
+        return replace(check, held=Held.SILENT, text=status.message)
 
     def _verdict_part(self) -> _AnyPart:
         view = self._verdict

@@ -3,7 +3,7 @@
 Who may look: addresses, names, the token, and how many connections.
 
 Nobody out there can make the page's process grow: too many connections are
-refused, silent and stuck ones are closed.
+refused; those that owe a request and those that read nothing are closed.
 """
 
 from __future__ import annotations
@@ -13,9 +13,12 @@ import hashlib
 import hmac
 import ipaddress
 import socket
+from collections.abc import Iterator
+from time import monotonic
 from typing import Any
 from urllib.parse import urlsplit
 
+import h11
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import cookie_parser
 from starlette.responses import PlainTextResponse, RedirectResponse
@@ -118,7 +121,7 @@ def pass_of(token: str) -> str:
 
 def same(given: str, expected: str) -> bool:
     """
-    Compare in a time that betrays nothing.
+    Compare in constant time.
     """
     return hmac.compare_digest(given.encode(), expected.encode())
 
@@ -140,18 +143,43 @@ def _is_same_origin(headers: Headers) -> bool:
 class Connection(H11Protocol):
     """
     A connection that may not wait for ever, one of not too many.
+
+    A request must be whole `ASK_S` after the connection or after the answer before it, however
+    it drips in. Where there are too many, the oldest one that still owes a request gives its
+    place to the next, so that only who asks can hold one.
     """
 
     _timer: asyncio.TimerHandle | None = None
+    since_s = 0.0
 
     def connection_made(self, transport: Any) -> None:
-        """Refuse it where there are too many."""
+        """Give it a place, or refuse it where there are too many viewers."""
         super().connection_made(transport)
-        if len(self.connections) > CONNECTIONS:
-            transport.write(_FULL)
-            transport.close()
+        self.since_s = monotonic()
+        self._expect_request()
+        if len(self.connections) <= CONNECTIONS:
             return
-        self._timer = self.loop.call_later(ASK_S, self._close_if_silent)
+        waiting = [each for each in self._others() if each.owes_request]
+        if waiting:
+            min(waiting, key=lambda each: each.since_s).leave()
+            return
+        transport.write(_FULL)
+        transport.close()
+
+    @property
+    def owes_request(self) -> bool:
+        """Whether no whole request has come since the last answer."""
+        return self.conn.their_state in (h11.IDLE, h11.SEND_BODY)
+
+    def _others(self) -> Iterator[Connection]:
+        for each in self.connections:
+            if isinstance(each, Connection) and each is not self:
+                yield each
+
+    def leave(self) -> None:
+        """Close it at once, and give its place away at once."""
+        self.connections.discard(self)
+        self.transport.abort()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget it."""
@@ -163,6 +191,11 @@ class Connection(H11Protocol):
         if not self.transport.is_closing():
             super().data_received(data)
 
+    def on_response_complete(self) -> None:
+        """Wait for the next request, but not for ever."""
+        super().on_response_complete()
+        self._expect_request()
+
     def pause_writing(self) -> None:
         """Wait for a reader who is behind, but not for ever."""
         super().pause_writing()
@@ -171,11 +204,15 @@ class Connection(H11Protocol):
 
     def resume_writing(self) -> None:
         """Go on: he reads again."""
-        self._stop_timer()
+        self._expect_request()
         super().resume_writing()
 
-    def _close_if_silent(self) -> None:
-        if self.cycle is None:
+    def _expect_request(self) -> None:
+        self._stop_timer()
+        self._timer = self.loop.call_later(ASK_S, self._close_if_late)
+
+    def _close_if_late(self) -> None:
+        if self.owes_request:
             self.transport.abort()
 
     def _stop_timer(self) -> None:

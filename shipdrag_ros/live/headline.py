@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from shipdrag_ros.coastdown.events import EndedBy
+from shipdrag_ros.messages.heard import READY_S
 
-READY_S = 600.0  # of steady sailing from which the noise is known well enough
 GOAL = 0.05  # two standard deviations over r that a run is worth
 ENDED_S = 600.0  # a run that has ended is the headline for so long
 SILENT_S = 5.0  # the node speaks every second
@@ -80,8 +80,10 @@ class Situation:
         States as the node names them.
     trouble
         What keeps the node from estimating; '' for nothing.
-    lead_s, lead_full_s
-        Steady sailing so far, and the longest that is used; None where it is not known.
+    doubt
+        What is not well, and does not keep it; '' for nothing.
+    lead_s, ready_s
+        Steady sailing so far, and from when the record is ready; None where it is not known.
     coast_s
         Since the stop; None without a coastdown.
     band
@@ -100,8 +102,9 @@ class Situation:
     lifecycle: str = ''
     monitor: str = ''
     trouble: str = ''
+    doubt: str = ''
     lead_s: float | None = None
-    lead_full_s: float | None = None
+    ready_s: float | None = None
     coast_s: float | None = None
     band: float | None = None
     to_go_s: float | None = None
@@ -131,10 +134,19 @@ def headline(now: Situation) -> Headline:
         return Headline(
             Tone.BAD, f'NODE {now.lifecycle.upper()}', 'It estimates nothing until it is active.'
         )
+    if now.trouble:
+        coasting = '' if now.coast_s is None else f' at {clock(now.coast_s)} of a coastdown'
+        return Headline(Tone.BAD, f'NO SPEED{coasting}', _sentence(now.trouble))
+    found = _sailing(now)
+    if not now.doubt:
+        return found
+    tone = Tone.WATCH if found.tone is Tone.GOOD else found.tone
+    return Headline(tone, found.text, f'Look first: {now.doubt.rstrip(".")}. {found.action}')
+
+
+def _sailing(now: Situation) -> Headline:
     if now.monitor == 'coastdown' and now.coast_s is not None:
         return _coasting(now)
-    if now.trouble:
-        return Headline(Tone.BAD, 'NO SPEED HEARD', _sentence(now.trouble))
     if now.monitor == 'candidate':
         return Headline(
             Tone.ACT,
@@ -196,9 +208,10 @@ def _then(now: Situation) -> str:
         return 'Both runs of the pair are made. The engine may be started.'
     if now.steer_deg is None:
         return 'Sail on steadily.'
-    full = 1800.0 if now.lead_full_s is None else now.lead_full_s
+    ready_s = READY_S if now.ready_s is None else now.ready_s
     return (
-        f'Now the reciprocal: steer {heading(now.steer_deg)}, then {full / 60.0:.0f} min steady.'
+        f'Now the reciprocal: steer {heading(now.steer_deg)}, then at least '
+        f'{ready_s / 60.0:.0f} min steady, up to 30.'
     )
 
 
@@ -206,18 +219,19 @@ def _before(now: Situation) -> Headline:
     hold = 'Hold course and revolutions.'
     if now.steer_deg is not None:
         hold = f'Steer {heading(now.steer_deg)} (reciprocal) and hold it and the revolutions.'
-    if now.lead_s is None or now.lead_full_s is None:
+    if now.lead_s is None or now.ready_s is None:
         return Headline(Tone.WATCH, 'STEADY' if now.monitor == 'steady' else 'WAITING', hold)
     if now.monitor != 'steady' or now.lead_s <= 0.0:
         return Headline(Tone.WATCH, 'NOT STEADY YET', hold)
-    ready_s = min(READY_S, now.lead_full_s)
-    text = f'STEADY {now.lead_s / 60.0:.0f} of {now.lead_full_s / 60.0:.0f} min'
-    if now.lead_s < ready_s:
-        more = math.ceil((ready_s - now.lead_s) / 60.0)
-        return Headline(Tone.WATCH, text, f'{hold} Ready in {more} min.')
+    minutes, needed = math.floor(now.lead_s / 60.0), round(now.ready_s / 60.0)
+    if now.lead_s < now.ready_s:
+        more = math.ceil((now.ready_s - now.lead_s) / 60.0)
+        return Headline(
+            Tone.WATCH, f'STEADY {minutes} of {needed} min', f'{hold} Ready in {more} min.'
+        )
     course = 'course' if now.steer_deg is None else f'{heading(now.steer_deg)} (reciprocal)'
     action = f'The engine may be stopped, if the master decides so. Until then hold {course}.'
-    return Headline(Tone.GOOD, f'{text}: record ready', action)
+    return Headline(Tone.GOOD, f'STEADY {minutes} min: record ready', action)
 
 
 def percent(share: float) -> str:

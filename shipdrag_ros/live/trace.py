@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field
+from itertools import islice
 
 import numpy as np
 
@@ -128,6 +129,13 @@ class Trace:
         """The newest second as far as it has been read, None before the first reading."""
         found = self._open.get(self.newest_s)
         return self.latest if found is None else found.row(self.newest_s)
+
+    def newest(self, column: int) -> float | None:
+        """
+        Return the last that was read of a column of `COLUMNS`; None where that is long ago.
+        """
+        rows = [self.current, *islice(reversed(self._fine), LATE_S)]
+        return next((row[1 + column] for row in rows if row and row[1 + column] is not None), None)
 
     def rows(self) -> list[TraceRow]:
         """

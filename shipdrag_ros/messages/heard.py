@@ -11,11 +11,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from shipdrag_ros.display import printable
 from shipdrag_ros.messages import types
 from shipdrag_ros.samples import Block
 
 DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 OK, WARN, ERROR, STALE = range(4)
+READY_S = 600.0  # of steady sailing from which the noise is known well enough
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,16 @@ class Health:
         return next((status for status in self.statuses if status.part == part), None)
 
     @property
+    def lead(self) -> tuple[float, float] | None:
+        """How long the ship has been steady, and from when the record is ready [s]."""
+        state = self.of('state')
+        steady_s = None if state is None else state.number('steady lead')
+        most_s = None if state is None else state.number('steady lead used at most')
+        if steady_s is None or most_s is None:
+            return None
+        return steady_s, min(READY_S, most_s)
+
+    @property
     def inputs(self) -> tuple[Status, ...]:
         """Those of the inputs."""
         return tuple(status for status in self.statuses if status.input)
@@ -131,12 +143,12 @@ def health_of(statuses: Iterable[Any]) -> list[Health]:
 
 
 def _read(status: Any) -> Status:
-    node, _, part = str(status.name).rpartition(': ')
+    node, _, part = printable(str(status.name)).rpartition(': ')
     level = status.level  # a byte of rclpy, a number elsewhere
     return Status(
         node=node,
         part=part,
         level=level[0] if isinstance(level, bytes) else int(level),
-        message=str(status.message),
-        values={str(item.key): str(item.value) for item in status.values},
+        message=printable(str(status.message)),
+        values={printable(str(item.key)): printable(str(item.value)) for item in status.values},
     )

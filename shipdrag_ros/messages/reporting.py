@@ -63,7 +63,8 @@ class EventKind(Enum):
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
     FILES = 'files'  # recordings removed
-    MESSAGE_LOST = 'message_lost'  # sent, and not heard
+    MESSAGE_LOST = 'message_lost'  # sent, and not received
+    SOURCE = 'source'  # an input is fed by another
 
     @property
     def is_warning(self) -> bool:
@@ -74,6 +75,7 @@ class EventKind(Enum):
             EventKind.CLOCK_JUMP,
             EventKind.FILES,
             EventKind.MESSAGE_LOST,
+            EventKind.SOURCE,
             EventKind.SILENCE,
         )
 

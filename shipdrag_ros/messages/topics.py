@@ -94,7 +94,7 @@ class MatchedTopics:
 
 
 def match_inputs(
-    topics: Iterable[tuple[str, str]], *, remap: Mapping[str, str] | None = None
+    topics: Iterable[tuple[str, str]], *, remap: Mapping[str, str] | None = None, own: bool = False
 ) -> MatchedTopics:
     """
     Find the inputs among the topics of a bag.
@@ -106,6 +106,10 @@ def match_inputs(
     remap
         Recorded topic -> input, before any match by name; also input -> topic, as ROS writes
         a remapping, where the second is no input.
+
+    own
+        Whether a node recorded them, which has used every accepted type one after the other;
+        of others the preferred one is used.
 
     Raises
     ------
@@ -136,8 +140,9 @@ def match_inputs(
             )
             continue
         if audible:
-            chosen = next(t for t in accepted if t in types_of[audible[0]])
-            heard[audible[0], chosen] = Source(name, chosen)
+            there = [each for each in accepted if each in types_of[audible[0]]]
+            for chosen in there if own else there[:1]:
+                heard[audible[0], chosen] = Source(name, chosen)
         unaccepted |= {
             (topic, type_name): name
             for topic in candidates

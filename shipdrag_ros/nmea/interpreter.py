@@ -3,7 +3,8 @@
 Lines heard live to messages of the inputs, as a driver would send them.
 
 A value is stamped with the time at which its line was read: the clocks of a log
-and of a GNSS receiver are not the node's. Each input is fed by one source, so
+and of a GNSS receiver are not the node's. Lines that waited, as their own times show,
+are stamped that much earlier. Each input is fed by one source, so
 that two instruments of different place or scale are never mixed.
 """
 
@@ -15,6 +16,7 @@ from dataclasses import dataclass, field
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros.messages import EncodedMessage, encode, types
+from shipdrag_ros.nmea.clock import WireClock
 from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
 from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting, NoValue
 from shipdrag_ros.nmea.values import SentenceSource, best, read_values
@@ -98,6 +100,8 @@ class Interpreter:
         Sentences that measure nothing that is used here, by address.
     no_value
         Values that a known sentence does not hold, by input and reason.
+    behind
+        Sentences of a backlog, stamped earlier than they were read, by address.
     used, not_taken
         Values by input; not taken are those of a source that was not chosen, and those that
         came while it was being chosen.
@@ -108,12 +112,14 @@ class Interpreter:
         self.rejected: Counter[str] = Counter()
         self.unknown: Counter[str] = Counter()
         self.no_value: Counter[str] = Counter()
+        self.behind: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
         self.not_taken: Counter[str] = Counter()
         self._mounting = mounting or Mounting()
+        self._clocks: dict[str, WireClock] = {}
         self._choices: dict[Channel, _Choice] = {}
 
-    def messages(self, text: str, address: str, stamp_ns: int) -> list[EncodedMessage]:
+    def messages(self, text: str, address: str, read_ns: int) -> list[EncodedMessage]:
         """
         Return what a line says of the inputs.
 
@@ -123,7 +129,7 @@ class Interpreter:
             The line.
         address
             Where it was heard.
-        stamp_ns
+        read_ns
             When it was read [ns since the epoch].
         """
         # a lost line end leaves two sentences in a line
@@ -137,7 +143,7 @@ class Interpreter:
             except ValueError as error:
                 self.rejected[str(error)] += 1
             else:
-                found += self._of_sentence(sentence, address, stamp_ns)
+                found += self._of_sentence(sentence, address, read_ns)
         return found
 
     def feeding(self) -> dict[str, str]:
@@ -150,10 +156,11 @@ class Interpreter:
                 by_input.setdefault(channel.input, {})[str(choice.held[0])] = None
         return {name: ', '.join(sources) for name, sources in by_input.items()}
 
-    def _of_sentence(
-        self, sentence: Sentence, address: str, stamp_ns: int
-    ) -> list[EncodedMessage]:
+    def _of_sentence(self, sentence: Sentence, address: str, read_ns: int) -> list[EncodedMessage]:
         self.sentences += 1
+        stamp_ns = self._clocks.setdefault(address, WireClock()).stamp_ns(sentence, read_ns)
+        if stamp_ns < read_ns:
+            _count(self.behind, address)
         if sentence.kind not in READERS:
             if sentence.kind not in TIMED:
                 _count(self.unknown, sentence.talker + sentence.kind)
@@ -166,12 +173,12 @@ class Interpreter:
                 _count(self.no_value, f'{channel.input} {sentence.kind}: {value.reason}')
                 continue
             assert source is not None
-            choice = self._choices.setdefault(channel, _Choice(stamp_ns))
-            if not choice.takes((source, address), stamp_ns):
+            choice = self._choices.setdefault(channel, _Choice(read_ns))
+            if not choice.takes((source, address), read_ns):
                 self.not_taken[channel.input] += 1
                 continue
             self.used[channel.input] += 1
-            sample = (int(channel), stamp_ns, stamp_ns, value.a, value.b)
+            sample = (int(channel), stamp_ns, read_ns, value.a, value.b)
             messages += encode(Block.of_samples([sample]))
         return messages
 

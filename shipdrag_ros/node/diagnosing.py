@@ -19,11 +19,12 @@ from enum import Enum
 from threading import Lock
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.coastdown.events import BRAKED, EndedCoastdown
+from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
 
 if TYPE_CHECKING:  # the process that diagnoses imports it, the node need not
     from shipdrag_ros.diagnosis import DiagnosisResult
@@ -71,8 +72,8 @@ class DiagnosisStatus:
     @property
     def caveat(self) -> str:
         """What the diagnosis has not looked at, a sentence; '' where it saw all of a glide."""
-        braked = self.coastdown is not None and self.coastdown.braked
-        return f'{BRAKED[0].upper()}{BRAKED[1:]}. {_GOES_ON}' if braked else ''
+        said = '' if self.coastdown is None else self.coastdown.disturbed
+        return f'{said[0].upper()}{said[1:]}. {_GOES_ON}' if said else ''
 
 
 @dataclass(frozen=True)
@@ -107,8 +108,7 @@ class Diagnosing:
         if not enabled:
             self._status = DiagnosisStatus(DiagnosisState.OFF, 'the parameter diagnose is false')
         elif ship.baseline is None:
-            reason = 'the ship file has no baseline; add `baseline` to it'
-            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, reason)
+            self._status = DiagnosisStatus(DiagnosisState.IMPOSSIBLE, NO_CLEAN_HULL)
         self._possible = self._status.state is DiagnosisState.NONE_YET
 
     @property

@@ -78,6 +78,8 @@ class Standing:
         Since when code is being compiled; None where it is.
     waiting
         Messages that wait for it.
+    namesakes
+        Other nodes of the same full name.
     """
 
     lifecycle: str
@@ -90,12 +92,24 @@ class Standing:
     progress: MonitorProgress | None = None
     compiling_s: float | None = None
     waiting: int = 0
+    namesakes: int = 0
 
 
 def state_status(standing: Standing, inputs: Sequence[InputState]) -> DiagnosticStatus:
     """
-    Say where the node stands, and what keeps it from estimating.
+    Say where the node stands, what keeps it from estimating, and whether its name is another's.
     """
+    status = _state(standing, inputs)
+    if standing.namesakes:
+        status.level = max(status.level, WARN)
+        status.message += (
+            f'; {standing.namesakes + 1} nodes have the name of this one, so that their figures '
+            'and services are mixed up: end one, or name it with -r __node:=NAME'
+        )
+    return status
+
+
+def _state(standing: Standing, inputs: Sequence[InputState]) -> DiagnosticStatus:
     monitor = standing.monitor
     values: dict[str, object] = {
         'lifecycle': standing.lifecycle,
@@ -156,8 +170,9 @@ def input_status(state: InputState) -> DiagnosticStatus:
     """
     topic, health = state.topic, state.health
     values: dict[str, object] = {
-        'topic': topic.topic,
-        'type': topic.fed_by or topic.type or 'not yet known',
+        'topic': topic.topic if topic.fed is None else topic.fed.input,
+        'type': (topic.type if topic.fed is None else topic.fed.type) or 'not yet known',
+        **({'fed by': topic.fed_by} if topic.fed_by else {}),
         'publishers': sum(topic.publishers.values()),
         'published by': ', '.join(topic.senders) or 'none',
         'reliability': 'reliable' if topic.reliable else 'best effort',
@@ -281,6 +296,7 @@ def diagnosis_status(status: DiagnosisStatus) -> DiagnosticStatus:
 def _figures(found: DiagnosisResult) -> dict[str, object]:
     """Return the figures of a diagnosis."""
     from shipdrag_ros.diagnosis.words import advice
+    from shipdrag_ros.inference.decision import NONE, UNKNOWN
     from shipdrag_ros.simulation.effects import LIBRARY
 
     values: dict[str, object] = {
@@ -289,7 +305,7 @@ def _figures(found: DiagnosisResult) -> dict[str, object]:
         'probability of something without a name [1]': found.unnamed,
     }
     for candidate in found.candidates:
-        if candidate.names:
+        if candidate.names not in (NONE, UNKNOWN):
             values[f'probability of {" + ".join(candidate.names)} [1]'] = candidate.probability
     sized = [(effect.name, effect) for effect in found.effects]
     if not sized:  # a set: what each would have

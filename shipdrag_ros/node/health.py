@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from shipdrag_ros.coastdown import InputHealth
+from shipdrag_ros.display import printable
 from shipdrag_ros.messages import TOPICS
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.inputs import InputTopic
@@ -198,6 +199,6 @@ def candidates_text(found: Mapping[str, Sequence[str]]) -> str:
     """
     if not found:
         return ''
-    listed = '; '.join(f'{name}: {", ".join(topics)}' for name, topics in found.items())
+    listed = '; '.join(f'{name}: {printable(", ".join(topics))}' for name, topics in found.items())
     name, topics = next(iter(found.items()))
-    return f'of a type that fits are {listed}; name one with -r {name}:={topics[0]}'
+    return f'of a type that fits are {listed}; name one with -r {name}:={printable(topics[0])}'

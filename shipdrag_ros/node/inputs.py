@@ -32,8 +32,9 @@ from rclpy.qos import (
 )
 from rclpy.subscription import Subscription
 
+from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.messages import Decoded
+from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
 from shipdrag_ros.node.losses import Sequences
 
@@ -41,10 +42,14 @@ from shipdrag_ros.node.losses import Sequences
 # as long as many messages.
 DEPTH = 5000
 LONGEST_BYTES = 65536  # no instrument sends a message as long; thousands may have to wait
+TRIES = 5
+SHARE_HZ = 1000  # of one input, as of one source of NMEA; a flood takes no time from the others
+_SECOND_NS = 1_000_000_000
 _OFFSETS = 32  # readings whose clock offset is kept
+PATIENCE_S = 10.0  # a type that is subscribed has so long to show that it is sound
 _UNKNOWN = '_NODE_NAME_UNKNOWN_'  # of rcl
 
-Arrived = Callable[[], None]
+Arrived = Callable[[], object]
 
 
 def message_class(type_name: str) -> Any:
@@ -76,6 +81,7 @@ class HeardMessage(NamedTuple):
     """A message, and when the middleware of this computer got it [ns, 0 if it does not say]."""
 
     topic: InputTopic
+    type: str
     data: bytes
     received_ns: int
 
@@ -94,6 +100,8 @@ class InputTopic:
         Type set by the user, '' for the one in the graph.
     arrived
         Called when there is something to `take`.
+    simulated
+        Whether the clock is simulated, so that a second may hold any number of messages.
 
     Attributes
     ----------
@@ -118,6 +126,8 @@ class InputTopic:
         Messages that gave no sample, by reason, and joints that have no place.
     fed_by
         What feeds the input instead of its topic, '' if nothing does.
+    fed
+        Topic and type under which that is published again; None without it.
     may_be_fed
         Whether something else than the topic could feed it.
     unstamped
@@ -125,7 +135,14 @@ class InputTopic:
     """
 
     def __init__(
-        self, node: Node, name: str, *, accepted: tuple[str, ...], fixed: str, arrived: Arrived
+        self,
+        node: Node,
+        name: str,
+        *,
+        accepted: tuple[str, ...],
+        fixed: str,
+        arrived: Arrived,
+        simulated: bool,
     ) -> None:
         self._node = node
         self._arrived = arrived
@@ -136,6 +153,9 @@ class InputTopic:
         self._sequences = Sequences(self._identities)
         self._offsets_s: deque[float] = deque(maxlen=_OFFSETS)
         self._least_lag_s: float | None = None
+        self._fixed = bool(fixed)
+        self._share = None if simulated else [0, 0]  # second of arrival, messages in it
+        self._since_s = 0.0
         self.name = name
         self.topic = node.resolve_topic_name(name)
         self.accepted = tuple(filter(is_installed, accepted))
@@ -152,6 +172,7 @@ class InputTopic:
         self.unstamped = 0
         self.unreadable: Counter[str] = Counter()
         self.fed_by = ''
+        self.fed: Source | None = None
         self.may_be_fed = False
         if fixed:
             self._subscribe(fixed, reliable=True)
@@ -161,10 +182,10 @@ class InputTopic:
         Read the graph, and subscribe once a type is there, as its publishers offer it.
         """
         self._sequences.look()
-        self.publishers = Counter(info.topic_type for info in self._found)
+        self.publishers = Counter(printable(info.topic_type) for info in self._found)
         type_name = self.type
-        if type_name is None:
-            type_name = next((name for name in self.accepted if name in self.publishers), None)
+        if type_name is None or (not self._fixed and type_name not in self.publishers):
+            type_name = next(iter(self._published()), type_name)
             if type_name is None:
                 return
         heard = [info for info in self._found if info.topic_type == type_name]
@@ -172,8 +193,35 @@ class InputTopic:
         reliable = all(
             info.qos_profile.reliability == ReliabilityPolicy.RELIABLE for info in heard
         )
-        if self.type is None or (heard and reliable is not self.reliable):
+        if self.type != type_name or (heard and reliable is not self.reliable):
             self._subscribe(type_name, reliable=reliable)
+
+    def rebind(self, why: str) -> bool:
+        """
+        Subscribe to another accepted type that is published, as the one subscribed is no use.
+
+        Parameters
+        ----------
+        why
+            What is wrong with it, for the log.
+
+        Returns
+        -------
+        bool
+            False where the user has fixed the type, no other is published, or the last
+            subscription is younger than `PATIENCE_S`.
+        """
+        others = [name for name in self._published() if name != self.type]
+        if self._fixed or not others or time.monotonic() < self._since_s + PATIENCE_S:
+            return False
+        self._node.get_logger().warning(
+            f'{self.name}: {self.type} is given up for {others[0]}, which is published too: {why}'
+        )
+        self._subscribe(others[0], reliable=False)  # the next look asks for more
+        return True
+
+    def _published(self) -> list[str]:
+        return [name for name in self.accepted if name in self.publishers]
 
     @property
     def other_types(self) -> tuple[str, ...]:
@@ -185,11 +233,18 @@ class InputTopic:
         """Time since the last message [s, steady clock], None before the first."""
         return None if self._last_s is None else time.monotonic() - self._last_s
 
-    def feed(self, by: str) -> None:
+    def feed(self, by: str, source: Source) -> None:
         """
         Note a message that came another way than by the topic.
+
+        Parameters
+        ----------
+        by
+            What sends it.
+        source
+            Topic and type under which it is published again.
         """
-        self.fed_by = by
+        self.fed_by, self.fed = by, source
         self.received += 1
         self._last_s = time.monotonic()
 
@@ -221,7 +276,9 @@ class InputTopic:
             With those that the executor has not come to.
         """
         subscription = self._subscription if ahead else None
-        while subscription is not None and len(self._taken) < most:
+        for _ in range(TRIES * most):  # a flood may come faster than it can be counted
+            if subscription is None or len(self._taken) >= most:
+                break
             with subscription.handle:
                 found = subscription.handle.take_message(subscription.msg_type, True)
             if found is None:
@@ -272,6 +329,7 @@ class InputTopic:
 
     def _subscribe(self, type_name: str, *, reliable: bool) -> None:
         again = self._subscription is not None
+        waiting: list[HeardMessage] = []
         if again:
             waiting = self.take(DEPTH)  # would go with the subscription
             self.close()
@@ -286,7 +344,10 @@ class InputTopic:
             self._subscription = self._create(type_name, qos, message_lost=self._on_message_lost)
         except UnsupportedEventTypeError:  # not every middleware says so
             self._subscription = self._create(type_name, qos)
+        changed = again and self.type != type_name
         self.type, self.reliable = type_name, reliable
+        if changed or not again:
+            self._since_s, self._last_s = time.monotonic(), None
         self.incompatible_qos = None
         how = 'reliably' if reliable else 'as best effort, as it is sent'
         what = 'now ' if again else ''
@@ -317,10 +378,24 @@ class InputTopic:
             self.dropped += 1
             return
         self.received += 1
-        if len(data) > LONGEST_BYTES:
+        if self._over_share(info.get('received_timestamp') or 0):
+            self.unreadable['flood'] += 1
+        elif len(data) > LONGEST_BYTES:
             self.unreadable['too_long'] += 1
         else:
-            self._taken.append(HeardMessage(self, data, info.get('received_timestamp') or 0))
+            assert self.type is not None
+            received_ns = info.get('received_timestamp') or 0
+            self._taken.append(HeardMessage(self, self.type, data, received_ns))
+
+    def _over_share(self, received_ns: int) -> bool:
+        """Count a message in its second of arrival, and say whether that holds too many."""
+        if self._share is None or not received_ns:
+            return False
+        second = received_ns // _SECOND_NS
+        if second != self._share[0]:
+            self._share = [second, 0]
+        self._share[1] += 1
+        return self._share[1] > SHARE_HZ
 
     def _on_message_lost(self, event: QoSMessageLostInfo) -> None:
         self.reported_lost += event.total_count_change
@@ -338,4 +413,4 @@ class InputTopic:
 def _sender(info: Any) -> str:
     if info.node_name == _UNKNOWN:  # its name comes a little after its publishers
         return 'a node without a name yet'
-    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+    return printable(f'{info.node_namespace.rstrip("/")}/{info.node_name}')

@@ -278,6 +278,7 @@ _ADVICE = {
     'future': 'stamps are ahead of the clock of this computer: set either',
     'malformed': 'no message of its type: is the driver built for this ROS?',
     'too_long': 'over 64 KiB, as no instrument sends: not recorded; look who publishes it',
+    'flood': 'over 1000 a second, as no instrument sends: not recorded; look who publishes it',
     'no_joint': 'no joint with the name and value that is read: see the list of inputs',
     'surplus_joint': 'more joints than are read',
 }

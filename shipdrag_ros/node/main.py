@@ -59,10 +59,10 @@ def line(health: Health) -> str:
     state, estimate = health.of('state'), health.of('estimate')
     monitor = '' if state is None else state.values.get('monitor', '')
     said = [monitor or 'not active']
-    if state is not None and monitor == 'steady':
-        lead_s, used_s = state.number('steady lead'), state.number('steady lead used at most')
-        if lead_s is not None and used_s is not None:
-            said[0] = f'steady {lead_s / 60.0:.0f} of {used_s / 60.0:.0f} min'
+    if monitor == 'steady' and health.lead is not None:
+        lead_s, ready_s = health.lead
+        enough = 'min: record ready' if lead_s >= ready_s else f'of {ready_s / 60.0:.0f} min'
+        said[0] = f'steady {lead_s // 60.0:.0f} {enough}'
     if state is not None and state.level != OK and not state.message.startswith(f'{monitor};'):
         said[0] = state.message  # inputs that are not well are named behind it
     if estimate is not None:

@@ -1,30 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-NMEA 0183 heard by the node, fed to the session as topics are.
+NMEA 0183 received by the node, fed to the session as topics are.
 
 An input is fed by a topic or by NMEA, whichever was used first since the node
-was activated; NMEA waits some seconds before it feeds, so a topic that is there
-at the start has it. The other is counted and reported, and never mixed in.
+was activated, until the other is plainly better: twice the readings of ten
+seconds, which is also the case where the first falls silent. NMEA waits some
+seconds before it feeds, so a topic that is there at the start has it. The other
+is counted and reported, and never mixed in. What feeds is published below
+`~/nmea`, for the page and whatever else looks on.
 """
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from time import monotonic
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
-from shipdrag_ros.messages import Source
+from shipdrag_ros.messages import Source, decode
 from shipdrag_ros.nmea.address import Address, parse_addresses
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.listener import SourceCounts
 from shipdrag_ros.nmea.live import LiveNmea
 from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
 from shipdrag_ros.node.diagnostics import ERROR, OK, STALE, WARN, nmea_status
-from shipdrag_ros.node.inputs import InputTopic
+from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.judging import SILENT_S
 from shipdrag_ros.node.session import Session
 from shipdrag_ros.node.settings import NodeSettings
@@ -35,8 +41,54 @@ _MOTION = ', '.join(
     for kind, readers in READERS.items()
     if any(channel.input in MOTION_INPUTS for channel, _ in readers)
 )
+COMPARED_S = 10.0
+BETTER = 2  # times the readings in that time, from which the other source takes over
+KEPT = 200  # readings of that time, more are as good
+TOPIC_FEEDS, NMEA_FEEDS = 'a topic', 'NMEA'
 AT_ONCE = 200  # lines between two turns of everything else
 BAD_SHARE = 0.05  # of the lines of a healthy line fewer are damaged
+
+
+class Rivals:
+    """
+    Which of a topic and NMEA feeds one input.
+
+    Attributes
+    ----------
+    holder
+        `TOPIC_FEEDS`, `NMEA_FEEDS`, or '' before the first reading.
+    """
+
+    def __init__(self) -> None:
+        self.holder = ''
+        self._readings: dict[str, deque[float]] = {}
+        self._since_s: dict[str, float] = {}
+
+    def admits(self, who: str, now_s: float) -> tuple[bool, str]:
+        """
+        Take a sound reading; say whether it is used, and from whom it took over, '' from none.
+
+        Parameters
+        ----------
+        now_s
+            Steady time [s].
+        """
+        self._readings.setdefault(who, deque(maxlen=KEPT)).append(now_s)
+        counts = {}
+        for name, times in self._readings.items():
+            while times and times[0] < now_s - COMPARED_S:
+                times.popleft()
+            counts[name] = len(times)
+        if counts[who] == 1:
+            self._since_s[who] = now_s  # after a silence it has to show again that it is there
+        before = self.holder
+        compared = now_s >= self._since_s[who] + 0.9 * COMPARED_S
+        if before not in ('', who) and compared:
+            better = counts[who] >= BETTER * counts.get(before, 0)
+            self.holder = who if better else before
+        self.holder = self.holder or who
+        changed = before not in ('', self.holder)
+        return self.holder == who, before if changed else ''
 
 
 class NmeaFeed:
@@ -67,12 +119,12 @@ class NmeaFeed:
         transducer_m = settings.nmea_transducer_m
         self._mounting = Mounting(transducer_m if transducer_m >= 0.0 else None)
         self._interpreter = Interpreter(self._mounting)
-        self._fed_by_topic: set[str] = set()
-        self._fed_by_nmea: set[str] = set()
+        self._rivals: defaultdict[str, Rivals] = defaultdict(Rivals)
         self._topic_refused: Counter[str] = Counter()
         self._nmea_refused: Counter[str] = Counter()
         self._unused = 0
         self._problems: dict[str, str] = {}
+        self._published: dict[Source, Publisher] = {}
         self._live = LiveNmea(
             parse_addresses(settings.nmea),
             clock_ns=lambda: int(node.get_clock().now().nanoseconds),
@@ -97,28 +149,45 @@ class NmeaFeed:
         """
         self._live.close()
         self._node.destroy_guard_condition(self._guard)
+        for publisher in self._published.values():
+            self._node.destroy_publisher(publisher)
 
     def renew(self) -> None:
         """
         Choose anew who feeds what: the node was activated.
         """
         self._interpreter = Interpreter(self._mounting)
-        for one in (self._fed_by_topic, self._fed_by_nmea):
-            one.clear()
+        self._rivals.clear()
         self._topic_refused.clear()
         self._nmea_refused.clear()
         for topic in self._topics.values():
-            topic.fed_by = ''
+            topic.fed_by, topic.fed = '', None
 
-    def admits(self, topic: InputTopic) -> bool:
+    def admits(self, source: Source, payload: bytes, now_ns: int) -> bool:
         """
         Say whether a message of a topic may be used.
         """
-        if topic.name in self._fed_by_nmea:
-            self._topic_refused[topic.name] += 1
+        rivals = self._rivals[source.input]
+        if not self._live.counts() or (rivals.holder == '' and not _is_sound(source, payload)):
+            return True
+        if rivals.holder == NMEA_FEEDS and not _is_sound(source, payload):
+            self._topic_refused[source.input] += 1
             return False
-        self._fed_by_topic.add(topic.name)
+        if not self._decides(source.input, TOPIC_FEEDS, now_ns):
+            self._topic_refused[source.input] += 1
+            return False
+        self._topics[source.input].fed_by, self._topics[source.input].fed = '', None
         return True
+
+    def _decides(self, name: str, who: str, now_ns: int) -> bool:
+        """Say whether a reading of one of both is used; a change is said and recorded."""
+        used, before = self._rivals[name].admits(who, monotonic())
+        session = self._session()
+        if before and session is not None:
+            text = f'{name}: now from {who}, no longer from {before}, which sends less'
+            self._node.get_logger().warning(text)
+            session.note_source(text, now_ns)
+        return used
 
     def silence(self) -> str:
         """
@@ -175,14 +244,22 @@ class NmeaFeed:
             for message in self._interpreter.messages(line.text, str(line.address), line.read_ns):
                 source = Source(message.topic.lstrip('/'), message.type)
                 topic = self._topics[source.input]
-                if source.input in self._fed_by_topic:
+                if not self._decides(source.input, NMEA_FEEDS, now_ns):
                     self._nmea_refused[source.input] += 1
                     continue
-                self._fed_by_nmea.add(source.input)
-                topic.feed(f'NMEA {line.address}')
+                topic.feed(f'NMEA {line.address}', self._publish(source, message.payload))
                 session.receive(source, message.payload, now_ns, topic.count)
         if self._live.waiting:
             self._wake()
+
+    def _publish(self, source: Source, payload: bytes) -> Source:
+        """Show a reading to other processes; return topic and type."""
+        if source not in self._published:
+            self._published[source] = self._node.create_publisher(
+                message_class(source.type), f'~/nmea/{source.input}', 10
+            )
+        self._published[source].publish(payload)
+        return Source(self._published[source].topic_name, source.type)
 
     def _status(self, address: str, counts: SourceCounts) -> DiagnosticStatus:
         level, text = self._health(counts)
@@ -205,6 +282,7 @@ class NmeaFeed:
             ('no value', found.no_value),
             ('feeds', found.feeding()),
             ('used', found.used),
+            ('of a backlog, stamped by their own times', found.behind),
             ('not taken, of another source', found.not_taken),
             ('not used, a topic feeds', self._nmea_refused),
             ('messages of the topic not used, NMEA feeds', self._topic_refused),
@@ -239,3 +317,9 @@ class NmeaFeed:
                 'depth is not used: set nmea_transducer_m, as the sentences state no offset'
             )
         return OK, '; '.join(used) or 'heard, nothing used yet'
+
+
+def _is_sound(source: Source, payload: bytes) -> bool:
+    """Whether a message holds a reading that is a number."""
+    block = decode(source, [payload], [0]).block
+    return len(block) > 0 and bool(np.isfinite(block.value[:, 0]).any())

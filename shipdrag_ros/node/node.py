@@ -30,8 +30,9 @@ from shipdrag_ros.node import diagnostics
 from shipdrag_ros.node.announcer import Announcer
 from shipdrag_ros.node.compiling import Compiling
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
-from shipdrag_ros.node.health import InputStates, candidates, candidates_text
+from shipdrag_ros.node.health import InputState, InputStates, candidates, candidates_text
 from shipdrag_ros.node.inputs import InputTopic, message_class
+from shipdrag_ros.node.judging import Level
 from shipdrag_ros.node.mailbox import Mailbox
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
@@ -46,6 +47,7 @@ from shipdrag_ros.ship import Ship
 NAME = 'coastdown_node'
 LOOK_S = 0.2  # a driver that starts is heard this soon; a look costs 0.1 ms
 DIAGNOSTICS_S = 1.0
+TURNS = 25  # of the mailbox before a tick, after a pause
 FIRST_S = 0.3  # by then who listens is found; compiling begins behind it
 RELIABLE = ReliabilityPolicy.RELIABLE
 # who joins late still gets the last message
@@ -189,6 +191,7 @@ class CoastdownNode(LifecycleNode):
                 accepted=accepted,
                 fixed=settings.types.get(name, ''),
                 arrived=self._hear,
+                simulated=self._simulated,
             )
             for name, accepted in TOPICS.items()
         ]
@@ -287,22 +290,26 @@ class CoastdownNode(LifecycleNode):
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
 
-    def _hear(self) -> None:
-        """Take what has come on all topics, in its order."""
+    def _hear(self) -> bool:
+        """Take what has come on all topics, in its order; say whether that was anything."""
         if self._session is not None and self._session.full:
-            return  # each input keeps some more, and counts what it drops
-        for topic, data, received_ns in self._mailbox.take():
+            return False  # each input keeps some more, and counts what it drops
+        taken = self._mailbox.take()
+        for topic, type_name, data, received_ns in taken:
             now_ns = self._now_ns()
             if self._session is None or now_ns == 0:  # 0: sim time before the first /clock
                 topic.unused += 1
                 continue
-            if self._nmea is not None and not self._nmea.admits(topic):
+            source = Source(topic.name, type_name)
+            if self._nmea is not None and not self._nmea.admits(source, data, now_ns):
                 continue
-            assert topic.type is not None
             assert self._watching is not None
             self._watching.watch_clock(self._session, now_ns)
             count = partial(topic.count, received_ns=0 if self._simulated else received_ns)
-            self._session.receive(Source(topic.name, topic.type), data, now_ns, count)
+            # by the clock of the node, and not when it comes to it: what waited is no younger
+            arrival_ns = now_ns if self._simulated else min(received_ns or now_ns, now_ns)
+            self._session.receive(source, data, arrival_ns, count)
+        return bool(taken)
 
     def _look(self) -> None:
         for topic in self._input_topics:
@@ -315,6 +322,9 @@ class CoastdownNode(LifecycleNode):
     # health
 
     def _publish_diagnostics(self) -> None:
+        for _ in range(TURNS):  # what came before this tick is timed before it
+            if self._simulated or not self._hear():
+                break
         now_ns = self._now_ns()
         session = self._session
         health = {} if session is None else session.monitor.health()
@@ -327,6 +337,7 @@ class CoastdownNode(LifecycleNode):
             doubts=self._doubts(),
             simulated=self._simulated,
         )
+        self._rebind(states, now_ns)
         standing = self._standing(now_ns)
         statuses = [diagnostics.state_status(standing, states)]
         statuses += map(diagnostics.input_status, states)
@@ -359,6 +370,17 @@ class CoastdownNode(LifecycleNode):
         if self._compiling is not None:
             self._compiling.begin()
 
+    def _rebind(self, states: Sequence[InputState], now_ns: int) -> None:
+        """Give up a type that is no use where another is published; said and recorded."""
+        if self._compiling_s is not None:
+            return  # nothing was judged yet
+        for state in states:
+            text = state.finding.text
+            unsound = not state.fresh or state.finding.level >= Level.ERROR
+            if self._session is not None and unsound and state.topic.rebind(text):
+                said = f'{state.topic.name}: now {state.topic.type}; before: {text}'
+                self._session.note_source(said, now_ns)
+
     def _publish_first(self) -> None:
         self.destroy_timer(self._first)
         self._publish_diagnostics()
@@ -369,17 +391,23 @@ class CoastdownNode(LifecycleNode):
             return {}
         return self._session.monitor.doubts() | self._watching.doubts()
 
+    def _namesakes(self) -> int:
+        own = (self.get_name(), self.get_namespace())
+        return max(int(self.get_node_names_and_namespaces().count(own)) - 1, 0)
+
     def _standing(self, now_ns: int) -> diagnostics.Standing:
         session, states = self._session, self._input_states.seen
         motion = [each for each in states if each.topic.name in MOTION_INPUTS]
         hint = ''
         if not any(each.fresh for each in motion):
             name = self.get_fully_qualified_name()
-            taken = [
-                *(each.topic.topic for each in states),
-                *(it.under(name) for it in OUTPUT_TOPICS),
+            taken = [each.topic.topic for each in states]
+            others = [
+                (topic, types)
+                for topic, types in self.get_topic_names_and_types()
+                if not topic.startswith(f'{name}/')  # what NMEA feeds is published there
             ]
-            found = candidates(self.get_topic_names_and_types(), MOTION_INPUTS, taken=taken)
+            found = candidates(others, MOTION_INPUTS, taken=taken)
             by_nmea = '' if self._nmea is None else self._nmea.silence()
             hint = '; '.join(filter(None, [by_nmea, candidates_text(found)]))
         return diagnostics.Standing(
@@ -391,6 +419,7 @@ class CoastdownNode(LifecycleNode):
             progress=None if session is None else session.monitor.progress,
             compiling_s=self._compiling_s,
             waiting=0 if session is None else session.waiting,
+            namesakes=self._namesakes(),
             steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
             steady_needed_s=0.0
             if self._settings is None

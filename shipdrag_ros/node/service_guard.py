@@ -14,12 +14,15 @@ from rclpy.node import Node
 from rclpy.service import Service
 from std_srvs.srv import Trigger
 
+from shipdrag_ros.display import printable
 from shipdrag_ros.node.recorder import RecordingState
 from shipdrag_ros.node.session import Session
 
 CHANGES = (2.0, 20.0)  # a second in the long run, and at once
 TRIGGERS = (0.2, 10.0)  # each may make a file, or drop an hour of memory
 READS = (50.0, 200.0)
+LONGEST = 1000  # names or parameters of a request
+TOO_LONG = f'refused: more than {LONGEST} entries'
 REFUSED = 'refused: asked too often; ask again in some seconds'
 _LIMITS = {
     'Trigger': TRIGGERS,
@@ -93,10 +96,15 @@ def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> Non
     change = change_state.callback
 
     def refuse_or_change(request: Any, response: Any) -> Any:
+        label = request.transition.label
+        if not label.isprintable():  # rcl would print it as it is
+            warn(f'transition refused: no transition is named {printable(label)!r}')
+            response.success = False
+            return response
         try:
             return change(request, response)
         except rclpy_implementation.RCLError as error:
-            warn(f'transition refused: {error}')
+            warn(f'transition refused: {printable(str(error))}')
             response.success = False
             return response
 
@@ -129,26 +137,33 @@ def _limited(
 
     def limited(request: Any, response: Any) -> Any:
         nonlocal refusing
+        if _entries(request) > LONGEST:
+            warn(f'{name}: {TOO_LONG}')
+            return _refuse(request, response, TOO_LONG)
         if limit.allows():
             refusing = False
             return answer(request, response)
         if not refusing:
             refusing = True
             warn(f'{name}: asked too often, requests are refused')
-        return _refuse(request, response)
+        return _refuse(request, response, REFUSED)
 
     return limited
 
 
-def _refuse(request: Any, response: Any) -> Any:
+def _entries(request: Any) -> int:
+    return max(len(getattr(request, name, ())) for name in ('parameters', 'names', 'prefixes'))
+
+
+def _refuse(request: Any, response: Any, why: str) -> Any:
     """Say no in the words of the service; what only reads gives nothing."""
-    refusal = SetParametersResult(successful=False, reason=REFUSED)
+    refusal = SetParametersResult(successful=False, reason=why)
     if hasattr(response, 'success'):
         response.success = False
     if hasattr(response, 'message'):
-        response.message = REFUSED
+        response.message = why
     if isinstance(response, SetParameters.Response):
-        response.results = [refusal for _ in request.parameters]
+        response.results = [refusal] * min(len(request.parameters), LONGEST)
     elif isinstance(response, SetParametersAtomically.Response):
         response.result = refusal
     return response

@@ -243,6 +243,13 @@ class Session:
         self.watch_clock(now_ns)
         self._note(EventKind.MESSAGE_LOST, text)
 
+    def note_source(self, text: str, now_ns: int) -> None:
+        """
+        Publish and record that an input is fed by another source from now on.
+        """
+        self.watch_clock(now_ns)
+        self._note(EventKind.SOURCE, text)
+
     def finish(self) -> None:
         """
         Give the last figures and close the recording; needs no ROS.

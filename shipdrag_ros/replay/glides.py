@@ -3,7 +3,7 @@
 All of a glide, with the parts in which something but the water slows or drives the ship.
 
 An estimate of r(v) leaves such parts out. A diagnosis asks what that was, and so needs them
-where no instrument shows the cause.
+to say what acted and how much.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.coastdown.driving import gone_s, start_of, thrust
-from shipdrag_ros.coastdown.events import BRAKED, BY_SPEED, Dismissal, EndedBy, EndedCoastdown
+from shipdrag_ros.coastdown.events import BY_SPEED, Dismissal, EndedBy, EndedCoastdown
 from shipdrag_ros.coastdown.expectation import expect
-from shipdrag_ros.coastdown.instruments import astern, length_s, turns
+from shipdrag_ros.coastdown.instruments import astern, length_s
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.replay.coasts import clocks_apart, window_between
@@ -30,9 +30,10 @@ DISMISSED = (
     'no coastdown is taken from it'
 )
 _NOT_FOLLOWED = (
-    '{braked}; all of the glide is not held against the model, as {why}, and what is said rests '
-    'on the coastdown alone'
+    '{disturbed}; all of the glide is not held against the model, as {why}, and what is said '
+    'rests on the coastdown alone'
 )
+_ACTED = (Dismissal.BRAKE, Dismissal.TURN, Dismissal.RUDDER)
 _BIN_S = 10.0
 _BEFORE_S = 300.0  # that show the speed before a stop
 _RISE = 0.05  # of the first speed: a ship that gains so much no longer glides
@@ -75,25 +76,26 @@ def whole_glide(result: ReplayResult, coastdown: EndedCoastdown) -> Glide | None
     Returns
     -------
     Glide or None
-        None where nothing was cut for that, or an instrument shows the cause.
+        None where nothing was cut for that, or the propeller shows the cause.
     """
-    if not coastdown.braked:
+    said = coastdown.disturbed
+    if not said:
         return None
-    braked = [cut for cut in coastdown.cuts if cut.reason is Dismissal.BRAKE]
+    acted = [cut for cut in coastdown.cuts if cut.reason in _ACTED]
     start_ns, steady = start_of(coastdown, result.ship)
-    if any(cut.start_ns < coastdown.start_ns for cut in braked):
+    if any(cut.start_ns < coastdown.start_ns for cut in acted):
         start_ns, steady = min(cut.start_ns for cut in coastdown.cuts), True
     if coastdown.ended_by is EndedBy.GIVEN:
-        end_ns = max(coastdown.end_ns, *(cut.end_ns for cut in braked))
-        return Glide(window_between(result, start_ns, end_ns, steady=steady), BRAKED)
+        end_ns = max(coastdown.end_ns, *(cut.end_ns for cut in acted))
+        return Glide(window_between(result, start_ns, end_ns, steady=steady), said)
     try:
         found = _glide(result, start_ns, steady=steady)
     except _Unfollowed as why:
-        said = _NOT_FOLLOWED.format(braked=BRAKED, why=why)
-        return Glide(None, said) if str(why) else None
+        unfollowed = _NOT_FOLLOWED.format(disturbed=said, why=why)
+        return Glide(None, unfollowed) if str(why) else None
     if (found.start_ns, found.end_ns) == (start_ns, coastdown.end_ns):
         return None
-    return Glide(found, BRAKED)
+    return Glide(found, said)
 
 
 def dismissed_glide(result: ReplayResult) -> Window | None:
@@ -160,7 +162,6 @@ def _glide(result: ReplayResult, start_ns: int, *, steady: bool) -> Window:
     cuts = (
         *thrust(window, result.ship, steady=steady),
         *astern(window, result.parameters),
-        *turns(window, result.parameters),
     )
     if not cuts:
         return window

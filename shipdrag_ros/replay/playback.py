@@ -300,8 +300,17 @@ def _ship(run: Run, given: Ship | None) -> Ship:
 def _parameters(run: Run, given: Parameters | None) -> Parameters:
     if given is not None:
         return given
+    return recorded_parameters(run)
+
+
+def recorded_parameters(run: Run) -> Parameters:
+    """
+    Return the parameters attached to a bag; what this version does not have is noted.
+    """
     text = run.attachments.get(PARAMETERS_FILE, '')
-    return Parameters.from_yaml(text, subject=f'{run.name}: {PARAMETERS_FILE}')
+    parameters, dropped = Parameters.of_bag(text, subject=PARAMETERS_FILE)
+    run.note(dropped)
+    return parameters
 
 
 def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:

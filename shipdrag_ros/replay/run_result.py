@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, short_repr
 from shipdrag_ros.replay import InputCounts, Recorded, ReplayResult
 from shipdrag_ros.replay.no_coastdown import why_no_coastdown
 from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
@@ -48,6 +48,8 @@ class RunResult:
         What the speed did where nothing was even nearly a coastdown; '' where there is
         something.
     """
+
+    __repr__ = short_repr
 
     bag: str
     ship: Ship

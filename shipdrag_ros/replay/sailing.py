@@ -8,7 +8,7 @@ import numpy as np
 from shipdrag_ros.bags.run import Run
 from shipdrag_ros.coastdown import validate
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay.playback import PARAMETERS_FILE
+from shipdrag_ros.replay.playback import recorded_parameters
 from shipdrag_ros.samples import Block, Channel, Reason, concatenate
 
 
@@ -35,8 +35,7 @@ def accepted_samples(run: Run, *, zeros: bool = False) -> tuple[Block, Parameter
     ParameterError
         If those attached cannot be used.
     """
-    text = run.attachments.get(PARAMETERS_FILE, '')
-    parameters = Parameters.from_yaml(text, subject=f'{run.name}: {PARAMETERS_FILE}')
+    parameters = recorded_parameters(run)
     block = concatenate([item for item in run.inputs() if isinstance(item, Block)])
     reason = validate(block, parameters)
     accepted = reason == Reason.ACCEPTED

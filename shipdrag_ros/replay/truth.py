@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipdrag_ros import strict_yaml
+from shipdrag_ros.display import short_repr
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import Float64
 
@@ -30,6 +31,8 @@ class TrueCurve:
     settings
         What the simulation was asked for, names carrying their units.
     """
+
+    __repr__ = short_repr
 
     speed_m_s: Float64
     resistance_m_s2: Float64

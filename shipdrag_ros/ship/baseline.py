@@ -27,6 +27,12 @@ from shipdrag_ros.fields import (
 )
 from shipdrag_ros.samples import Float64
 
+NO_CLEAN_HULL = (
+    'Fouling cannot be judged without a clean hull: the ship file states no `baseline`. Add one '
+    'from model tests, or learn it from runs of the clean hull with `shipdrag baseline`.'
+)
+"""What is said first of a ship without a baseline."""
+
 # Below this the flow along the hull is laminar and the ITTC line, singular at 100, means
 # nothing: C_F is held, so that the resistance falls to 0 with the square of the speed.
 REYNOLDS_MIN = 1e5

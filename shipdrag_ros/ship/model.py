@@ -48,9 +48,13 @@ class Ship:
     """
     A ship as its file states it.
 
-    `load` and `from_yaml` check every value; constructing one directly does
-    not. Only the length and the volume are needed to estimate r(v); the
-    baseline is needed to simulate.
+    Every value is checked, wherever it comes from. Only the length and the volume are
+    needed to estimate r(v); the baseline is needed to simulate.
+
+    Raises
+    ------
+    ShipFileError
+        Naming every value out of its range, and every two that contradict each other.
 
     Examples
     --------
@@ -85,6 +89,15 @@ class Ship:
         section(Economics), 'prices, for a trend over months', default=None
     )
     facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        keys = keys_of(type(self))
+        read_keys(keys, plain(self), '', problems)
+        if not problems:
+            problems.extend(inconsistencies({name: getattr(self, name) for name in keys}))
+        if problems:
+            raise ShipFileError('Ship(...)', problems)
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Ship:

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.fields import declare, keys_of, number, parse, read_keys, section, text_of
-from shipdrag_ros.ship.consistency import inconsistencies
 from shipdrag_ros.ship.facts import Fact, fact_list
 from shipdrag_ros.ship.model import Ship
 
@@ -97,23 +96,22 @@ class RunSheet:
         ShipFileError
             If what is overridden does not fit the rest of the ship file.
         """
-        changed = replace(
-            ship,
-            draught_m=self.draught_m or ship.draught_m,
-            displaced_volume_m3=self.displaced_volume_m3 or ship.displaced_volume_m3,
-        )
+        water = ship.water
         if self.water is not None:
             density = self.water.density_kg_m3 or self.water.density or ship.water.density_kg_m3
             viscosity = ship.water.kinematic_viscosity_m2_s
             if self.water.temperature_c is not None:
                 viscosity = kinematic_viscosity(self.water.temperature_c, density)
             water = replace(ship.water, density_kg_m3=density, kinematic_viscosity_m2_s=viscosity)
-            changed = replace(changed, water=water)
-        values = {item.name: getattr(changed, item.name) for item in fields(changed)}
-        problems = list(inconsistencies(values))
-        if problems:
-            raise ShipFileError(subject, problems)
-        return changed
+        try:
+            return replace(
+                ship,
+                draught_m=self.draught_m or ship.draught_m,
+                displaced_volume_m3=self.displaced_volume_m3 or ship.displaced_volume_m3,
+                water=water,
+            )
+        except ShipFileError as error:
+            raise ShipFileError(subject, error.problems) from error
 
 
 def kinematic_viscosity(temperature_c: float, density_kg_m3: float) -> float:

@@ -36,7 +36,7 @@ class WithoutBaseline(StrEnum):
     Attributes
     ----------
     LOG_TRACK
-        The log held against the track over ground, on many courses and at many
+        The log compared with the track over ground, on many courses and at many
         speeds. Such an effect acts alike on all ships.
     ZEROS
         Readings of exactly 0 while the ship moves, and right ones when she is faster.
@@ -141,6 +141,9 @@ class Effect:
         How far what the effect does may depart from its formula, relative.
     odds
         That it is missing in a model, before any data.
+    size_power
+        Its trace grows about as this power of the first parameter; below 0, the smaller that is
+        the more there is of the effect.
     confounders
         Effects of nearly the same trace, and what decides from each; nothing:
         no record can.
@@ -163,7 +166,7 @@ class Effect:
         Values of parameters at which many other causes leave the same trace, so that it
         is no name.
     lasts_s
-        Time in which it goes unseen, to 1 - 1/e: repaired, cleaned, set anew [s]. 0:
+        Time in which it goes unseen, to 1 - 1/e: repaired, cleaned, set again [s]. 0:
         of its run or its day, so that it says nothing of another.
     """
 
@@ -178,6 +181,7 @@ class Effect:
     not_with: tuple[str, ...] = ()
     formula_sd: float = 0.0
     odds: float = 0.04
+    size_power: float = 1.0
     needs: tuple[str, ...] = ()
     errs_in: tuple[str, ...] = ()
     without_baseline: Mapping[WithoutBaseline, str] = field(default_factory=dict)

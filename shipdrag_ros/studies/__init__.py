@@ -3,26 +3,58 @@
 The systems of S2 to S5, which no coastdown needs: every package here is one.
 
 A study that has a verb says so in a `STUDY`; its page and its verb stand in its
-`face/`, where the command line finds them.
+`face/`, where the command line finds them. A package installed beside this one adds a
+study of its own by an entry point of the group `shipdrag.papers`, `NAME = PACKAGE:STUDY`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 from pkgutil import iter_modules
 
 from shipdrag_ros.studies.study import Study
 
-__all__ = ['Study', 'found']
+__all__ = ['GROUP', 'Study', 'found']
+
+GROUP = 'shipdrag.papers'
 
 
-def found() -> Iterator[tuple[str, Study]]:
+@cache
+def found(taken: frozenset[str] = frozenset()) -> tuple[tuple[str, Study], ...]:
     """
-    Yield the package of each study that has a verb, and what it says of itself.
+    Return the package of each study that has a verb, and what it says of itself.
+
+    One of another package that cannot be loaded, or whose verb is taken, is left out with a
+    warning. Its own are found without an entry point, as in a tree that was not installed.
+
+    Parameters
+    ----------
+    taken
+        Verbs that no study may have.
     """
-    for module in iter_modules(__path__, f'{__name__}.'):
-        if module.ispkg:
-            study = getattr(import_module(module.name), 'STUDY', None)
-            if study is not None:
-                yield module.name, study
+    own = [each.name for each in iter_modules(__path__, f'{__name__}.') if each.ispkg]
+    studies = {
+        study.verb: (name, study)
+        for name in own
+        if (study := getattr(import_module(name), 'STUDY', None)) is not None
+    }
+    for entry in sorted(entry_points(group=GROUP)):
+        if entry.module in own:
+            continue
+        try:
+            study = entry.load()
+            if not isinstance(study, Study) or study.verb in (taken | {*studies}):
+                raise TypeError(f'{study!r}, expected a Study with a verb that is not taken')
+        except Exception as error:  # whatever the code of a stranger does
+            warnings.warn(
+                f'the study {entry.name!r} ({entry.value}) is left out: {error}; mend or '
+                'uninstall its package',
+                RuntimeWarning,
+                stacklevel=2,
+            )
+            continue
+        studies[study.verb] = (entry.module, study)
+    return tuple(studies.values())

@@ -57,7 +57,7 @@ class OneMore:
         before = times[self._places - 1]
         gaps = np.maximum(times[self._places] - before, 1e-6)
         self.years = before + 0.5 * gaps
-        self._after = (np.arange(len(times))[:, None] >= self._places[None, :]).astype(float)
+        self._after = state.steps.carried(times, self.years)
         self._kinds = np.array(
             [(-size, DOWN_PER_YEAR) for size in _SIZES] + [(size, UP_PER_YEAR) for size in _SIZES]
         )
@@ -90,7 +90,7 @@ class OneMore:
         years : (m,)
             Since the first run, 0 or later.
         """
-        after = (years[:, None] >= self.years[None, :]).astype(float)
+        after = self.state.steps.carried(years, self.years)
         return self._over_all(self.state.level_of(years), after, after)
 
     def growth_per_year(self) -> Mixture:
@@ -204,7 +204,9 @@ def search(runs: Runs, known: Steps, growth: Growth) -> Found:
 
 
 def _with(known: Steps, taken: list[float]) -> Steps:
-    return Steps(np.sort(np.append(known.years, taken)))
+    for year in taken:
+        known = known.with_one(year)
+    return known
 
 
 def _most_likely(more: OneMore) -> tuple[float, float]:

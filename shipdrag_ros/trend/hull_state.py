@@ -4,9 +4,11 @@ The state of one hull against time: a Gaussian process with steps.
 
 The added resistance x(t) of a hull, a fraction of the clean hull's, is modelled as
 
-    x(t) = level + growth t + wander(t) + sum of steps and changes of growth at events
+    x(t) = clean + fouling(t) + wander(t),  fouling(t) = level + growth t + changes at events
     y_i  = x(t_i) + covariates b + scatter + error of the run,
 
+A known event keeps a share of the fouling before it and adds a step of unknown size: after
+a docking nothing of it is left but the error of the clean hull (`KINDS`). Growth may change.
 wander an integrated Brownian motion (growth that changes slowly) and a plain one (growth in
 bursts, in port for instance), scatter and wander of unknown size. All of it is Gaussian once
 the three sizes are given; these are averaged over
@@ -28,7 +30,8 @@ from shipdrag_ros.samples import Float64
 
 LEVEL_SD = 0.4  # a hull when its first run is seen: from clean to heavily fouled
 GROWTH_PER_YEAR = (0.10, 0.12)  # merchant hulls: 5 to 20 % a year between cleanings
-STEP_SD = 0.10  # a cleaning, a docking, a sudden growth in port
+CLEAN_SD = 0.05  # of the stated clean hull: model tests, added mass, the paint of a new hull
+STEP_SD = 0.10  # that no log book notes: a cleaning, a sudden growth in port
 GROWTH_CHANGE_SD = 0.10  # per year, after a step: new paint, another trade
 COVARIATE_SD = 1.0  # relative resistance for a relative change of displacement
 SEASON_SD = 0.005  # of a yearly wave: light, water and trade
@@ -39,8 +42,17 @@ _WANDER_PRIOR = np.array([0.4, 0.35, 0.25])
 WALK = np.array([0.0, 0.015, 0.04])  # of the level, per square root of a year: growth in bursts
 _WALK_PRIOR = np.array([0.5, 0.25, 0.25])
 _OUTLIER_PROBABILITY, _OUTLIER_SCALE = 0.02, 6.0
+KINDS = {
+    'docking': (0.0, 0.07),  # blasted and painted: what is left differs from dock to dock
+    'coating': (0.0, 0.07),
+    'cleaning': (0.3, 0.08),  # divers leave 10 to 50 %
+    'propeller_polish': (1.0, 0.02),  # the hull is as it was
+}
+"""Share of the fouling that an event keeps, and the sd of what it adds."""
+
 _ROUNDS = 4
 _NEGLIGIBLE = 1e-4  # weight of a setting
+_GROWTH = 2  # the column of it
 
 
 @dataclass(frozen=True)
@@ -56,12 +68,15 @@ class Runs:
         Added resistance over the clean hull's, and its repeatable standard deviation.
     covariates : (n, k)
         What else moves the resistance, each about 0 on average.
+    clean_sd
+        Of the clean hull that all are compared with.
     """
 
     years: Float64
     added: Float64
     sd: Float64
     covariates: Float64
+    clean_sd: float = CLEAN_SD
 
     def __len__(self) -> int:
         return len(self.years)
@@ -83,13 +98,43 @@ class Steps:
     Attributes
     ----------
     years : (m,)
-        When; a run at that very time is after the step.
+        When, ascending; a run at that very time is after the step.
+    kinds : tuple of str
+        Of each, one of `KINDS`; '' where no log book notes it.
     """
 
     years: Float64 = field(default_factory=lambda: np.zeros(0))
+    kinds: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.years)
+
+    @property
+    def keeps(self) -> Float64:
+        """Share of the fouling that each keeps (m,)."""
+        return np.array([KINDS.get(kind, (1.0, 0.0))[0] for kind in self._each()])
+
+    @property
+    def sd(self) -> Float64:
+        """Standard deviation of what each adds (m,)."""
+        return np.array([KINDS.get(kind, (1.0, STEP_SD))[1] for kind in self._each()])
+
+    def with_one(self, year: float) -> Steps:
+        """Return these and one that no log book notes."""
+        place = int(np.searchsorted(self.years, year))
+        kinds = list(self._each())
+        kinds.insert(place, '')
+        return Steps(np.insert(self.years, place, year), tuple(kinds))
+
+    def carried(self, years: Float64, since: Float64) -> Float64:
+        """Return how much of fouling that came at some times is left at others (n, m)."""
+        left = (years[:, None] >= since[None, :]).astype(float)
+        for when, keeps in zip(self.years, self.keeps):
+            left[np.ix_(years >= when, since < when)] *= keeps
+        return left
+
+    def _each(self) -> tuple[str, ...]:
+        return self.kinds or ('',) * len(self.years)
 
 
 @dataclass(frozen=True)
@@ -108,7 +153,7 @@ class Functional:
     Attributes
     ----------
     columns : (m, p)
-        Weights of level, growth, and of each step the jump and the change of growth.
+        Weights of the clean hull, level, growth, and of each step what it adds and the new growth.
     years : (m,)
         Where the wander counts; NaN: not at all.
     own : (m,)
@@ -223,20 +268,39 @@ class HullState:
         return found
 
     def _columns(self, years: Float64) -> Float64:
-        """Return level, growth, and of each step the jump and the change of growth."""
-        after = years[:, None] >= self.steps.years[None, :]
-        later = np.maximum(years[:, None] - self.steps.years[None, :], 0.0)
-        return np.hstack([np.ones((len(years), 1)), years[:, None], after, later])
+        """Return clean hull, level, growth, and of each step what it adds and the new growth."""
+        steps = self.steps
+        later = np.maximum(years[:, None] - steps.years[None, :], 0.0)
+        one = np.ones((len(years), 1))
+        many = len(steps)
+        found = np.hstack([one, one, years[:, None], np.zeros((len(years), many)), later])
+        for number, jump in enumerate(self._jumps()):
+            found[years >= steps.years[number]] += jump
+        return found
+
+    def _jumps(self) -> Float64:
+        """Return what each step takes from the fouling before it and adds to it, as columns."""
+        steps, many = self.steps, len(self.steps)
+        jumps = np.zeros((many, 3 + 2 * many))
+        for number, (when, keeps) in enumerate(zip(steps.years, steps.keeps)):
+            before = jumps[:number].sum(axis=0)
+            before[1:3] += (1.0, when)
+            before[3 + many :] += np.maximum(when - steps.years, 0.0)
+            jumps[number] = (keeps - 1.0) * before
+            jumps[number, 3 + number] += 1.0
+        return jumps
 
     def _sd(self) -> Float64:
         """Return the prior standard deviations of the columns."""
-        many = len(self.steps)
-        return np.array([LEVEL_SD, self.growth.sd] + [STEP_SD] * many + [GROWTH_CHANGE_SD] * many)
+        change = np.full(len(self.steps), GROWTH_CHANGE_SD)
+        clean = self.runs.clean_sd
+        first = (clean, math.sqrt(LEVEL_SD**2 - clean**2), self.growth.sd)
+        return np.concatenate([first, self.steps.sd, change])
 
     def _prior(self, years: Float64, covariates: Float64) -> tuple[Float64, Float64]:
         """Return the prior mean of the runs and their covariance without noise and wander."""
-        scaled = self._columns(years) * self._sd()
-        mean = self.growth.mean * years
+        columns = self._columns(years)
+        scaled, mean = columns * self._sd(), self.growth.mean * columns[:, _GROWTH]
         phase = 2.0 * np.pi * (years[:, None] - years[None, :])
         others = COVARIATE_SD**2 * covariates @ covariates.T + SEASON_SD**2 * np.cos(phase)
         return mean, scaled @ scaled.T + others
@@ -266,7 +330,7 @@ class HullState:
         cross = (columns * sd**2) @ self._columns(runs.years).T
         cross += _wander(at, runs.years, *sizes) / own[:, None]
         gain = cross @ self._precision[number]
-        value = columns[:, 1] * self.growth.mean + gain @ self._residual
+        value = columns[:, _GROWTH] * self.growth.mean + gain @ self._residual
         variance = (
             ((columns * sd) ** 2).sum(axis=1)
             + np.diag(_wander(at, at, *sizes)) / own**2
@@ -320,18 +384,16 @@ class HullState:
         """
         end = max(float(self.runs.years[-1]), 1e-9)
         columns = self._columns(np.array([end])) - self._columns(np.zeros(1))
-        many = len(self.steps)
-        if many:
-            columns[:, 2 : 2 + many] *= self.changes().value > 0.0
+        columns -= self._jumps()[self.changes().value <= 0.0].sum(axis=0)
         return Functional(columns / end, np.array([end]), np.array([end]))
 
     def growth_since_last_step(self) -> Mixture:
         """
         Return the growth now, by the law since the last step.
         """
-        columns = np.zeros((1, 2 + 2 * len(self.steps)))
-        columns[0, 1] = 1.0
-        columns[0, 2 + len(self.steps) :] = 1.0
+        columns = np.zeros((1, 3 + 2 * len(self.steps)))
+        columns[0, _GROWTH] = 1.0
+        columns[0, 3 + len(self.steps) :] = 1.0
         return self._averaged(Functional(columns, np.array([np.nan]), np.ones(1)))
 
     def changes(self) -> Mixture:
@@ -339,9 +401,7 @@ class HullState:
         Return the jump at each step.
         """
         many = len(self.steps)
-        columns = np.zeros((many, 2 + 2 * many))
-        columns[np.arange(many), 2 + np.arange(many)] = 1.0
-        return self._averaged(Functional(columns, np.full(many, np.nan), np.ones(many)))
+        return self._averaged(Functional(self._jumps(), np.full(many, np.nan), np.ones(many)))
 
     def asked_for(self, number: int, after: Float64) -> tuple[Float64, Float64]:
         """

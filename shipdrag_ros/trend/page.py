@@ -13,7 +13,7 @@ from shipdrag_ros.report.document import page_text
 from shipdrag_ros.trend import pictures, words
 from shipdrag_ros.trend.ship_trend import ShipTrend
 
-_RANKED = 'Each ship at her reference speed, the one to be cleaned first on top'
+_RANKED = 'Each ship at her reference speed, the one to be cleaned first on top.'
 _RUNS = 'Coastdowns, the latest first; ± is two standard deviations'
 Links = Mapping[tuple[str, int], str]
 _HOW = Section(
@@ -63,7 +63,12 @@ def fleet_text(
     links
         Where the page of each coastdown is, by bag and start; None where there are none.
     """
-    sections = [Section('Which hull first', tables=((_RANKED, words.ranking(trends)),))]
+    sections = [
+        Section(
+            'Which hull first',
+            tables=((f'{_RANKED} {words.ranked_by(trends)}', words.ranking(trends)),),
+        )
+    ]
     for trend in trends:
         drawn = () if trend.curve is None else (pictures.added_resistance(trend),)
         steps = (('Steps in the state of the hull', words.event_table(trend)),)
@@ -114,7 +119,8 @@ def _sentence(trends: Sequence[ShipTrend]) -> str:
     if not trends or trends[0].now is None:
         return 'No ship has runs enough for a trend.'
     first = trends[0]
+    cost = f'; it costs {words.amount(first.costs.usd_per_year)} USD a year' if first.costs else ''
     return (
         f'{first.series.name} first: {words.percent(first.now)} % over the clean hull'
-        f'{words.speed_loss(first)}.'
+        f'{words.speed_loss(first)}{cost}.'
     )

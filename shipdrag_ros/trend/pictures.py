@@ -47,12 +47,15 @@ def draw_added_resistance(axes: Axes, trend: ShipTrend) -> None:
     value, sd = 100.0 * trend.curve.value, 100.0 * trend.curve.sd
     axes.fill_between(days, value - 2.0 * sd, value + 2.0 * sd, color=BLUE, alpha=0.2, lw=0)
     axes.plot(days, value, color=BLUE, label='hull, with its band of two sd')
-    shown = trend.points
+    # the date of a wrong clock would stretch the axis over decades
+    first, last = trend.curve.time_ns[[0, -1]]
+    drawn = [each for each in trend.points if np.isfinite(each.value)]
+    shown = [each for each in drawn if each.used or first <= each.time_ns <= last]
     for used, colour, marker, label in (
         (True, '#333333', 'o', 'a coastdown, one sd'),
         (False, VERMILION, 'x', 'outlier, or not used'),
     ):
-        points = [each for each in shown if each.used is used and np.isfinite(each.value)]
+        points = [each for each in shown if each.used is used]
         if points:
             axes.errorbar(
                 _days(np.array([each.time_ns for each in points])),
@@ -79,7 +82,12 @@ def draw_added_resistance(axes: Axes, trend: ShipTrend) -> None:
         )
     axes.axhline(0.0, color='#333333', lw=0.8)
     axes.set_ylabel('resistance over the clean hull [%]')
-    axes.set_xlabel('date (UTC)')
+    beyond = len(drawn) - len(shown)
+    axes.set_xlabel(
+        f'date (UTC); {beyond} run(s) of another time are in the list alone'
+        if beyond
+        else 'date (UTC)'
+    )
     axes.xaxis_date()
     axes.legend(loc='upper left')
 

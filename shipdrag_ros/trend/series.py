@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.display import day
+from shipdrag_ros.fleet.rows import same_time
 from shipdrag_ros.samples import Float64
 
 SPEED_SHARE = 0.75  # of the speed at the stop: inside what nearly every run covers
@@ -115,7 +116,7 @@ def series_of(
     baseline = any(np.isfinite(value) for value in with_baseline)
     points = [_point(row, speed, clean, baseline) for row, clean in zip(rows, with_baseline)]
     points = _of_one_hull(points, [row['length_m'] for row in rows])
-    points = _dated(points)
+    points = _dated(_each_once(points, rows))
     masses = [row['displaced_volume_m3'] * row['water_density_kg_m3'] for row in rows]
     mass = float(np.median(masses)) if masses else np.nan
     if baseline:
@@ -214,6 +215,16 @@ def _of_one_hull(points: list[Point], lengths: Sequence[float]) -> list[Point]:
         else point
         for point, length in zip(points, lengths)
     ]
+
+
+def _each_once(points: list[Point], rows: Sequence[CoastdownRow]) -> list[Point]:
+    """Leave out what was recorded at the same time as another run: it is the same run."""
+    used = [number for number, point in enumerate(points) if point.used]
+    found = list(points)
+    for number, other in same_time([rows[each] for each in used]).items():
+        reason = f'recorded at the same time as {points[used[other]].bag}: one run, counted once'
+        found[used[number]] = replace(points[used[number]], reason=reason)
+    return found
 
 
 def _dated(points: list[Point]) -> list[Point]:

@@ -72,7 +72,7 @@ class LevelCurve:
 @dataclass(frozen=True)
 class Costs:
     """
-    What the added resistance costs.
+    What the added resistance costs, each with the error of the added resistance alone.
 
     Attributes
     ----------
@@ -84,9 +84,9 @@ class Costs:
         Since the first run.
     """
 
-    fuel_t_per_day: float
-    usd_per_year: float
-    usd_so_far: float
+    fuel_t_per_day: Parameter
+    usd_per_year: Parameter
+    usd_so_far: Parameter
 
 
 @dataclass(frozen=True)
@@ -105,8 +105,10 @@ class ShipTrend:
         Probability that a run is an outlier.
     cleaning
         When cleaning pays; None where that cannot be said, and `notes` say why.
+    costs, usd_per_unit
+        And what an added resistance of 1 costs [USD a year]; only where there are prices.
     rank
-        1: which hull first.
+        1: which hull first, by cost a year, or by power where a ship has no prices.
     """
 
     series: ShipSeries
@@ -118,6 +120,7 @@ class ShipTrend:
     outlier: tuple[float, ...] = ()
     scatter: float | None = None
     costs: Costs | None = None
+    usd_per_unit: float = np.nan
     cleaning: CleaningDate | None = None
     cleaning_from_ns: int | None = None
     rank: int | None = None
@@ -197,7 +200,10 @@ def ship_trend(
     first_ns = used[0].time_ns
     runs = _runs(used)
     inside = [event for event in known if first_ns < event.time_ns <= used[-1].time_ns]
-    steps = Steps(np.array([(event.time_ns - first_ns) / YEAR_NS for event in inside]))
+    steps = Steps(
+        np.array([(event.time_ns - first_ns) / YEAR_NS for event in inside]),
+        tuple(event.kind for event in inside),
+    )
     found = search(runs, steps, growth or Growth())
     state, open_state = found.state, found.open
     shared = _shared_sd(used)
@@ -213,7 +219,7 @@ def ship_trend(
         _events(state, inside, found.steps, first_ns),
         Parameter(float(slope.value[0]), float(slope.sd[0])),
         now,
-        Parameter(now.value * kw, now.sd * kw),
+        _times(now, kw),
         LevelCurve((first_ns + years * YEAR_NS).astype(np.int64), curve.value, curve.sd),
         tuple(state.outlier.tolist()),
         state.scatter,
@@ -277,19 +283,27 @@ def _with_costs(
     assert result.curve is not None
     series = result.series
     per_unit = usd_per_year(economics, series.clean_force_n, series.reference_speed_m_s)
-    mean = float(np.trapezoid(result.curve.value, result.curve.time_ns / YEAR_NS))
+    years = result.curve.time_ns / YEAR_NS
+    so_far = float(np.trapezoid(result.curve.value, years))
+    # the level at one time and at another err together: at most so much
+    sd = float(np.trapezoid(np.hypot(result.curve.sd, _shared_sd(series.used)), years))
     costs = Costs(
-        fuel_t_per_day(economics, result.power_kw.value),
-        per_unit * result.now.value,
-        per_unit * mean,
+        _times(result.power_kw, fuel_t_per_day(economics, 1.0)),
+        _times(result.now, per_unit),
+        _times(Parameter(so_far, sd), per_unit),
     )
+    result = replace(result, costs=costs, usd_per_unit=per_unit)
     since = _since_cleaning(result, state)
     date = cleaning_date(economics, per_unit, since, state.growth_since_last_step())
     if date is None:
         why = 'no date of a cleaning: growth and state are not known well enough for one'
-        return replace(result, costs=costs, notes=(*result.notes, why))
+        return replace(result, notes=(*result.notes, why))
     from_ns = last_ns + round(date.years * YEAR_NS)
-    return replace(result, costs=costs, cleaning=date, cleaning_from_ns=from_ns)
+    return replace(result, cleaning=date, cleaning_from_ns=from_ns)
+
+
+def _times(figure: Parameter, unit: float) -> Parameter:
+    return Parameter(figure.value * unit, figure.sd * unit)
 
 
 def _since_cleaning(result: ShipTrend, state: HullState) -> Mixture:
@@ -332,17 +346,20 @@ def _from_sisters(alone: Sequence[ShipTrend], place: int) -> Growth | None:
     return Growth(mean, float(np.sqrt(1.0 / total + _SISTER_SD**2)))
 
 
+def are_priced(trends: Sequence[ShipTrend]) -> bool:
+    """
+    Return whether every ship with a trend has prices, so that money ranks them; else power.
+    """
+    return all(each.costs is not None for each in trends if each.now is not None)
+
+
 def _ranked(trends: Sequence[ShipTrend]) -> list[ShipTrend]:
-    """Rank by what the fouling costs a year, else by the power it takes; unknown ones last."""
-    priced = all(each.costs is not None for each in trends if each.now is not None)
+    """Rank by the figure that the ranking shows first; ships without a trend last."""
+    priced = are_priced(trends)
 
     def burden(trend: ShipTrend) -> float:
-        if trend.now is None:
-            return -np.inf
-        if priced and trend.costs is not None:
-            return trend.costs.usd_per_year
-        assert trend.power_kw is not None
-        return trend.power_kw.value
+        figure = trend.costs.usd_per_year if priced and trend.costs else trend.power_kw
+        return -np.inf if figure is None else figure.value
 
     ordered = sorted(trends, key=lambda trend: (-burden(trend), trend.series.name))
     return [

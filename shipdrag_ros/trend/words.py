@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shipdrag_ros.display import M_S_PER_KNOT, Table, day
+from shipdrag_ros.display import M_S_PER_KNOT, Table, day, decimals_of
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.trend.series import YEAR_NS
-from shipdrag_ros.trend.ship_trend import ShipTrend
+from shipdrag_ros.trend.ship_trend import ShipTrend, are_priced
 
 _CLEAN = {
     'ship file': 'the clean hull of the ship file',
@@ -23,31 +23,51 @@ def ranking(trends: Sequence[ShipTrend]) -> Table:
     rows = []
     for trend in trends:
         costs = trend.costs
+        money = (
+            'costs [USD a year]',
+            '-' if costs is None else amount(costs.usd_per_year),
+        )
+        power = (
+            'effective power [kW]',
+            '-' if trend.power_kw is None else _plus_minus(trend.power_kw, 1.0),
+        )
+        burdens = (money, power) if are_priced(trends) else (power, money)  # what ranks first
         rows.append(
             (
-                '-' if trend.rank is None else f'{trend.rank}',
-                trend.series.name,
-                f'{len(trend.series.used)} of {len(trend.series.points)}',
-                percent(trend.now),
-                _speed_lost(trend),
-                '-' if trend.power_kw is None else _plus_minus(trend.power_kw, 1.0),
-                '-' if costs is None else f'{costs.fuel_t_per_day:.2f}',
-                percent(trend.growth_per_year),
-                _cleaning(trend),
+                ('rank', '-' if trend.rank is None else f'{trend.rank}'),
+                ('ship', trend.series.name),
+                *burdens,
+                ('added now [%]', percent(trend.now)),
+                ('speed lost [%]', _speed_lost(trend)),
+                ('fuel [t/day]', '-' if costs is None else amount(costs.fuel_t_per_day)),
+                ('growth [% a year]', percent(trend.growth_per_year)),
+                ('cleaning pays from', _cleaning(trend)),
+                ('runs used', f'{len(trend.series.used)} of {len(trend.series.points)}'),
             )
         )
-    head = (
-        'rank',
-        'ship',
-        'runs used',
-        'added now [%]',
-        'speed lost [%]',
-        'effective power [kW]',
-        'fuel [t/day]',
-        'growth [% a year]',
-        'cleaning pays from',
+    head = tuple(name for name, _ in rows[0]) if rows else ('rank', 'ship')
+    return Table(head, tuple(tuple(cell for _, cell in row) for row in rows))
+
+
+def ranked_by(trends: Sequence[ShipTrend]) -> str:
+    """
+    Say what the ranking goes by.
+    """
+    if are_priced(trends):
+        return 'Ranked by what the added resistance costs a year.'
+    return (
+        'Ranked by the effective power that the added resistance takes: not every ship file has '
+        'prices (`economics`).'
     )
-    return Table(head, tuple(rows))
+
+
+def amount(figure: Parameter) -> str:
+    """
+    Return an amount of money or of fuel and its standard deviation, to two digits of it.
+    """
+    decimals = decimals_of(figure.sd) if figure.sd > 0.0 else 2
+    value, sd = (round(each, decimals) for each in (figure.value, figure.sd))
+    return f'{value:,.{max(decimals, 0)}f} ± {sd:,.{max(decimals, 0)}f}'
 
 
 def lines(trend: ShipTrend) -> list[str]:
@@ -67,8 +87,8 @@ def lines(trend: ShipTrend) -> list[str]:
         found.append(f'Runs scatter by {100.0 * trend.scatter:.1f} % beyond their own error.')
     if trend.costs is not None:
         found.append(
-            f'It costs {trend.costs.usd_per_year:,.0f} USD a year as it is now; since the first '
-            f'run {trend.costs.usd_so_far:,.0f} USD.'
+            f'It costs {amount(trend.costs.usd_per_year)} USD a year as it is now; since the '
+            f'first run {amount(trend.costs.usd_so_far)} USD.'
         )
     if trend.cleaning is not None and trend.cleaning_from_ns is not None:
         base = trend.cleaning_from_ns - round(trend.cleaning.years * YEAR_NS)

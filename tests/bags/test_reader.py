@@ -17,7 +17,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as Rosbag2Writer
 from rosbags.typesys import Stores, get_typestore
 
-from shipdrag_ros.bags import BagWriter, Compression, ResetMark, Run, ahead, open_runs
+from shipdrag_ros.bags import BagWriter, Compression, ResetMark, Run, mcap_file, open_runs
 from shipdrag_ros.bags import run as run_module
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode, reset_request, types
@@ -169,7 +169,8 @@ def test_memory_does_not_grow_with_the_bag(
     write_bag: WriteBag, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(run_module, 'BATCH', 256)
-    monkeypatch.setattr(ahead, '_AHEAD_BYTES', 60_000)  # less than either bag holds
+    monkeypatch.setattr(mcap_file, '_AHEAD_BYTES', 60_000)  # less than either bag holds
+    monkeypatch.setattr(mcap_file, '_WORTHWHILE_BYTES', 20_000)
     peaks = []
     for n in (8000, 40_000):
         block = Block.of(Channel.SHAFT, START_NS + np.arange(n) * 10**8, 1.0)

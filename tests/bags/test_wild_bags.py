@@ -275,7 +275,7 @@ def test_a_packed_file_that_unpacks_without_end(
 ) -> None:
     monkeypatch.setattr(mcap_file, 'CHUNK_LIMIT_BYTES', 1 << 20)
     path = tmp_path / 'a.mcap.zstd'
-    for size, raised in ((1 << 19, 'is no MCAP file'), (1 << 27, 'unpacks to more than')):
+    for size, raised in ((1 << 19, 'is no MCAP file'), (1 << 27, 'cannot be unpacked')):
         path.write_bytes(zstandard.ZstdCompressor().compress(bytes(size)))
         with pytest.raises(BagError, match=raised):
             open_runs([path])
@@ -294,7 +294,7 @@ def test_messages_out_of_order_are_held_back_up_to_a_limit(
     found, _ = read(tmp_path / 'a.mcap', content)
     np.testing.assert_array_equal(found.stamp_ns, np.argsort(received, kind='stable'))
     monkeypatch.setattr(mcap_file, '_WAITING_LIMIT_BYTES', 50_000)
-    with pytest.raises(BagError, match=r'out of order.*write it anew'):
+    with pytest.raises(BagError, match=r'out of order.*write it again'):
         read(tmp_path / 'a.mcap', content)
 
 
@@ -335,4 +335,4 @@ def test_a_checksum_is_tested(tmp_path: Path, bags: dict[str, bytes]) -> None:
         content = bytearray(chunk('', records, len(records)))
         struct.pack_into('<I', content, 9 + 24, checksum)
         _, warnings = read(tmp_path / 'a.mcap', MAGIC + bytes(content))
-        assert any('wrong checksum' in text for text in warnings) is told
+        assert any('(checksum)' in text for text in warnings) is told

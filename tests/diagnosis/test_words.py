@@ -10,6 +10,7 @@ import pytest
 from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict, Where
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis.words import answers, place, probability, sentence
+from shipdrag_ros.inference.decision import NONE, UNKNOWN
 from shipdrag_ros.parameter import Parameter
 
 FOULING = EffectEstimate('fouling', 0.9995, {'friction_factor': Parameter(0.4013, 0.0121)})
@@ -51,16 +52,6 @@ def diagnosis(
             '97.0 %).',
         ),
         (
-            diagnosis(Verdict.NONE, (('fouling',), 0.7), ((), 0.3), nothing=0.3),
-            'No effect can be named: fouling is the likeliest (70.0 %), but a baseline that is '
-            'further off than stated would explain these runs as well (30.0 %).',
-        ),
-        (
-            diagnosis(Verdict.NONE, ((), 0.2), nothing=0.2, unnamed=0.8),
-            'No effect can be named: something without a name is the likeliest (80.0 %), but a '
-            'baseline that is further off than stated would explain these runs as well (20.0 %).',
-        ),
-        (
             diagnosis(Verdict.NAMED, (('fouling',), 0.9995), effects=(FOULING,)),
             'Missing in the model: fouling (friction factor 0.401 ± 0.024); probability > 99.9 %.',
         ),
@@ -75,20 +66,22 @@ def diagnosis(
             'separate them.',
         ),
         (
-            diagnosis(Verdict.ONE_OF, (('waves',), 0.3), (('wind',), 0.2), unnamed=0.5),
-            'Missing is one of these: waves (30.0 %), wind (20.0 %), or something without a name '
-            '(50.0 %). These runs cannot separate them.',
+            diagnosis(
+                Verdict.ONE_OF, (UNKNOWN, 0.45), (('waves',), 0.3), (('wind',), 0.25), unnamed=0.45
+            ),
+            'Missing is one of these: something without a name (45.0 %), waves (30.0 %), wind '
+            '(25.0 %). These runs cannot separate them.',
+        ),
+        (
+            diagnosis(
+                Verdict.ONE_OF, (NONE, 0.6), (('fouling',), 0.35), (('wind',), 0.05), nothing=0.6
+            ),
+            'Nothing is missing (60.0 %), or fouling (35.0 %). These runs cannot separate them.',
         ),
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),
             'Something is missing that is none of the known effects, in the force on the ship, 12 '
-            'to 900 s after the stop, at 5.8 to 14.6 knots (3.0 to 7.5 m/s).',
-        ),
-        (
-            diagnosis(Verdict.UNKNOWN, (('wind',), 0.98)),
-            'Something is missing that is none of the known effects, in the force on the ship, 12 '
-            'to 900 s after the stop, at 5.8 to 14.6 knots (3.0 to 7.5 m/s). The likeliest of '
-            'them, wind, leaves more than noise.',
+            'to 900 s after the stop, at 5.8 to 14.6 knots (3.0 to 7.5 m/s) (probability 90.0 %).',
         ),
     ],
 )

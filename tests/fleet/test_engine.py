@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import sys
 import time
@@ -30,6 +31,10 @@ from shipdrag_ros.fleet.store import (
     ship_texts,
 )
 from shipdrag_ros.fleet.update import update
+from shipdrag_ros.library.listener import Notes
+from shipdrag_ros.library.trending import trends_of
+
+from .conftest import SHIP
 
 cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import tests
 
@@ -152,6 +157,33 @@ def test_a_bag_that_has_changed_takes_the_place_of_its_former_rows(
     assert report.notes == (
         '1 bag(s) of the store are not below these folders; their rows stay in it',
     )
+
+
+def test_a_run_is_counted_once_however_often_it_was_copied(
+    bags: list[Path], tmp_path: Path, engine: Engine
+) -> None:
+    """A folder under another name, a copy without its run file, and half of a bag."""
+    folder, store = tmp_path / 'fleet', Store(tmp_path / 'store')
+    for name in ('a copy', 'ship'):
+        (folder / name).mkdir(parents=True)
+        (folder / name / 'ship.yaml').write_text(SHIP.read_text())
+        shutil.copy(bags[1], folder / name / 'run.mcap')
+    (folder / 'ship' / 'run.yaml').write_text('{draught_m: 8.5}')
+    report = update(find([str(folder)]), store, engine, silent)
+    assert report.twins == (('a copy/run.mcap', 'ship/run.mcap', True),)
+    assert read_coastdowns(store.path)['draught_m'].to_pylist() == [8.5]
+    assert report.notes == ()
+    # half of it is another content, and the same run
+    whole = (folder / 'ship' / 'run.mcap').read_bytes()
+    (folder / 'a copy' / 'run.mcap').write_bytes(whole[: int(0.75 * len(whole))])
+    report = update(find([str(folder)]), store, engine, silent)
+    assert len(read_coastdowns(store.path)) == 2
+    (note,) = report.notes
+    assert note.startswith("1 coastdown(s) of 'Vitus Bering' were recorded at the same time as")
+    assert "'a copy/run.mcap' and 'ship/run.mcap' for one" in note
+    [trend], _ = trends_of(Notes(), store.path)
+    [left] = [point for point in trend.points if not point.used]
+    assert left.bag == 'a copy/run.mcap'
 
 
 def test_a_scheduler_that_cannot_be_reached_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

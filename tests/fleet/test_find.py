@@ -45,7 +45,6 @@ def test_every_bag_once_whatever_links_lead_to_it(fleet_folder: Path) -> None:
 def test_a_bag_alone_may_be_given(fleet_folder: Path) -> None:
     (source,) = find([str(fleet_folder / 'bering' / '2026' / 'run 2.mcap')]).sources
     assert (source.root, source.bag) == ('2026', 'run 2.mcap')
-    assert 'Vitus Bering' in source.beside.ship
 
 
 def test_what_does_not_exist_is_an_error(tmp_path: Path) -> None:
@@ -96,9 +95,17 @@ def test_the_nearest_ship_file_upwards_counts(tmp_path: Path) -> None:
         'd/x.mcap': 'fleet',
     }
     assert all(each.events == f'events of {each.ship[6:]}' for each in found.values())
-    # above the folder that is given, too
-    (below,) = find([str(tmp_path / 'a' / 'b' / 'x.mcap')]).sources
-    assert below.beside.ship == 'name: a'
+
+
+def test_nothing_above_the_folder_given_speaks_for_its_bags(tmp_path: Path) -> None:
+    bag = tmp_path / 'a' / 'bag'
+    touch(tmp_path / 'a' / 'x.mcap', bag / 'metadata.yaml', bag / 'bag_0.mcap')
+    (tmp_path / 'ship.yaml').write_text('name: of another')
+    for place in (tmp_path / 'a', tmp_path / 'a' / 'x.mcap', bag):
+        assert {each.beside.ship for each in find([str(place)]).sources} == {''}
+    (tmp_path / 'a' / 'ship.yaml').write_text('name: own')
+    for place in (tmp_path / 'a', tmp_path / 'a' / 'x.mcap', bag):  # beside what is given
+        assert {each.beside.ship for each in find([str(place)]).sources} == {'name: own'}
 
 
 def test_a_directory_of_rosbag2_is_one_bag(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ SOURCE = Path(sd.__file__)
 def test_every_name_that_is_exported_is_there() -> None:
     for name in sd.__all__:
         assert getattr(sd, name) is not None
-    assert set(sd.__all__) <= set(dir(sd))
+    assert dir(sd) == sd.__all__
     assert len(sd.__all__) <= 15
 
 

@@ -155,7 +155,7 @@ def test_a_frame_is_named_and_its_arguments_too(tmp_path: Path) -> None:
     for columns in (['log'], {'speed_through_water': 1}, {'speed_through_water': None}):
         with pytest.raises(sd.ShipdragError, match='give the column of each input'):
             sd.read(speed, columns=columns, rate_hz=1.0)  # type: ignore[arg-type]
-    with pytest.raises(sd.ShipdragError, match='cannot be written'):
+    with pytest.raises(sd.ShipdragError, match=r'cannot be (written|made)'):
         sd.read(speed, rate_hz=1.0, columns={'speed_through_water': '1'}).save(
             tmp_path / 'none' / 'a.mcap'
         )
@@ -166,11 +166,7 @@ def test_a_frame_with_the_names_of_the_inputs_and_an_index_of_dates_is_si() -> N
     assert speeds(sd.read(frame)).tolist() == table()['log'].tolist()
 
 
-@pytest.mark.parametrize('length_m', [-1.0, 'long', float('nan')])
-def test_a_ship_made_in_python_is_checked(length_m: Any) -> None:
-    ship = sd.Ship(name='x', length_m=length_m, displaced_volume_m3=4000.0)
-    with pytest.raises(sd.ShipdragError, match='length_m'):
-        sd.read(pd.DataFrame(table()), ship=ship, columns=LOG, time='t')
+def test_what_is_no_ship_is_refused() -> None:
     with pytest.raises(sd.ShipdragError, match='expected a Ship'):
         sd.read(pd.DataFrame(table()), ship=4, columns=LOG, time='t')  # type: ignore[arg-type]
 

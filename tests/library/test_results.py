@@ -8,6 +8,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 
@@ -40,10 +41,46 @@ def test_a_notebook_shows_text_and_a_table_and_nothing_else(
     for each in (record, found, found.coastdowns[0], diagnosis):
         page = each._repr_html_()
         assert page.count('<table>') == page.count('</table>') == 1
-        assert page.count('<p>') == 1 + len(each.summary())
+        assert page.count('<p>') == 1 + len(each.summary().splitlines())
     named = sd.Record(record.runs, given=sd.Ship(name='<b>', length_m=80, displaced_volume_m3=4e3))
     assert '<b>' not in named._repr_html_()
     assert '&lt;b&gt;' in named._repr_html_()
+
+
+def test_a_summary_is_a_text_that_prints(
+    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
+) -> None:
+    for each in (record, found, found.coastdowns[0], diagnosis):
+        text = each.summary()
+        assert isinstance(text, str)
+        assert repr(text) == str(text)
+        assert not text.startswith('(')
+        assert text._repr_html_().count('<p>') == len(text.splitlines())
+
+
+def test_nothing_that_a_result_holds_fills_a_screen(
+    record: sd.Record, found: sd.Resistance, diagnosis: sd.Diagnosis
+) -> None:
+    (coastdown,) = found.coastdowns
+    parts = (found.curve, coastdown.event, coastdown.estimate, coastdown.run, record.truth)
+    for each in (*parts, diagnosis.found, found.ship, record.samples()):
+        assert len(repr(each)) < 1500, type(each).__name__
+        assert repr(each).startswith(f'{type(each).__name__}(')
+
+
+def test_a_log_with_its_sign_turned_is_said() -> None:
+    seconds = np.arange(1500.0)
+    knots = 14.0 / (1.0 + np.maximum(seconds - 700.0, 0.0) / 400.0)
+    for sign in (1.0, -1.0):
+        frame = {'t': seconds, 'log': sign * knots}
+        record = sd.read(
+            pd.DataFrame(frame),
+            ship=sd.Ship(length_m=80.0, displaced_volume_m3=4000.0),
+            columns={'speed_through_water': 'log:kn'},
+            time='t',
+        )
+        summary = sd.estimate(record).summary()
+        assert ('the sign of the log is wrong' in summary) == (sign < 0.0)
 
 
 def test_the_frame_is_the_curve(found: sd.Resistance) -> None:
@@ -121,7 +158,7 @@ def test_several_coastdowns_are_one_curve(record: sd.Record) -> None:
     assert both.combined is not None
     assert both.curve is not None
     assert both.curve.speed_m_s.tobytes() == both.combined.speed_m_s.tobytes()
-    assert '2 coastdowns together.' in ' '.join(both.summary())
+    assert '2 coastdowns together.' in both.summary()
     try:
         assert len(both.plot().lines) >= 3
     finally:
@@ -133,7 +170,7 @@ def test_where_there_is_no_coastdown_it_says_why() -> None:
     found = sd.estimate(steady)
     assert found.coastdowns == ()
     assert repr(found) == '<Resistance: Vitus Bering, no coastdowns>'
-    assert found.summary()[0].startswith('No coastdown found')
+    assert found.summary().startswith('No coastdown found')
     for ask in (lambda: found.curve, found.plot, found.to_frame):
         with pytest.raises(sd.ShipdragError, match='No coastdown found'):
             ask()
@@ -176,7 +213,7 @@ def test_one_fact_may_stand_alone(record: sd.Record) -> None:
 
 def test_a_trend_says_what_it_is_of() -> None:
     nothing = sd.trends([])
-    assert nothing.summary() == ('No coastdown was given: no trend.',)
+    assert nothing.summary() == 'No coastdown was given: no trend.'
     with pytest.raises(sd.ShipdragError, match='there is no ship'):
         nothing.plot()
     with pytest.raises(sd.ShipdragError, match="no ship is called 'North'"):

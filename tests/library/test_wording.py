@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 
 import shipdrag_ros as sd
-from shipdrag_ros.importing import formats
-from shipdrag_ros.importing.format import Option
 from shipdrag_ros.library import wording
 from shipdrag_ros.library.wording import in_python
+from shipdrag_ros.sources import formats
+from shipdrag_ros.sources.format import Option
 
 PACKAGE = Path(sd.__file__).parent
 
@@ -69,7 +69,7 @@ def test_options_of_a_new_format_need_no_list() -> None:
 
 def test_no_option_that_a_message_of_the_library_names_is_left_over() -> None:
     # all rooms below the doors; of another program are --src, --dst and --nthreads
-    rooms = ('bags', 'coastdown', 'diagnosis', 'estimation', 'importing', 'library', 'messages')
+    rooms = ('bags', 'coastdown', 'diagnosis', 'estimation', 'sources', 'library', 'messages')
     rooms += ('replay', 'ship', 'simulation')
     own = {'--src', '--dst', '--dst-storage', '--effect', '--report', '--option'}
     for path in (file for room in rooms for file in (PACKAGE / room).rglob('*.py')):

@@ -78,10 +78,20 @@ def test_another_page_cannot_press_the_buttons(
 
 
 @pytest.mark.parametrize(
-    'body', ['', '[]', '{"action": 1}', '{"action": "x", "value": []}', 'x' * 20_000]
+    'body',
+    [
+        *('', '[]', '{"action": 1}', '{"action": "x", "value": []}'),
+        *('[' * 9_000, '{"action": "speed", "value": 1e999}', '{"action": "seek", "value": NaN}'),
+        '{"action": "seek", "value": 1%s}' % ('0' * 4000),
+    ],
 )
 def test_nonsense_is_answered(open_page: str, body: str) -> None:
     assert post(f'{open_page}player', content=body).status_code == 400
+
+
+def test_a_body_that_is_too_long_is_refused(open_page: str, guarded: str) -> None:
+    assert post(f'{open_page}player', content='x' * 20_000).status_code == 413
+    assert post(f'{guarded}login', content='token=' + 'x' * 20_000).status_code == 413
 
 
 @pytest.mark.parametrize('path', ['../app.py', '%2e%2e/app.py', 'vendor/../../app.py'])
@@ -113,21 +123,60 @@ def test_with_the_token_all_is_there_and_the_browser_keeps_something_else(guarde
     assert get(guarded, headers=kept).status_code == 200
 
 
-def test_too_many_connections_are_refused_and_silent_ones_closed(
-    serving: Any, monkeypatch: pytest.MonkeyPatch
+HEAD = b'GET / HTTP/1.1\r\nHost: localhost\r\n'
+POST = b'POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9000\r\n\r\n'
+
+
+@pytest.mark.parametrize('beginning', [b'', HEAD, POST], ids=['silent', 'header', 'body'])
+@pytest.mark.parametrize('drips', [False, True])
+def test_who_never_asks_holds_no_place(
+    serving: Any, monkeypatch: pytest.MonkeyPatch, beginning: bytes, drips: bool
 ) -> None:
     monkeypatch.setattr(guard, 'CONNECTIONS', 5)
-    monkeypatch.setattr(guard, 'ASK_S', 4.0)
-    with serving(LivePage(NodeSource())) as url:
+    monkeypatch.setattr(guard, 'ASK_S', 1.5)
+    with serving(LivePage(NodeSource(), token=TOKEN)) as url:
         address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
         opened = [socket.create_connection(address) for _ in range(20)]
-        refused = 0
         for each in opened:
-            each.settimeout(30.0)
-            refused += each.recv(100).startswith(b'HTTP/1.1 503')  # else closed: nothing asked
+            each.sendall(beginning)
+        assert get(f'{url}login', timeout=5.0).status_code == 200
+        # those that still have a place lose it, though they go on
+        end_s = time.monotonic() + 1.5 + 5.0
+        while opened and time.monotonic() < end_s:
+            opened = [each for each in opened if not closed(each, drips=drips)]
+            time.sleep(0.1)
+        assert opened == []
+
+
+def closed(connection: socket.socket, *, drips: bool) -> bool:
+    connection.setblocking(False)
+    try:
+        if drips:
+            connection.send(b'x')
+        return connection.recv(1000) == b''
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+def test_more_viewers_than_places_are_told(serving: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, 'CONNECTIONS', 5)
+    with serving(LivePage(NodeSource())) as url:
+        address = ('127.0.0.1', int(url.rstrip('/').rpartition(':')[2]))
+        viewers = []
+        for _ in range(5):
+            viewers.append(socket.create_connection(address))
+            viewers[-1].sendall(b'GET /stream HTTP/1.1\r\nHost: localhost\r\n\r\n')
+            assert viewers[-1].recv(100).startswith(b'HTTP/1.1 200')
+        with socket.create_connection(address) as one_more:
+            assert one_more.recv(1000).startswith(b'HTTP/1.1 503')
+        viewers.pop().close()
+        end_s = time.monotonic() + 20.0
+        while get(url).status_code != 200:
+            assert time.monotonic() < end_s
+        for each in viewers:
             each.close()
-        assert refused == 15
-        assert get(url).status_code == 200
 
 
 def test_a_reader_who_reads_nothing_is_let_go(

@@ -12,7 +12,7 @@ from shipdrag_ros.live.figures import to_go_s
 from shipdrag_ros.live.headline import Ended, Situation, Tone, headline
 
 STEADY = Situation(
-    silent_s=0.5, lifecycle='active', monitor='steady', lead_s=1440.0, lead_full_s=1800.0
+    silent_s=0.5, lifecycle='active', monitor='steady', lead_s=1440.0, ready_s=600.0
 )
 COASTING = replace(STEADY, monitor='coastdown', lead_s=0.0, coast_s=400.0)
 ENDED = Ended(by='turn', ago_s=20.0, band=0.04)
@@ -24,9 +24,15 @@ ENDED = Ended(by='turn', ago_s=20.0, band=0.04)
         (Situation(), 'NO NODE HEARD', 'shipdrag node --ship FILE'),
         (replace(STEADY, silent_s=65.0), 'NODE SILENT for 1:05', 'old'),
         (replace(STEADY, lifecycle='inactive'), 'NODE INACTIVE', 'nothing'),
-        (replace(STEADY, trouble='no data: log'), 'NO SPEED HEARD', 'No data: log.'),
-        (STEADY, 'STEADY 24 of 30 min: record ready', 'if the master decides so'),
-        (replace(STEADY, lead_s=130.0), 'STEADY 2 of 30 min', 'Ready in 8 min'),
+        (replace(STEADY, trouble='no data: log'), 'NO SPEED', 'No data: log.'),
+        (replace(COASTING, trouble='no data'), 'NO SPEED at 6:40 of a coastdown', 'No data.'),
+        (
+            replace(STEADY, doubt='log: frozen'),
+            'STEADY 24 min: record ready',
+            'Look first: log: frozen. The engine',
+        ),
+        (STEADY, 'STEADY 24 min: record ready', 'if the master decides so'),
+        (replace(STEADY, lead_s=130.0), 'STEADY 2 of 10 min', 'Ready in 8 min'),
         (replace(STEADY, lead_s=0.0), 'NOT STEADY YET', 'Hold course'),
         (replace(STEADY, lead_s=0.0, steer_deg=269.6), 'NOT STEADY YET', 'Steer 270'),
         (replace(STEADY, monitor='candidate'), 'SLOWING', 'rudder amidships'),
@@ -36,7 +42,7 @@ ENDED = Ended(by='turn', ago_s=20.0, band=0.04)
         (replace(COASTING, band=0.021), '±2.1 %', 'Good enough'),
         (replace(STEADY, ended=ENDED, steer_deg=9.7), 'TURNED: this run ends here', 'steer 010'),
         (replace(STEADY, ended=ENDED, paired=True), 'TURNED', 'Both runs'),
-        (replace(STEADY, ended=replace(ENDED, ago_s=601.0)), 'STEADY 24 of 30', 'master'),
+        (replace(STEADY, ended=replace(ENDED, ago_s=601.0)), 'STEADY 24 min', 'master'),
         (replace(STEADY, ended=replace(ENDED, band=None, why_not='a plateau')), 'RUN NOT', 'A pl'),
         (replace(STEADY, ended=replace(ENDED, by='news')), 'RUN ENDED: news', 'Sail on'),
     ],
@@ -45,6 +51,13 @@ def test_it_says_where_things_stand_and_what_to_do(now: Situation, text: str, ac
     said = headline(now)
     assert text in said.text
     assert action in said.action
+
+
+def test_nothing_is_green_that_is_not_well() -> None:
+    for now in (STEADY, replace(COASTING, band=0.02), replace(STEADY, ended=ENDED)):
+        assert headline(now).tone is Tone.GOOD
+        assert headline(replace(now, doubt='log: frozen')).tone is Tone.WATCH
+        assert headline(replace(now, trouble='no data')).tone is Tone.BAD
 
 
 @pytest.mark.parametrize('by', [by for by in EndedBy if by is not EndedBy.GIVEN])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -164,3 +165,45 @@ def test_no_text_is_an_error(content: str) -> None:
     for text in (content, f'${content}', sentence(content)):
         interpreter.messages(text, LINE, START_NS)
     assert raw_message(content, receive_ns=START_NS).payload
+
+
+def _line_of(k: int) -> list[str]:
+    clock = f'12{k // 60:02d}{k % 60:02d}'
+    fix = f'GPRMC,{clock},A,5430.000,N,01030.000,E,7.0,90.0,010123,,,A'
+    return [sentence(fix), sentence(f'VWVHW,,,,,{10.0 - 0.01 * k:.2f},N,,K')]
+
+
+def _stamps(times: dict[int, float], lines: Callable[[int], list[str]]) -> list[float]:
+    """Return the stamps of the speeds through water [s], of lines read at given times [s]."""
+    interpreter, found = Interpreter(), []
+    for k, read_s in times.items():
+        for line in lines(k):
+            read_ns = START_NS + round(read_s * 1e9)
+            for message in interpreter.messages(line, LINE, read_ns):
+                assert message.log_ns == read_ns
+                if message.topic == '/speed_through_water':
+                    found.append((message.publish_ns - START_NS) / 1e9)
+    return found
+
+
+def test_a_backlog_after_a_stall_has_its_own_times() -> None:
+    # read a second apart with a delay of up to 0.3 s, but 20 s of them together
+    times = {k: k + 0.3 * (k % 2) for k in range(100)}
+    stalled = times | dict.fromkeys(range(40, 60), 59.95)
+    flowing, waited = _stamps(times, _line_of), _stamps(stalled, _line_of)
+    assert len(waited) == len(flowing) > 90
+    assert np.diff(waited).min() > 0.0  # none is rejected as a repetition
+    assert waited == pytest.approx(flowing, abs=1.0)
+    assert waited[-30:] == flowing[-30:]  # what flows is stamped with its receipt
+
+
+def test_a_receiver_whose_clock_stands_still_delays_nothing() -> None:
+    times = {k: float(k) for k in range(50)}
+    stamps = _stamps(times, lambda k: [_line_of(0)[0], _line_of(k)[1]])
+    assert np.diff(stamps) == pytest.approx(1.0)
+
+
+def test_a_clock_of_the_node_that_is_set_forward_is_known_after_two_minutes() -> None:
+    times = {k: k + 20.0 * (k >= 30) for k in range(300)}
+    stamps = _stamps(times, _line_of)
+    assert stamps[-1] == times[299]

@@ -99,7 +99,7 @@ class Peer:
     The rest of the ROS graph, one context of this process.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, name: str = 'peer') -> None:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
@@ -108,7 +108,7 @@ class Peer:
         self._rclpy = rclpy
         self._context = rclpy.Context()
         rclpy.init(context=self._context)
-        self.node = rclpy.create_node('peer', context=self._context)
+        self.node = rclpy.create_node(name, context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         self.player = Player(self.node, self._executor)

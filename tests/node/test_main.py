@@ -228,7 +228,8 @@ def test_it_holds_state_figure_and_inputs() -> None:
         )
     )
     assert line(health) == (
-        'steady 10 of 30 min | last at 10.0 kn: r 0.0200 m/s² ± 5 % | 1 inputs, not well: heading'
+        'steady 10 min: record ready | last at 10.0 kn: r 0.0200 m/s² ± 5 % | '
+        '1 inputs, not well: heading'
     )
 
 
@@ -239,7 +240,7 @@ def test_what_keeps_it_from_estimating_comes_first() -> None:
 
 def test_an_input_that_is_not_well_hides_no_state() -> None:
     state = Status('n', 'state', 1, 'steady; not well, heading: stuck', STATE)
-    assert line(Health((state,))).startswith('steady 10 of 30 min |')
+    assert line(Health((state,))).startswith('steady 10 min: record ready |')
 
 
 def test_without_a_terminal_there_is_no_line() -> None:

@@ -99,7 +99,9 @@ def test_what_is_heard_is_used_recorded_and_replayed(
     status = diagnostics.of('input speed_through_water')
     assert status.level == b'\x00'
     assert status.message == f'receiving, from NMEA {instruments.source}'
-    assert values(status)['type'] == f'NMEA {instruments.source}'
+    assert values(status)['fed by'] == f'NMEA {instruments.source}'
+    assert values(status)['type'] == SPEED_TYPE
+    assert values(status)['topic'] == '/coastdown_node/nmea/speed_through_water'
     assert node.stop() == 0
 
     (bag,) = (tmp_path / 'bags').glob('*.mcap')

@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ship as a whole: reading, writing, and what follows from the particulars."""
 
+import math
+import re
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -275,6 +278,29 @@ def test_round_trip_is_exact(name, length, volume, value, sd, effect):
 
 def test_a_ship_is_one_line(cargo: Ship) -> None:
     assert cargo.summary() == 'Vitus Bering: length 150 m, displacement 20200 m³ (20,705 t)'
-    model = replace(cargo, name='', length_m=1.1, displaced_volume_m3=0.0142)
+    model = Ship(length_m=1.1, displaced_volume_m3=0.0142)
     assert model.summary().startswith('a ship without a name: ')
     assert model.summary().endswith('displacement 0.0142 m³ (14.56 kg)')
+
+
+@pytest.mark.parametrize(
+    ('values', 'key'),
+    [
+        ({'length_m': -80.0}, 'length_m'),
+        ({'length_m': math.nan}, 'length_m'),
+        ({'displaced_volume_m3': 4e6}, 'displaced_volume_m3'),
+        ({'length_m': 262.0}, 'length_m'),  # feet: too slender for the volume
+        ({'water': Water(density_kg_m3=1.0)}, 'water.density_kg_m3'),
+        ({'propulsion': 8.0}, 'propulsion'),
+    ],
+)
+def test_a_ship_made_in_python_is_checked_as_one_of_a_file(
+    values: dict[str, Any], key: str
+) -> None:
+    with pytest.raises(ShipFileError, match=re.escape(key)):
+        Ship(**{'length_m': 80.0, 'displaced_volume_m3': 4000.0} | values)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    ship = Ship(length_m=np.float32(80.0), displaced_volume_m3=np.int64(4000))  # type: ignore[arg-type]
+    assert ship.mass_kg == 4000 * 1025.0

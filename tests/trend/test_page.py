@@ -3,8 +3,12 @@
 
 import json
 
+import pytest
+
 from shipdrag_ros.cli import main
 from shipdrag_ros.fleet.store import Store
+
+NAME = 'Test <b>ship</b>'
 
 
 def test_json_is_the_contracts(fleet_store, tmp_path, capsys):
@@ -38,6 +42,32 @@ def test_json_is_the_contracts(fleet_store, tmp_path, capsys):
     assert f', about {loss:.1%} of speed lost at equal effective power.' in page
 
 
+@pytest.mark.parametrize(
+    ('question', 'row'),
+    [
+        (
+            'select date::date, round(added_percent, 1), used from runs order by date limit 1',
+            ['2023-11-14', 0.0, True],
+        ),
+        (
+            'select count(*), min(resistance_kn) > 0 from runs where usd_per_year is null',
+            [12, True],
+        ),
+        ('select ship, rank, added_percent > 5, usd_per_year from ships', [NAME, 1, True, None]),
+        ('select to_timestamp(min(time_ns) / 1e9) from coastdowns', ['2023-11-14 22:13:20+00:00']),
+        (
+            'select [1, 2], 1.5::decimal(4, 2), null',
+            [[1, 2], '1.50', None],
+        ),
+    ],
+)
+def test_what_an_office_asks_is_answered(fleet_store, capsys, question, row):
+    assert main(['trend', str(fleet_store), '--sql', question, '--json']) == 0
+    out, table = capsys.readouterr()
+    assert json.loads(out)['rows'] == [row]
+    assert table
+
+
 def test_questions_in_sql_read_the_store_and_no_file(fleet_store, tmp_path, capsys):
     question = 'select ship, count(*) as n from coastdowns group by ship'
     assert main(['trend', str(fleet_store), '--sql', question, '--json']) == 0
@@ -46,7 +76,11 @@ def test_questions_in_sql_read_the_store_and_no_file(fleet_store, tmp_path, caps
     secret.write_text('a\n1\n')
     assert main(['trend', str(fleet_store), '--sql', f"select * from '{secret}'"]) == 1
     assert main(['trend', str(fleet_store), '--sql', 'selec']) == 1
-    assert 'the tables are coastdowns and bags' in capsys.readouterr().err
+    assert main(['trend', str(fleet_store), '--sql', 'select * from trends']) == 1
+    assert main(['trend', str(fleet_store), '--sql', '']) == 1
+    said = capsys.readouterr().err
+    assert 'the tables are runs (ship, date, added_percent' in said
+    assert 'begin with SELECT' in said
 
 
 def test_a_folder_that_is_no_store(tmp_path, capsys):

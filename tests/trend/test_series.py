@@ -64,6 +64,21 @@ def test_what_is_not_used_says_why(changes, reason):
     assert left.reason == reason
 
 
+def test_one_time_of_one_ship_is_one_run_of_which_the_longest_is_used():
+    hour = 3600 * 10**9
+    whole, half, late = row(0.0), row(0.0, 0.2), row(0.0, 0.3)
+    whole |= {'end_ns': whole['time_ns'] + hour, 'bag': 'whole'}
+    half |= {'end_ns': whole['time_ns'] + hour // 2, 'bag': 'half'}
+    late |= {'time_ns': whole['time_ns'] + hour // 2, 'end_ns': whole['time_ns'] + hour}
+    copy = whole | {'bag': 'a copy', 'water_temperature_c': 9.0}  # says more: it is used
+    after = row(1.0) | {'time_ns': whole['end_ns'], 'end_ns': whole['end_ns'] + hour}
+    series = series_of('Test', [half, whole, late, after, copy])
+    assert [point.bag for point in series.used] == ['a copy', '1.0.mcap']
+    assert {point.reason for point in series.points if not point.used} == {
+        'recorded at the same time as a copy: one run, counted once'
+    }
+
+
 def test_a_run_years_from_all_others_has_a_wrong_clock():
     rows = [row(15.0 * number) for number in range(6)]
     assert all(point.used for point in series_of('Test', rows).points)

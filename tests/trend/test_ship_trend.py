@@ -3,10 +3,12 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from shipdrag_ros.fleet.events import HullEvent
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.trend import fleet_trends
+from shipdrag_ros.trend import fleet_trends, words
+from shipdrag_ros.trend.pictures import draw_added_resistance
 
 START_NS = 1_700_000_000_000_000_000
 DAY_NS = 86_400_000_000_000
@@ -69,7 +71,7 @@ def test_the_hull_that_costs_most_comes_first(priced):
     assert first.growth_per_year.value == pytest.approx(0.15, abs=3.0 * first.growth_per_year.sd)
     force_n = 1e-3 * 36.0 * 1.025e6 * first.now.value
     assert first.power_kw.value == pytest.approx(force_n * 6.0 / 1000.0, rel=0.01)
-    assert first.costs.usd_per_year > trends[1].costs.usd_per_year > 0.0
+    assert first.costs.usd_per_year.value > trends[1].costs.usd_per_year.value > 0.0
     assert first.cleaning_from_ns is not None
     assert first.now.sd > 0.02  # the error of the added mass is shared by all runs
 
@@ -88,6 +90,53 @@ def test_known_and_unknown_steps(priced):
         assert event.change.value == pytest.approx(-0.1, abs=3.0 * event.change.sd)
         assert abs(event.time_ns - cleaning.time_ns) < 31 * DAY_NS
     assert any('no `economics`' in note for note in trends['Known'].notes)
+
+
+def test_a_docking_that_takes_off_half_of_the_resistance_is_one_step():
+    """At 45 % of fouling, after which nothing of it is left; seeds 1 to 4."""
+    docking = HullEvent(START_NS + 400 * DAY_NS, 'docking')
+    for seed in range(1, 5):
+        seen = rows('Docked', 0.15, seed=seed, cleaned=400.0)
+        for each in seen:
+            before = each['time_ns'] < docking.time_ns
+            shift = (0.3 if before else -0.05) * CLEAN
+            each['resistance_m_s2'] = (np.array(each['resistance_m_s2']) + shift).tolist()
+        [trend] = fleet_trends(seen, {}, {'Docked': [docking]})
+        [event] = trend.events  # no second step beside it that explains the other half
+        assert event.known
+        assert event.change.value == pytest.approx(-0.45, abs=3.0 * event.change.sd)
+        assert event.change.sd < 0.04
+
+
+def test_what_ranks_stands_first_with_its_error(priced):
+    seen = rows('Slow', 0.05) + rows('Fast', 0.15)
+    trends = fleet_trends(seen, {'Slow': priced, 'Fast': priced}, {})
+    table = words.ranking(trends)
+    assert table.columns[2] == 'costs [USD a year]'
+    assert words.ranked_by(trends) == 'Ranked by what the added resistance costs a year.'
+    shown = [float(row[2].replace(',', '').split(' ± ')[0]) for row in table.rows]
+    costs = [trend.costs.usd_per_year for trend in trends]
+    assert shown == sorted(shown, reverse=True)
+    assert shown == pytest.approx([each.value for each in costs], rel=0.05)
+    for trend, each in zip(trends, costs, strict=True):  # linear in what was added
+        assert each.sd / each.value == pytest.approx(trend.now.sd / trend.now.value)
+    # without the prices of one, power ranks them all
+    trends = fleet_trends(seen, {'Slow': priced}, {})
+    table = words.ranking(trends)
+    assert [row[1] for row in table.rows] == ['Fast', 'Slow']
+    assert table.columns[2] == 'effective power [kW]'
+    assert 'not every ship file has prices' in words.ranked_by(trends)
+
+
+def test_a_wrong_clock_does_not_stretch_the_axis():
+    seen = rows('Test', 0.1)
+    seen[5]['time_ns'] = 946_684_800_000_000_000
+    [trend] = fleet_trends(seen, {}, {})
+    axes = Figure().add_subplot()
+    draw_added_resistance(axes, trend)
+    low, high = axes.get_xlim()
+    assert high - low < 1.2 * 705.0
+    assert axes.get_xlabel().endswith('1 run(s) of another time are in the list alone')
 
 
 def test_a_sister_lends_her_growth():

@@ -8,10 +8,12 @@ the report and the documentation find it here; a module is imported when it is a
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 
 from shipdrag_ros.estimation.estimator import Estimator
+from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import FORMER_ESTIMATORS
 
 DURING, AFTER = 'log_time', 'ode_fit'
@@ -31,4 +33,4 @@ def named(name: str) -> Estimator:
     known = DURING if name == 'auto' else FORMER_ESTIMATORS.get(name, name)
     found = import_module(f'{__name__}.{known}').ESTIMATOR
     assert isinstance(found, Estimator)
-    return found
+    return replace(found, estimate=shielded(found.estimate))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.assemble import AtEnd, assembled
+from shipdrag_ros.estimation.assemble import AtEnd, assembled, log_scale_note
 from shipdrag_ros.estimation.curve import ValidRange, resistance_curve
 from shipdrag_ros.estimation.log_time.inputs import Inputs, gather
 from shipdrag_ros.estimation.log_time.learnt_noise import LearntNoise
@@ -35,9 +35,9 @@ from shipdrag_ros.estimation.motion import Motion, sigma
 from shipdrag_ros.estimation.result import Estimate, Track
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.averaging import average
-from shipdrag_ros.inference.gaussian import condense, deviations, root
+from shipdrag_ros.inference.gaussian import condense, root
 from shipdrag_ros.inference.robust import GROSS
-from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Input
+from shipdrag_ros.inference.rows import LOG, LOG_SCALE_SD, OVER_GROUND, POSITION, Input
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -49,8 +49,6 @@ _POLYNOMIALS = 12  # as many as any record needs, the priors do the rest
 # AMPLITUDE DECAY^(j - 2) / j of the distance run, that of the first ones FREE_SD.
 _AMPLITUDE, _DECAY, _FREE_SD = 0.03, 0.45, 10.0
 CURRENT_SD_M_S = 1.0  # prior
-SCALE_SD = 0.02  # prior of the factor of the log
-_IDENTIFIED = 0.5  # posterior/prior sd above which a parameter counts as unidentified
 _THRUST_SD = 0.3  # prior of the thrust at the stop, of the resistance there
 _SHORTEST_RUN_DOWN_S = 0.1
 
@@ -173,7 +171,8 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     # every column but the thrust: its prior is not about nothing
     full = np.ones(len(rows), np.bool_)
     full[-1] = False
-    full[-3:-1] = inputs.separates_water_from_ground
+    full[-2] = bool(inputs.count[LOG])
+    full[-3] = inputs.separates_water_from_ground
     columns = np.flatnonzero(full)
     start, weight, noise_sd, used_sd = robust_fit(
         rows,
@@ -194,18 +193,16 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     else:
         white = slow.whitened(rows, residual, weight, inputs, ship)
         products = condense(*white, np.ones(len(residual)))
-    of_columns = deviations(products, start, columns, mean, sd)[polynomials:]
-    known, notes = _known(of_columns, inputs)
-    if slow is not None:
-        notes.append(slow.note)
-    families = _families(polynomials, *known, stated > 0.0)
+    notes = [] if slow is None else [slow.note]
+    families = _families(polynomials, bool(full[-3]), bool(full[-2]), stated > 0.0)
     # what is free is so about where it is, so that nothing cancels; the priors hold the others
     mean[:FREE], mean[FREE:polynomials], sd[FREE:polynomials] = start[:FREE], 0.0, 0.0
     priors = coast_priors(length, speed, tc, float(ship.froude(speed)), mean, sd)
-    coefficients, covariance, share = average(
+    coefficients, covariance, _ = average(
         products, start, families, np.ones(len(families)), *priors
     )
-    notes += _scale_note(float(coefficients[-2]), float(share[families[:, -2]].sum()))
+    if full[-2]:
+        notes.append(log_scale_note(float(coefficients[-2]), float(np.sqrt(covariance[-2, -2]))))
     return _AveragedFit(
         tc,
         coefficients,
@@ -217,16 +214,6 @@ def _fit(window: Window, inputs: Inputs, ship: Ship, parameters: Parameters) -> 
     )
 
 
-def _scale_note(scale: float, probability: float) -> list[str]:
-    """Return what to say of a factor of the log."""
-    if probability <= 0.5:
-        return []
-    return [
-        f'the log reads {100.0 * scale:+.2g} % (probability {probability:.2f} that it is off at '
-        'all): taken into account'
-    ]
-
-
 def _loose(polynomials: int, distance: float, deceleration: float) -> tuple[Float64, Float64]:
     """Return mean and sd of all coefficients, the polynomials held loosely."""
     j = np.arange(polynomials)
@@ -234,35 +221,15 @@ def _loose(polynomials: int, distance: float, deceleration: float) -> tuple[Floa
     sd[:polynomials] = distance * _AMPLITUDE * _DECAY ** (j - FREE) / np.maximum(j, 1)
     sd[:FREE] = distance * _FREE_SD
     mean[-1] = deceleration
-    sd[polynomials:] = (CURRENT_SD_M_S, SCALE_SD, _THRUST_SD * deceleration)
+    sd[polynomials:] = (CURRENT_SD_M_S, LOG_SCALE_SD, _THRUST_SD * deceleration)
     return mean, sd
-
-
-def _known(sd: Float64, inputs: Inputs) -> tuple[tuple[bool, bool], list[str]]:
-    """Say whether the data show current and factor of the log, and why not."""
-    if not inputs.separates_water_from_ground:
-        return (False, False), []
-    current, scale = sd[0] < _IDENTIFIED * CURRENT_SD_M_S, sd[1] < _IDENTIFIED * SCALE_SD
-    notes = []
-    if not current:
-        notes.append(
-            f'a current was left out: this window gives it to +-{sd[0]:.2g} m/s only, which is no '
-            'better than not knowing'
-        )
-    if not scale:
-        notes.append(
-            f'a factor of the log was left out: this window gives it to +-{100.0 * sd[1]:.2g} % '
-            'only'
-        )
-    return (bool(current), bool(scale)), notes
 
 
 @cache
 def _families(polynomials: int, current: bool, scale: bool, runs_down: bool) -> NDArray[np.bool_]:
-    """Return the columns of each family: with and without factor, with and without thrust."""
+    """Return the columns of each family: with and without thrust."""
     rows = [
-        [True] * polynomials + [current, with_scale, with_thrust]
-        for with_scale in ((False, True) if scale else (False,))
+        [True] * polynomials + [current, scale, with_thrust]
         for with_thrust in ((False, True) if runs_down else (False,))
     ]
     return np.array(rows)

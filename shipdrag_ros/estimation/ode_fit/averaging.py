@@ -109,7 +109,10 @@ def average(
                     if held > 0.0:
                         means[f, a], roots[f, a, a] = priors.mean[f, a], 1.0 / np.sqrt(held)
                     else:
-                        means[f, a], roots[f, a, a] = now[a], _VAGUE / np.sqrt(matrix[a, a])
+                        # infinite where no row shows it
+                        shown = np.sqrt(matrix[a, a])
+                        means[f, a] = now[a]
+                        roots[f, a, a] = _VAGUE / shown if shown > 0.0 else np.inf
             # written so that NaN fails: such a setting is left out
             if not np.isfinite(roots).all() or not np.isfinite(products).all():
                 continue

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.assemble import AtEnd, assembled
+from shipdrag_ros.estimation.assemble import AtEnd, assembled, log_scale_note
 from shipdrag_ros.estimation.curve import ValidRange
 from shipdrag_ros.estimation.ode_fit.batch_means import BatchMeans
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_LAG, LOG_SCALE, V0, predict
@@ -86,12 +86,6 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     if start.near is None:
         start = start.again(problem)
     first, full, problem = start.first, start.full, start.condensed
-    if LOG_SCALE in problem.extras:
-        scale, sd = first.unknown(LOG_SCALE)
-        notes.append(
-            f'the log reads {100.0 * scale:+.2g} ± {200.0 * sd:.1g} % off (two standard '
-            'deviations), taken out'
-        )
     near = start.near or problem.whole(first)
     noise = learn(problem.seen(near), guess.speed_m_s)
     problem = problem.disturbed(noise.settings)
@@ -100,6 +94,8 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         # where the whole law cannot be fitted, the first family stands alone
         found = start.near or first
         notes.append(_NOT_AVERAGED if start.near else _FIRST_ALONE)
+    if LOG_SCALE in problem.extras:
+        notes.append(log_scale_note(*found.unknown(LOG_SCALE)))
     full = full.disturbed(noise.typical)
     notes += _noise_notes(noise, record)
     correlated = full.correlated(found)

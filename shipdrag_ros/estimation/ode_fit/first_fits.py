@@ -1,21 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The first fits of a coastdown: they find how good each row is, and whether the log is off."""
+"""The first fits of a coastdown: they find how good each row is."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.ode_fit.coast import CURRENT, LOG_SCALE
 from shipdrag_ros.estimation.ode_fit.fitted import FittedMotion
 from shipdrag_ros.estimation.ode_fit.problem import Problem
 from shipdrag_ros.estimation.ode_fit.weighing import drop_gross, weigh
 from shipdrag_ros.inference.noise import whiten
 
 _ROUNDS, _ROUNDS_DISTURBED = 3, 2  # of the weights
-_SCALE_SIGNIFICANT = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -28,7 +26,7 @@ class Start:
     first
         Fit of the first family.
     full, condensed
-        Every row weighed; a row a step, with the scale of the log where it shows.
+        Every row weighed; a row a step.
     near
         The whole law; None where it does not converge.
     """
@@ -56,7 +54,7 @@ class Start:
             Its `near` is None where the whole law does not converge.
         """
         full = weigh_disturbed(problem, first)
-        first, condensed = with_log_scale(full.condensed(first), first)
+        condensed = full.condensed(first)
         return cls(first, full, condensed, condensed.average(condensed.whole(first)))
 
     def again(self, problem: Problem) -> Start:
@@ -136,19 +134,3 @@ def weigh_disturbed(problem: Problem, near: FittedMotion) -> Problem:
         whiten(problem.rows, white, problem.noise)
         weigh(white[0], problem.rows.kind, problem.steady, unknown, base, weight)
     return problem.weighted(base / weight)
-
-
-def with_log_scale(problem: Problem, first: FittedMotion) -> tuple[FittedMotion, Problem]:
-    """
-    Take the scale of the log as unknown where the data show that it is not 1.
-    """
-    if CURRENT not in problem.extras:
-        return first, problem
-    scaled = replace(problem, extras=(*problem.extras, LOG_SCALE))
-    found, _ = scaled.fit_first(first.unknowns)
-    if found is None:
-        return first, problem
-    scale, sd = found.unknown(LOG_SCALE)
-    if abs(scale) <= _SCALE_SIGNIFICANT * sd:
-        return first, problem
-    return found, scaled

@@ -32,7 +32,7 @@ from shipdrag_ros.estimation.ode_fit.record import RunRows
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.ode_fit.solve import fit
 from shipdrag_ros.inference.noise import WHITE, Noise, whiten
-from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.inference.rows import LOG, LOG_SCALE_SD, POSITION, Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import SENSORS_ALONE, Settings, noise_of
 from shipdrag_ros.samples import Float64, Int64
@@ -43,7 +43,6 @@ _ITERATIONS = 30
 # Of a shorter coast the errors that go over in seconds look like powers of the speed: four of
 # them run away at its ends, and with them r at the top, by which the slow noise is scaled.
 _SHORT_S = 60.0
-_SCALE_SD = 0.02  # of a log's scale, before the fit
 _LAG_S, _LAG_SD_S = 0.0, 6.0  # of a log behind other inputs, by its filter
 
 
@@ -124,6 +123,9 @@ class Problem:
         kinds = set(coast.kind.tolist())
         if POSITION in kinds:
             extras.append(X0)
+        if LOG in kinds:
+            # whether or not another input can show it
+            extras.append(LOG_SCALE)
         if LOG in kinds and len(kinds) > 1:
             extras.append(CURRENT)
             if len(steady.time_s) or stopped:
@@ -265,8 +267,8 @@ class Problem:
         """
         Fit the first family, None where that fails; return whitened residuals too.
 
-        How the thrust ended is held as it is most likely: without the priors of the whole law
-        it cannot be separated from the highest powers.
+        How the thrust ended and the scale of the log are held as they are most likely: without
+        the priors of the whole law they cannot be separated from the powers.
         """
         converged, _, unknowns, covariance, white = fit(
             self.first,
@@ -274,7 +276,7 @@ class Problem:
             self.grid_s,
             self.rows,
             self.noise,
-            self._active(self.first, held=(THRUST, THRUST_FAST)),
+            self._active(self.first, held=(THRUST, THRUST_FAST, LOG_SCALE)),
             self._prior(self.first),
             _ITERATIONS,
         )
@@ -325,7 +327,7 @@ class Problem:
         """Return mean and precision of what is known before, (2, k + 8)."""
         k = law.size
         prior = np.zeros((2, k + EXTRAS))
-        of_log = (LOG_SCALE, 0.0, _SCALE_SD), (LOG_LAG, _LAG_S, _LAG_SD_S)
+        of_log = (LOG_SCALE, 0.0, LOG_SCALE_SD), (LOG_LAG, _LAG_S, _LAG_SD_S)
         for extra, mean, sd in (*self.run_down.priors, *of_log):
             prior[:, k + extra] = mean, 1.0 / sd**2 if sd > 0.0 else 0.0
         return prior

@@ -11,7 +11,7 @@ const FINE_S = 1800;
 const THIN_EVERY = 300; // rows
 const MODES = ['day', 'dusk', 'night'];
 const SIGNS = { good: '✓', act: '►', watch: '…', bad: '✕' };
-const HELD = { yes: ['✓', 'yes'], no: ['✕', 'no'], wait: ['…', 'not yet'], unknown: ['?', 'not measured'] };
+const HELD = { yes: ['✓', 'yes'], no: ['✕', 'no'], wait: ['…', 'not yet'], unknown: ['?', 'not measured'], silent: ['✕', 'no reading now'] };
 const LEVELS = [['✓', 'good'], ['!', 'look'], ['✕', 'fault'], ['✕', 'silent']];
 
 const el = id => document.getElementById(id);
@@ -48,6 +48,7 @@ function connect() {
     if (rows.length && !whole) thin();
     Object.assign(picture, parts);
     for (const name of Object.keys(parts)) due.parts.add(name);
+    due.rows ||= parts.inputs !== undefined;
     due.rows ||= rows.length > 0 || whole;
     ask();
   };
@@ -137,6 +138,9 @@ function showFigures(part) {
   const mass = picture.ship?.mass_kg;
   const speed = part.speed_m_s == null ? '–' : units.toSpeed(part.speed_m_s).toFixed(units === SI ? 2 : 1);
   setFigure('figure-speed', speed, units.speed, '');
+  const old = part.speed_old_s != null;
+  el('figure-speed').classList.toggle('stale', old);
+  text('note-speed', `${part.speed_kind ?? 'not measured'}${old ? `, ${part.speed_old_s} s old` : ''}`);
   const { usual } = part;
   text('force-name', units === SI ? 'Specific resistance' : 'Resistance');
   if (!usual || (!mass && units !== SI)) {
@@ -178,7 +182,7 @@ function showInputs(part) {
   if (!part.length) return;
   signed('inputs', part.map(input => {
     const rejected = Object.entries(input.rejected).map(([reason, count]) => `${count} ${reason}`).join(', ');
-    const none = input.text === 'no publisher';
+    const none = !input.level && input.text.startsWith('no publisher');
     const [sign, word] = none ? ['–', 'none'] : LEVELS[input.level] ?? LEVELS[2];
     const rate = input.rate_hz ? `${input.rate_hz.toFixed(input.rate_hz < 9.5 ? 1 : 0)} Hz` : '';
     const said = input.level || (!rate && !none) ? input.text : '';
@@ -250,6 +254,12 @@ function sameCurve(one, other) {
   return one.speed_m_s[0] === other.speed_m_s[0] && one.r[0] === other.r[0];
 }
 
+/** Whether all of these inputs have fallen silent. */
+function silent(...names) {
+  const known = (picture.inputs ?? []).filter(({ name, rate_hz, level }) => names.includes(name) && (rate_hz || level === 3));
+  return known.length > 0 && known.every(({ level }) => level === 3);
+}
+
 function showTraces() {
   const { rows } = picture;
   const span = Number(el('span').value);
@@ -257,12 +267,12 @@ function showTraces() {
   drawSpeeds(charts.speeds, rows, span, units, zone);
   const last = rows[rows.length - 1];
   const said = [['log', 1], ['over ground', 2], ['estimate', 3]].filter(([, i]) => last[i] != null).map(([name, i]) => `${name} ${units.toSpeed(last[i]).toFixed(1)}`);
-  text('trace-say', said.length ? `Now: ${said.join(', ')} ${units.speed}.` : 'Nothing was read in the last second.');
+  text('trace-say', said.length ? `${silent('speed through water', 'speed over ground') ? 'Last' : 'Now'}: ${said.join(', ')} ${units.speed}.` : 'Nothing was read in the last second.');
   const turning = rows.some(row => row[4] != null);
   el('shafts').hidden = !turning;
   if (turning) {
     drawShafts(charts.shafts, rows, span, zone);
-    text('shaft-say', last[4] == null ? 'Not read in the last second.' : `Now: ${Math.round(last[4] * 60 / (2 * Math.PI)) || 0} rpm.`);
+    text('shaft-say', last[4] == null ? 'Not read in the last second.' : `${silent('shaft') ? 'Last' : 'Now'}: ${Math.round(last[4] * 60 / (2 * Math.PI)) || 0} rpm.`);
   }
 }
 

@@ -82,6 +82,7 @@ EFFECT = Effect(
             measured_in=DRAUGHTS,
         ),
     ),
+    size_power=-1.79,
     formula='C_V (1 + 0.57 (T/h)^1.79); all of it times (1 + dV/V)^(2/3), dV from the added '
     'sinkage 1.46 V/L^2 [Fr_h^2 / sqrt(1 - Fr_h^2)] less that at h = 0.3 L, at most 5 %; '
     'n_r grows by [3.77 + 1.14 B/T - 0.233 L/T - 3.43 C_B] / (h/T - 1)^1.3 of itself, if at all',

@@ -208,13 +208,12 @@ def test_every_set_of_inputs_serves(
     assert any('a current is part of the speed' in n for n in found.notes) != through_water
 
 
-def test_a_short_window_leaves_out_what_it_cannot_tell(coast: Any, ship: Ship) -> None:
+def test_a_short_window_takes_what_it_cannot_show_from_the_prior(coast: Any, ship: Ship) -> None:
     found = log_time.estimate(
         window(coast.block(500, position_sigma=100.0), START_NS + 60 * 10**9), ship, Parameters()
     )
-    assert found.current_m_s is None
-    assert any(note.startswith('a current was left out') for note in found.notes)
-    assert any(note.startswith('a factor of the log was left out') for note in found.notes)
+    assert found.current_sigma_m_s == pytest.approx(1.0, rel=0.3)
+    assert any('± 4 % off' in note for note in found.notes)
 
 
 def test_the_curve_stops_at_the_speed_of_the_ship(coast: Any, ship: Ship) -> None:

@@ -75,7 +75,7 @@ def test_a_current_is_told_from_log_and_position(coast, ship) -> None:
     assert found.current_sigma_m_s is not None
     assert abs(found.current_m_s - 0.25) < 4.0 * found.current_sigma_m_s
     largest = float(found.curve.resistance_m_s2.max())
-    assert np.sqrt(np.mean(error(found, coast, ship) ** 2)) < 0.012 * largest
+    assert np.sqrt(np.mean(error(found, coast, ship) ** 2)) < 0.015 * largest
 
 
 def test_outliers_hardly_matter(coast, ship) -> None:

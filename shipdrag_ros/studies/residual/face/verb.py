@@ -12,10 +12,10 @@ from typing import Any
 from shipdrag_ros.cli.arguments import add_json, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.importing.numbers import read_numbers
 from shipdrag_ros.regression import Prediction
 from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.sources.numbers import read_numbers
 from shipdrag_ros.studies.residual.baseline import with_residual
 from shipdrag_ros.studies.residual.face.page import write_residual
 from shipdrag_ros.studies.residual.fit import AUTO, ResidualFit, fit_residual

@@ -14,10 +14,10 @@ import numpy as np
 from shipdrag_ros.cli.arguments import add_json, add_report, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import DataError
-from shipdrag_ros.importing.numbers import read_numbers
 from shipdrag_ros.regression import Prediction, Surface, fit_surface
 from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.regression.surface import LOWEST, MAX_DEGREE
+from shipdrag_ros.sources.numbers import read_numbers
 from shipdrag_ros.studies.surface.face.page import write_surface
 
 

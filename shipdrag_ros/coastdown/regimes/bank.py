@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bank over one bin: births, motion, readings, and the probability of each regime."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import typeof, types
+
+from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.births import bear, thin
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
+from shipdrag_ros.coastdown.regimes.motion import hull_law, predict, weigh
+from shipdrag_ros.coastdown.regimes.noise import NoiseFilters, listen
+from shipdrag_ros.coastdown.regimes.state import (
+    A0,
+    A_VAR,
+    ADVANCE,
+    BEFORE,
+    BRAKE,
+    COUNT,
+    CURRENT,
+    DRIVEN,
+    FIRST_A,
+    GLIDE,
+    GLIDED,
+    GROUND,
+    HIGH,
+    LEVEL,
+    LIAR,
+    LN_A,
+    LN_U,
+    LOG,
+    LOW,
+    OPEN,
+    P0,
+    P_VAR,
+    POWER,
+    RAMP_S,
+    RATE,
+    REGIME,
+    SAID,
+    SHAFTS,
+    SINCE,
+    STATES,
+    WAY,
+    WEIGHT,
+    BankSetting,
+    Histories,
+)  # fmt: skip
+from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.samples import Float64
+
+OUT = ('driven', 'run_down', 'gliding', 'braked', 'turning', 're_engaged')
+"""What a probability is given of."""
+P_DRIVEN, P_RUN_DOWN, P_GLIDING, P_BRAKED, P_TURNING, P_ENGAGED, P_EVEN, SPEED, FIT = range(9)
+OUTS = 9  # and of even power since the start, mean speed, log predictive density
+_TURNING_RAD_S = 0.5  # a shaft below it drives no ship
+
+
+class Bank(NamedTuple):
+    """
+    All that the filter remembers.
+
+    Attributes
+    ----------
+    histories, noise
+    revs : (4,)
+        Of each shaft in the first steady state, times pitch [rad/s].
+    first : (2,)
+        ln of the speed then, and the bins that both were learnt from.
+    said, out, work
+        Of the last bin; room.
+    """
+
+    histories: Histories
+    noise: NoiseFilters
+    revs: Float64
+    first: Float64
+    said: Float64
+    out: Float64
+    work: Float64
+
+    @classmethod
+    def fresh(cls) -> Bank:
+        """
+        Return a bank that has seen nothing.
+        """
+        return cls(
+            Histories.fresh(),
+            NoiseFilters.fresh(),
+            np.zeros(4),
+            np.zeros(2),
+            np.full(SAID, np.nan),
+            np.zeros(OUTS),
+            np.zeros((STATES + 1, STATES)),
+        )
+
+
+@compiled(uncounted=True)
+def _begin(bank: Bank, setting: BankSetting, speed: float, by_log: bool, both: bool) -> None:
+    """Give birth to the first histories: driven, or in a glide; any instrument may lie."""
+    all_ = bank.histories
+    hull = setting.hull
+    for liar in range(3 if both else 1):
+        for regime in (DRIVEN, GLIDE):
+            chance = setting.glides if regime == GLIDE else 1.0 - setting.glides
+            if liar > 0:
+                chance *= n.LIES_FIRST
+            if not chance > 0.0:
+                continue
+            j = all_.used[0]
+            all_.used[0] = j + 1
+            x, p, f, w = all_.mean[j], all_.spread[j], all_.number[j], all_.whole[j]
+            for k in range(STATES):
+                x[k] = 0.0
+                for m in range(STATES):
+                    p[k, m] = 0.0
+            for k in range(len(f)):
+                f[k] = 0.0
+            for k in range(len(w)):
+                w[k] = 0
+            x[LN_U] = math.log(speed)
+            p[LN_U, LN_U] = 0.1**2
+            x[LN_A], p[LN_A, LN_A] = hull.level, hull.level_var
+            x[POWER], p[POWER, POWER] = hull.exponent, hull.exponent_var
+            p[WAY, WAY] = 1e4
+            p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
+            f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
+            f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
+            f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
+            w[REGIME], w[LIAR] = regime, liar
+            if regime == DRIVEN:
+                x[OPEN], p[OPEN, OPEN] = x[LN_U], 0.1**2
+                # the same error: she is in balance
+                p[LN_U, OPEN] = p[OPEN, LN_U] = 0.095**2
+            else:
+                w[COUNT], w[GLIDED] = 1, 1
+                all_.at[j, 0], all_.what[j, 0], all_.ramp[j, 0] = 0.0, GLIDE, 0.0
+
+
+@compiled(uncounted=True)
+def _shafts(bank: Bank, even: float, speed: float) -> None:
+    """Put the fastest and the slowest shaft over their steady revs; learn those."""
+    said, revs = bank.said, bank.revs
+    said[HIGH] = said[LOW] = np.nan
+    known = bank.first[1] >= 6.0
+    learns = even > 0.9 and bank.first[1] < 60.0 and speed > 0.0
+    gain = 1.0 / (bank.first[1] + 1.0)
+    learnt = False
+    for k in range(4):
+        value = said[SHAFTS + k]
+        if np.isnan(value):
+            continue
+        if known and abs(revs[k]) > _TURNING_RAD_S * 1e-3:
+            nu = value / revs[k]
+            said[HIGH] = nu if np.isnan(said[HIGH]) else max(said[HIGH], nu)
+            said[LOW] = nu if np.isnan(said[LOW]) else min(said[LOW], nu)
+        if learns:
+            revs[k] += gain * (value - revs[k])
+            learnt = True
+    if learns and (learnt or not known):
+        bank.first[0] += gain * (math.log(speed) - bank.first[0])
+        bank.first[1] += 1.0
+
+
+@compiled(uncounted=True)
+def _sum_up(bank: Bank, setting: BankSetting) -> None:
+    """Add the weights of each regime."""
+    out, all_ = bank.out, bank.histories
+    for k in range(FIT):
+        out[k] = 0.0
+    now_s = all_.clock[0] * setting.step_s
+    for i in range(all_.used[0]):
+        share = math.exp(all_.number[i, WEIGHT])
+        f, w = all_.number[i], all_.whole[i]
+        regime = w[REGIME]
+        if regime == DRIVEN:
+            out[P_DRIVEN] += share
+            out[P_EVEN] += share
+        elif regime == LEVEL:
+            out[P_ENGAGED if w[GLIDED] == 1 else P_DRIVEN] += share
+            if now_s - f[SINCE] > 5.0 * n.LEVEL_RAMP_S[1] * setting.pace:
+                out[P_EVEN] += share
+        elif regime == GLIDE:
+            running = now_s - f[SINCE] < f[RAMP_S]
+            out[P_RUN_DOWN if running else P_GLIDING] += share
+        elif regime == BRAKE:
+            out[P_BRAKED] += share
+        else:
+            out[P_TURNING] += share
+        out[SPEED] += share * math.exp(all_.mean[i, LN_U])
+
+
+_SETTING = BankSetting(
+    HullPrior(0.0, 0.0, np.zeros(1), 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0, 0.0
+)  # its types are all that counts
+_SIGNATURE: Signature = types.void(typeof(Bank.fresh()), typeof(_SETTING))
+
+
+@compiled(_SIGNATURE, uncounted=True)
+def step(bank: Bank, setting: BankSetting) -> None:
+    """
+    Take the bin in `bank.said`; the probabilities are then in `bank.out`.
+    """
+    all_, said = bank.histories, bank.said
+    log, ground, way = said[LOG], said[GROUND], said[ADVANCE]
+    by_log = not np.isnan(log)
+    both = by_log and not (np.isnan(ground) and np.isnan(way))
+    if all_.used[0] == 0:
+        speed = log if by_log else ground
+        if np.isnan(speed):
+            speed = way / setting.step_s
+        if not speed > 0.0:
+            return
+        _begin(bank, setting, speed, by_log, both)
+        bank.out[SPEED], bank.out[P_EVEN] = speed, 1.0
+    all_.clock[0] += 1
+    _shafts(bank, bank.out[P_EVEN], bank.out[SPEED])
+    used = bank.noise.used
+    if all_.clock[0] > 1:
+        bear(all_, setting, both, not np.isnan(said[RATE]))
+    before = 0.0
+    advance = 0.0 if np.isnan(way) else way
+    for i in range(all_.used[0]):
+        slowing = predict(all_, i, setting, used, advance, bank.work)
+        weigh(all_, i, setting, used, said, slowing, bank.first[0], bank.work)
+    thin(all_, setting)
+    _sum_up(bank, setting)
+    listen(bank.noise, setting, said, bank.out[P_EVEN])
+    bank.out[FIT] = before

@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Histories that are born, merged and dropped."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
+from shipdrag_ros.coastdown.regimes.motion import hull_law
+from shipdrag_ros.coastdown.regimes.state import (
+    A0,
+    A_VAR,
+    BEFORE,
+    BRAKE,
+    COUNT,
+    DRIVEN,
+    FIRST_A,
+    GLIDE,
+    GLIDE_TURN,
+    GLIDED,
+    KEPT,
+    LEVEL,
+    LIAR,
+    LN_A,
+    LN_U,
+    OPEN,
+    P0,
+    P_VAR,
+    POWER,
+    RAMP_FROM,
+    RAMP_S,
+    REGIME,
+    REVS,
+    ROOM,
+    SINCE,
+    STATES,
+    SWITCHES,
+    THE_LOG,
+    THE_TRACK,
+    TURN,
+    UNSEEN,
+    WANDER,
+    WEIGHT,
+    BankSetting,
+    Histories,
+)  # fmt: skip
+from shipdrag_ros.compiled import compiled
+
+_PARENTS = 7.0  # nats below the best: a history that still has children
+_LOST = 16.0  # and one that is dropped
+_ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
+_THIN_EVERY = 6  # bins
+_LOG_S = math.log(float(n.NO_THRUST))
+
+
+@compiled(uncounted=True)
+def _copy(bank: Histories, i: int, j: int) -> None:
+    for k in range(STATES):
+        bank.mean[j, k] = bank.mean[i, k]
+        for m in range(STATES):
+            bank.spread[j, k, m] = bank.spread[i, k, m]
+    for k in range(bank.number.shape[1]):
+        bank.number[j, k] = bank.number[i, k]
+    for k in range(bank.whole.shape[1]):
+        bank.whole[j, k] = bank.whole[i, k]
+    for k in range(SWITCHES):
+        bank.at[j, k] = bank.at[i, k]
+        bank.what[j, k] = bank.what[i, k]
+        bank.ramp[j, k] = bank.ramp[i, k]
+
+
+@compiled(uncounted=True)
+def _free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
+    """Give a state a prior of its own."""
+    for k in range(STATES):
+        bank.spread[j, row, k] = 0.0
+        bank.spread[j, k, row] = 0.0
+    bank.mean[j, row] = mean
+    bank.spread[j, row, row] = var
+
+
+@compiled(uncounted=True)
+def _born(
+    bank: Histories,
+    i: int,
+    hull: HullPrior,
+    now_s: float,
+    share: float,
+    regime: int,
+    ramp_s: float,
+) -> int:
+    """Copy a history that switches now; return its slot, or -1 where there is no room."""
+    j = bank.used[0]
+    if j >= ROOM or not share > 0.0:
+        return -1
+    _copy(bank, i, j)
+    bank.used[0] = j + 1
+    f, w = bank.number[j], bank.whole[j]
+    f[WEIGHT] += math.log(share)
+    f[SINCE], f[RAMP_S], f[REVS] = now_s, ramp_s, np.nan
+    w[REGIME], w[UNSEEN] = regime, 0
+    if w[COUNT] == SWITCHES:  # the oldest is forgotten
+        for k in range(SWITCHES - 1):
+            bank.at[j, k] = bank.at[j, k + 1]
+            bank.what[j, k] = bank.what[j, k + 1]
+            bank.ramp[j, k] = bank.ramp[j, k + 1]
+        w[COUNT] -= 1
+    bank.at[j, w[COUNT]], bank.what[j, w[COUNT]] = now_s, regime
+    bank.ramp[j, w[COUNT]] = ramp_s
+    w[COUNT] += 1
+    # how a log's filter bears a sudden change is not known
+    law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    bank.spread[j, WANDER, WANDER] += (n.LOG_LAG_SD_S * math.exp(law)) ** 2
+    return int(j)
+
+
+@compiled(uncounted=True)
+def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """Let the thrust run down."""
+    under_way = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
+    for k in range(len(n.RUN_DOWN_S)):
+        for unseen in range(2 if setting.shafts > 0 else 1):
+            ramp_s = n.RUN_DOWN_S[k] * setting.pace
+            share = n.RUN_DOWN_SHARE[k]
+            if setting.shafts > 0:
+                share *= n.PITCH_UNSEEN if unseen else 1.0 - n.PITCH_UNSEEN
+            if not under_way and k > 0:
+                continue
+            j = _born(
+                bank, i, setting.hull, now_s, chance * (share if under_way else 1.0), GLIDE, ramp_s
+            )
+            if j < 0:
+                continue
+            x, p = bank.mean[j], bank.spread[j]
+            bank.whole[j, UNSEEN] = unseen
+            if under_way:
+                if bank.whole[i, REGIME] == LEVEL:
+                    p[LN_A, LN_A] += n.KEPT_SD**2
+                x[LN_A] += n.DRAGGED[0]
+                p[LN_A, LN_A] += n.DRAGGED[1] ** 2
+                bank.number[j, BEFORE] = x[OPEN]
+            bank.number[j, FIRST_A] = math.exp(hull_law(setting.hull, x[LN_U])[0] + x[LN_A])
+            _free(bank, j, OPEN, 0.0, 0.0)
+            bank.whole[j, GLIDED] = 1
+
+
+@compiled(uncounted=True)
+def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """Let the engine go to another level, or engage."""
+    f = bank.number[i]
+    engaged = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
+    base = bank.mean[i, OPEN] if engaged else f[BEFORE]
+    for k in range(len(n.LEVELS)):
+        for m in range(len(n.LEVEL_RAMP_S) if engaged else 1):
+            share = chance * n.LEVELS_SHARE[k] / (len(n.LEVEL_RAMP_S) if engaged else 1)
+            ramp_s = (n.LEVEL_RAMP_S[m] if engaged else n.ENGAGE_S) * setting.pace
+            j = _born(bank, i, setting.hull, now_s, share, LEVEL, ramp_s)
+            if j < 0:
+                continue
+            bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
+            _free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
+
+
+@compiled(uncounted=True)
+def _turns(
+    bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float, regime: int
+) -> None:
+    for k in range(len(n.TURNS)):
+        j = _born(bank, i, setting.hull, now_s, chance / len(n.TURNS), regime, 1.0)
+        if j >= 0:
+            if regime == TURN:
+                bank.number[j, BEFORE] = bank.mean[i, OPEN]
+            _free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
+
+
+@compiled(uncounted=True)
+def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
+    """Let a turn end under the power of before."""
+    j = _born(bank, i, setting.hull, now_s, chance, LEVEL, 1.0)
+    if j >= 0:
+        before = bank.number[i, BEFORE]
+        bank.number[j, RAMP_FROM] = before
+        _free(bank, j, OPEN, before, 0.02**2)
+
+
+@compiled(uncounted=True)
+def _lies(bank: Histories, i: int, liar: int, chance: float) -> None:
+    j = bank.used[0]
+    if j < ROOM:
+        _copy(bank, i, j)
+        bank.used[0] = j + 1
+        bank.number[j, WEIGHT] += math.log(chance)
+        bank.whole[j, LIAR] = liar
+
+
+@compiled(uncounted=True)
+def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> None:
+    """
+    Let every likely history switch at the beginning of this bin.
+
+    Parameters
+    ----------
+    both
+        Two instruments show the motion: either may lie from now on.
+    steered
+        The rate of turn is seen: without it a turn in a glide is any brake.
+    """
+    now_s = (bank.clock[0] - 1) * setting.step_s
+    hours = setting.step_s / 3600.0
+    parents = bank.used[0]
+    best = -np.inf
+    for i in range(parents):
+        best = max(best, bank.number[i, WEIGHT])
+    for i in range(parents):
+        f, w = bank.number[i], bank.whole[i]
+        if f[WEIGHT] < best - _PARENTS:
+            continue
+        regime = w[REGIME]
+        age_s = now_s - f[SINCE] if w[COUNT] > 0 else np.inf
+        if both and w[LIAR] == 0:
+            _lies(bank, i, THE_LOG, n.LIES * hours)
+            _lies(bank, i, THE_TRACK, n.LIES * hours)
+        if regime == LEVEL and age_s > n.SETTLED_S * setting.pace:
+            w[REGIME] = regime = DRIVEN
+            f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
+            f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
+        if regime in (DRIVEN, LEVEL):
+            if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
+                continue
+            stop, level, turn = float(n.STOP), float(n.LEVEL), float(n.TURN)
+            if age_s < n.MANOEUVRING_S * setting.pace:
+                after = w[GLIDED] == 1
+                stops = n.AFTER_KICK if after else n.OF_MANOEUVRES[0]
+                rest = (1.0 - stops) / (n.OF_MANOEUVRES[1] + n.OF_MANOEUVRES[2])
+                stop = n.MANOEUVRE * stops
+                level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
+                turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
+            _glides(bank, i, setting, now_s, stop * hours)
+            _levels(bank, i, setting, now_s, level * hours)
+            _turns(bank, i, setting, now_s, turn * hours, TURN)
+        elif regime == GLIDE:
+            _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+            if steered:
+                _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+            for k in range(len(n.BRAKES)):
+                share = n.GLIDE_BRAKE * hours / len(n.BRAKES)
+                j = _born(bank, i, setting.hull, now_s, share, BRAKE, 1.0)
+                if j >= 0:
+                    _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
+        elif regime == BRAKE:
+            _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
+            _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
+        elif regime == TURN:
+            _back(bank, i, setting, now_s, n.TURN_OUT * hours)
+        else:
+            _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+
+
+@compiled(uncounted=True)
+def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
+    """Say whether two histories differ by the moment of an old switch alone."""
+    w, v = bank.whole[i], bank.whole[j]
+    last = w[COUNT] - 1
+    if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[UNSEEN] != v[UNSEEN] or last < 0:
+        return bool(w[COUNT] == 0 and v[COUNT] == 0 and w[LIAR] == v[LIAR])
+    if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
+        return False
+    if abs(bank.at[i, last] - bank.at[j, last]) > _ALIKE_S * pace:
+        return False
+    differ = 0
+    for k in range(last + 1):
+        differ += bank.what[i, k] != bank.what[j, k]
+    return differ == 0
+
+
+@compiled(uncounted=True)
+def thin(bank: Histories, setting: BankSetting) -> None:
+    """
+    Weigh against the best; merge and keep the likeliest now and then.
+    """
+    count = bank.used[0]
+    best = -np.inf
+    for i in range(count):
+        best = max(best, bank.number[i, WEIGHT])
+    total = 0.0
+    for i in range(count):
+        total += math.exp(bank.number[i, WEIGHT] - best)
+    norm = best + math.log(total)
+    due = bank.clock[0] % _THIN_EVERY == 0 or count > ROOM - 2 * KEPT
+    now_s = bank.clock[0] * setting.step_s
+    kept = 0
+    for i in range(count):
+        bank.number[i, WEIGHT] -= norm
+        if bank.number[i, WEIGHT] < -_LOST:
+            continue
+        if kept != i:
+            _copy(bank, i, kept)
+        kept += 1
+    bank.used[0] = kept
+    if not due:
+        return
+    _merge(bank, now_s, setting.pace)
+    if bank.used[0] > KEPT:
+        _keep_best(bank)
+
+
+@compiled(uncounted=True)
+def _merge(bank: Histories, now_s: float, pace: float) -> None:
+    count, kept = bank.used[0], 0
+    for i in range(count):
+        into = -1
+        for j in range(kept):
+            if _alike(bank, j, i, now_s, pace):
+                into = j
+                break
+        if into < 0:
+            if kept != i:
+                _copy(bank, i, kept)
+            kept += 1
+            continue
+        a, b = bank.number[into, WEIGHT], bank.number[i, WEIGHT]
+        total = max(a, b) + math.log1p(math.exp(-abs(a - b)))
+        part = math.exp(b - total)
+        last = bank.whole[i, COUNT] - 1
+        at = ramp = 0.0
+        if last >= 0:
+            at = bank.at[into, last] + part * (bank.at[i, last] - bank.at[into, last])
+            ramp = bank.ramp[into, last] + part * (bank.ramp[i, last] - bank.ramp[into, last])
+        if b > a:
+            _copy(bank, i, into)
+        bank.number[into, WEIGHT] = total
+        if last >= 0:
+            bank.at[into, last], bank.ramp[into, last] = at, ramp
+    bank.used[0] = kept
+
+
+@compiled(uncounted=True)
+def _keep_best(bank: Histories) -> None:
+    count = bank.used[0]
+    low, high = -_LOST - 1.0, 0.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        above = 0
+        for i in range(count):
+            above += bank.number[i, WEIGHT] > middle
+        if above > KEPT:
+            low = middle
+        else:
+            high = middle
+    kept = 0
+    for i in range(count):
+        if bank.number[i, WEIGHT] > high:
+            if kept != i:
+                _copy(bank, i, kept)
+            kept += 1
+    bank.used[0] = kept

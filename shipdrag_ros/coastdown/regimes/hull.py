@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the water slows a hull: from the baseline, else from length and volume alone."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.baseline import ittc57
+
+# Taylor's wetted-surface coefficient of ordinary hulls; C_T = 1.25 C_F + 0.0004
+_TAYLOR, _FORM, _ALLOWANCE = 2.6, 1.25, 4e-4
+_POINTS = 64
+_SPEEDS = (0.03, 1.2)  # Froude numbers of the table
+
+
+class HullPrior(NamedTuple):
+    """
+    ln of the resistance per moving mass against ln u, and what is known of both.
+
+    Attributes
+    ----------
+    first, step
+        ln u of the first point, and between two.
+    curve : (points,)
+        ln of the resistance per moving mass [m/s^2].
+    level, level_var, exponent, exponent_var
+        Of what comes on top: a constant and a power of u.
+    length_m
+        Of the hull.
+    """
+
+    first: float
+    step: float
+    curve: Float64
+    level: float
+    level_var: float
+    exponent: float
+    exponent_var: float
+    length_m: float
+
+    @classmethod
+    def of(cls, ship: Ship) -> HullPrior:
+        """
+        Take it from a ship file, with or without a baseline.
+        """
+        slow, fast = (math.log(float(ship.speed(each))) for each in _SPEEDS)
+        log_u = np.linspace(slow, fast, _POINTS)
+        known = _baseline(ship, np.exp(log_u))
+        curve, level, exponent = known or (
+            _friction(ship, np.exp(log_u)),
+            n.RESISTANCE,
+            n.EXPONENT,
+        )
+        return cls(
+            float(log_u[0]),
+            float(log_u[1] - log_u[0]),
+            curve,
+            float(level[0]),
+            float(level[1] ** 2),
+            float(exponent[0]),
+            float(exponent[1] ** 2),
+            ship.length_m,
+        )
+
+
+def _moving(ship: Ship, speed: Float64) -> Float64:
+    return np.array([ship.mass_kg * (1.0 + float(ship.n_r(each))) for each in speed])
+
+
+def _friction(ship: Ship, speed: Float64) -> Float64:
+    surface = _TAYLOR * math.sqrt(ship.displaced_volume_m3 * ship.length_m)
+    friction = ittc57(speed * ship.length_m / ship.water.kinematic_viscosity_m2_s)
+    force = 0.5 * ship.water.density_kg_m3 * surface * speed**2 * (_FORM * friction + _ALLOWANCE)
+    return np.asarray(np.log(force / _moving(ship, speed)))
+
+
+def _baseline(ship: Ship, speed: Float64) -> tuple[Float64, Float64, Float64] | None:
+    """Return curve and priors by the baseline; beyond its ends it goes on as friction does."""
+    try:
+        low, high = ship.baseline_range_m_s
+        low = max(low, speed[0])
+        near = np.clip(speed, low, high)
+        force = np.array([float(ship.resistance_n(each)) for each in near])
+    except ShipdragError:
+        return None
+    if not np.all(force > 0.0):
+        return None
+    curve = np.log(force / _moving(ship, near))
+    friction = _friction(ship, speed)
+    inside = (speed >= low) & (speed <= high)
+    if not inside.any():
+        return None
+    first, last = np.flatnonzero(inside)[[0, -1]]
+    curve[:first] = curve[first] + friction[:first] - friction[first]
+    curve[last:] = curve[last] + friction[last:] - friction[last]
+    return curve, n.RESISTANCE_FILE, n.EXPONENT_FILE

@@ -1,0 +1,344 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One history over one bin: the motion by its regime, then what the bin says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
+from shipdrag_ros.coastdown.regimes.state import (
+    A0,
+    A_VAR,
+    ADVANCE,
+    BEFORE,
+    BRAKE,
+    CURRENT,
+    DRIVEN,
+    FIRST_A,
+    GLIDE,
+    GLIDE_TURN,
+    GROUND,
+    GUST,
+    HIGH,
+    LAG,
+    LEVEL,
+    LIAR,
+    LN_A,
+    LN_U,
+    LOG,
+    LOW,
+    N_FIX,
+    N_GROUND,
+    N_GUST,
+    N_LOG,
+    N_RATE,
+    N_WALK,
+    N_WANDER,
+    N_WANDER_S,
+    OPEN,
+    P0,
+    P_VAR,
+    POWER,
+    RAMP_FROM,
+    RAMP_S,
+    RATE,
+    REGIME,
+    REVS,
+    SINCE,
+    STATES,
+    THE_LOG,
+    THE_TRACK,
+    TURN,
+    UNSEEN,
+    WANDER,
+    WAY,
+    WEIGHT,
+    BankSetting,
+    Histories,
+)  # fmt: skip
+from shipdrag_ros.compiled import compiled
+from shipdrag_ros.samples import Float64
+
+_PARTS = 5  # of a bin
+_S = float(n.NO_THRUST)
+_LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
+_ROOT = math.sqrt(2.0 * math.pi)
+
+
+@compiled(inline=True, uncounted=True)
+def hull_law(hull: HullPrior, log_u: float) -> tuple[float, float]:
+    """Return ln of the resistance per moving mass by the curve, and its slope."""
+    place = (log_u - hull.first) / hull.step
+    i = int(min(max(math.floor(place), 0.0), len(hull.curve) - 2.0))
+    slope = hull.curve[i + 1] - hull.curve[i]
+    return hull.curve[i] + (place - i) * slope, slope / hull.step
+
+
+@compiled(inline=True, uncounted=True)
+def _force(
+    regime: int, x: Float64, f: Float64, now_s: float, law: float, slope: float
+) -> tuple[float, float, float, float, float]:
+    """Return net force per mass, its derivatives by ln u, ln a and the open one, and a."""
+    a = math.exp(min(max(law + x[LN_A], -20.0), 5.0))
+    left, by_u, by_open = 1.0, 0.0, 0.0  # of the resistance that nothing balances
+    if regime in (DRIVEN, LEVEL, TURN):
+        target, share = x[OPEN], 1.0
+        if regime == TURN:
+            target, share = f[BEFORE], 0.0
+        elif regime == LEVEL:
+            share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+            target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
+        rho = math.exp(min(target - x[LN_U], 1.0))
+        thrust = (_S * rho * rho - rho) / (_S - 1.0)
+        steep = rho * (2.0 * _S * rho - 1.0) / (_S - 1.0)
+        left, by_u, by_open = 1.0 - thrust, steep, -steep * share
+    elif regime == GLIDE:
+        left = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+    if regime in (TURN, GLIDE_TURN):
+        drag = math.exp(min(x[OPEN], 3.0))
+        left, by_open = left + drag, drag
+    net = -a * left + x[GUST]
+    more = 0.0
+    if regime == BRAKE:
+        more = -math.exp(min(x[OPEN], 3.0)) * f[FIRST_A]
+    return (
+        net + more,
+        -a * left * slope - a * by_u,
+        -a * left,
+        -a * by_open + more,
+        a,
+    )
+
+
+@compiled(inline=True, uncounted=True)
+def _rows(p: Float64, work: Float64, row: int, c: Float64) -> None:
+    """Put sum_j c[j] p[j] into a row of `work`."""
+    for k in range(STATES):
+        total = 0.0
+        for j in range(STATES):
+            if c[j] != 0.0:
+                total += c[j] * p[j, k]
+        work[row, k] = total
+
+
+@compiled(uncounted=True)
+def predict(
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, advance: float, work: Float64
+) -> float:
+    """
+    Carry a history to the end of the bin; return its deceleration there [m/s^2].
+    """
+    x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
+    regime = bank.whole[i, REGIME]
+    dt = setting.step_s / _PARTS
+    pace = setting.pace
+    keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
+    keep_c = math.exp(-dt / (n.CURRENT_S * pace))
+    keep_f = math.exp(-dt / (_LAG_S * pace))
+    c = work[STATES]
+    slowing = 0.0
+    for part in range(_PARTS):
+        now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
+        law, slope = hull_law(setting.hull, x[LN_U])
+        net, by_u, by_a, by_open, a = _force(regime, x, f, now_s, law, slope)
+        u = math.exp(x[LN_U])
+        change = min(max(dt * net / u, -0.5), 0.5)
+        for j in range(STATES):
+            c[j] = 0.0
+        c[LN_U] = min(max(1.0 + dt * by_u / u - change, 0.2), 1.5)
+        c[LN_A] = dt * by_a / u
+        c[OPEN] = dt * by_open / u
+        c[GUST] = dt / u
+        power = x[POWER]
+        _rows(p, work, 0, c)
+        # ln a follows ln u by the exponent on top of the curve; the curve itself by its table
+        for k in range(STATES):
+            work[1, k] = p[LN_A, k] + power * (work[0, k] - p[LN_U, k]) + change * p[POWER, k]
+            work[2, k] = p[WAY, k] + dt * (u * p[LN_U, k] + p[CURRENT, k])
+            work[3, k] = keep_f * p[LAG, k] - u * (work[0, k] - p[LN_U, k])
+        l_l, l_a, l_o, l_g = c[LN_U], c[LN_A], c[OPEN], c[GUST]
+        for k in range(STATES):
+            p[LN_U, k], p[LN_A, k], p[WAY, k] = work[0, k], work[1, k], work[2, k]
+            p[LAG, k] = work[3, k]
+            p[GUST, k] *= keep_g
+            p[WANDER, k] *= keep_b
+            p[CURRENT, k] *= keep_c
+        for k in range(STATES):
+            new = (
+                l_l * p[k, LN_U] + l_a * p[k, LN_A] + l_o * p[k, OPEN]
+                + l_g * p[k, GUST]
+            )  # fmt: skip
+            old, way = p[k, LN_U], p[k, WAY] + dt * (u * p[k, LN_U] + p[k, CURRENT])
+            p[k, LN_A] += power * (new - old) + change * p[k, POWER]
+            p[k, LAG] = keep_f * p[k, LAG] - u * (new - old)
+            p[k, LN_U], p[k, WAY] = new, way
+            p[k, GUST] *= keep_g
+            p[k, WANDER] *= keep_b
+            p[k, CURRENT] *= keep_c
+        p[LN_U, LN_U] += 1e-10
+        p[POWER, POWER] += n.EXPONENT_WALK**2 * abs(change)
+        if regime in (TURN, GLIDE_TURN):
+            p[OPEN, OPEN] += n.TURNS_SD**2 * dt / (60.0 * pace)
+        elif regime in (DRIVEN, LEVEL):
+            p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
+        p[GUST, GUST] += (1.0 - keep_g * keep_g) * (noise[N_GUST] * a) ** 2
+        p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
+        p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
+        p[WAY, WAY] += noise[N_WALK] ** 2 * dt
+        x[WAY] += dt * (u + x[CURRENT])
+        x[LAG] = keep_f * x[LAG] - u * change
+        x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
+        x[LN_A] += power * change
+        x[GUST] *= keep_g
+        x[WANDER] *= keep_b
+        x[CURRENT] *= keep_c
+        slowing = net
+    x[WAY] -= advance
+    return slowing
+
+
+@compiled(inline=True, uncounted=True)
+def _take(
+    x: Float64, p: Float64, h: Float64, work: Float64, off: float, variance: float, bad: float
+) -> float:
+    """Update by one reading, good or bad; return its log density."""
+    total = variance
+    for j in range(STATES):
+        row = 0.0
+        for k in range(STATES):
+            if h[k] != 0.0:
+                row += p[j, k] * h[k]
+        work[0, j] = row
+        total += h[j] * row
+    good = (1.0 - n.BAD) * math.exp(-0.5 * off * off / total) / (_ROOT * math.sqrt(total))
+    density = good + n.BAD * bad
+    share = good / density
+    if share > 1e-6:
+        around = share * (1.0 - share) * off * off / total
+        for j in range(STATES):
+            gain = work[0, j] / total
+            x[j] += share * gain * off
+            for k in range(j + 1):
+                p[j, k] += (around - share) * gain * work[0, k]
+                p[k, j] = p[j, k]
+    return math.log(density)
+
+
+@compiled(inline=True, uncounted=True)
+def _normal(off: float, sd: float) -> float:
+    return math.exp(-0.5 * (off / sd) ** 2) / (_ROOT * sd)
+
+
+@compiled(uncounted=True)
+def _shaft(
+    bank: Histories, i: int, said: Float64, log_first: float, now_s: float, several: bool
+) -> float:
+    """Return the log density of what the shafts do, by the regime."""
+    f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
+    nu, low = said[HIGH], said[LOW]
+    sd = float(n.SHAFT_SD)
+    u_part = math.exp(min(x[LN_U] - log_first, 1.0))
+    if low < -0.05:
+        return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
+    if regime in (DRIVEN, LEVEL):
+        target = x[OPEN]
+        if regime == LEVEL:
+            share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+            target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
+        at = math.exp(min(target - log_first, 1.0))
+        held, f[REVS] = f[REVS], nu if np.isnan(f[REVS]) else 0.7 * f[REVS] + 0.3 * nu
+        density = 0.5 * _normal(nu - at, sd)
+        if abs(at - nu) < 0.35:  # a governor, or the sea, holds them near it
+            density += 0.5 * (1.0 if np.isnan(held) else _normal(nu - held, sd))
+        if several and regime == LEVEL:
+            density = 0.5 * density + (0.5 if at - sd < nu < 1.0 + sd else 0.0)
+    elif regime == TURN:
+        density = 3.0 if 0.75 < nu < 1.05 else 0.0
+    elif bank.whole[i, UNSEEN] == 1:
+        held, f[REVS] = f[REVS], nu if np.isnan(f[REVS]) else 0.7 * f[REVS] + 0.3 * nu
+        density = 1.0 if np.isnan(held) else _normal(nu - held, sd)
+    else:
+        risen = nu > f[REVS] + 3.0 * sd
+        f[REVS] = nu if np.isnan(f[REVS]) else min(f[REVS], nu)
+        running = regime == GLIDE and now_s - f[SINCE] < f[RAMP_S] + 10.0
+        at, wide = n.WINDMILL[0] * u_part, math.sqrt(sd * sd + (n.WINDMILL[1] * u_part) ** 2)
+        density = 0.3 * _normal(nu, 0.5 * sd)
+        if nu < n.WINDMILL[2] * u_part + sd:
+            density += 0.7 * _normal(nu - at, wide)
+        if running and nu < 1.05:
+            density = 0.5 * density + 0.5
+        if risen:
+            density = 0.0
+    return math.log(density + n.SHAFT_LIES)
+
+
+@compiled(uncounted=True)
+def weigh(
+    bank: Histories, i: int, setting: BankSetting, noise: Float64, said: Float64, slowing: float,
+    log_first: float, work: Float64,
+) -> None:  # fmt: skip
+    """
+    Update a history by what a bin says.
+    """
+    x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
+    regime, liar = bank.whole[i, REGIME], bank.whole[i, LIAR]
+    h = work[STATES]
+    half = 0.5 * setting.step_s
+    pace = setting.pace
+    gained = 0.0
+    bad = float(n.BAD_DENSITY)
+    now_s = (bank.clock[0] - 0.5) * setting.step_s
+    for which in (LOG, GROUND):
+        if np.isnan(said[which]):
+            continue
+        if (which == LOG and liar == THE_LOG) or (which == GROUND and liar == THE_TRACK):
+            gained += math.log(bad)
+            continue
+        u = math.exp(x[LN_U])
+        for j in range(STATES):
+            h[j] = 0.0
+        h[LN_U] = u
+        lag = half + (0.0 if which == LOG else pace * _GROUND_LAG_S)
+        expected = u - lag * slowing
+        sd = noise[N_LOG]
+        if which == LOG:
+            h[WANDER] = h[LAG] = 1.0
+            expected += x[WANDER] + x[LAG]
+        else:
+            h[CURRENT] = 1.0
+            expected += x[CURRENT]
+            sd = noise[N_GROUND]
+        gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad)
+    if not np.isnan(said[ADVANCE]):
+        if liar == THE_TRACK:
+            gained += math.log(bad)
+        else:
+            u = math.exp(x[LN_U])
+            for j in range(STATES):
+                h[j] = 0.0
+            h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
+            expected = x[WAY] - half * (u + x[CURRENT])
+            gained += _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad)
+    if not np.isnan(said[RATE]):
+        u = math.exp(x[LN_U])
+        wide = n.TURN_RATE * u / setting.hull.length_m + noise[N_RATE]
+        turning = regime in (TURN, GLIDE_TURN)
+        share = 0.9 if turning else n.STEADY_TURNS
+        density = share * _normal(said[RATE], wide)
+        density += (1.0 - share) * _normal(said[RATE], noise[N_RATE])
+        gained += n.SHAFT_TEMPER * math.log(density + 1e-9)
+    if not np.isnan(said[HIGH]):
+        several = setting.shafts > 1
+        gained += n.SHAFT_TEMPER * _shaft(bank, i, said, log_first, now_s, several)
+    f[WEIGHT] += gained
+    if regime in (DRIVEN, TURN):
+        # at balance neither is seen, only the filter's own errors
+        for which, mean, var in ((LN_A, f[A0], f[A_VAR]), (POWER, f[P0], f[P_VAR])):
+            x[which] = mean
+            for k in range(STATES):
+                p[which, k] = 0.0
+                p[k, which] = 0.0
+            p[which, which] = var

@@ -1,0 +1,273 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The noise of a steady record: small filters of a driven ship, averaged by their evidence."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.motion import hull_law
+from shipdrag_ros.coastdown.regimes.state import (
+    ADVANCE,
+    GROUND,
+    LOG,
+    N_FIX,
+    N_GROUND,
+    N_GUST,
+    N_LOG,
+    N_RATE,
+    N_WALK,
+    N_WANDER,
+    N_WANDER_S,
+    NOISES,
+    RATE,
+    BankSetting,
+)  # fmt: skip
+from shipdrag_ros.compiled import compiled
+from shipdrag_ros.samples import Float64, Int64
+
+_GUSTS, _WANDERS, _TIMES, _WHITES = len(n.GUST), len(n.WANDER), len(n.WANDER_S), len(n.WHITE)
+_WALKS = len(n.TRACK_WALK)
+FILTERS = _GUSTS * _WANDERS * _TIMES * _WHITES  # of a speed
+_STATES = 5  # speed, that of the engine, gust, slow error or current, way less the way as read
+_DELAY = 24  # bins of FROZEN_S at BIN_S
+_STEEP = (2.0 * float(n.NO_THRUST) - 1.0) / (float(n.NO_THRUST) - 1.0)
+
+
+class NoiseFilters(NamedTuple):
+    """
+    Filters of three instruments, and what they made of the record.
+
+    Attributes
+    ----------
+    mean, spread : (3, FILTERS, states), (3, FILTERS, states, states)
+        For log, speed over ground and fixes.
+    evidence : (3, FILTERS)
+        Faded log likelihood.
+    last, jump : (3, 2), (3,)
+        Last readings; mean size of their differences.
+    seen : (3,) int64
+        Readings.
+    rate : (2,)
+        Mean square of the rate of turn, and its weight.
+    queue : (delay, NOISES)
+        What will be used.
+    used : (NOISES,)
+    work : (2 states, states)
+    """
+
+    mean: Float64
+    spread: Float64
+    evidence: Float64
+    last: Float64
+    jump: Float64
+    seen: Int64
+    rate: Float64
+    queue: Float64
+    used: Float64
+    work: Float64
+
+    @classmethod
+    def fresh(cls) -> NoiseFilters:
+        """
+        Return filters that have seen nothing.
+        """
+        first = np.array([0.08, 0.03, 60.0, 0.05, 0.05, 1.0, 0.2, 0.003])
+        return cls(
+            np.zeros((3, FILTERS, _STATES)),
+            np.zeros((3, FILTERS, _STATES, _STATES)),
+            np.zeros((3, FILTERS)),
+            np.full((3, 2), np.nan),
+            np.zeros(3),
+            np.zeros(3, np.int64),
+            np.zeros(2),
+            np.tile(first, (_DELAY, 1)),
+            first,
+            np.zeros((2 * _STATES, _STATES)),
+        )
+
+
+@compiled(inline=True, uncounted=True)
+def _parts(which: int, k: int) -> tuple[float, float, float, float, float]:
+    """Return gust, slow error and its time, white noise and walk of a filter."""
+    gust = n.GUST[k % _GUSTS]
+    k //= _GUSTS
+    if which == 2:
+        return (
+            gust,
+            float(n.CURRENT[1]),
+            float(n.CURRENT_S),
+            n.WHITE[k % _WHITES],
+            n.TRACK_WALK[k // _WHITES % _WALKS],
+        )
+    white = n.WHITE[k % _WHITES]
+    k //= _WHITES
+    return gust, n.WANDER[k // _TIMES], n.WANDER_S[k % _TIMES], white, 0.0
+
+
+@compiled(uncounted=True)
+def listen(noise: NoiseFilters, setting: BankSetting, said: Float64, driven: float) -> None:
+    """
+    Learn from a bin, by the probability that she was driven evenly, and age what is used.
+    """
+    for which in range(3):
+        value = said[LOG] if which == 0 else said[GROUND] if which == 1 else said[ADVANCE]
+        if not np.isnan(value):
+            _one(noise, setting, which, value, driven)
+    if not np.isnan(said[RATE]):
+        sd = math.sqrt(noise.rate[0]) if noise.rate[1] > 8.0 else np.inf
+        clipped = min(abs(said[RATE]), 3.0 * sd)
+        gain = driven / min(noise.rate[1] + 1.0, n.MEMORY_S / n.BIN_S)
+        noise.rate[1] += 1.0
+        noise.rate[0] += gain * (clipped * clipped - noise.rate[0])
+    slot = noise.queue[0]
+    for k in range(NOISES):
+        noise.used[k] = slot[k]
+    for row in range(_DELAY - 1):
+        for k in range(NOISES):
+            noise.queue[row, k] = noise.queue[row + 1, k]
+    _average(noise, setting, noise.queue[_DELAY - 1])
+
+
+@compiled(uncounted=True)
+def _one(
+    noise: NoiseFilters, setting: BankSetting, which: int, value: float, driven: float
+) -> None:
+    step = setting.step_s
+    speed = value / step if which == 2 else value
+    count = noise.seen[which]
+    last = noise.last[which]
+    if count > 0 and not np.isnan(last[0]):
+        size = abs(value - last[0])
+        if count > 8:
+            size = min(size, 4.0 * noise.jump[which])
+        gain = driven / min(count, n.MEMORY_S / n.BIN_S)
+        noise.jump[which] += gain * (size - noise.jump[which])
+    last[0] = value
+    noise.seen[which] = count + 1
+    if count < 4 or not speed > 0.0:
+        for k in range(FILTERS):
+            _start(noise.mean[which, k], noise.spread[which, k], max(speed, 1e-3))
+        return
+    spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
+    size = noise.mean[which, 0, 1]
+    spread = max(spread, n.WHITE_FLOOR * size * (step if which == 2 else 1.0))
+    a = math.exp(hull_law(setting.hull, math.log(max(size, 1e-3)))[0] + setting.hull.level)
+    fade = 1.0 - driven * n.BIN_S / n.MEMORY_S
+    walks = _WALKS * _GUSTS * _WHITES
+    for k in range(walks if which == 2 else FILTERS):
+        gained = _filter(noise, setting, which, k, value, spread, a)
+        noise.evidence[which, k] = fade * noise.evidence[which, k] + driven * gained
+
+
+@compiled(uncounted=True)
+def _start(x: Float64, p: Float64, speed: float) -> None:
+    for j in range(_STATES):
+        x[j] = 0.0
+        for k in range(_STATES):
+            p[j, k] = 0.0
+    x[0] = x[1] = speed
+    p[0, 0] = p[1, 1] = (0.05 * speed) ** 2
+    p[3, 3] = 1e-4
+
+
+@compiled(uncounted=True)
+def _filter(
+    noise: NoiseFilters,
+    setting: BankSetting,
+    which: int,
+    k: int,
+    value: float,
+    spread: float,
+    a: float,
+) -> float:
+    """Carry one filter over a bin; return the log density of the reading."""
+    x, p, work = noise.mean[which, k], noise.spread[which, k], noise.work
+    gust, wander, wander_s, white, walk = _parts(which, k)
+    dt, pace = setting.step_s, setting.pace
+    keep = math.exp(-dt * min(_STEEP * a / max(x[1], 1e-3), 1.0 / dt))
+    keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (wander_s * pace))
+    way = dt if which == 2 else 0.0
+    # rows of the transition: speed, engine, gust, slow error, way
+    for m in range(_STATES):
+        work[0, m] = keep * p[0, m] + (1.0 - keep) * p[1, m] + dt * p[2, m]
+        work[1, m] = p[1, m]
+        work[2, m] = keep_g * p[2, m]
+        work[3, m] = keep_b * p[3, m]
+        work[4, m] = p[4, m] + way * (p[0, m] + p[3, m])
+    for m in range(_STATES):
+        q = work[m]
+        p[m, 0] = keep * q[0] + (1.0 - keep) * q[1] + dt * q[2]
+        p[m, 1] = q[1]
+        p[m, 2] = keep_g * q[2]
+        p[m, 3] = keep_b * q[3]
+        p[m, 4] = q[4] + way * (q[0] + q[3])
+    moved = way * (x[0] + x[3]) - (value if which == 2 else 0.0)
+    x[4] += moved
+    x[0] = keep * x[0] + (1.0 - keep) * x[1] + dt * x[2]
+    x[2] *= keep_g
+    x[3] *= keep_b
+    p[1, 1] += (n.POWER_DRIFT * x[1]) ** 2 * dt / (600.0 * pace)
+    p[2, 2] += (1.0 - keep_g * keep_g) * (gust * a) ** 2
+    p[3, 3] += (1.0 - keep_b * keep_b) * wander * wander
+    p[4, 4] += walk * walk * dt
+    first, second = (4, 4) if which == 2 else (0, 3)
+    variance = (white * spread) ** 2 + 1e-12
+    off = -x[4] if which == 2 else value - x[0] - x[3]
+    gain = work[_STATES]
+    total = variance
+    for m in range(_STATES):
+        gain[m] = p[m, first] + (p[m, second] if second != first else 0.0)
+    total += gain[first] + (gain[second] if second != first else 0.0)
+    z2 = off * off / total
+    density = -0.5 * z2 - 0.5 * math.log(total)
+    if z2 > 16.0:  # something else than this noise
+        return -8.0 - 0.5 * math.log(total)
+    for m in range(_STATES):
+        x[m] += gain[m] / total * off
+        for j in range(_STATES):
+            p[m, j] -= gain[m] * gain[j] / total
+    return float(density)
+
+
+@compiled(uncounted=True)
+def _average(noise: NoiseFilters, setting: BankSetting, out: Float64) -> None:
+    """Average the filters of each instrument by their evidence; the gust is the log's first."""
+    gusted = False
+    for which in range(3):
+        if noise.seen[which] < 8:
+            continue
+        filters = _WALKS * _GUSTS * _WHITES if which == 2 else FILTERS
+        best = -np.inf
+        for k in range(filters):
+            best = max(best, noise.evidence[which, k])
+        total = g = b = t = w = q = 0.0
+        for k in range(filters):
+            share = math.exp(noise.evidence[which, k] - best)
+            gust, wander, wander_s, white, walk = _parts(which, k)
+            total += share
+            g += share * math.log(gust)
+            b += share * math.log(wander)
+            t += share * math.log(wander_s)
+            w += share * math.log(white)
+            q += share * math.log(max(walk, 1e-6))
+        spread = noise.jump[which] * 1.2533 / math.sqrt(6.0 if which == 2 else 2.0)
+        step = setting.step_s if which == 2 else 1.0
+        spread = max(spread, n.WHITE_FLOOR * noise.mean[which, 0, 1] * step)
+        white = math.exp(w / total) * spread
+        if not gusted:
+            out[N_GUST], gusted = math.exp(g / total), True
+        if which == 0:
+            out[N_WANDER], out[N_WANDER_S] = math.exp(b / total), math.exp(t / total)
+            out[N_LOG] = white
+        elif which == 1:
+            out[N_GROUND] = math.sqrt(white**2 + math.exp(2.0 * b / total))
+            if noise.seen[0] < 8:
+                out[N_GROUND] = white
+        else:
+            out[N_FIX], out[N_WALK] = white, math.exp(q / total)
+    if noise.rate[1] > 8.0:
+        out[N_RATE] = math.sqrt(noise.rate[0]) + 1e-5

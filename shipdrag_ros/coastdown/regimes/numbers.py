@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Every number of the regimes: priors, hazards, shares, and what a decision costs.
+
+One table, so that a vessel which behaves otherwise changes a prior here and nothing
+else. Times are those of a ship whose bin is `BIN_S`; a smaller craft has a shorter
+bin, and all times of the table but the hazards shrink with it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.samples import Float64
+
+
+class Number(NamedTuple):
+    """
+    A row of the table.
+
+    Attributes
+    ----------
+    name
+        Of the constant in this module.
+    values
+        One, or the points of a grid.
+    unit
+        '1' for ratios.
+    source
+        What it was learnt from, or why it is so.
+    """
+
+    name: str
+    values: tuple[float, ...]
+    unit: str
+    source: str
+
+
+NUMBERS: list[Number] = []
+"""All of them, in the order in which the docs list them."""
+
+
+def _number(name: str, value: float, unit: str, source: str) -> float:
+    NUMBERS.append(Number(name, (value,), unit, source))
+    return value
+
+
+def _grid(name: str, values: tuple[float, ...], unit: str, source: str) -> Float64:
+    NUMBERS.append(Number(name, values, unit, source))
+    return np.array(values)
+
+
+BIN_S = _number('BIN_S', 5.0, 's', 'the filter of a log is 2 to 10 s')
+LOG_LAG_S = _number('LOG_LAG_S', 5.0, 's', 'middle of the filters of logs')
+LOG_LAG_SD_S = _number('LOG_LAG_SD_S', 3.0, 's', 'how a log bears a sudden change')
+GROUND_LAG_S = _number('GROUND_LAG_S', 1.0, 's', 'filter of a GNSS speed')
+
+# the hull
+RESISTANCE = _grid(
+    'RESISTANCE', (0.30, 0.28), 'ln', 'over friction by length and volume: mean, sd; waves, wind'
+)
+RESISTANCE_FILE = _grid(
+    'RESISTANCE_FILE', (0.15, 0.20), 'ln', 'over the baseline of the ship file: mean, sd'
+)
+DRAGGED = _grid('DRAGGED', (0.15, 0.20), 'ln', 'more in a glide: a propeller that is dragged')
+KEPT_SD = _number('KEPT_SD', 0.15, 'ln', 'of a resistance learnt under power, taken to a glide')
+EXPONENT = _grid('EXPONENT', (0.45, 0.6), '1', 'over that of friction: mean, sd; waves have 4')
+EXPONENT_FILE = _grid('EXPONENT_FILE', (0.1, 0.3), '1', 'over that of the baseline: mean, sd')
+EXPONENT_WALK = _number('EXPONENT_WALK', 0.4, '1', 'per root of ln u: no law is one power')
+NO_THRUST = _number('NO_THRUST', 1.8, '1', 'advance without thrust over that of service')
+
+# what disturbs her
+GUST = _grid('GUST', (0.03, 0.08, 0.2), 'of the resistance', 'sd: wind of 13 %, wave groups')
+GUST_S = _number('GUST_S', 40.0, 's', 'wave groups')
+WANDER = _grid('WANDER', (0.005, 0.012, 0.03, 0.07, 0.14), 'm/s', 'sd of the slow error of a log')
+WANDER_S = _grid('WANDER_S', (12.0, 60.0), 's', 'its time')
+WHITE = _grid('WHITE', (0.4, 1.0), '1', 'white noise over the spread of differences of bins')
+WHITE_FLOOR = _number('WHITE_FLOOR', 0.0015, 'of the speed', 'no log resolves less')
+TRACK_WALK = _grid('TRACK_WALK', (0.05, 0.2, 0.6), 'm/sqrt(s)', 'wander of a fix')
+CURRENT = _grid('CURRENT', (0.3, 0.03), 'm/s', 'sd at first, and of its change')
+CURRENT_S = _number('CURRENT_S', 600.0, 's', 'time of its change: eddies of 5 to 60 min')
+POWER_DRIFT = _number('POWER_DRIFT', 0.01, 'ln in 10 min', 'sd of the speed under even power')
+MEMORY_S = _number('MEMORY_S', 1200.0, 's', 'over which noise is learnt')
+FROZEN_S = _number('FROZEN_S', 120.0, 's', 'age of the noise that is used')
+BAD = _number('BAD', 0.01, '1', 'share of readings that are something else')
+BAD_DENSITY = _number('BAD_DENSITY', 0.1, 's/m', 'their density')
+LIES = _number('LIES', 0.05, '1/h', 'an instrument begins to say nothing true')
+LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
+
+# switches, each an hour
+STOP = _number('STOP', 0.5, '1/h', 'driven to gliding')
+LEVEL = _number('LEVEL', 0.5, '1/h', 'driven to another level')
+TURN = _number('TURN', 1.0, '1/h', 'driven to turning')
+MANOEUVRE = _number('MANOEUVRE', 6.0, '1/h', 'all three within `MANOEUVRING_S` of a switch')
+MANOEUVRING_S = _number('MANOEUVRING_S', 1800.0, 's', 'manoeuvres come in groups')
+OF_MANOEUVRES = _grid('OF_MANOEUVRES', (0.3, 0.5, 0.2), '1', 'stop, level, turn')
+AFTER_KICK = _number('AFTER_KICK', 0.6, '1', 'of switches after one from a glide: stops')
+GLIDE_LEVEL = _number('GLIDE_LEVEL', 4.0, '1/h', 'gliding to a level')
+GLIDE_BRAKE = _number('GLIDE_BRAKE', 1.0, '1/h', 'gliding to braked')
+GLIDE_TURN = _number('GLIDE_TURN', 0.5, '1/h', 'gliding to turning without thrust')
+BRAKE_GLIDE = _number('BRAKE_GLIDE', 6.0, '1/h', 'braked to gliding')
+BRAKE_LEVEL = _number('BRAKE_LEVEL', 2.0, '1/h', 'braked to a level')
+TURN_OUT = _number('TURN_OUT', 40.0, '1/h', 'turning to what was before')
+SETTLED_S = _number('SETTLED_S', 900.0, 's', 'a level that is held so long is sailing')
+LEVEL_LEAST_S = _number('LEVEL_LEAST_S', 30.0, 's', 'before the next switch')
+GLIDES_FIRST = _number('GLIDES_FIRST', 0.3, '1', 'of a window that is given: it begins in a glide')
+
+# shapes of switches
+RUN_DOWN_S = _grid('RUN_DOWN_S', (2.0, 12.0, 35.0, 75.0), 's', 'fuel cut, pitch, controlled')
+RUN_DOWN_SHARE = _grid('RUN_DOWN_SHARE', (0.6, 0.2, 0.13, 0.07), '1', 'short by default')
+LEVELS = _grid('LEVELS', (1.15, 0.88, 0.72, 0.58, 0.45, 0.32), '1', 'steps of a telegraph')
+LEVELS_SHARE = _grid('LEVELS_SHARE', (0.1, 0.3, 0.25, 0.2, 0.1, 0.05), '1', 'of these')
+LEVELS_SD = _number('LEVELS_SD', 0.12, 'ln', 'of each')
+LEVEL_RAMP_S = _grid('LEVEL_RAMP_S', (15.0, 60.0), 's', 'from level to level')
+ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
+BRAKES = _grid('BRAKES', (0.3, 1.0), 'of the first resistance', 'astern power')
+BRAKES_SD = _number('BRAKES_SD', 0.47, 'ln', 'a factor of 1.6 either way')
+TURNS = _grid('TURNS', (0.35, 1.1), 'of the resistance', 'helm')
+TURNS_SD = _number('TURNS_SD', 0.3, 'ln', 'of each, and its drift in a minute')
+TURN_RATE = _number('TURN_RATE', 0.2, 'ship lengths', 'rate of turn over u / L')
+STEADY_TURNS = _number('STEADY_TURNS', 0.03, '1', 'share of bins with a yaw like that of a turn')
+
+# the shaft, revs times pitch over those of steady sailing
+SHAFT_TEMPER = _number('SHAFT_TEMPER', 0.35, '1', 'of its log likelihood: errors last a minute')
+SHAFT_SD = _number('SHAFT_SD', 0.06, '1', 'its own error')
+WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.72), '1', 'over u / U: mean, sd, most; 108 glides')
+PITCH_UNSEEN = _number('PITCH_UNSEEN', 0.1, '1', 'share of glides with the shaft held')
+SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
+
+# what is made of it: the only loss
+ANNOUNCE = _grid('ANNOUNCE', (0.7, 0.3), '1', 'P(gliding) above, and again below')
+HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
+SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
+EVEN = _grid('EVEN', (0.98, 120.0), '1, s', 'a ship that keeps so much so long glides no more')
+
+
+def table() -> str:
+    """
+    Return all numbers as a table of Markdown.
+    """
+    rows = [
+        f'| {each.name} | {", ".join(f"{value:g}" for value in each.values)} | {each.unit} | '
+        f'{each.source} |'
+        for each in NUMBERS
+    ]
+    return '\n'.join(['| number | value | unit | source |', '|---|---|---|---|', *rows])
+
+
+if __name__ == '__main__':
+    print(table())

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a bin of the regimes says, taken from the bins of a second."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import typeof, types
+
+from shipdrag_ros.coastdown.bins import (
+    COUNT,
+    PER_UNIT,
+    SPEED,
+    Bins,
+    displacement,
+    mean_place,
+    mean_turning,
+)
+from shipdrag_ros.coastdown.regimes.state import ADVANCE, GROUND, LOG, RATE, SHAFTS
+from shipdrag_ros.compiled import Signature, compiled
+from shipdrag_ros.samples import Channel, Float64
+
+_LOG, _GROUND = int(Channel.SPEED_THROUGH_WATER), int(Channel.SPEED_OVER_GROUND)
+_TRACKS = (int(Channel.POSITION), int(Channel.POSITION_GEODETIC))
+_HEADING = int(Channel.HEADING)
+_SHAFT, _SHAFT_2, _PITCH = int(Channel.SHAFT), int(Channel.SHAFT_2), int(Channel.PITCH)
+_COURSE = 6  # bins of a way that shows a course
+
+_SIGNATURE: Signature = types.void(
+    typeof(Bins.fresh(1)), types.int64, types.int64, types.float64, types.float64[::1]
+)
+
+
+@compiled(inline=True, uncounted=True)
+def _mean_speed(bins: Bins, source: int, last: int, width: int) -> float:
+    totals = bins.speeds[source]
+    mask = len(totals) - 1
+    newest = bins.closed[source]
+    before = max(last - width, newest - mask)
+    last = max(before, min(last, newest))
+    low, high = totals[before & mask], totals[last & mask]
+    count = high[COUNT] - low[COUNT]
+    return (high[SPEED] - low[SPEED]) / (PER_UNIT * count) if count > 0 else np.nan
+
+
+@compiled(inline=True, uncounted=True)
+def _apart(one: float, other: float) -> float:
+    return math.atan2(math.sin(one - other), math.cos(one - other))
+
+
+@compiled(_SIGNATURE, uncounted=True)
+def observe(bins: Bins, last: int, width: int, step_s: float, said: Float64) -> None:
+    """
+    Put what the bins last - width + 1 .. last say into `said`; NaN where they say nothing.
+    """
+    for k in range(len(said)):
+        said[k] = np.nan
+    said[LOG] = _mean_speed(bins, _LOG, last, width)
+    said[GROUND] = _mean_speed(bins, _GROUND, last, width)
+    for track in _TRACKS:
+        if mean_place(bins, track, last, width)[3] == 0:
+            continue
+        time, east, north = displacement(bins, track, last, width)
+        _, along, across = displacement(bins, track, last, _COURSE * width)
+        way = math.hypot(along, across)
+        if not np.isnan(time) and way > 0.0:
+            advance = (east * along + north * across) / way * width / time
+            said[ADVANCE] = advance
+            _, old_east, old_north = displacement(bins, track, last - width, _COURSE * width)
+            turned = _apart(math.atan2(across, along), math.atan2(old_north, old_east))
+            said[RATE] = turned / step_s
+    _, cosine, sine, count = mean_place(bins, _HEADING, last, width)
+    _, old_cosine, old_sine, old = mean_place(bins, _HEADING, last - width, width)
+    if count > 0 and old > 0:
+        said[RATE] = _apart(math.atan2(sine, cosine), math.atan2(old_sine, old_cosine)) / step_s
+    for k in range(4):
+        shaft = _SHAFT if k == 0 else _SHAFT_2 + k - 1
+        turning, count = mean_turning(bins, shaft, last, width)
+        if count > 0:
+            pitch, known = mean_turning(bins, _PITCH + k, last, width)
+            said[SHAFTS + k] = turning * pitch if known > 0 else turning

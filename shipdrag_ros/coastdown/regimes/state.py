@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The histories, their columns, and the bins that they are told."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.coastdown.regimes import numbers as n
+from shipdrag_ros.coastdown.regimes.hull import HullPrior
+from shipdrag_ros.samples import Float64, Int64
+
+KEPT = 300  # histories
+ROOM = 1400  # with those born since they were last thinned out
+SWITCHES = 12  # that a history remembers
+
+# the state of a history: ln u, ln resistance over the curve of the hull, its exponent over that
+# of the curve, what the regime leaves open, gust [m/s^2], slow error of the log [m/s], current
+# [m/s], true way less the way as read [m], what the filter of the log lags behind [m/s]
+LN_U, LN_A, POWER, OPEN, GUST, WANDER, CURRENT, WAY, LAG = range(9)
+STATES = 9
+
+DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
+
+# further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
+# start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], lowest revs of a
+# glide, prior of ln a and exponent with their variances
+WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, A0, A_VAR, P0, P_VAR = range(11)
+COLUMNS = 11
+# and whole ones: regime, whether the shaft says nothing, the input that lies, number of switches,
+# whether she has glided
+REGIME, UNSEEN, LIAR, COUNT, GLIDED = range(5)
+WHOLE = 5
+NOBODY, THE_LOG, THE_TRACK = range(3)
+
+# what a bin says; NaN where nothing
+LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)
+SHAFTS = 6  # and the three after it: revs times pitch of each shaft [rad/s]
+SAID = 10
+
+# noise in use: gust over resistance, sd and time of the log's slow error, white noise of log,
+# speed over ground and fixes, their walk, sd of the rate of turn
+N_GUST, N_WANDER, N_WANDER_S, N_LOG, N_GROUND, N_FIX, N_WALK, N_RATE = range(8)
+NOISES = 8
+
+
+class Histories(NamedTuple):
+    """
+    The bank; slots from `used[0]` on hold nothing.
+
+    Attributes
+    ----------
+    used, clock : (1,)
+        Histories; bins since the start.
+    mean, spread
+        (ROOM, STATES) and (ROOM, STATES, STATES): state and covariance.
+    number, whole
+        Columns as above.
+    at, what, ramp : (ROOM, SWITCHES)
+        When each switch was [s since the start], the regime entered and its ramp [s].
+    scratch : (ROOM,)
+    """
+
+    used: Int64
+    clock: Int64
+    mean: Float64
+    spread: Float64
+    number: Float64
+    whole: Int64
+    at: Float64
+    what: Int64
+    ramp: Float64
+    scratch: Float64
+
+    @classmethod
+    def fresh(cls) -> Histories:
+        """
+        Return a bank without a history.
+        """
+        return cls(
+            np.zeros(1, np.int64),
+            np.zeros(1, np.int64),
+            np.zeros((ROOM, STATES)),
+            np.zeros((ROOM, STATES, STATES)),
+            np.zeros((ROOM, COLUMNS)),
+            np.zeros((ROOM, WHOLE), np.int64),
+            np.zeros((ROOM, SWITCHES)),
+            np.zeros((ROOM, SWITCHES), np.int64),
+            np.zeros((ROOM, SWITCHES)),
+            np.zeros(ROOM),
+        )
+
+
+class BankSetting(NamedTuple):
+    """
+    What a bank is told once.
+
+    Attributes
+    ----------
+    hull
+        Of the ship.
+    step_s, pace
+        Length of a bin [s], and over that of the table.
+    shafts
+        How many are read.
+    glides
+        Probability that the record begins in a glide.
+    """
+
+    hull: HullPrior
+    step_s: float
+    pace: float
+    shafts: int
+    glides: float
+
+    @classmethod
+    def of(
+        cls, hull: HullPrior, step_s: float, *, shafts: int = 0, glides: float = 0.0
+    ) -> BankSetting:
+        """
+        Return the setting of a bank with bins of `step_s`.
+        """
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides)

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+r(v) of a window by the one posterior.
+
+An adapter: a window becomes rows and a prior of the stop, the posterior becomes an estimate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation.assemble import AtEnd, assembled
+from shipdrag_ros.estimation.curve import ValidRange
+from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
+from shipdrag_ros.estimation.ode_fit.record import RunRows
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
+from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.inference.rows import CODES, LOG, Rows
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior import motion
+from shipdrag_ros.posterior.laplace import RunPosterior, infer
+from shipdrag_ros.posterior.problem import RunModel, StopPrior
+from shipdrag_ros.posterior.readout import read
+from shipdrag_ros.posterior.rows import condense
+from shipdrag_ros.ship import Ship
+
+NAME = 'one'
+_CURVE_POINTS = 129
+
+
+def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    """
+    Estimate r(v) from one window.
+
+    Parameters
+    ----------
+    window
+        Accepted samples, with the steady record `before` it.
+    ship
+        For the law of the hull, n_r and the run-down of the thrust.
+    parameters
+        `froude_min` and the known standard deviations are used.
+
+    Raises
+    ------
+    EstimationError
+        If the window does not hold a coastdown that can be estimated.
+
+    Notes
+    -----
+    Source: docs/model.md.
+    """
+    run_down = RunDown.of(window, ship)
+    record = RunRows.of(window, run_down, parameters)
+    guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
+    coast, variance = condense(record.coast, record.variance(record.coast, record.coast_weight))
+    steady = record.steady
+    problem = RunModel.of(
+        Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast))),
+        np.concatenate([record.steady_variance(), variance]),
+        len(steady.time_s),
+        ship,
+        StopPrior(run_down.stop_sd_s, run_down.shaft_s, run_down.run_down_sd_s),
+        speed_m_s=guess.speed_m_s,
+        low_m_s=guess.lowest * guess.speed_m_s,
+    )
+    found = infer(problem)
+    return _result(found, record, window, ship, parameters, (*run_down.notes, *_notes(found)))
+
+
+def _notes(found: RunPosterior) -> tuple[str, ...]:
+    chances = ', '.join(
+        f'{name} {found.chance(name):.2g}'
+        for name in dict.fromkeys(each.name for each in found.problem.families)
+    )
+    notes = [f'averaged over what the hull may differ by: {chances}']
+    if not found.noise.learnt:
+        notes.append('the record is too short to learn slow disturbances from: usual ones are')
+    if not found.converged:
+        notes.append('the linearised posterior did not settle: the band may be too narrow')
+    return tuple(notes)
+
+
+def _result(
+    found: RunPosterior,
+    record: RunRows,
+    window: Window,
+    ship: Ship,
+    parameters: Parameters,
+    notes: tuple[str, ...],
+) -> Estimate:
+    problem, k = found.problem, found.problem.coefficients
+    coast = record.coast
+    table, speed = motion.predict(problem.forces, found.mean, problem.grid_s, coast)
+    last = float(speed[-1])
+    low = max(last, float(ship.speed(parameters.froude_min)))
+    high = float(found.mean[k + motion.SPEED])
+    if not high > low * 1.02:
+        raise EstimationError(
+            f'the fitted speed falls from {high:.4g} to {low:.4g} m/s only, above froude_min '
+            f'{parameters.froude_min:g}: give a window that lies in a coastdown, or a smaller '
+            'froude_min'
+        )
+    grid = np.linspace(low, high, _CURVE_POINTS)
+    part = read(found, grid)
+    driving = np.flatnonzero(part.resistance_m_s2 <= 0.0)
+    use = slice(int(driving[-1]) + 1 if len(driving) else 0, None)
+    if len(grid[use]) < 3:
+        raise EstimationError(
+            f'the fitted force nowhere slows the ship from {high:.4g} to {low:.4g} m/s: give a '
+            'window in which she coasts'
+        )
+    # where the file states retardations, n_r is no unknown of the motion
+    of_n_r = part.parts_m_s2['n_r']
+    if not of_n_r.any():
+        of_n_r = part.resistance_m_s2 / (1.0 + ship.n_r(grid)) * ship.added_mass.sd
+    per_froude = float(ship.speed(1.0))
+    curve = ResistanceCurve(
+        grid[use].copy(),
+        part.resistance_m_s2[use],
+        np.hypot(part.repeatable_m_s2, of_n_r)[use],
+        part.repeatable_m_s2[use],
+        ship.froude(grid[use]),
+        per_froude * part.slope_1_s[use],
+        per_froude * part.slope_sigma_1_s[use],
+    )
+    at_end = read(found, np.array([last]))
+    row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
+    now = found.mean.copy()
+    now[k + motion.SCALE :] = 0.0  # the speed itself, not the log
+    by, _ = motion.predict(problem.forces, now, problem.grid_s, row)
+    by[1 + k + motion.SCALE :] = 0.0
+    speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
+    stamps = np.concatenate(list(record.stamps.values()))
+    tracks = {}
+    for name, times in record.stamps.items():
+        chosen = coast.kind == CODES[name]
+        measured = coast.value[chosen]
+        tracks[name] = Track(times, measured, measured - table[0, chosen])
+    several = len(record.stamps) > 1 and 'speed_through_water' in record.stamps
+    current = k + motion.CURRENT
+    return assembled(
+        NAME,
+        curve,
+        ValidRange.of_branch(curve),
+        AtEnd(
+            last,
+            speed_sd,
+            float(at_end.resistance_m_s2[0]),
+            float(at_end.sigma_m_s2[0]),
+        ),
+        start_ns=int(stamps.min()),
+        end_ns=int(stamps.max()),
+        order=None,
+        orders=(),
+        samples={name: len(times) for name, times in record.stamps.items()},
+        noise_sd=dict(record.white_sd),
+        tracks=tracks,
+        current_m_s=float(found.mean[current]) if several else None,
+        current_sigma_m_s=float(np.sqrt(found.covariance[current, current])) if several else None,
+        notes=(*window.notes, *ship.warnings, *notes),
+    )

@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+When the sentences of a log, or of a wire, were measured.
+
+Few sentences state their time. The others have that of the last one that did;
+where an input speaks several times before the next, its samples are spread
+evenly until then. Where the logger noted when it received each line, the time
+since is measured instead, on its clock.
+"""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from datetime import date
+
+from shipdrag_ros.nmea.framing import Sentence
+from shipdrag_ros.nmea.sentences import TIMED, Fields, NoValue, has_fix
+from shipdrag_ros.samples import SECOND_NS
+
+DAY_NS = 86_400 * SECOND_NS
+GAP_NS = 10 * SECOND_NS
+"""A longer step of the time is a gap; what was measured inside it has no time."""
+
+BEHIND_NS = SECOND_NS
+"""A line that comes later than others by more waited somewhere: it is of a backlog."""
+
+_MEMORY_NS = 60 * SECOND_NS  # of the least delay; a clock that was set is known after it
+_LIMIT_NS = 2**31 * SECOND_NS  # of the stamp of a message
+
+_TIME = re.compile(r'(\d\d)(\d\d)(\d\d)(?:\.(\d+))?')
+_DATE = re.compile(r'(\d\d)(\d\d)(\d\d)')
+_CENTURY_TURNS = 80  # 80 to 99 are years of the 20th century
+ROLLOVER_DAYS = 1024 * 7  # a week number of GPS has ten bits
+
+
+class SentenceTime:
+    """
+    The time in a sentence.
+
+    Parameters
+    ----------
+    fields
+        Of RMC, GGA, GLL or ZDA.
+
+    Attributes
+    ----------
+    of_day_ns
+        Since midnight [ns]; a leap second is that of the midnight after it.
+    day
+        Days since 1970; None if the sentence has no date.
+    trusted
+        Whether the source calls its fix valid; ZDA always.
+
+    Raises
+    ------
+    NoValue
+        If there is no time, or no possible date.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        self.of_day_ns = _of_day_ns(fields['time'])
+        self.day = _day(fields)
+        self.trusted = fields.kind == 'ZDA' or has_fix(fields)
+
+
+def _of_day_ns(text: str) -> int:
+    if not text:
+        raise NoValue('empty')
+    found = _TIME.fullmatch(text)
+    if found is None:
+        raise NoValue('no time of day', text)
+    hour, minute, second = int(found[1]), int(found[2]), int(found[3])
+    leap = (hour, minute, second) == (23, 59, 60)
+    if hour > 23 or minute > 59 or (second > 59 and not leap):
+        raise NoValue('no time of day', text)
+    fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
+    return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns
+
+
+def _day(fields: Fields) -> int | None:
+    if fields.kind == 'ZDA':
+        texts = [fields[name] for name in ('year', 'month', 'day')]
+        if not all(texts):
+            return None
+        if not all(text.isdecimal() and text.isascii() for text in texts):
+            raise NoValue('no possible date', ','.join(texts))
+        year, month, day = (int(text) for text in texts)
+    elif fields.kind == 'RMC' and fields['date']:
+        found = _DATE.fullmatch(fields['date'])
+        if found is None:
+            raise NoValue('no possible date', fields['date'])
+        day, month, year = (int(text) for text in found.groups())
+        year += 1900 if year >= _CENTURY_TURNS else 2000
+    else:
+        return None
+    try:
+        days = days_of(date(year, month, day))
+    except (ValueError, OverflowError):
+        raise NoValue('no possible date', f'{year}-{month}-{day}') from None
+    if not 0 <= days * DAY_NS < _LIMIT_NS - DAY_NS:
+        raise NoValue('no possible date', f'{year}-{month}-{day}')
+    return days
+
+
+def days_of(day: date) -> int:
+    """
+    Return the days since 1970.
+    """
+    return (day - date(1970, 1, 1)).days
+
+
+def rollover_days(day: int, true: date) -> int | None:
+    """
+    Return what is to be added to the days of a log whose date is known.
+
+    GPS counts weeks modulo 1024, and an old receiver shows a date that many
+    weeks early. None if the difference is no such number of weeks.
+    """
+    difference = days_of(true) - day
+    return difference if difference % ROLLOVER_DAYS == 0 else None
+
+
+class SentenceClock:
+    """
+    Follows the time through a log.
+
+    Parameters
+    ----------
+    near_ns
+        A time at most half a day from the first one [ns since the epoch]; None
+        if nothing states it but the receipt of the lines.
+    shift_days
+        Added to every date of the log.
+
+    Attributes
+    ----------
+    shift_days
+        As given.
+    dates_put_right
+        Number of times whose date was a day off at midnight.
+    now_ns
+        Last time stated [ns since the epoch]; None before the first.
+    """
+
+    def __init__(self, near_ns: int | None, *, shift_days: int = 0) -> None:
+        self._near_ns = near_ns
+        self.shift_days = shift_days
+        self._received_ns: int | None = None
+        self.dates_put_right = 0
+        self.now_ns: int | None = None
+
+    def resolve(self, moment: SentenceTime, receive_ns: int | None) -> int:
+        """
+        Return the time of a sentence [ns since the epoch].
+
+        One without a date has that nearest to the last time, or to that of
+        its receipt before the first.
+
+        Raises
+        ------
+        NoValue
+            If nothing states the date, or a time without a fix does not go on
+            from the last one.
+        """
+        if moment.day is None:
+            time_ns = self._nearest(moment.of_day_ns, receive_ns)
+        else:
+            time_ns = (moment.day + self.shift_days) * DAY_NS + moment.of_day_ns
+            if self.now_ns is not None and abs(abs(time_ns - self.now_ns) - DAY_NS) < GAP_NS:
+                # some receivers change the date a sentence too late or too early
+                time_ns = self._nearest(moment.of_day_ns, receive_ns)
+                self.dates_put_right += 1
+        if not moment.trusted and (
+            self.now_ns is None or not 0 <= time_ns - self.now_ns <= GAP_NS
+        ):
+            # before its first fix a receiver shows any date
+            raise NoValue('without a fix, and not going on from the last')
+        return time_ns
+
+    def _nearest(self, of_day_ns: int, receive_ns: int | None) -> int:
+        known = (self.now_ns, self._near_ns, receive_ns)
+        near_ns = next((time_ns for time_ns in known if time_ns is not None), None)
+        if near_ns is None:
+            raise NoValue('no date')
+        day = round((near_ns - of_day_ns) / DAY_NS)
+        return day * DAY_NS + of_day_ns
+
+    def set(self, time_ns: int, receive_ns: int | None) -> None:
+        """
+        Take a time as the present one.
+        """
+        self.now_ns = time_ns
+        self._received_ns = receive_ns
+
+    def since(self, receive_ns: int | None) -> int | None:
+        """
+        Return the time of a line by its receipt [ns], None if that is not known.
+        """
+        if receive_ns is None:
+            return None
+        if self.now_ns is None:
+            return receive_ns
+        if self._received_ns is None:
+            return None
+        return self.now_ns + receive_ns - self._received_ns
+
+
+class WireClock:
+    """
+    Knows a backlog on a wire: lines whose own times are further back than those of others.
+
+    A line that flows is stamped with its receipt: what it states holds the delay of its
+    source, and the difference of two clocks. The least difference between receipt and stated
+    time, of the last minute or two, is that of a line that flows; what exceeds it has waited,
+    after a stall of TCP for instance.
+    """
+
+    def __init__(self) -> None:
+        self._receivers: dict[str, _Receiver] = {}
+        self._behind_ns = 0
+        self._waited = False
+
+    def stamp_ns(self, sentence: Sentence, read_ns: int) -> int:
+        """
+        Return when a sentence was measured, by the clock of its receipt [ns since the epoch].
+
+        Parameters
+        ----------
+        sentence
+            One that states no time has waited as long as the last one that did.
+        read_ns
+            When its line was read [ns since the epoch].
+        """
+        if sentence.kind in TIMED:
+            with suppress(NoValue):
+                moment = SentenceTime(Fields(sentence.kind, sentence.fields))
+                if moment.trusted:
+                    receiver = self._receivers.setdefault(sentence.talker, _Receiver())
+                    self._behind_ns = receiver.behind_ns(moment.of_day_ns, read_ns)
+        # a backlog ends where its lines have caught up
+        self._waited = self._behind_ns > (BEHIND_NS // 10 if self._waited else BEHIND_NS)
+        return read_ns - self._behind_ns if self._waited else read_ns
+
+
+class _Receiver:
+    """The clock of one talker beside that of the receipt; the day does not count."""
+
+    def __init__(self) -> None:
+        self._least_ns: list[int] = []  # of this minute, then of the one before
+        self._since_ns = 0
+        self._stated_ns = -1
+        self._behind_ns = 0
+
+    def behind_ns(self, stated_ns: int, read_ns: int) -> int:
+        """Return how long a line that states a time of day has waited [ns]."""
+        if stated_ns == self._stated_ns:  # of the same fix, or of a clock that stands still
+            return self._behind_ns
+        self._stated_ns = stated_ns
+        difference_ns = read_ns - stated_ns
+        if not self._least_ns or not 0 <= read_ns - self._since_ns <= _MEMORY_NS:
+            self._least_ns, self._since_ns = [difference_ns, *self._least_ns[:1]], read_ns
+        self._least_ns[0] += min(_within_a_day(difference_ns - self._least_ns[0]), 0)
+        self._behind_ns = max(_within_a_day(difference_ns - each) for each in self._least_ns)
+        return max(self._behind_ns, 0)
+
+
+def _within_a_day(difference_ns: int) -> int:
+    return (difference_ns + DAY_NS // 2) % DAY_NS - DAY_NS // 2

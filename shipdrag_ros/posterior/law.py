@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The one law of the hull, r(u) = (1 + theta_f) r_f + (1 + theta_w) r_w + s(u), as tables.
+
+r_f and r_w are those of the ship file; without a baseline the same two parts from length and
+volume alone. s is a spline relative to r, orthogonal to both parts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipdrag_ros.posterior.motion import Forces
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship.baseline import TableBaseline
+from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
+from shipdrag_ros.simulation.hydrodynamics import drag_n, friction_n, viscous_n
+
+_NODES = 97  # of the grid of speeds
+_ABOVE = 1.25  # of the highest speed that a fit may try
+_SPLINE_FROUDE, _FEWEST, _MOST = 0.02, 6, 14  # spacing and number of splines
+_ALIKE = 5.0  # spacings over which neighbours are alike, but for the humps of wave making
+_OWN = 0.02  # of their variance, with the share of waves more
+# C_W = _WAVE (Fr / _WAVE_FROUDE)^4 without a baseline
+_WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
+
+
+@dataclass(frozen=True)
+class HullLaw:
+    """
+    The law over a grid of speeds.
+
+    Attributes
+    ----------
+    speed_m_s : (m,)
+    parts : (2, m)
+        r_f and r_w [m/s^2].
+    shapes : (k, m)
+        Columns of s per unit size [m/s^2], alike in size.
+    stated
+        Whether the ship file states a baseline.
+    """
+
+    speed_m_s: Float64
+    parts: Float64
+    shapes: Float64
+    stated: bool
+
+    @classmethod
+    def of(cls, ship: Ship, low_m_s: float, top_m_s: float) -> HullLaw:
+        """
+        Tabulate the law.
+
+        Parameters
+        ----------
+        ship
+        low_m_s, top_m_s
+            Speeds of the run, over which s is spread.
+        """
+        speed = np.linspace(0.0, _ABOVE * top_m_s, _NODES)
+        stated = ship.baseline is not None
+        parts = (_stated(ship, speed) if stated else _generic(ship, speed)) / ship.mass_kg
+        return cls(speed, parts, _shapes(ship, speed, parts, low_m_s, top_m_s), stated)
+
+    def forces(self, ship: Ship, tau_s: float) -> Forces:
+        """
+        Return what the motion takes.
+        """
+        step = float(self.speed_m_s[1])
+        columns = np.concatenate([self.parts, self.shapes])
+
+        def with_slope(value: Float64) -> Float64:
+            return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
+
+        return Forces(
+            step,
+            with_slope(self.parts.sum(axis=0)),
+            with_slope(columns),
+            with_slope(1.0 + ship.n_r(self.speed_m_s)),
+            tau_s,
+        )
+
+
+def _stated(ship: Ship, speed: Float64) -> Float64:
+    """Return friction and wave part [N]; outside the tables with the square of the speed."""
+    low, high = ship.baseline_range_m_s
+    inside = np.clip(speed, max(low, 1e-3 * speed[-1]), high)
+    total = ship.resistance_n(inside)
+    if isinstance(ship.baseline, TableBaseline):
+        # a table has no parts: its one scale is that of the friction
+        parts = np.stack([total, np.zeros_like(total)])
+    else:
+        wave = total - viscous_n(ship, inside) - ship.air_drag_n(inside)
+        parts = np.stack([total - wave, wave])
+    result: Float64 = parts * (speed / inside) ** 2
+    return result
+
+
+def _generic(ship: Ship, speed: Float64) -> Float64:
+    surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
+        ship.length_m, ship.displaced_volume_m3
+    )
+    wave = _WAVE * (ship.froude(speed) / _WAVE_FROUDE) ** _WAVE_POWER
+    return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
+
+
+def _shapes(ship: Ship, speed: Float64, parts: Float64, low_m_s: float, top_m_s: float) -> Float64:
+    """Return columns of s: cubic B-splines of neighbours that are alike, less both parts."""
+    froude = float(ship.froude(top_m_s - low_m_s))
+    count = int(np.clip(np.ceil(froude / _SPLINE_FROUDE), _FEWEST, _MOST))
+    spacing = (1.05 * top_m_s - 0.9 * low_m_s) / (count - 1)
+    d = np.abs((speed - 0.9 * low_m_s) / spacing - np.arange(count)[:, None])
+    splines = np.where(d < 1.0, 2 / 3 - d**2 + d**3 / 2, np.maximum(2.0 - d, 0.0) ** 3 / 6)
+    apart = np.arange(count)[:, None] - np.arange(count)
+    middle = 0.9 * low_m_s + spacing * np.arange(count)
+    waves = np.interp(middle, speed, parts[1] / np.maximum(parts.sum(axis=0), 1e-12))
+    alike = np.exp(-0.5 * (apart / _ALIKE) ** 2) + np.diag(_OWN + waves**2)
+    found = np.linalg.cholesky(alike).T @ splines
+    inside = (speed >= 0.9 * low_m_s) & (speed <= 1.05 * top_m_s)
+    total = np.maximum(parts.sum(axis=0), 1e-12)
+    shares = parts[parts.any(axis=1)] / total
+    of_parts = np.linalg.lstsq(shares[:, inside].T, found[:, inside].T, rcond=None)[0]
+    found = found - of_parts.T @ shares
+    # a flat end beyond the speeds of the run: nothing is known there
+    first, last = np.flatnonzero(inside)[[0, -1]]
+    found = found[:, np.clip(np.arange(len(speed)), first, last)]
+    size = np.sqrt(np.mean(np.sum(found[:, inside] ** 2, axis=0)))
+    result: Float64 = found / size * total
+    return result

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Every prior of the model, as data.
+
+docs/model.md prints this table (`python docs/tables.py`). Those of the noise stand in
+`inference.learning`, until that is part of this room; those of effects in their declarations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shipdrag_ros.parameter import Prior, half_normal, heavy_tailed, log_normal, normal
+
+
+@dataclass(frozen=True)
+class Declared:
+    """
+    A prior with its letter, unit and source.
+
+    Attributes
+    ----------
+    letter
+        As in docs/model.md.
+    meaning
+    prior
+        A number where it is taken as known.
+    unit
+        '' for a pure number.
+    source
+        A publication, or the records that it was learnt from.
+    """
+
+    letter: str
+    meaning: str
+    prior: Prior | float
+    unit: str
+    source: str
+
+    @property
+    def mean(self) -> float:
+        """Mean of a normal prior, median of a log-normal one, or the number."""
+        return self.prior.first if isinstance(self.prior, Prior) else self.prior
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation, of the logarithm of a log-normal one; 0 of a number."""
+        return self.prior.second if isinstance(self.prior, Prior) else 0.0
+
+
+_REALITY = 'records of many craft, as a range'
+
+# the law of the hull
+FRICTION = Declared(
+    'theta_f',
+    'friction over that of the ship file, less one; sd of the file in place of this one',
+    heavy_tailed(0.02),
+    '',
+    'a good model test',
+)
+WAVE = Declared(
+    'theta_w',
+    'wave part over that of the ship file, less one; sd of the file in place of this one',
+    heavy_tailed(0.10),
+    '',
+    'a good model test',
+)
+GENERIC_FRICTION = Declared(
+    'theta_f',
+    'the same without a baseline: ITTC-57, k = 0.2, wetted surface from length and volume',
+    normal(0.4, mean=0.1),
+    '',
+    'form factors 0.1 to 0.5, roughness, dragged propeller, appendages',
+)
+GENERIC_WAVE = Declared(
+    'theta_w',
+    'the same without a baseline: C_W = 0.0008 (Fr / 0.22)^4',
+    normal(1.0),
+    '',
+    'C_W of 25 model tests at Fr 0.22: 0 to 0.002',
+)
+LAW_ERROR = Declared(
+    's',
+    'size of the error of the law, relative to r, in every hypothesis',
+    half_normal(0.015),
+    '',
+    'residuals of model tests about two parts: 0.5 to 2 %',
+)
+FOULED = Declared(
+    'theta_f',
+    'the same where the hull differs from the baseline in her friction',
+    normal(0.25, mean=0.25),
+    '',
+    'fouling of years in service: 10 to 60 % of friction',
+)
+# the thrust
+THRUST = Declared(
+    'q',
+    'law of the thrust: 0 the square of the shaft speed, -1 as the shaft, 1 gone at once, '
+    '1.2 a propeller that brakes once it turns slowly',
+    normal(0.8, mean=0.2),
+    '',
+    'four-quadrant open-water data of B4-70',
+)
+RUN_DOWN = Declared(
+    'tau',
+    'time of the run-down of the shaft where neither ship file nor shaft says it',
+    log_normal(3.0, 1.0),
+    's',
+    _REALITY,
+)
+RUN_DOWN_SHAPE = Declared(
+    'tau',
+    'error of a run-down that is seen or stated, relative: no shaft falls as an exponential',
+    normal(0.15),
+    '',
+    _REALITY,
+)
+STOP = Declared(
+    't_0',
+    'time of the stop, of an onset that no shaft shows',
+    normal(30.0),
+    's',
+    'dates of onsets found from the speed',
+)
+# the instruments
+LOG_SCALE = Declared('b_1', 'scale of a log, less one', normal(0.02), '', 'Doppler logs: 2 %')
+LOG_OFFSET = Declared('b_0', 'offset of a log', normal(0.02), 'm/s', 'zeroed logs')
+LOG_LAG = Declared('lambda', 'filter of a log', normal(5.0, mean=2.0), 's', '3 to 10 s, or none')
+GROUND_LAG = Declared(
+    'lambda_g', 'filter of a speed over ground', normal(3.0, mean=1.0), 's', '1 to 8 s, or none'
+)
+# the water
+CURRENT = Declared('c', 'current along the track', normal(0.4), 'm/s', 'steady 0.1 to 0.8 m/s')
+WRONG = Declared(
+    'epsilon',
+    'chance that a reading is anything within the range of its input',
+    0.01,
+    '',
+    _REALITY,
+)
+# what a hull may differ by: probabilities, and points of what a size is averaged over
+NOTHING, FRICTION_ALONE, SMOOTH = 'nothing', 'friction', 'smooth in u'
+CHANCES = {NOTHING: 0.5, FRICTION_ALONE: 0.2, SMOOTH: 0.3}
+"""Prior probability of each, where a baseline is stated."""
+HALF_NORMAL = ((0.3, 0.35), (0.9, 0.45), (1.8, 0.20))
+"""Points and weights of a half-normal size, in its standard deviation."""
+LOG_UNIFORM = (0.03, 0.09, 0.27)
+"""Points of the size of s where something smooth in u is missing, all alike."""
+WIDE = (0.01, 0.03, 0.1, 0.3)
+"""The same without a baseline."""
+WIDER, WIDER_CHANCE = 3.0, 0.1
+"""A baseline is so many times worse than stated, so often."""
+
+TABLE: tuple[Declared, ...] = (
+    FRICTION,
+    WAVE,
+    GENERIC_FRICTION,
+    GENERIC_WAVE,
+    LAW_ERROR,
+    FOULED,
+    THRUST,
+    RUN_DOWN,
+    RUN_DOWN_SHAPE,
+    STOP,
+    LOG_SCALE,
+    LOG_OFFSET,
+    LOG_LAG,
+    GROUND_LAG,
+    CURRENT,
+    WRONG,
+)
+"""What docs/model.md prints, in its order."""

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+One run under the model: rows, motion, unknowns and the families of their priors.
+
+A family is a hypothesis, or one size of what a hypothesis leaves open, with its prior
+probability. All families share the rows and the unknowns.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from shipdrag_ros.inference.noise import WHITE, Noise
+from shipdrag_ros.inference.rows import LOG, POSITION, Rows
+from shipdrag_ros.posterior import motion, priors
+from shipdrag_ros.posterior.law import HullLaw
+from shipdrag_ros.posterior.motion import EXTRAS, Forces
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import CoefficientBaseline, Ship
+
+_STEPS = 80  # of the integration, longer as the ship slows down
+_SPREAD = 25.0  # of all over the time from which steps grow
+_STEPS_A_RUN_DOWN = 3.0
+_VAGUE_SPEED, _VAGUE_S = 0.3, 300.0  # of the steady speed, and of where she was
+_EXACT = 1e-8  # sd of what does not act, so that every prior is proper
+
+
+@dataclass(frozen=True)
+class StopPrior:
+    """
+    What is known of the stop beforehand; times count from it.
+
+    Attributes
+    ----------
+    sd_s
+        Of its time; 0: it is before the first row, and no thrust is left.
+    run_down_s, run_down_sd_s
+        Of the shaft; 0: not known.
+    """
+
+    sd_s: float
+    run_down_s: float
+    run_down_sd_s: float
+
+
+@dataclass(frozen=True)
+class Family:
+    """
+    A prior of all unknowns: mean and precision (p,), and the probability of the family.
+    """
+
+    name: str
+    chance: float
+    mean: Float64
+    precision: Float64
+
+
+@dataclass(frozen=True)
+class RunModel:
+    """
+    One run.
+
+    Attributes
+    ----------
+    rows, white
+        Readings and their white noise, the steady record first.
+    steady
+        How many rows are before the stop.
+    forces, grid_s
+        See `motion.predict`.
+    start : (p,)
+        Where the search begins.
+    families
+    speed_m_s
+        At the stop, roughly.
+    law
+    """
+
+    rows: Rows
+    white: Noise
+    steady: int
+    forces: Forces
+    grid_s: Float64
+    start: Float64
+    families: tuple[Family, ...]
+    speed_m_s: float
+    law: HullLaw
+
+    @property
+    def coefficients(self) -> int:
+        """How many of the unknowns are coefficients of forces."""
+        return int(self.forces.columns.shape[1])
+
+    @property
+    def widest(self) -> Family:
+        """The family that holds the coefficients least."""
+        return min(
+            self.families, key=lambda each: float(each.precision[: self.coefficients].sum())
+        )
+
+    @classmethod
+    def of(
+        cls,
+        rows: Rows,
+        variance: Float64,
+        steady: int,
+        ship: Ship,
+        stop: StopPrior,
+        *,
+        speed_m_s: float,
+        low_m_s: float,
+    ) -> RunModel:
+        """
+        Set up the model of a run.
+
+        Parameters
+        ----------
+        rows
+            In ascending time from the stop as it is thought to be.
+        variance : (n,)
+            Of their white noise.
+        steady
+            How many of them are before the stop.
+        ship
+        stop
+        speed_m_s, low_m_s
+            At the stop and at the end, roughly.
+        """
+        law = HullLaw.of(ship, low_m_s, speed_m_s)
+        tau_s = _tau_s(stop)
+        forces = law.forces(ship, tau_s)
+        end = float(rows.time_s[-1]) + 3.0 * stop.sd_s
+        ones = np.ones(len(variance))
+        position = rows.value[rows.kind == POSITION]
+        start = np.zeros(forces.columns.shape[1] + EXTRAS)
+        k = forces.columns.shape[1]
+        start[k + motion.SPEED] = speed_m_s
+        start[k + motion.THRUST] = priors.THRUST.mean
+        if len(position):
+            at = np.searchsorted(rows.time_s[rows.kind == POSITION], 0.0)
+            start[k + motion.PLACE] = position[min(int(at), len(position) - 1)]
+        kinds = frozenset(np.unique(rows.kind).tolist())
+        families = tuple(_all_families(ship, law, stop, start, kinds))
+        found = cls(
+            rows,
+            Noise(variance, WHITE, ones, ones),
+            steady,
+            forces,
+            _grid(end, tau_s),
+            start,
+            families,
+            speed_m_s,
+            law,
+        )
+        start[:k] = found.widest.mean[:k]
+        return found
+
+
+def _tau_s(stop: StopPrior) -> float:
+    if stop.run_down_s > 0.0:
+        return stop.run_down_s
+    return priors.RUN_DOWN.mean if stop.sd_s > 0.0 else 0.0
+
+
+def _grid(end_s: float, tau_s: float) -> Float64:
+    """Return the times of the integration."""
+    spread = end_s / _SPREAD
+    steps = _STEPS
+    if tau_s > 0.0:
+        # the first step is spread ln(1 + _SPREAD) / steps
+        most = max(tau_s / _STEPS_A_RUN_DOWN, end_s / 2000.0)
+        spread = min(spread, most * steps / math.log1p(end_s / spread))
+    result: Float64 = spread * np.expm1(np.linspace(0.0, math.log1p(end_s / spread), steps + 1))
+    return result
+
+
+def _extras(
+    ship: Ship, stop: StopPrior, start: Float64, kinds: frozenset[int]
+) -> tuple[Float64, Float64]:
+    """Return mean and sd of the unknowns that are no coefficients; alike in all families."""
+    mean, sd = start[-EXTRAS:].copy(), np.full(EXTRAS, _EXACT)
+    ground = kinds - {LOG}
+    sd[motion.SPEED] = _VAGUE_SPEED * mean[motion.SPEED]
+    base = ship.baseline
+    if base is None or base.relative_sd_of == 'resistance':
+        sd[motion.INERTIA] = max(ship.added_mass.sd, _EXACT)
+    if stop.sd_s > 0.0:
+        sd[motion.STOP] = stop.sd_s
+        sd[motion.THRUST] = priors.THRUST.sd
+        sd[motion.TAU] = priors.RUN_DOWN.sd
+        if stop.run_down_s > 0.0:
+            shape = priors.RUN_DOWN_SHAPE.sd
+            sd[motion.TAU] = math.hypot(shape, stop.run_down_sd_s / stop.run_down_s)
+    if POSITION in kinds:
+        sd[motion.PLACE] = _VAGUE_S * mean[motion.SPEED]
+    if LOG in kinds:
+        sd[motion.SCALE] = priors.LOG_SCALE.sd
+        sd[motion.OFFSET] = priors.LOG_OFFSET.sd
+        mean[motion.LAG], sd[motion.LAG] = priors.LOG_LAG.mean, priors.LOG_LAG.sd
+    if ground:
+        sd[motion.CURRENT] = priors.CURRENT.sd
+    if ground - {POSITION}:
+        lag = priors.GROUND_LAG
+        mean[motion.GROUND_LAG], sd[motion.GROUND_LAG] = lag.mean, lag.sd
+    return mean, sd
+
+
+def _all_families(
+    ship: Ship, law: HullLaw, stop: StopPrior, start: Float64, kinds: frozenset[int]
+) -> Iterator[Family]:
+    extra_mean, extra_sd = _extras(ship, stop, start, kinds)
+    count = len(law.shapes)
+    for name, chance, scales, size in _hulls(ship):
+        mean = np.concatenate([[each[0] for each in scales], np.zeros(count), extra_mean])
+        sd = np.concatenate([[each[1] for each in scales], np.full(count, size), extra_sd])
+        yield Family(name, chance, mean, 1.0 / sd**2)
+
+
+_Hull = tuple[str, float, tuple[tuple[float, float], tuple[float, float]], float]
+
+
+def _hulls(ship: Ship) -> Iterator[_Hull]:
+    """Yield what hulls may be: name, probability, mean and sd of both scales, size of s."""
+    base = ship.baseline
+    unsure = priors.LAW_ERROR.sd
+    if base is None:
+        friction, wave = priors.GENERIC_FRICTION, priors.GENERIC_WAVE
+        scales = ((friction.mean, friction.sd), (wave.mean, wave.sd))
+        for size in priors.WIDE:
+            yield priors.SMOOTH, 1.0 / len(priors.WIDE), scales, size
+        return
+    if isinstance(base, CoefficientBaseline):
+        sds = max(base.relative_sd.friction, _EXACT), max(base.relative_sd.wave, _EXACT)
+    else:
+        sds = max(base.relative_sd, _EXACT), _EXACT
+    for (wide, chance), (size, part) in product(
+        ((1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)), priors.HALF_NORMAL
+    ):
+        stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
+        yield priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
+    fouled = priors.FOULED
+    for size, part in priors.HALF_NORMAL:
+        scales = ((fouled.mean, fouled.sd), (0.0, priors.WIDER * sds[1]))
+        yield (
+            priors.FRICTION_ALONE,
+            priors.CHANCES[priors.FRICTION_ALONE] * part,
+            scales,
+            size * unsure,
+        )
+    for size in priors.LOG_UNIFORM:
+        scales = ((0.0, sds[0]), (0.0, sds[1]))
+        yield priors.SMOOTH, priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM), scales, size
+
+
+def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
+    """
+    Yield the families of a ship whose baseline states 2 % of friction and 10 % of waves.
+
+    Yields
+    ------
+    tuple
+        Name, probability, mean and sd of both scales, size of s, as text.
+    """
+    ship = Ship.example()
+    for which in (ship, replace(ship, baseline=None)):
+        for name, chance, scales, size in _hulls(which):
+            friction, wave = (f'{mean:g} ± {sd:g}' for mean, sd in scales)
+            beside = name if which.baseline is not None else f'{name}, no baseline'
+            yield beside, chance, friction, wave, f'{size:.2g}'

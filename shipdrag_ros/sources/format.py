@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a format of log files declares: how it is recognised, read and shown."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from shipdrag_ros.display import Table
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.progress import PartDone
+from shipdrag_ros.sources.log import Log, Understood
+from shipdrag_ros.sources.opened import beginning
+
+CERTAIN, LIKELY, POSSIBLE, NO = 1.0, 0.7, 0.3, 0.0
+"""Scores of `Format.score`; the highest of all formats is taken."""
+
+_TEXT_PER_ZERO = 100  # bytes
+
+
+@dataclass(frozen=True)
+class Head:
+    """
+    The beginning of a file, as formats are recognised by it.
+
+    Attributes
+    ----------
+    path
+    raw
+        Its first bytes, unpacked where it is packed with gzip.
+    """
+
+    path: Path
+    raw: bytes
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """The first lines that are not blank, as text; none of a binary file."""
+        # a serial line leaves a few zeros in a text when it is plugged
+        if self.raw.count(0) > len(self.raw) // _TEXT_PER_ZERO:
+            return ()
+        texts = self.raw.decode('utf-8', 'replace').removeprefix('\ufeff').splitlines()
+        whole = texts if len(texts) == 1 else texts[:-1]  # the last one is cut
+        return tuple(line.strip() for line in whole if line.strip())[:200]
+
+    def share(self, is_one: Callable[[str], object]) -> float:
+        """
+        Return which share of the lines fulfils a condition.
+        """
+        return sum(bool(is_one(line)) for line in self.lines) / max(len(self.lines), 1)
+
+
+def head_of(path: Path) -> Head:
+    """
+    Read the beginning of a file; of a folder, nothing.
+
+    Raises
+    ------
+    ImportDataError
+        If it cannot be read or is empty.
+    """
+    return Head(path, b'' if path.is_dir() else beginning(path))
+
+
+@dataclass(frozen=True)
+class Option:
+    """
+    An option of a format on the command line.
+
+    Attributes
+    ----------
+    flag
+        `--date` for instance.
+    metavar, help
+        As argparse shows them; without a metavar it is a switch.
+    read
+        Text to value; a ValueError or an ImportDataError says why not.
+    many
+        Whether it may be given more than once.
+    """
+
+    flag: str
+    metavar: str
+    help: str
+    read: Callable[[str], Any] = str
+    many: bool = False
+
+    @property
+    def key(self) -> str:
+        """Its name in `Job.options`."""
+        return self.flag.lstrip('-').replace('-', '_')
+
+
+@dataclass(frozen=True)
+class Job:
+    """
+    A file to read.
+
+    Attributes
+    ----------
+    source
+        The file.
+    options
+        Values by `Option.key`; one that was not given is not there.
+    progress
+        Called with how much is read, and of how much.
+    """
+
+    source: Path
+    options: Mapping[str, Any] = field(default_factory=dict)
+    progress: PartDone | None = None
+
+
+class ImportResult(Protocol):
+    """What became of a file: a dataclass that shows itself."""
+
+    @property
+    def written(self) -> Mapping[str, int]:
+        """Samples by input."""
+
+    @property
+    def understood(self) -> Sequence[Understood]:
+        """What each input was taken from."""
+
+    def table(self) -> Table:
+        """Return messages by input."""
+
+    def summary(self, bag: Path) -> list[str]:
+        """Return sentences above the table."""
+
+    def details(self) -> list[str]:
+        """Return sentences below the table: what was not used, and why."""
+
+
+class Format(NamedTuple):
+    """
+    A format of log files.
+
+    Attributes
+    ----------
+    name
+        As `--format` takes it.
+    kind
+        What a file of it is called in a sentence.
+    about
+        What is read of it, a line of the help.
+    score
+        How well the beginning of a file fits, from `NO` to `CERTAIN`.
+    read
+        Reads a file into a log, and says what became of it.
+    options
+        Those that it knows.
+    chosen_by
+        Key of an option that chooses it; '' for none.
+    by_head
+        Whether the score comes from the first bytes alone, and not from the file.
+    """
+
+    name: str
+    kind: str
+    about: str
+    score: Callable[[Head], float]
+    read: Callable[[Job, Log], ImportResult]
+    options: tuple[Option, ...] = ()
+    chosen_by: str = ''
+    by_head: bool = True
+
+
+def best_of(formats: Sequence[Format], head: Head) -> Format:
+    """
+    Return the format of a file.
+
+    Raises
+    ------
+    ImportDataError
+        If it has none of them.
+    """
+    scores = {each.name: each.score(head) for each in formats}
+    best = max(formats, key=lambda each: scores[each.name])
+    if scores[best.name] <= NO:
+        if head.path.is_dir():
+            raise ImportDataError(f'{str(head.path)!r} is a folder that is no bag; give a file')
+        if head.raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+            raise ImportDataError(f'{str(head.path)!r} is in UTF-16; save it as UTF-8')
+        known = ', '.join(each.kind for each in formats)
+        raise ImportDataError(
+            f'{str(head.path)!r} is of no format known here; it begins with '
+            f'{head.raw[:16]!r}. Known are {known}; say which it is with --format, or save it '
+            'as a table (CSV)'
+        )
+    return best
+
+
+def missing_library(job: Job, kind: str, library: str) -> ImportDataError:
+    """
+    Return the error of a file whose format needs a library that is not installed.
+
+    Parameters
+    ----------
+    job
+    kind
+        What the file is, with its article.
+    library
+        One of the extra `logs`.
+    """
+    return ImportDataError(
+        f"{str(job.source)!r} is {kind}, which needs {library}: pip install 'shipdrag_ros[logs]'"
+    )

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which column of a table is which input, and in which unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, tzinfo
+from decimal import Decimal
+from math import pi
+
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.samples import PITCHES, SHAFTS, Channel
+from shipdrag_ros.sources.formats.csv.cells import Form
+
+_KNOT, _KMH, _MPH = 1852.0 / 3600.0, 1.0 / 3.6, 0.44704
+_SPEED = {'m/s': 1.0, 'kn': _KNOT, 'km/h': _KMH, 'ft/s': 0.3048, 'mph': _MPH}
+SPEED_UNITS: Mapping[str, float] = _SPEED
+"""Units of speed [m/s]."""
+_LENGTH = {'m': 1.0, 'km': 1000.0, 'ft': 0.3048, 'nmi': 1852.0}
+_ANGLE = {'rad': 1.0, 'deg': pi / 180.0}
+_TURN_RATE = {'rad/s': 1.0, 'rpm': pi / 30.0, 'rev/s': 2.0 * pi, 'rps': 2.0 * pi}
+_PITCH = {'ratio': 1.0, '%': 0.01, **_ANGLE}
+COMPASS = 'compass'
+_LATITUDE = {'deg': 1.0}  # as they are sent
+_UNITS: Mapping[Channel, Mapping[str, float]] = {
+    Channel.SPEED_THROUGH_WATER: _SPEED,
+    Channel.SPEED_OVER_GROUND: _SPEED,
+    Channel.POSITION: _LENGTH,
+    Channel.POSITION_GEODETIC: _LATITUDE,
+    Channel.HEADING: {**_ANGLE, COMPASS: pi / 180.0},
+    Channel.SHAFT: _TURN_RATE,
+    Channel.PITCH: _PITCH,
+    Channel.RUDDER: _ANGLE,
+    Channel.WIND_APPARENT: {**_SPEED, **_ANGLE},
+    Channel.DEPTH: _LENGTH,
+}
+_COUNTS = {
+    'position': (2,),
+    'wind_apparent': (2,),
+    'speed_over_ground': (1, 2),
+    'shaft': (1, 2, 3, 4),
+    'pitch': (1, 2, 3, 4),
+}
+NANOSECONDS: Mapping[str, Decimal] = {
+    's': Decimal(10**9),
+    'ms': Decimal(10**6),
+    'us': Decimal(10**3),
+    'ns': Decimal(1),
+}
+
+
+@dataclass(frozen=True)
+class InputColumns:
+    """
+    The columns of one input.
+
+    Attributes
+    ----------
+    channel
+        What they hold; of several shafts or pitches, the first one.
+    names
+        Names or numbers, counted from 1; of one value, or of one a shaft.
+    factors
+        What each is multiplied by for the unit of `Channel`.
+    units
+        In which they stand, as `--map` takes them.
+    form
+        How several make one value.
+    """
+
+    channel: Channel
+    names: tuple[str, ...]
+    factors: tuple[float, ...]
+    units: tuple[str, ...] = ()
+    form: Form = Form.PLAIN
+
+    @property
+    def name(self) -> str:
+        """What they are mapped to."""
+        return _name(self.channel)
+
+    def by_channel(self) -> Iterator[InputColumns]:
+        """
+        Yield the columns of each channel: of several shafts, one each.
+        """
+        for channels in (SHAFTS, PITCHES):
+            if self.channel is channels[0]:
+                columns = zip(channels, self.names, self.factors, self.units, strict=False)
+                for channel, name, factor, unit in columns:
+                    yield InputColumns(channel, (name,), (factor,), (unit,))
+                return
+        yield self
+
+
+@dataclass(frozen=True)
+class TimeColumn:
+    """
+    The column of the time of measurement.
+
+    Attributes
+    ----------
+    names
+        One column, or one of the date and one of the time of day.
+    unit_ns
+        Of a count [ns]; s where none is given.
+    given
+        Whether the unit was given.
+    order
+        Of year, month and day in a date, see `dates.ORDERS`; '' to be found.
+    zone
+        Of dates that state none.
+    """
+
+    names: tuple[str, ...]
+    unit_ns: Decimal
+    given: bool = False
+    order: str = ''
+    zone: tzinfo = UTC
+
+
+def parse_input(text: str) -> InputColumns:
+    """
+    Read `INPUT=COLUMN[:unit]`.
+
+    `position` and `wind_apparent` take two columns, `speed_over_ground` one or the
+    components east and north, `shaft` and `pitch` up to four, one a shaft. An
+    apparent wind `aws:kn,awa:deg` is its speed and where it comes from, clockwise
+    from ahead. A heading in `compass` is in degrees clockwise from north. A unit
+    given once holds for all, `position=x,y:km` as much as `position=x:km,y`; several are
+    taken as written, `position=x:km,y:m`. A position in `deg` is
+    latitude and longitude. Without a unit the values are SI, a pitch is a ratio.
+
+    Raises
+    ------
+    ImportDataError
+        If the input or a unit is not known, or a column is missing.
+    """
+    name, _, rest = text.partition('=')
+    name = name.strip()
+    channels = [channel for channel in _UNITS if _name(channel) == name]
+    if not channels:
+        known = ', '.join(dict.fromkeys(map(_name, _UNITS)))
+        raise ImportDataError(f'--map {text!r}: no input {name!r}; inputs are {known}')
+    counts = _COUNTS.get(name, (1,))
+    columns = [_split_unit(piece, _units_of(channels)) for piece in rest.split(',')]
+    if len(columns) not in counts or not all(column for column, _ in columns):
+        expected = f'{counts[0]}' if len(counts) == 1 else f'{counts[0]} to {counts[-1]}'
+        example = f'{name}={",".join(["COLUMN[:unit]"] * counts[0])}'
+        raise ImportDataError(f'--map {text!r}: expected {expected} column(s), {example}')
+    return columns_of(name, [column for column, _ in columns], [unit for _, unit in columns])
+
+
+def columns_of(name: str, columns: Sequence[str], stated: Sequence[str | None]) -> InputColumns:
+    """
+    Return the columns of an input.
+
+    Parameters
+    ----------
+    name
+        Of the input, as `--map` takes it.
+    columns
+        Their names.
+    stated
+        Unit of each, None where none is stated.
+
+    Raises
+    ------
+    ImportDataError
+        If the units do not go together.
+    """
+    text = f'{name}={",".join(columns)}'
+    given = [unit for unit in stated if unit is not None]
+    channel = next(channel for channel in _UNITS if _name(channel) == name)
+    if 'deg' in given and channel is Channel.POSITION:
+        channel = Channel.POSITION_GEODETIC
+    known = _UNITS[channel]
+    if any(unit not in known for unit in given):
+        raise ImportDataError(
+            f'--map {text!r}: expected both columns in deg, or both in {", ".join(_LENGTH)}'
+        )
+    common = given[0] if given else next(iter(known))
+    units = tuple(unit or common for unit in stated)  # a unit given once holds for all
+    form = Form.PLAIN
+    if channel is Channel.WIND_APPARENT:
+        angles = [unit in _ANGLE for unit in units]
+        if angles == [False, True]:
+            form = Form.POLAR
+        elif any(angles):
+            raise ImportDataError(
+                f'--map {text!r}: expected both columns in a unit of speed, or the second in deg'
+            )
+    elif COMPASS in units:
+        form = Form.COMPASS
+    elif channel is Channel.SPEED_OVER_GROUND and len(columns) == 2:
+        form = Form.HYPOT
+    return InputColumns(
+        channel,
+        tuple(columns),
+        tuple(known[unit] for unit in units),
+        units,
+        form,
+    )
+
+
+def parse_time(text: str) -> TimeColumn:
+    """
+    Read `COLUMN[:unit]` of the time, or `DATE,TIME` of two columns; s without a unit.
+
+    Raises
+    ------
+    ImportDataError
+        If the unit is not known.
+    """
+    column, unit = _split_unit(text, NANOSECONDS)
+    names = tuple(name.strip() for name in column.split(',')) if unit is None else (column,)
+    if not all(names) or len(names) > 2:
+        raise ImportDataError(f'--time {text!r}: expected COLUMN[:unit], or DATE,TIME')
+    return TimeColumn(names, NANOSECONDS[unit or 's'], given=unit is not None)
+
+
+def _name(channel: Channel) -> str:
+    return 'pitch' if channel in PITCHES else channel.input
+
+
+def _units_of(channels: list[Channel]) -> set[str]:
+    return {unit for channel in channels for unit in _UNITS[channel]}
+
+
+def _split_unit(text: str, units: Mapping[str, object] | set[str]) -> tuple[str, str | None]:
+    """Return column and unit; a colon may also be part of a column's name."""
+    column, colon, unit = text.strip().rpartition(':')
+    if not colon:
+        return text.strip(), None
+    if unit.strip() in units:
+        return column.strip(), unit.strip()
+    raise ImportDataError(
+        f'{text!r}: no unit {unit!r} here; units are {", ".join(sorted(units))}. '
+        'For a colon in the name of a column write its number'
+    )

@@ -1,0 +1,356 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which columns of a table are which inputs, where nobody says so.
+
+A column is taken where its name says what it is and its unit is sure: stated in
+the name or below it, shown by its values (degrees beyond 2 pi), or by the
+positions of the same table. What is not sure is named with what to type, and
+not used.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.samples import MOTION_INPUTS, Float64
+from shipdrag_ros.sources.formats.csv.agreement import plane_speed, track_speed, unit_of
+from shipdrag_ros.sources.formats.csv.cells import are_in_minutes
+from shipdrag_ros.sources.formats.csv.columns import (
+    COMPASS,
+    SPEED_UNITS,
+    InputColumns,
+    TimeColumn,
+    columns_of,
+)
+from shipdrag_ros.sources.formats.csv.first_rows import FirstRows, NamedColumn, coordinates
+from shipdrag_ros.sources.formats.csv.guess_time import guessed_time, row_seconds
+from shipdrag_ros.sources.table import LogTable
+
+PLAIN_TIMES = ('time', 'time_s', 't', 't_s')
+PLAIN_COLUMNS = {
+    'speed_through_water': 'speed_through_water',
+    'speed_over_ground': 'speed_over_ground',
+    'heading': 'heading',
+    'shaft': 'shaft',
+    'rudder': 'rudder',
+    'depth': 'depth',
+    'x,y': 'position',
+    'latitude,longitude': 'position',
+}
+"""Columns named as the inputs are, in SI units, and their input."""
+
+_TURN = 6.4  # no angle in rad is larger
+_NO_COORDINATES = ('rad', 'mrad', 'gon', 'm', 'km', 'ft', 'nmi', 'min')
+_SPEED_UNIT = 'kn'  # in what is to be typed
+
+
+@dataclass
+class Guess:
+    """
+    What was understood of a table.
+
+    Attributes
+    ----------
+    inputs
+        Columns to take.
+    time
+        Column of the time; None where rows are counted.
+    notes
+        How it is known, a sentence each.
+    unclear
+        What was not sure, and what to type, a sentence each.
+    """
+
+    inputs: list[InputColumns] = field(default_factory=list)
+    time: TimeColumn | None = None
+    notes: list[str] = field(default_factory=list)
+    unclear: list[str] = field(default_factory=list)
+
+
+def guess(
+    table: LogTable, *, time: TimeColumn | None = None, counted: bool = False, speed_unit: str = ''
+) -> Guess:
+    """
+    Find the inputs in a table.
+
+    Parameters
+    ----------
+    table
+    time
+        Column of the time, where it is given.
+    counted
+        Whether the rows are counted, so that none is needed.
+    speed_unit
+        Of speeds whose columns state none; '' where it is not given.
+
+    Raises
+    ------
+    ImportDataError
+        If nothing that moves has a known unit, saying what to type.
+    """
+    if table.header is None:
+        raise ImportDataError(
+            f'{str(table.path)!r} has no names of columns; say what they are by their numbers, '
+            'for instance --map speed_through_water=1:kn --rate 1'
+        )
+    rows = FirstRows(table)
+    made = _Guesser(rows, speed_unit)
+    if time is None and not counted:
+        time = guessed_time(rows, made.found.notes)
+    made.found.time = time
+    if made.is_plain():
+        made.plain()
+    else:
+        made.by_names(time)
+    if not any(each.channel.input in MOTION_INPUTS for each in made.found.inputs):
+        raise ImportDataError(made.nothing())
+    return made.found
+
+
+class _Guesser:
+    """Guesses by the first rows of a table."""
+
+    def __init__(self, rows: FirstRows, speed_unit: str) -> None:
+        self._rows = rows
+        self._speed_unit = speed_unit
+        self._track: Float64 | None = None
+        self.found = Guess()
+
+    def _one(self, role: str) -> NamedColumn | None:
+        columns = self._rows.roles.get(role, [])
+        if len(columns) > 1:
+            others = ', '.join(repr(each.key) for each in columns[1:])
+            self._doubt(f'{others}: {columns[0].key!r} is taken for the same thing')
+        return columns[0] if columns else None
+
+    def _doubt(self, text: str) -> None:
+        if text not in self.found.unclear:
+            self.found.unclear.append(text)
+
+    def _take(self, name: str, columns: Sequence[NamedColumn], units: Sequence[str]) -> None:
+        self.found.inputs.append(columns_of(name, [each.key for each in columns], list(units)))
+
+    # columns named as the inputs are
+
+    def is_plain(self) -> bool:
+        header = set(self._rows.header)
+        known = {name for names in PLAIN_COLUMNS for name in names.split(',')}
+        named = {each.key for columns in self._rows.roles.values() for each in columns}
+        return (
+            bool(header & set(PLAIN_TIMES))
+            and bool(header & known - {'x', 'y'})
+            and (named <= known | set(PLAIN_TIMES))
+        )
+
+    def plain(self) -> None:
+        header = self._rows.header
+        for names, name in PLAIN_COLUMNS.items():
+            columns = names.split(',')
+            if not all(column in header for column in columns):
+                continue
+            unit = 'deg' if names.startswith('latitude') else None
+            found = columns_of(name, columns, [unit] * len(columns))
+            largest = self._rows.largest(self._rows.table.column(columns[0]))
+            if name in ('heading', 'rudder') and largest > _TURN:
+                raise ImportDataError(
+                    f'{self._rows.path!r}: {name!r} goes to {largest:g}, '
+                    f'which is no angle in rad; a column of this name is in SI units. Name the '
+                    f'unit in it, {name}_deg, or give --map'
+                )
+            self.found.inputs.append(found)
+        self.found.notes.append('The columns have the names of the inputs: their units are SI.')
+
+    # columns by their usual names
+
+    def by_names(self, time: TimeColumn | None) -> None:
+        self._position(time)
+        known = [
+            self._speed('stw', 'speed_through_water'),
+            self._speed('sog', 'speed_over_ground'),
+        ]
+        if not known[1]:
+            self._components()
+        self._heading()
+        self._rudder()
+        self._wind()
+        for role, name, units in (('shaft', 'shaft', 'rpm'), ('depth', 'depth', 'm')):
+            column = self._one(role)
+            if column is None:
+                continue
+            try:
+                self._take(name, [column], [column.unit])
+            except ImportDataError:  # of none, or of another quantity
+                self._unit_unknown(column, name, units)
+
+    def _position(self, time: TimeColumn | None) -> None:
+        latitude, longitude = self._one('lat'), self._one('lon')
+        x, y = self._one('x'), self._one('y')
+        time_s = row_seconds(self._rows, time)
+        if latitude is not None and longitude is not None:
+            for unit in (latitude.unit, longitude.unit):
+                if unit in _NO_COORDINATES:
+                    self._doubt(
+                        f'{latitude.key!r}, {longitude.key!r}: coordinates in {unit} are not read'
+                    )
+                    return
+            self._take('position', [latitude, longitude], ['deg', 'deg'])
+            texts = [self._rows.texts(each.place) for each in (latitude, longitude)]
+            minutes = are_in_minutes(*texts)
+            values = [
+                coordinates(cells, side, minutes)
+                for cells, side in zip(texts, ('NS', 'EW'), strict=True)
+            ]
+            if time_s is not None:
+                self._track = track_speed(time_s, *values)
+        elif x is not None and y is not None:
+            if x.unit == y.unit and x.unit in ('m', 'km', 'ft', 'nmi'):
+                self._take('position', [x, y], [x.unit, y.unit])
+                if time_s is not None and x.unit == 'm':
+                    self._track = plane_speed(
+                        time_s, self._rows.values(x.place), self._rows.values(y.place)
+                    )
+            else:
+                self._doubt(
+                    f'{x.key!r}, {y.key!r}: unit not known; --map '
+                    f'{shlex.quote(f"position={x.typed},{y.typed}:m")}'
+                )
+
+    def _speed(self, role: str, name: str) -> bool:
+        column = self._one(role)
+        if column is None:
+            return False
+        values = self._rows.values(column.place)
+        unit = self._unit_of_speed(column)
+        seen = '' if self._track is None else unit_of(values, self._track, unit)
+        if column.unit and not unit:
+            self._unit_unknown(column, name, _SPEED_UNIT)
+            return False
+        if unit and seen and seen != unit:
+            self._doubt(
+                f'{column.key!r} is said to be in {unit}, and agrees with the positions in '
+                f'{seen}; --map {shlex.quote(f"{name}={column.typed}:{unit}")}, or {seen}'
+            )
+            return False
+        if not unit and seen:
+            self.found.notes.append(
+                f'{column.key!r} states no unit; it agrees with the way between the positions in '
+                f'{seen}.'
+            )
+        if not (unit or seen):
+            self._unit_unknown(column, name, _SPEED_UNIT)
+            return False
+        self._take(name, [column], [unit or seen])
+        if self._track is None:  # the other speed is held against this one
+            self._track = values * SPEED_UNITS[unit or seen]
+        return True
+
+    def _unit_of_speed(self, column: NamedColumn) -> str:
+        """Return the unit that is stated or given; '' for none, or one of no speed."""
+        if column.unit:
+            return column.unit if column.unit in SPEED_UNITS else ''
+        return self._speed_unit
+
+    def _components(self) -> None:
+        east, north = self._one('east'), self._one('north')
+        if east is None or north is None:
+            return
+        unit = east.unit if east.unit == north.unit else ''
+        if not unit and self._track is not None:
+            unit = unit_of(
+                np.hypot(self._rows.values(east.place), self._rows.values(north.place)),
+                self._track,
+            )
+            if unit:
+                self.found.notes.append(
+                    f'{east.key!r}, {north.key!r} agree with the way between the positions in '
+                    f'{unit}.'
+                )
+        unit = unit or self._speed_unit
+        if unit in SPEED_UNITS:
+            self._take('speed_over_ground', [east, north], [unit, unit])
+        else:
+            self._doubt(
+                f'{east.key!r}, {north.key!r}: unit not known; --map '
+                f'{shlex.quote(f"speed_over_ground={east.typed},{north.typed}:m/s")}, or another'
+            )
+
+    def _heading(self) -> None:
+        column = self._one('heading')
+        if column is None:
+            return
+        largest = self._rows.largest(column.place)
+        if column.unit == 'rad' and column.key.lower() == 'heading_rad':
+            self._take('heading', [column], ['rad'])
+            self.found.notes.append(
+                f'{column.key!r} is taken as the input of this name, yaw from east to north.'
+            )
+        elif column.unit == 'deg' or (not column.unit and largest > _TURN):
+            self._take('heading', [column], [COMPASS])
+            self.found.notes.append(f'{column.key!r} is taken as degrees clockwise from north.')
+        else:
+            unit = column.unit if column.unit == 'rad' else COMPASS
+            self._doubt(
+                f'{column.key!r}: whether it is yaw or compass, or its unit, is not known; --map '
+                f'{shlex.quote(f"heading={column.typed}:{unit}")}, or rad deg '
+                'compass'
+            )
+
+    def _rudder(self) -> None:
+        column = self._one('rudder')
+        if column is None:
+            return
+        unit = column.unit or ('deg' if self._rows.largest(column.place) > _TURN else '')
+        if unit in ('deg', 'rad'):
+            self._take('rudder', [column], [unit])
+        else:
+            self._unit_unknown(column, 'rudder', 'deg')
+
+    def _wind(self) -> None:
+        speed, angle = self._one('aws'), self._one('awa')
+        if speed is None or angle is None:
+            return
+        unit = self._unit_of_speed(speed)
+        turn = angle.unit or ('deg' if self._rows.largest(angle.place) > _TURN else '')
+        if unit and turn in ('deg', 'rad'):
+            self._take('wind_apparent', [speed, angle], [unit, turn])
+        else:
+            turn = turn if turn in ('deg', 'rad') else 'deg'
+            typed = f'wind_apparent={speed.typed}:{_SPEED_UNIT},{angle.typed}:{turn}'
+            self._doubt(
+                f'{speed.key!r}, {angle.key!r}: unit not known; --speed-unit {_SPEED_UNIT} or '
+                f'm/s, or --map {shlex.quote(typed)}'
+            )
+
+    def _unit_unknown(self, column: NamedColumn, name: str, unit: str) -> None:
+        speeds = f'--speed-unit {unit} or m/s, or ' if unit in SPEED_UNITS else ''
+        self._doubt(
+            f'{column.key!r}: unit not known; {speeds}--map '
+            f'{shlex.quote(f"{name}={column.typed}:{unit}")}, or another unit'
+        )
+
+    def nothing(self) -> str:
+        """Say that nothing that moves is known, and what to type."""
+        path = self._rows.path
+        why = '; '.join(self.found.unclear) or (
+            f'its columns are {", ".join(map(repr, self._rows.header))}, and none has a '
+            'usual name of a speed or a position; say which it is, for instance --map '
+            'speed_over_ground=COLUMN:kn --map position=LAT,LON:deg'
+        )
+        return f'{path!r} gives no speed and no position in a unit that is known: {why}'
+
+
+def is_table(path: Path) -> bool:
+    """
+    Say whether a file can be read as a table with several columns or numbers alone.
+    """
+    try:
+        table = LogTable(path)
+    except ImportDataError:
+        return False
+    return table.width > 1 or table.header is None

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+A log of NMEA 0183 as sentences, and a count of what is none.
+"""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections.abc import Iterator
+from datetime import datetime
+from fractions import Fraction
+from io import BufferedReader, TextIOWrapper
+from pathlib import Path
+from typing import IO, cast
+
+from pynmeagps.nmeahelpers import calc_checksum
+
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
+from shipdrag_ros.progress import PartDone
+from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.sources.log import LIMIT_NS, Rejected
+from shipdrag_ros.sources.opened import check_unpacked, opened
+
+_UTF_16 = (b'\xff\xfe', b'\xfe\xff')
+_UTF_8_MARK = '\xef\xbb\xbf'  # as it looks in the encoding below
+# every byte is a character, so that checksums are those of the bytes
+_ENCODING = 'latin-1'
+_LINE = 4096  # a sentence has 82 characters; some with a prefix have more
+_TAG = re.compile(r'\\([^\\]*)\*([0-9A-Fa-f]{2})\\')
+_TAGS = re.compile(f'(?:{_TAG.pattern})+')
+_TAG_TIME = re.compile(r'(?:^|,)c:(\d{9,14})(?:,|$)')
+_EPOCH = re.compile(r'\[?(\d{9,10}|\d{13})(\.\d+)?\]?[\s,;:]*')
+_ISO = re.compile(
+    r'(?:\w{1,40}\s+)?\[?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d+))?'
+    r'(Z|[+-]\d\d:?\d\d)?\]?[\s,;:]*'
+)
+_MILLISECONDS_FROM = 100_000_000_000  # a count of seconds that large is past the year 5000
+
+
+class NmeaLog:
+    """
+    A log, plain or compressed with gzip.
+
+    Parameters
+    ----------
+    path
+        File with a sentence a line. Before a sentence may stand a TAG block,
+        or the time of its receipt: seconds or milliseconds since 1970, or ISO
+        8601, taken as UTC without a zone.
+    checksum
+        Of the sentences.
+
+    Attributes
+    ----------
+    checksum
+    rejected
+        Lines without a sentence by reason, of the last reading.
+    lines
+        Number of lines of the last reading.
+    damage
+        Why the last reading ended early, empty if it did not.
+
+    Raises
+    ------
+    ImportDataError
+        If the file cannot be read, is empty or in UTF-16.
+    """
+
+    def __init__(self, path: Path, *, checksum: Checksum = Checksum.REQUIRED) -> None:
+        self.path = path
+        self.checksum = checksum
+        self.rejected: dict[str, Rejected] = {}
+        self.lines = 0
+        self.damage = ''
+        try:
+            with opened(self.path) as (_, file):
+                start = file.read(2)
+        except (OSError, EOFError, zlib.error) as error:
+            reason = getattr(error, 'strerror', None) or str(error)
+            raise ImportDataError(
+                f'{str(path)!r} cannot be read: {reason}; give a log of NMEA 0183'
+            ) from error
+        if not start:
+            raise ImportDataError(f'{str(path)!r} is empty; give a log with a sentence a line')
+        if start in _UTF_16:
+            raise ImportDataError(f'{str(path)!r} is in UTF-16; save it as UTF-8')
+
+    def text(self, limit_bytes: int) -> str | None:
+        """
+        Return the whole log, or None if it is longer or no text in UTF-8.
+        """
+        with opened(self.path) as (_, file):
+            try:
+                raw = file.read(limit_bytes + 1)
+                return None if len(raw) > limit_bytes else raw.decode()
+            except (EOFError, OSError, zlib.error, UnicodeDecodeError):
+                return None
+
+    def sentences(self, progress: PartDone | None = None) -> Iterator[Sentence]:
+        """
+        Yield the sentences in the order of the log.
+
+        Parameters
+        ----------
+        progress
+            Called with how many bytes are read, and of how many.
+        """
+        self.rejected = {}
+        self.damage = ''
+        total = self.path.stat().st_size
+        with opened(self.path) as (raw, file):
+            for line in self._lines(raw, file):
+                if progress is not None and self.lines % 1000 == 0:
+                    progress(raw.tell(), total)
+                yield from self._of_line(self.lines, line)
+
+    def _lines(self, raw: IO[bytes], file: IO[bytes]) -> Iterator[str]:
+        """Yield lines ended by LF, CR or both; of a long one only its beginning."""
+        text = TextIOWrapper(cast(BufferedReader, file), encoding=_ENCODING)
+        self.lines = 0
+        size = 0
+        try:
+            while line := text.readline(_LINE):
+                self.lines += 1
+                rest = line
+                size += len(line)
+                while len(rest) == _LINE and not rest.endswith('\n'):
+                    rest = text.readline(_LINE)
+                    size += len(rest)
+                    if file is not raw:
+                        check_unpacked(self.path, size, raw.tell())
+                if file is not raw:
+                    check_unpacked(self.path, size, raw.tell())
+                if self.lines == 1:
+                    line = line.removeprefix(_UTF_8_MARK)
+                yield line.strip()
+        except (EOFError, OSError, zlib.error) as error:
+            self.damage = f'after line {self.lines}: {error}'
+        finally:
+            text.detach()  # whoever opened the file closes it
+
+    def _of_line(self, number: int, line: str) -> Iterator[Sentence]:
+        if len(line) >= _LINE - 1:
+            self._reject(f'longer than {_LINE} characters', number, line)
+            return
+        if not line:
+            return
+        # a lost line end leaves two sentences in a line
+        prefix, *texts = START.split(line)
+        if not texts:
+            self._reject('no sentence', number, line)
+            return
+        prefix = prefix.strip()
+        try:
+            receive_ns = _receive_ns(prefix) if prefix else None
+        except ValueError as error:
+            self._reject(str(error), number, prefix)
+            receive_ns = None
+        for text in texts:
+            try:
+                yield parse(text.strip(), self.checksum, line=number, receive_ns=receive_ns)
+            except ValueError as error:
+                self._reject(str(error), number, text)
+
+    def _reject(self, reason: str, number: int, text: str) -> None:
+        self.rejected.setdefault(reason, Rejected()).add(number, text)
+
+
+def _receive_ns(prefix: str) -> int | None:
+    """Return the time before a sentence [ns]; ValueError says why there is none."""
+    if _TAGS.fullmatch(prefix):
+        tags = _TAG.findall(prefix)
+        if any(calc_checksum(content) != checksum.upper() for content, checksum in tags):
+            raise ValueError('wrong checksum of a TAG block')
+        times = [found for content, _ in tags if (found := _TAG_TIME.search(content))]
+        if not times:
+            return None
+        receive_ns = _counted_ns(times[0][1], '')
+    elif epoch := _EPOCH.fullmatch(prefix):
+        receive_ns = _counted_ns(epoch[1], epoch[2] or '')
+    elif iso := _ISO.fullmatch(prefix):
+        try:
+            moment = datetime.fromisoformat(iso[1] + (iso[3] or 'Z'))
+        except ValueError:
+            raise ValueError('prefix not understood') from None
+        fraction = f'.{iso[2]}' if iso[2] else ''
+        receive_ns = int(moment.timestamp()) * SECOND_NS + _fraction_ns(fraction, SECOND_NS)
+    else:
+        raise ValueError('prefix not understood')
+    if not 0 <= receive_ns < LIMIT_NS:
+        raise ValueError('no possible date before it')
+    return receive_ns
+
+
+def _counted_ns(digits: str, fraction: str) -> int:
+    count = int(digits)
+    unit_ns = 1_000_000 if count >= _MILLISECONDS_FROM else SECOND_NS
+    return count * unit_ns + _fraction_ns(fraction, unit_ns)
+
+
+def _fraction_ns(text: str, unit_ns: int) -> int:
+    """Return `.25` of a unit exactly; none without text."""
+    return round(Fraction(f'0{text}') * unit_ns) if text else 0

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every format shares: what is read of a file, and what is left out of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from shipdrag_ros.bags.writer import BagWriter
+from shipdrag_ros.messages import EncodedMessage, input_type
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
+
+LIMIT_NS = 2**31 * SECOND_NS
+"""Of the stamp of a message."""
+
+BATCH_SAMPLES = 4096
+"""Taken at a time."""
+
+ATTACHMENT = 'import.yaml'
+"""Where a bag says what it was made from."""
+
+_FIRST_LINES = 3
+_SHOWN = 40  # characters of a cell
+
+
+@dataclass
+class Rejected:
+    """Cells or sentences rejected for one reason: how many, and the first of them."""
+
+    count: int = 0
+    first: list[str] = field(default_factory=list)
+
+    def add(self, line: int, text: str) -> None:
+        """
+        Count one more.
+        """
+        self.count += 1
+        if len(self.first) < _FIRST_LINES:
+            shown = text if len(text) <= _SHOWN else f'{text[:_SHOWN]}...'
+            self.first.append(f'line {line}: {shown!r}')
+
+
+@dataclass(frozen=True)
+class Understood:
+    """
+    What an input was taken from.
+
+    Attributes
+    ----------
+    input
+    source
+        Column, sentence or message.
+    unit
+        In which it stands there; '' where the format fixes it.
+    first
+        First value, in the unit of `Channel`.
+    geodetic
+        Whether it is a latitude and a longitude.
+    """
+
+    input: str
+    source: str
+    unit: str
+    first: tuple[float, ...]
+    geodetic: bool = False
+
+    def __str__(self) -> str:
+        unit = f' [{self.unit}]' if self.unit else ''
+        values = ', '.join(f'{value:.6g}' for value in self.first)
+        si = 'deg' if self.geodetic else _SI[self.input]
+        return f'{self.input} <- {self.source}{unit}, first {values} {si}'
+
+
+_SI = {
+    'speed_through_water': 'm/s',
+    'speed_over_ground': 'm/s',
+    'position': 'm',
+    'heading': 'rad (yaw)',
+    'shaft': 'rad/s (pitch: ratio or rad)',
+    'rudder': 'rad',
+    'wind_apparent': 'm/s (forward, to port)',
+    'depth': 'm',
+}
+_TWO_VALUES = (Channel.POSITION, Channel.POSITION_GEODETIC, Channel.WIND_APPARENT)
+
+
+class Log:
+    """
+    What was read of a file, or of several: samples in memory, or messages as they stand in it.
+
+    Attributes
+    ----------
+    blocks
+        Samples in order of arrival, their variances unknown.
+    messages
+        Yields the messages of a file that holds messages and no samples, in order of arrival;
+        None of others.
+    counts
+        Messages by topic and type.
+    attachments
+        Text by name.
+    first
+        First value of each channel, in its unit.
+    span_ns
+        First and last time of arrival [ns]; None without any.
+    """
+
+    def __init__(self) -> None:
+        self.blocks: list[Block] = []
+        self.messages: Callable[[], Iterator[EncodedMessage]] | None = None
+        self.counts: Counter[tuple[str, str]] = Counter()
+        self.attachments: dict[str, str] = {}
+        self.first: dict[Channel, tuple[float, ...]] = {}
+        self.span_ns: tuple[int, int] | None = None
+
+    def include(self, *received_ns: int) -> None:
+        """
+        Widen the span by times of arrival [ns].
+        """
+        times = (*(self.span_ns or ()), *received_ns)
+        self.span_ns = (min(times), max(times))
+
+    def write_samples(self, block: Block) -> None:
+        """
+        Take samples that arrived after those before.
+        """
+        for number, place, count in zip(
+            *np.unique(block.channel, return_index=True, return_counts=True), strict=True
+        ):
+            channel = Channel(number)
+            if channel not in self.first:
+                values = block.value[place, : 2 if channel in _TWO_VALUES else 1]
+                self.first[channel] = tuple(values.tolist())
+            self.counts[key_of(channel)] += int(count)
+        if len(block):
+            self.include(int(block.receive_ns[0]), int(block.receive_ns[-1]))
+            self.blocks.append(block)
+
+    def attach(self, name: str, text: str) -> None:
+        """
+        Take a text that belongs to the samples.
+        """
+        self.attachments[name] = text
+
+    def copy_to(self, bag: BagWriter) -> None:
+        """
+        Write all of it into a bag.
+
+        Raises
+        ------
+        BagError
+            If the disk does not take it.
+        """
+        for name, text in self.attachments.items():
+            bag.attach(name, text)
+        for block in self.blocks:
+            bag.write_samples(block)
+        for message in self.messages() if self.messages is not None else ():
+            bag.write(
+                message.topic,
+                message.type,
+                message.payload,
+                log_ns=message.log_ns,
+                publish_ns=message.publish_ns,
+            )
+
+
+def key_of(channel: Channel) -> tuple[str, str]:
+    """
+    Return topic and type that samples of a channel have in a bag.
+    """
+    return f'/{channel.input}', input_type(channel)
+
+
+@contextmanager
+def new_bag(out: Path, attachments: Mapping[str, str]) -> Iterator[BagWriter]:
+    """
+    Open a bag to write into; where that fails, none is left.
+
+    Parameters
+    ----------
+    out
+        MCAP file to make.
+    attachments
+        Text by name, a ship file for instance.
+
+    Raises
+    ------
+    BagError
+        If the bag cannot be made.
+    """
+    writer = BagWriter(out)
+    try:
+        with writer:
+            for name, text in attachments.items():
+                writer.attach(name, text)
+            yield writer
+    except BaseException:
+        out.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,299 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A text file as a table: its delimiter, its header if it has one, its rows."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import gzip
+import re
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from io import BufferedReader, TextIOWrapper
+from pathlib import Path
+from typing import IO, NamedTuple, cast
+
+from shipdrag_ros.display import NUMBER
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.progress import PartDone
+from shipdrag_ros.sources.formats.csv.names import role_and_unit
+from shipdrag_ros.sources.opened import check_unpacked, opened
+
+DELIMITERS = ',;\t|'
+BLANKS = ' '
+"""Delimiter of a table whose columns stand apart by blanks alone."""
+
+_SAMPLE_LINES = 400
+_LINE = 1 << 20  # characters; no row of a table is as long
+_DATE = re.compile(r'\d{1,4}[-/.]\d{1,2}[-/.]\d{1,4}([T ].*)?|\d{1,2}:\d\d(:\d\d.*)?')
+UNITS = (
+    *('m/s', 'mps', 'kn', 'kt', 'kts', 'knot', 'knots', 'km/h', 'kmh', 'kph', 'ft/s', 'fps'),
+    'mph',
+    *('rad', 'deg', '°', 'rad/s', 'rpm', '1/min', 'min-1', 'rps', 'rev/s', '1/s', 's-1', 'hz'),
+    *('s', 'ms', 'us', 'ns', 'sec', 'm', 'km', 'ft', 'nmi', 'nm', '%', 'utc', 'hh:mm:ss'),
+)
+"""What stands in a line of units."""
+
+_UNIT = re.compile(r'[\[(]?([^\[\]()]*)[\])]?')
+
+
+class LogRow(NamedTuple):
+    """The cells of a row, stripped, and the line it ends on."""
+
+    line: int
+    cells: Sequence[str]
+
+
+class _Layout(NamedTuple):
+    """How the lines of a table hang together: lines of a title before it, and its delimiter."""
+
+    titles: int
+    delimiter: str
+    cells: Sequence[str]
+
+
+class LogTable:
+    """
+    A table in a file.
+
+    Parameters
+    ----------
+    path
+        UTF-8, with or without a byte-order mark, plain or packed with gzip;
+        separated by comma, semicolon, tab or bar, or by blanks alone. Lines of a
+        title may stand before it, and a line of units below the header.
+
+    Attributes
+    ----------
+    delimiter
+        One of `DELIMITERS`, or `BLANKS`.
+    header
+        Names of the columns; None if the first line holds measurements.
+    units
+        What stands below the header in a line of units; None without one.
+    titles
+        Lines before the table.
+    width
+        Number of columns.
+    joined_lines
+        Lines that the last reading of the rows took as part of a cell in quotation marks.
+
+    Raises
+    ------
+    ImportDataError
+        If the file cannot be read or has no line.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.joined_lines = 0
+        lines = self._first_lines()
+        first = lines[0][1] if lines else ''
+        if not first:
+            raise ImportDataError(f'{str(path)!r} is empty; give a table with a line a sample')
+        if '\0' in first or first.startswith('PK'):  # as spreadsheets begin, which are archives
+            raise ImportDataError(
+                f'{str(path)!r} is no text, it begins with {first[:4]!r}; save it as CSV'
+            )
+        layout = self._layout([line for _, line in lines])
+        self.delimiter = layout.delimiter
+        self.titles = tuple(line.strip() for _, line in lines[: layout.titles])
+        self._skip = lines[layout.titles][0] - 1
+        if not layout.cells:
+            raise ImportDataError(
+                f'{str(path)!r} holds no cell; give a table with a line a sample'
+            )
+        cells = [layout.cells[0].lstrip('# '), *layout.cells[1:]]
+        measured = [_is_measured(cell) for cell in cells if cell]
+        self.header: tuple[str, ...] | None = None
+        if 2 * sum(measured) < len(measured):
+            self.header = tuple(cells)
+        self.width = len(cells)
+        below = lines[layout.titles + 1][1] if len(lines) > layout.titles + 1 else ''
+        self.units = None if self.header is None else _units(self._cells(below, self.delimiter))
+
+    def _first_lines(self) -> list[tuple[int, str]]:
+        """Return the first lines that are not blank, with their numbers."""
+        blank = DELIMITERS + ' \r\n'
+        found = []
+        try:
+            with self._decoded() as (_, file):
+                for number, line in enumerate(self._lines(file), start=1):
+                    if line.strip(blank).strip():
+                        found.append((number, line))
+                    if len(found) >= _SAMPLE_LINES or number > 10_000:
+                        break
+        except OSError as error:
+            raise ImportDataError(
+                f'{str(self.path)!r} cannot be read: {error.strerror or error}; give a CSV file'
+            ) from error
+        return found
+
+    def _layout(self, lines: Sequence[str]) -> _Layout:
+        """Find the delimiter that makes rows of the lines, and the first of these."""
+        best: tuple[tuple[int, int], _Layout] | None = None
+        for mark in DELIMITERS:
+            rows = [self._cells(line, mark) for line in lines]
+            start = _first_row(rows)
+            if start is None:
+                continue
+            score = (-start, len(rows[start]))
+            if best is None or score > best[0]:
+                best = (score, _Layout(start, mark, rows[start]))
+        if best is not None:
+            return best[1]
+        rows = [line.split() for line in lines]
+        width = len(rows[-1])
+        start = next(place for place, row in enumerate(rows) if len(row) == width)
+        same = sum(len(row) == width for row in rows[start:])
+        if width > 1 and same >= 0.8 * len(rows[start:]) and _DATE.match(rows[-1][0]):
+            return _Layout(start, BLANKS, rows[start])
+        return _Layout(0, DELIMITERS[0], self._cells(lines[0], DELIMITERS[0]))
+
+    def column(self, name: str) -> int:
+        """
+        Return the place of a column given by name or number.
+
+        Raises
+        ------
+        ImportDataError
+            If there is none, or several of the name.
+        """
+        names = self.header or ()
+        found = [place for place, each in enumerate(names) if each == name]
+        if len(found) > 1:
+            numbers = ' or '.join(str(place + 1) for place in found)
+            raise ImportDataError(
+                f'{str(self.path)!r} has {len(found)} columns {name!r}; write a number: {numbers}'
+            )
+        if found:
+            return found[0]
+        if name.isdecimal() and 1 <= int(name) <= self.width:
+            return int(name) - 1
+        listed = ', '.join(repr(each) for each in names) or 'no header'
+        hint = f'and numbers 1 to {self.width} are names too'
+        if self.width == 1:
+            hint = 'and no comma, semicolon or tab that would separate columns'
+        raise ImportDataError(
+            f'{str(self.path)!r} has no column {name!r}; it has {listed}, {hint}'
+        )
+
+    def rows(self, progress: PartDone | None = None) -> Iterator[LogRow]:
+        """
+        Yield the rows below the header; lines without any cell are skipped.
+
+        Parameters
+        ----------
+        progress
+            Called with how many bytes are read, and of how many.
+        """
+        total = self.path.stat().st_size
+        above = (self.header is not None) + (self.units is not None)
+        self.joined_lines = 0
+        with self._decoded() as (raw, file):
+            lines = self._lines(file, raw)
+            for _ in range(self._skip):
+                next(lines, None)
+            for count, row in enumerate(self._rows(lines, self.delimiter, self._skip)):
+                if count < above:
+                    continue
+                if progress is not None and count % 1000 == 0:
+                    progress(raw.tell(), total)
+                yield row
+
+    def _cells(self, line: str, delimiter: str) -> Sequence[str]:
+        return next((row.cells for row in self._rows([line], delimiter)), ())
+
+    def _rows(self, lines: Iterable[str], delimiter: str, above: int = 0) -> Iterator[LogRow]:
+        if delimiter == BLANKS:
+            for number, line in enumerate(lines, start=above + 1):
+                if line.strip():
+                    yield LogRow(number, line.split())
+            return
+        reader = csv.reader(lines, delimiter=delimiter)
+        try:
+            last = 0
+            for cells in reader:
+                self.joined_lines += reader.line_num - last - 1
+                last = reader.line_num
+                stripped = [cell.strip() for cell in cells]
+                if any(stripped):
+                    yield LogRow(above + reader.line_num, stripped)
+        except csv.Error as error:
+            raise ImportDataError(
+                f'{str(self.path)!r} line {above + reader.line_num} is no row of a table: {error}'
+            ) from error
+
+    def _lines(self, file: TextIOWrapper, raw: IO[bytes] | None = None) -> Iterator[str]:
+        """Yield lines of a sane length, of a packed file that unpacks to a sane size."""
+        number = size = 0
+        try:
+            while line := file.readline(_LINE):
+                number += 1
+                size += len(line)
+                if len(line) == _LINE:
+                    raise ImportDataError(
+                        f'{str(self.path)!r} line {number} is no row of a table: it is longer '
+                        f'than {_LINE} characters'
+                    )
+                if raw is not None and file.buffer is not raw:
+                    check_unpacked(self.path, size, raw.tell())
+                yield line
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise ImportDataError(
+                f'{str(self.path)!r} cannot be unpacked after line {number}: {error}'
+            ) from error
+
+    @contextmanager
+    def _decoded(self) -> Iterator[tuple[IO[bytes], TextIOWrapper]]:
+        with opened(self.path) as (raw, file):
+            reader = cast(BufferedReader, file)
+            try:
+                start = reader.peek(2)
+            except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+                raise ImportDataError(f'{str(self.path)!r} cannot be unpacked: {error}') from error
+            if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+                raise ImportDataError(f'{str(self.path)!r} is in UTF-16; save it as UTF-8')
+            # a name that is not UTF-8 may still be given by its number
+            with TextIOWrapper(reader, encoding='utf-8-sig', errors='replace', newline='') as text:
+                yield raw, text
+
+
+def _first_row(rows: Sequence[Sequence[str]]) -> int | None:
+    """
+    Return where a table of several columns begins, None where the rows make none.
+
+    Its last rows show its width, whatever stands above; its first row is one of that
+    width of which most of those below are too.
+    """
+    below = rows[len(rows) // 2 :]
+    usual = Counter(map(len, below)).most_common(1)[0][0]
+    near = [len(row) > 1 and abs(len(row) - usual) <= 1 for row in rows]
+    for start, row in enumerate(rows):
+        # a title of a spreadsheet is followed by empty cells
+        if not near[start] or sum(map(bool, row)) < 2:
+            continue
+        rest = near[start:]
+        if sum(rest) >= 0.6 * len(rest) and sum(rest[:5]) >= 0.7 * len(rest[:5]):
+            # titles may be as wide as the table: the header is the line with known names
+            names = [
+                0 if any(map(_is_measured, row)) else sum(bool(role_and_unit(c)[0]) for c in row)
+                for row in rows[start:]
+            ]
+            return start + names.index(max(names))
+    return None
+
+
+def _is_measured(cell: str) -> bool:
+    return bool(NUMBER.fullmatch(cell) or _DATE.fullmatch(cell))
+
+
+def _units(cells: Sequence[str]) -> tuple[str, ...] | None:
+    """Return the units of a line that holds nothing else; None of any other line."""
+    found = [match[1].strip() if (match := _UNIT.fullmatch(cell)) else cell for cell in cells]
+    known = sum(each.lower() in UNITS for each in found)
+    if not known or any(map(_is_measured, cells)):
+        return None
+    return tuple(found)

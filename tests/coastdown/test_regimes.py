@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bank of histories: what it finds, dates and dismisses, and that cutting changes no bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.coastdown.events import (
+    Dismissal,
+    EndedBy,
+    EndedCoastdown,
+    NotCoastdown,
+)
+from shipdrag_ros.coastdown.regimes.numbers import NUMBERS, table
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel
+from shipdrag_ros.simulation import EngineOrder, GaussMarkov, Sensor
+
+START_NS = 1_700_000_000_000_000_000
+S = 1_000_000_000
+FILTER = Parameters(regimes='filter', update_s=60.0)
+LOG = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.03, coloured=GaussMarkov(0.01, 30.0))
+SHAFT = Sensor(channel=Channel.SHAFT, sd=0.05)
+TRACK = Sensor(channel=Channel.POSITION, sd=1.0)
+COMPASS = Sensor(channel=Channel.HEADING, sd=0.01)
+
+
+def window_only(window, ship, parameters):
+    return window
+
+
+def events_of(ship, block: Block, places=()) -> list:
+    monitor = Monitor(ship, FILTER, estimate=window_only, final=window_only)
+    events = []
+    for first, last in zip([0, *places], [*places, len(block)], strict=True):
+        events += monitor.update(block[first:last])
+    return events + monitor.finish()
+
+
+def of(kind, events):
+    return [event for event in events if isinstance(event, kind)]
+
+
+@pytest.mark.parametrize(
+    ('sensors', 'within_s'),
+    [((LOG,), 20.0), ((LOG, SHAFT), 15.0), ((TRACK, COMPASS), 30.0), ((LOG, TRACK), 20.0)],
+)
+@pytest.mark.parametrize('seed', [1, 2])
+def test_a_coastdown_is_found_and_dated(ship, record, sensors, within_s, seed) -> None:
+    block = record(sensors=sensors, seed=seed)
+    (ended,) = [each for each in of(EndedCoastdown, events_of(ship, block)) if not each.withdrawn]
+    assert abs(ended.start_ns - START_NS - 900 * S) < within_s * S
+    assert ended.end_ns > START_NS + 1700 * S
+    assert ended.estimate is not None
+
+
+@pytest.mark.parametrize('sensors', [(LOG,), (LOG, SHAFT)])
+@pytest.mark.parametrize('seed', [1, 2])
+def test_less_power_is_no_coastdown_and_is_named(ship, record, sensors, seed) -> None:
+    orders = (EngineOrder(0.0, shaft=0.7, thrust=0.49),)
+    events = events_of(ship, record(sensors=sensors, seed=seed, orders=orders))
+    assert not [each for each in of(EndedCoastdown, events) if not each.withdrawn]
+    assert {each.reason for each in of(NotCoastdown, events)} == {Dismissal.SETTLED}
+
+
+def test_an_engine_that_is_engaged_ends_it(ship, record) -> None:
+    orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(400.0, shaft=1.0, thrust=1.0))
+    events = events_of(ship, record(sensors=(LOG, SHAFT), orders=orders, duration_s=1200.0))
+    (ended,) = [each for each in of(EndedCoastdown, events) if not each.withdrawn]
+    assert ended.ended_by is EndedBy.ENGINE
+    assert abs(ended.end_ns - START_NS - 1300 * S) < 30 * S
+
+
+@given(seed=st.integers(0, 2**16))
+@settings(max_examples=5, deadline=None)
+def test_how_a_record_is_cut_changes_no_bit(ship, record, bits, seed) -> None:
+    block = record(sensors=(LOG, SHAFT), seed=4)
+    whole = events_of(ship, block)
+    assert of(EndedCoastdown, whole)
+    places = np.sort(np.random.default_rng(seed).integers(0, len(block), 40)).tolist()
+    assert bits(events_of(ship, block, places)) == bits(whole)
+
+
+def test_the_docs_print_the_numbers_of_the_code() -> None:
+    page = (Path(__file__).resolve().parents[2] / 'docs' / 'regimes.md').read_text()
+    assert table() in page
+    assert all(each.unit and each.source for each in NUMBERS)

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The scale of a log is unknown by 2 %, whether or not another input can show it."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
+from shipdrag_ros.estimation.ode_fit.coast import CURRENT
+from shipdrag_ros.estimation.ode_fit.first_fits import fit_robustly
+from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
+from shipdrag_ros.estimation.ode_fit.problem import Problem
+from shipdrag_ros.estimation.ode_fit.record import RunRows
+from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.inference.rows import LOG_SCALE_SD
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import Block, Channel, in_arrival_order
+from shipdrag_ros.ship import Ship
+
+SHIP = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
+DRAG_1_M, NOISE_M_S = 3e-4, 0.02  # v' = -DRAG v^2
+AT_M_S = 5.0
+
+
+def _window(scale: float, *, position: bool) -> Window:
+    time_s = np.arange(900.0)
+    stamps = (time_s * 1e9).astype(np.int64) + 10**15
+    rng = np.random.default_rng(0)
+    speed = 1.0 / (1.0 / 8.2 + DRAG_1_M * time_s)
+    read = (1.0 + scale) * speed + rng.normal(0.0, NOISE_M_S, 900)
+    blocks = [Block.of(Channel.SPEED_THROUGH_WATER, stamps, read)]
+    if position:
+        way = np.log1p(8.2 * DRAG_1_M * time_s) / DRAG_1_M
+        place = np.c_[way, 0.0 * way] + rng.normal(0.0, 1.0, (900, 2))
+        blocks.append(Block.of(Channel.POSITION, stamps, place))
+    return Window.from_block(in_arrival_order(blocks), int(stamps[0]), int(stamps[-1]))
+
+
+@pytest.mark.parametrize('scale', [-0.03, 0.02])
+@pytest.mark.parametrize('estimator', [estimate, estimate_final])
+def test_the_band_of_a_log_alone_holds_its_scale(estimator, scale: float) -> None:  # type: ignore[no-untyped-def]
+    curve = estimator(_window(scale, position=False), SHIP, Parameters()).valid_curve
+    r, sigma = (
+        float(np.interp(AT_M_S, curve.speed_m_s, each))
+        for each in (curve.resistance_m_s2, curve.sigma_repeatable_m_s2)
+    )
+    true = (1.0 + float(SHIP.n_r(AT_M_S))) * DRAG_1_M * AT_M_S**2
+    assert abs(r - true) < 2.0 * sigma
+    # r at a speed goes with the scale where it is quadratic
+    assert sigma == pytest.approx(LOG_SCALE_SD * r, rel=0.4)
+
+
+def test_positions_show_the_scale_and_it_is_said() -> None:
+    found = estimate_final(_window(0.02, position=True), SHIP, Parameters())
+    curve = found.valid_curve
+    r, sigma = (
+        float(np.interp(AT_M_S, curve.speed_m_s, each))
+        for each in (curve.resistance_m_s2, curve.sigma_repeatable_m_s2)
+    )
+    true = (1.0 + float(SHIP.n_r(AT_M_S))) * DRAG_1_M * AT_M_S**2
+    assert abs(r - true) < 3.0 * sigma
+    assert sigma < 0.5 * LOG_SCALE_SD * r
+    assert any('the log reads +' in note and 'in the band' in note for note in found.notes)
+
+
+def test_an_unknown_that_no_row_shows_is_no_error() -> None:
+    # a current, of a log alone: without a prior nothing holds it
+    window = _window(0.0, position=False)
+    run_down = RunDown.of(window, SHIP)
+    record = RunRows.of(window, run_down, Parameters())
+    guess = InitialGuess.of(record.coast, float(SHIP.n_r(1.0)))
+    problem = Problem.of(record, run_down, SHIP, guess)
+    first, _ = fit_robustly(problem)
+    near = problem.whole(first)
+    assert problem.average(near) is not None
+    blind = problem.__class__(**{**vars(problem), 'extras': (*problem.extras, CURRENT)})
+    assert blind.average(near) is None
+    assert ode_fit.estimate(window, SHIP, Parameters()).curve is not None

@@ -1,0 +1,214 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Peers that were there first, peers that flood, peers of the same name: over real DDS and UDP."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from pynmeagps.nmeahelpers import calc_checksum
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.messages import encode
+from shipdrag_ros.replay import replay
+from shipdrag_ros.samples import Block, Channel
+
+PREFERRED = 'geometry_msgs/msg/TwistWithCovarianceStamped'
+PLAIN = 'geometry_msgs/msg/TwistStamped'
+PART = 'input speed_through_water'
+
+
+def values(status: Any) -> dict[str, str]:
+    return {item.key: item.value for item in status.values}
+
+
+def twist(speed_m_s: float) -> Any:
+    from geometry_msgs.msg import TwistStamped
+
+    message = TwistStamped()
+    now_ns = time.time_ns()
+    message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, 10**9)
+    message.twist.linear.x = speed_m_s
+    return message
+
+
+def preferred(speed_m_s: float) -> bytes:
+    block = Block.of(Channel.SPEED_THROUGH_WATER, [time.time_ns()], [speed_m_s])
+    (message,) = encode(block)
+    return message.payload
+
+
+class Driver:
+    """A publisher of its own context, which sends at a rate until it is closed."""
+
+    def __init__(self, peer: Any, type_name: str, message: Any, rate_hz: float) -> None:
+        self._peer = type(peer)()
+        publisher = self._peer.advertise('/speed_through_water', type_name)
+        self._ended = threading.Event()
+
+        def send() -> None:
+            speed = 5.0
+            while not self._ended.wait(1.0 / rate_hz):
+                speed += 1e-4
+                publisher.publish(message(speed))
+
+        self._thread = threading.Thread(target=send)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._ended.set()
+        self._thread.join()
+        self._peer.close()
+
+
+@pytest.mark.parametrize('first', ['gone', 'silent', 'no number'])
+def test_a_peer_of_another_type_that_was_there_first_does_not_keep_an_input(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path, first: str
+) -> None:
+    node = start_node()
+    other = type(peer)()
+    early = other.advertise('/speed_through_water', PREFERRED)
+    diagnostics.wait_for(PART, PREFERRED, value='type')
+    if first == 'gone':
+        other.close()
+    elif first == 'no number':
+        bad = Driver(peer, PREFERRED, lambda _: preferred(float('nan')), 2.0)
+    late = Driver(peer, PLAIN, twist, 10.0)
+    try:
+        diagnostics.wait_for(PART, PLAIN, value='type')
+        peer.spin_until(lambda: int(values(diagnostics.of(PART)).get('used', '0')) >= 20)
+    finally:
+        late.close()
+        if first == 'no number':
+            bad.close()
+        if first != 'gone':
+            del early
+            other.close()
+    assert node.stop() == 0
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    (run,) = open_runs([bag])
+    result = replay(run)
+    assert result.inputs['speed_through_water'].used >= 20
+    assert result.recorded.first_difference is None
+
+
+def test_a_sentence_a_second_does_not_shadow_a_topic_at_10_hz(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(('127.0.0.1', 0))
+        port = probe.getsockname()[1]
+    node = start_node(nmea=f'udp://127.0.0.1:{port}')
+    ended = threading.Event()
+
+    def talk() -> None:
+        text = 'IIVHW,,T,,M,10.0,N,,K'
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            while not ended.wait(1.0):
+                sentence = f'${text}*{calc_checksum(text)}\r\n'
+                line.sendto(sentence.encode(), ('127.0.0.1', port))
+
+    talking = threading.Thread(target=talk)
+    talking.start()
+    try:
+        diagnostics.wait_for(PART, f'NMEA udp://127.0.0.1:{port}', value='fed by')
+        driver = Driver(peer, PLAIN, twist, 10.0)
+        try:
+            node.wait_for_log('speed_through_water: now from a topic, no longer from NMEA')
+            diagnostics.wait_for(PART, PLAIN, value='type')
+        finally:
+            driver.close()
+        # the topic dies: NMEA is there again
+        node.wait_for_log('speed_through_water: now from NMEA, no longer from a topic')
+    finally:
+        ended.set()
+        talking.join()
+    assert node.stop() == 0
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    (run,) = open_runs([bag])
+    assert replay(run).recorded.first_difference is None
+
+
+def test_a_flood_on_one_input_delays_no_other(
+    start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
+) -> None:
+    node = start_node()
+    ground = peer.advertise('/speed_over_ground', PREFERRED)
+    peer.wait_for_listener(ground)
+    flood = Driver(peer, PLAIN, twist, 20_000.0)
+    sent = []
+    try:
+        end_s = time.monotonic() + 15.0
+        while time.monotonic() < end_s:
+            block = Block.of(Channel.SPEED_OVER_GROUND, [time.time_ns()], [[5.0, 0.0]])
+            sent.append(int(block.stamp_ns[0]))
+            (message,) = encode(block)
+            ground.publish(message.payload)
+            peer.spin_for(0.1)
+        diagnostics.wait_for(PART, 'over 1000 a second')
+    finally:
+        flood.close()
+    assert node.stop() == 0
+    (bag,) = (tmp_path / 'bags').glob('*.mcap')
+    (run,) = open_runs([bag])
+    lags = [
+        (block.receive_ns - block.stamp_ns)[block.channel == Channel.SPEED_OVER_GROUND] * 1e-9
+        for block in run.inputs()
+        if isinstance(block, Block)
+    ]
+    lag_s = np.concatenate(lags)
+    assert len(lag_s) == len(sent)
+    assert float(np.median(lag_s)) < 0.2
+    assert float(lag_s.max()) < 2.0
+
+
+def test_a_node_of_the_same_name_is_said(start_node: Any, peer: Any, diagnostics: Any) -> None:
+    start_node()
+    namesake = type(peer)('coastdown_node')
+    try:
+        status = diagnostics.wait_for('state', '2 nodes have the name of this one')
+        assert status.level >= b'\x01'
+    finally:
+        namesake.close()
+
+
+def test_control_characters_of_a_peer_do_not_reach_the_terminal(
+    start_node: Any, peer: Any
+) -> None:
+    node = start_node()
+    assert not peer.change_state('\x1b]0;owned\x07')
+    node.wait_for_log('transition refused')
+    assert '\x1b]' not in node.log
+    assert '\x07' not in node.log
+
+
+@pytest.mark.parametrize('kind', ['SetParameters', 'GetParameters', 'DescribeParameters'])
+def test_a_giant_request_is_refused_and_others_are_answered(
+    start_node: Any, peer: Any, kind: str
+) -> None:
+    import rcl_interfaces.srv as services
+    from rclpy.parameter import Parameter as Value
+
+    start_node()
+    service = getattr(services, kind)
+    request = service.Request()
+    if kind == 'SetParameters':
+        request.parameters = [Value('window_s', value=900.0).to_parameter_msg()] * 30_000
+    else:
+        request.names = ['window_s'] * 300_000
+    words = {'SetParameters': 'set', 'GetParameters': 'get', 'DescribeParameters': 'describe'}
+    begin_s = time.monotonic()
+    answer = peer.call(f'/coastdown_node/{words[kind]}_parameters', request, service)
+    assert time.monotonic() - begin_s < 15.0
+    if kind == 'SetParameters':
+        assert len(answer.results) == 1000
+        assert 'more than 1000 entries' in answer.results[0].reason
+    assert peer.state() == 'active'

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Derivatives, closed forms, and evidence against sampling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.inference.gaussian import products_of
+from shipdrag_ros.inference.noise import WHITE, Noise, whiten
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.inference.settings import SENSORS_ALONE
+from shipdrag_ros.posterior import motion
+from shipdrag_ros.posterior.laplace import Families, mix, of_family
+from shipdrag_ros.posterior.motion import predict
+from shipdrag_ros.posterior.problem import RunModel, StopPrior
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+
+
+def problem_of(ship: Ship, *, seed: int = 0) -> RunModel:
+    """Set up 120 rows of the model's own motion, three inputs with white noise."""
+    rng = np.random.default_rng(seed)
+    time_s = np.sort(np.concatenate([rng.uniform(-300.0, 0.0, 40), rng.uniform(0.0, 900.0, 80)]))
+    kind = np.resize([LOG, OVER_GROUND, POSITION], 120)
+    variance = np.where(kind == POSITION, 25.0, 0.02**2)
+    rows = Rows(time_s, kind, np.zeros(120))
+    empty = RunModel.of(
+        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, low_m_s=4.0
+    )
+    exact = -predict(empty.forces, empty.start, empty.grid_s, rows)[0][0]
+    rows = rows._replace(value=exact + np.sqrt(variance) * rng.standard_normal(120))
+    return RunModel.of(
+        rows, variance, 40, ship, StopPrior(5.0, 8.0, 2.0), speed_m_s=8.0, low_m_s=4.0
+    )
+
+
+def test_derivatives_are_those_of_the_prediction(ship: Ship) -> None:
+    problem = problem_of(ship)
+    k = problem.coefficients
+    now = problem.start.copy()
+    now[:k] += 0.01
+    now[k + motion.STOP], now[k + motion.LAG], now[k + motion.GROUND_LAG] = 1.3, 4.0, 2.0
+    now[k + motion.SCALE], now[k + motion.CURRENT] = 0.01, 0.2
+
+    def predicted(unknowns: Float64) -> Float64:
+        return -predict(problem.forces, unknowns, problem.grid_s, problem.rows)[0][0]
+
+    table, _ = predict(problem.forces, now, problem.grid_s, problem.rows)
+    for place in range(len(now)):
+        step = np.zeros(len(now))
+        step[place] = 1e-5
+        by = (predicted(now + step) - predicted(now - step)) / 2e-5
+        size = max(float(np.abs(by).max()), 1e-3)
+        # where a reading is taken at a node of a table, the slope jumps a little
+        np.testing.assert_allclose(table[1 + place], by, rtol=0.0, atol=0.01 * size)
+
+
+def test_motion_of_quadratic_drag_is_exact(ship: Ship) -> None:
+    # du/dt = -c u^2 / (1 + n): u = u0 / (1 + c u0 t / (1 + n))
+    grid = np.linspace(0.0, 10.0, 41)
+    c, n = 5e-4, 0.05
+    value = np.stack([c * grid**2, 2.0 * c * grid])
+    inertia = np.stack([np.full(41, 1.0 + n), np.zeros(41)])
+    forces = motion.Forces(0.25, value, np.zeros((2, 0, 41)), inertia, 0.0)
+    unknowns = np.zeros(motion.EXTRAS)
+    unknowns[motion.SPEED] = 8.0
+    time_s = np.linspace(0.0, 1000.0, 50)
+    rows = Rows(time_s, np.full(50, LOG), np.zeros(50))
+    table, _ = predict(forces, unknowns, np.linspace(0.0, 1000.0, 81), rows)
+    np.testing.assert_allclose(-table[0], 8.0 / (1.0 + c * 8.0 * time_s / (1.0 + n)), rtol=1e-6)
+
+
+def test_a_linear_model_has_its_closed_form() -> None:
+    rng = np.random.default_rng(2)
+    n, p = 30, 4
+    columns, value = rng.standard_normal((p, n)), rng.standard_normal(n)
+    mean, sd, variance = rng.standard_normal(p), rng.uniform(0.5, 2.0, p), 0.3
+    rows = Rows(np.arange(n, dtype=float), np.zeros(n, np.int64), value)
+    ones = np.ones(n)
+    noise = Noise(np.full(n, variance), WHITE, ones, ones)
+    families = Families(mean[None], 1.0 / sd[None] ** 2, np.zeros(1))
+    table = np.concatenate([value[None], columns])
+    step, covariance, weight = mix(table, rows, noise, 0, SENSORS_ALONE, families)
+    exact = np.linalg.inv(columns @ columns.T / variance + np.diag(sd**-2.0))
+    np.testing.assert_allclose(covariance, exact, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        step, exact @ (columns @ value / variance + mean / sd**2), rtol=1e-9
+    )
+    assert weight == pytest.approx(1.0)
+    # the evidence is the density of the readings under N(mean columns, columns' sd^2 columns + 1)
+    log_det = whiten(rows, table, noise)
+    _, log_evidence, *_ = of_family(products_of(table), mean, sd**-2.0)
+    of_rows = columns.T * sd**2 @ columns + variance * np.eye(n)
+    away = value - mean @ columns
+    wanted = -0.5 * (away @ np.linalg.solve(of_rows, away) + np.linalg.slogdet(of_rows)[1])
+    assert log_evidence - 0.5 * log_det == pytest.approx(wanted, abs=1e-8)
+
+
+@pytest.mark.parametrize('seed', [0, 1])
+def test_log_evidence_is_that_of_long_sampling(ship: Ship, seed: int) -> None:
+    # 4000 points by importance, seeds 0 and 1; the motion is not linear, within 0.5
+    problem = problem_of(ship, seed=seed)
+    family = problem.families[0]
+
+    def log_joint(unknowns: Float64) -> float:
+        table, _ = predict(problem.forces, unknowns, problem.grid_s, problem.rows)
+        white = table[:1] / np.sqrt(problem.white.variance)
+        away = unknowns - family.mean
+        of_prior = 0.5 * np.log(family.precision) - 0.5 * family.precision * away**2
+        return float(-0.5 * (white**2).sum() + of_prior.sum())
+
+    now = family.mean.copy()
+    for _ in range(6):
+        table, _ = predict(problem.forces, now, problem.grid_s, problem.rows)
+        table /= np.sqrt(problem.white.variance)
+        _, log_evidence, step, lower, scale = of_family(
+            products_of(table), family.mean - now, family.precision
+        )
+        now = now + step
+    covariance = np.linalg.inv((lower / scale[:, None]) @ (lower / scale[:, None]).T)
+    root = np.linalg.cholesky(covariance) * 1.1
+    z = np.random.default_rng(seed).standard_normal((4000, len(now)))
+    log_of_draw = -0.5 * (z**2).sum(axis=1) - np.log(np.diag(root)).sum()
+    ratio = np.array([log_joint(now + root @ each) for each in z]) - log_of_draw
+    sampled = ratio.max() + np.log(np.mean(np.exp(ratio - ratio.max())))
+    assert log_evidence == pytest.approx(sampled, abs=0.5)

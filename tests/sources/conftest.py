@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A ship to sail with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shipdrag_ros.sources.log import Log, new_bag
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope='session')
+def ship_file() -> Path:
+    return ROOT / 'config' / 'vitus_bering.yaml'
+
+
+def into_bag(read: Callable[..., Any], source: Path, out: Path, *args: Any, **options: Any) -> Any:
+    """Read a log into a bag, as `shipdrag import` does."""
+    with new_bag(out, {}) as bag:
+        log = Log()
+        result = read(source, log, *args, **options)
+        log.copy_to(bag)
+    return result

@@ -1,0 +1,458 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tables of every make come in whole, and what does not is told by line."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shipdrag_ros.bags import open_runs
+from shipdrag_ros.errors import BagError, ImportDataError
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay import replay
+from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.ship import ConstantAddedMass, Ship
+from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
+from shipdrag_ros.sources.formats.csv.importer import BASE_NS, TableColumns, read_csv
+from shipdrag_ros.sources.formats.csv.result import TableResult
+from shipdrag_ros.sources.table import LogTable
+
+from .conftest import into_bag
+
+Imported = tuple[TableResult, Block]
+Import = Callable[..., Imported]
+
+
+@pytest.fixture
+def import_text(tmp_path: Path) -> Import:
+    """Write a table, import it, read the bag."""
+
+    def run(text: str | bytes, *maps: str, time: str | None = None, **options: Any) -> Imported:
+        source, out = tmp_path / 'in.csv', tmp_path / 'out.mcap'
+        source.write_bytes(text if isinstance(text, bytes) else text.encode())
+        out.unlink(missing_ok=True)
+        progress = options.pop('progress', None)
+        result = into_bag(read_csv, source, out, columns(maps, time, **options), progress=progress)
+        return result, samples(out)
+
+    return run
+
+
+def columns(maps: Sequence[str], time: str | None = None, **options: Any) -> TableColumns:
+    inputs = [parse_input(each) for each in maps]
+    return TableColumns(inputs, None if time is None else parse_time(time), **options)
+
+
+def samples(path: Path) -> Block:
+    (run,) = open_runs([path])
+    assert run.warnings == ()
+    return concatenate([item for item in run.inputs() if isinstance(item, Block)])
+
+
+def test_a_plain_table(import_text: Import) -> None:
+    result, block = import_text('t,u\n0,5.5\n0.5,5.25\n', 'speed_through_water=u', time='t')
+    assert block.channel.tolist() == [Channel.SPEED_THROUGH_WATER] * 2
+    assert block.value[:, 0].tolist() == [5.5, 5.25]
+    assert (block.stamp_ns - BASE_NS).tolist() == [0, 500_000_000]
+    assert block.receive_ns.tolist() == block.stamp_ns.tolist()
+    assert np.isnan(block.variance).all()
+    assert (result.rows, result.left_out, result.backward) == (2, 0, 0)
+    assert result.written == {'speed_through_water': 2}
+    assert result.rejected == {}
+    assert (result.start_ns, result.end_ns) == (BASE_NS, BASE_NS + 500_000_000)
+    assert result.base_ns == BASE_NS
+    assert (result.delimiter, result.header) == (',', True)
+
+
+@pytest.mark.parametrize('delimiter', [',', ';', '\t'])
+@pytest.mark.parametrize('start', ['', '\ufeff', '\n\n', ' , \n'.replace(',', '')])
+@pytest.mark.parametrize('end', ['\n', '\r\n', '\r'])
+def test_delimiters_marks_and_line_ends(
+    import_text: Import, delimiter: str, start: str, end: str
+) -> None:
+    lines = ['"time, s";u', '1; 2.5', ';', '"2";3.5']
+    text = start + end.join(lines).replace(';', delimiter)
+    result, block = import_text(text, 'speed_through_water=u', time='1')
+    assert result.delimiter == delimiter
+    assert block.value[:, 0].tolist() == [2.5, 3.5]
+
+
+@pytest.mark.parametrize(
+    ('text', 'name', 'value'),
+    [
+        ('1\n', 'speed_through_water=1:kn', 1852 / 3600),
+        ('36\n', 'speed_over_ground=1:km/h', 10.0),
+        ('10\n', 'speed_over_ground=1:ft/s', 3.048),
+        ('2\n', 'speed_over_ground=1:m/s', 2.0),
+        ('180\n', 'heading=1:deg', math.pi),
+        ('60\n', 'shaft=1:rpm', 2 * math.pi),
+        ('2\n', 'shaft=1:rad/s', 2.0),
+        ('2\n', 'shaft=1:rev/s', 4 * math.pi),
+        ('-80\n', 'pitch=1:%', -0.8),
+        ('0.7\n', 'pitch=1', 0.7),
+        ('180\n', 'pitch=1:deg', math.pi),
+        ('90\n', 'rudder=1:deg', math.pi / 2),
+        ('10\n', 'depth=1:ft', np.float32(3.048)),
+        ('0.5\n', 'depth=1:km', 500.0),
+    ],
+)
+def test_units(import_text: Import, text: str, name: str, value: float) -> None:
+    _, block = import_text(text, name, rate_hz=1.0)
+    assert block.value[0, 0] == pytest.approx(value, rel=1e-15)
+
+
+def test_several_shafts_and_their_pitch(import_text: Import) -> None:
+    text = 'p,s,a,b\n60,-120,50,25\n,90,0,x\n'
+    result, block = import_text(text, 'shaft=p,s:rpm', 'pitch=a:%,b:ratio', rate_hz=1)
+    assert block.channel.tolist() == [
+        *(Channel.SHAFT, Channel.SHAFT_2, Channel.PITCH, Channel.PITCH_2),
+        *(Channel.SHAFT_2, Channel.PITCH),
+    ]
+    turn = 2 * math.pi
+    np.testing.assert_allclose(
+        block.value[:, 0], [turn, -2 * turn, 0.5, 25.0, 1.5 * turn, 0.0], rtol=1e-15
+    )
+    assert result.written == {'shaft': 6}
+    assert {reason: each.count for reason, each in result.rejected['shaft'].items()} == {
+        'empty': 1,
+        'not a number': 1,
+    }
+
+
+def test_two_columns(import_text: Import) -> None:
+    _, block = import_text('1,2,3,4\n', 'position=1:km,2:nmi', 'wind_apparent=4,3', rate_hz=1)
+    assert block.value[0].tolist() == [1000.0, 3704.0]
+    assert block.value[1].tolist() == [4.0, 3.0]
+    _, block = import_text('lat,lon\n60.5,-5.25\n', 'position=lat:deg,lon:deg', rate_hz=1)
+    assert block.channel.tolist() == [Channel.POSITION_GEODETIC]
+    assert block.value[0].tolist() == [60.5, -5.25]
+
+
+@pytest.mark.parametrize(
+    ('columns', 'value'),
+    [
+        ('position=1,2:km', [1000.0, 2000.0]),
+        ('position=1:km,2', [1000.0, 2000.0]),
+        ('position=1:km,2:km', [1000.0, 2000.0]),
+        ('position=1:km,2:m', [1000.0, 2.0]),
+        ('position=1,2:deg', [1.0, 2.0]),
+        ('position=1:deg,2', [1.0, 2.0]),
+        ('wind_apparent=1,2:kn', [1852 / 3600, 2 * 1852 / 3600]),
+    ],
+)
+def test_a_unit_given_once_holds_for_both_columns(
+    import_text: Import, columns: str, value: list[float]
+) -> None:
+    _, block = import_text('1,2\n', columns, rate_hz=1)
+    assert block.value[0] == pytest.approx(value, rel=1e-15)
+    geodetic = block.channel[0] == Channel.POSITION_GEODETIC
+    assert geodetic == columns.count('deg')
+
+
+@pytest.mark.parametrize(
+    ('time', 'cell', 'expected_ns', 'base_ns'),
+    [
+        ('t', '0.000000001', BASE_NS + 1, BASE_NS),
+        ('t:s', '1.5e3', BASE_NS + 1_500_000_000_000, BASE_NS),
+        ('t', '-2', BASE_NS - 2_000_000_000, BASE_NS),
+        ('t:us', '7', BASE_NS + 7000, BASE_NS),
+        ('t:ns', '7', BASE_NS + 7, BASE_NS),
+        ('t:ms', '1544175458614', 1_544_175_458_614_000_000, None),
+        ('t:ns', '1544175458614000001', 1_544_175_458_614_000_001, None),
+        ('t', '1700000000.123456789', 1_700_000_000_123_456_789, None),
+    ],
+)
+def test_times_are_exact(
+    import_text: Import, time: str, cell: str, expected_ns: int, base_ns: int | None
+) -> None:
+    result, block = import_text(f't,u\n{cell},1\n', 'shaft=u', time=time)
+    assert block.stamp_ns.tolist() == [expected_ns]
+    assert result.base_ns == base_ns
+
+
+def test_a_rate_counts_the_rows_that_are_chosen(import_text: Import) -> None:
+    text = 'test,u\na,1\nb,2\nb,\nb,4\nc,5\n'
+    result, block = import_text(text, 'shaft=u', rate_hz=3.0, where=[('test', 'b')])
+    assert (block.stamp_ns - BASE_NS).tolist() == [0, 666_666_667]
+    assert block.value[:, 0].tolist() == [2.0, 4.0]
+    assert (result.rows, result.left_out) == (5, 2)
+    assert result.base_ns == BASE_NS
+
+
+def test_all_conditions_must_hold(import_text: Import) -> None:
+    text = 'test,part,u\na,x,1\na,y,2\nb,y,3\n'
+    _, block = import_text(text, 'shaft=u', rate_hz=1, where=[('test', 'a'), ('2', 'y')])
+    assert block.value[:, 0].tolist() == [2.0]
+
+
+def test_the_date_of_time_zero_can_be_given(import_text: Import) -> None:
+    result, block = import_text('1\n', 'shaft=1', rate_hz=1, start_ns=10**18)
+    assert block.stamp_ns.tolist() == [10**18]
+    assert result.base_ns == 10**18
+    result, block = import_text('3,1\n', 'shaft=2', time='1', start_ns=10**18)
+    assert block.stamp_ns.tolist() == [10**18 + 3 * 10**9]
+
+
+def test_bad_cells_are_counted_by_reason_with_their_lines(
+    import_text: Import, tmp_path: Path
+) -> None:
+    cells = ['1', '', 'x', '2,5', 'nan', '1_0', 'inf', '0x1', '1e9999', '5', '--']
+    rows = [f'{i};"{cell}";{i}' for i, cell in enumerate(cells)]
+    result, block = import_text(
+        '\n'.join(['t;u;n', *rows, '11']), 'speed_through_water=u', 'shaft=n', time='t'
+    )
+    bad = result.rejected['speed_through_water']
+    assert bad['empty'].count == 2
+    assert bad['empty'].first == ["line 3: ''", "line 13: ''"]
+    assert bad['not a number'].count == 7
+    assert bad['not a number'].first == ["line 4: 'x'", "line 5: '2,5'", "line 6: 'nan'"]
+    assert result.rejected['shaft']['empty'].count == 1
+    assert result.written == {'speed_through_water': 3, 'shaft': 11}
+    # a number too large for any computer is written, and rejected by the monitor
+    log = block.value[block.channel == Channel.SPEED_THROUGH_WATER, 0]
+    assert log.tolist() == [1.0, math.inf, 5.0]
+    used = replay(
+        open_runs([tmp_path / 'out.mcap'])[0],
+        ship=Ship(name='x', length_m=100.0, displaced_volume_m3=9000.0),
+    ).inputs['speed_through_water']
+    assert used.rejected == {'infinite': 1}
+
+
+def test_a_row_without_a_time_is_counted_whole(import_text: Import) -> None:
+    text = 't,u\n0,1\n,2\nnoon,3\n1e15,4\n-1e15,5\n9999999999,6\n1,7\n'
+    result, block = import_text(text, 'shaft=u', time='t')
+    assert block.value[:, 0].tolist() == [1.0, 7.0]
+    assert {reason: bad.count for reason, bad in result.rejected['time'].items()} == {
+        'empty': 1,
+        'not a number': 1,
+        'no possible date': 3,
+    }
+
+
+def test_rows_out_of_order_stay_in_their_order_and_are_counted(import_text: Import) -> None:
+    result, block = import_text('t,u\n0,1\n2,2\n1,3\n2,4\n3,5\n', 'shaft=u', time='t')
+    assert block.value[:, 0].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert ((block.stamp_ns - BASE_NS) // 10**9).tolist() == [0, 2, 1, 2, 3]
+    assert ((block.receive_ns - BASE_NS) // 10**9).tolist() == [0, 2, 2, 2, 3]
+    assert result.backward == 1
+
+
+def test_many_rows_are_the_same_rows(import_text: Import) -> None:
+    values = np.random.default_rng(2).normal(5.0, 1.0, 10_000)
+    told: list[tuple[int, int]] = []
+    _, block = import_text(
+        '\n'.join(map(repr, values.tolist())),
+        'speed_through_water=1',
+        rate_hz=10.0,
+        progress=lambda done, total: told.append((done, total)),
+    )
+    np.testing.assert_array_equal(block.value[:, 0], values)
+    assert len(told) >= 10
+    assert all(0 < done <= total for done, total in told)
+    assert told[-1][0] > told[0][0]
+
+
+def test_the_bag_says_where_it_comes_from(import_text: Import, tmp_path: Path) -> None:
+    text = 'a,u,v,p\nx,1,2,3\n'
+    import_text(text, 'shaft=u,v', 'pitch=p', rate_hz=2.0, where=[('a', 'x')])
+    (run,) = open_runs([tmp_path / 'out.mcap'])
+    assert yaml.safe_load(run.attachments['import.yaml']) == {
+        'source': 'in.csv',
+        'inputs': {'shaft': ['u', 'v'], 'pitch': ['p']},
+        'time': None,
+        'rate_hz': 2.0,
+        'where': {'a': 'x'},
+    }
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('speed=u', "no input 'speed'; inputs are speed_through_water, "),
+        ('position=x', r'expected 2 column\(s\), position=COLUMN'),
+        ('depth=a,b', r'expected 1 column\(s\), depth=COLUMN'),
+        ('shaft=a,b,c,d,e', r'expected 1 to 4 column\(s\), shaft=COLUMN'),
+        ('shaft=a,', r'expected 1 to 4 column\(s\)'),
+        ('shaft=', r'expected 1 to 4 column\(s\)'),
+        ('shaft', r'expected 1 to 4 column\(s\)'),
+        ('shaft=n:hz', "no unit 'hz' here; units are rad/s, rev/s, rpm, rps"),
+        ('pitch=p:rpm', "no unit 'rpm' here; units are %, deg, rad, ratio"),
+        ('depth=d:kn', "no unit 'kn' here"),
+        ('position=x:m,y:deg', 'both columns in deg'),
+        ('position=x:deg,y:m', 'both columns in deg'),
+    ],
+)
+def test_maps_that_say_nothing(text: str, expected: str) -> None:
+    with pytest.raises(ImportDataError, match=expected):
+        parse_input(text)
+
+
+def test_times_that_say_nothing() -> None:
+    with pytest.raises(ImportDataError, match="no unit 'min' here; units are ms, ns, s, us"):
+        parse_time('t:min')
+    with pytest.raises(ImportDataError, match='expected COLUMN'):
+        parse_time('')
+
+
+@pytest.mark.parametrize(
+    ('content', 'maps', 'options', 'expected'),
+    [
+        ('', ['shaft=1'], {'rate_hz': 1}, 'is empty'),
+        ('\n \n', ['shaft=1'], {'rate_hz': 1}, 'is empty'),
+        ('t,u\n', ['shaft=u'], {'rate_hz': 1}, r'no sample from 0 row\(s\)'),
+        ('t,u\n1,x\n', ['shaft=u'], {'rate_hz': 1}, "shaft: not a number 1 times, line 2: 'x'"),
+        ('t,u\n1,2\n', ['shaft=v'], {'rate_hz': 1}, "no column 'v'; it has 't', 'u', and numbers"),
+        ('1,2\n', ['shaft=u'], {'rate_hz': 1}, "no column 'u'; it has no header"),
+        ('1,2\n', ['shaft=3'], {'rate_hz': 1}, "no column '3'"),
+        ('1,2\n', ['shaft=0'], {'rate_hz': 1}, "no column '0'"),
+        ('u,u\n1,2\n', ['shaft=u'], {'rate_hz': 1}, "2 columns 'u'; write a number: 1 or 2"),
+        ('1,2\n', ['shaft=1'], {}, 'give either --time COLUMN.* or --rate'),
+        ('1,2\n', ['shaft=1'], {'rate_hz': 1, 'time': '2'}, 'give either --time'),
+        ('1,2\n', ['shaft=1'], {'rate_hz': 0.0}, '--rate 0.0: expected'),
+        ('1,2\n', ['shaft=1'], {'rate_hz': math.nan}, '--rate nan: expected'),
+        ('1,2\n', [], {'rate_hz': 1}, 'no column is mapped'),
+        ('1,2\n', ['shaft=1', 'shaft=2'], {'rate_hz': 1}, 'shaft=...: given 2 times'),
+        ('1,2\n', ['pitch=1', 'pitch=2'], {'rate_hz': 1}, 'pitch=...: given 2 times'),
+        (
+            't,u\na,1\nb,2\n',
+            ['shaft=u'],
+            {'rate_hz': 1, 'where': [('t', 'c')]},
+            '--where chooses none of them: the column holds a, b',
+        ),
+        ('t,u\n1,2\n'.encode('utf-16'), ['shaft=1'], {'rate_hz': 1}, 'UTF-16; save it as UTF-8'),
+        ('1,"' + 'x' * 200_000, ['shaft=1'], {'rate_hz': 1}, 'is no row of a table'),
+    ],
+)
+def test_tables_that_cannot_be_used(
+    import_text: Import,
+    tmp_path: Path,
+    content: str | bytes,
+    maps: list[str],
+    options: dict[str, Any],
+    expected: str,
+) -> None:
+    with pytest.raises(ImportDataError, match=expected):
+        import_text(content, *maps, **options)
+    assert not (tmp_path / 'out.mcap').exists()
+
+
+def test_a_source_that_is_not_there_and_a_bag_that_is(tmp_path: Path) -> None:
+    shaft = columns(['shaft=1'], rate_hz=1.0)
+    with pytest.raises(ImportDataError, match='cannot be read: No such file'):
+        into_bag(read_csv, tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
+    with pytest.raises(ImportDataError, match='cannot be read: Is a directory'):
+        into_bag(read_csv, tmp_path, tmp_path / 'a.mcap', shaft)
+    (tmp_path / 'a.csv').write_text('1\n')
+    (tmp_path / 'a.mcap').write_text('precious')
+    with pytest.raises(BagError, match='exists'):
+        into_bag(read_csv, tmp_path / 'a.csv', tmp_path / 'a.mcap', shaft)
+    assert (tmp_path / 'a.mcap').read_text() == 'precious'
+
+
+@pytest.mark.parametrize('content', [b'\x1f\x8b', b'\x1f\x8b\x08' + bytes(20)])
+def test_a_packed_table_that_is_cut_is_an_error(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / 'a.csv').write_bytes(content)
+    with pytest.raises(ImportDataError, match='cannot be unpacked'):
+        LogTable(tmp_path / 'a.csv')
+
+
+@settings(
+    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    content=st.one_of(
+        st.binary(max_size=200),
+        st.text(alphabet='0123456789.,;\t\n\r"-+eE x', max_size=200).map(str.encode),
+    ),
+    by_time=st.booleans(),
+)
+def test_any_content(import_text: Import, content: bytes, by_time: bool) -> None:
+    options: dict[str, Any] = {'time': '1'} if by_time else {'rate_hz': 1.0}
+    try:
+        result, block = import_text(content, 'speed_through_water=1', **options)
+    except ImportDataError as error:
+        assert 'in.csv' in str(error)  # noqa: PT017
+    else:
+        rejected = sum(
+            bad.count for reasons in result.rejected.values() for bad in reasons.values()
+        )
+        assert len(block) + rejected == result.rows - result.left_out
+
+
+# measured records, not part of this project
+
+DATA = Path(os.environ.get('SHIPDRAG_DATA', ''))
+needs_data = pytest.mark.skipif(
+    'SHIPDRAG_DATA' not in os.environ, reason='needs the folder of records in SHIPDRAG_DATA'
+)
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ('name', 'maps', 'options', 'count'),
+    [
+        (
+            'cse1_coast_153s_20hz.csv',
+            ['speed_through_water=u_mps', 'position=x_m,y_m', 'heading=psi_rad'],
+            {'time': 't_s'},
+            3 * 642,
+        ),
+        (
+            'milliampere_coast_t457_20hz.csv',
+            ['speed_over_ground=speed_mps', 'position=pos_e_m,pos_n_m', 'shaft=motor1_rpm:rpm'],
+            {'time': 't_s'},
+            3 * 698,
+        ),
+        (
+            'awsp_usv_coast_1hz.csv',
+            ['position=x_m,y_m', 'heading=yaw_rad'],
+            {'time': 't_s', 'where': [('test', 'Test_6'), ('segment', 'coast')]},
+            2 * 16,
+        ),
+        ('car/Michelin60A.csv', ['speed_through_water=1:km/h'], {'rate_hz': 1.0}, 165),
+        (
+            'car/shotgoose_RR-Coastdown-2_coast_100hz.csv',
+            ['speed_through_water=v_mps'],
+            {'time': 't_s'},
+            1517,
+        ),
+    ],
+)
+def test_measured_records(
+    tmp_path: Path, name: str, maps: list[str], options: dict[str, Any], count: int
+) -> None:
+    result = into_bag(read_csv, DATA / name, tmp_path / 'a.mcap', columns(maps, **options))
+    assert sum(result.written.values()) == count == len(samples(tmp_path / 'a.mcap'))
+    assert result.rejected == {}
+    assert result.backward == 0
+
+
+@needs_data
+def test_the_coasting_ferry_gives_a_resistance(tmp_path: Path) -> None:
+    into_bag(
+        read_csv,
+        DATA / 'milliampere_coast_t457_20hz.csv',
+        tmp_path / 'a.mcap',
+        columns(['speed_over_ground=speed_mps', 'position=pos_e_m,pos_n_m'], 't_s'),
+    )
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    ferry = Ship(
+        name='ferry',
+        length_m=5.0,
+        displaced_volume_m3=1.8,
+        added_mass=ConstantAddedMass(value=0.1, sd=0.05),
+    )
+    slow = Parameters(froude_min=0.01, estimator='s1_joint')
+    (coastdown,) = replay(run, ship=ferry, parameters=slow, window=(9.0, 33.0)).coastdowns
+    assert coastdown.estimate is not None, coastdown.failure
+    assert coastdown.estimate.estimator == 's1_joint'
+    assert coastdown.estimate.samples == {'speed_over_ground': 481, 'position': 481}

@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every format gives the same minute of the same ship alike, and what it does not know is said."""
+
+from __future__ import annotations
+
+import gzip
+import importlib.util
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.cli import main
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.samples import Block, Channel, concatenate
+from shipdrag_ros.sources import formats
+from shipdrag_ros.sources.format import best_of, head_of
+from shipdrag_ros.sources.reading import Understanding, read_any
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _samples() -> ModuleType:
+    place = ROOT / 'benchmarks' / '_log_samples.py'
+    spec = importlib.util.spec_from_file_location('_log_samples', place)
+    assert spec is not None
+    assert spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    return made
+
+
+made = _samples()
+FORMAT_OF = {
+    'csv': 'csv',
+    'csv_commas': 'csv',
+    'nmea': 'nmea',
+    'candump': 'n2k',
+    'actisense': 'n2k',
+    'yacht_devices': 'n2k',
+    'canboat': 'n2k',
+    'slcan': 'n2k',
+    'signalk': 'signalk',
+    'gpx': 'gpx',
+    'ardupilot': 'ardupilot',
+    'ulog': 'ulog',
+    'ros1': 'rosbag',
+    'sqlite3': 'rosbag',
+}
+
+
+@pytest.fixture(scope='module')
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A file of each format."""
+    folder = tmp_path_factory.mktemp('logs')
+    found = {}
+    for kind, (name, data) in made.samples(folder).items():
+        found[kind] = folder / name
+        found[kind].write_bytes(data)
+    return found
+
+
+def block_of(*paths: Path, **options: object) -> Block:
+    """Read the samples of logs as one run."""
+    (run,) = read_any(paths, joined=True, options=options)
+    return concatenate([part for part in run.inputs() if isinstance(part, Block)])
+
+
+def values(block: Block, channel: Channel) -> np.ndarray:
+    return block.value[block.channel == channel]
+
+
+def needs(kind: str) -> None:
+    library = {'ardupilot': 'pymavlink', 'ulog': 'pyulog'}.get(kind)
+    if library is not None:
+        pytest.importorskip(library)
+
+
+def test_every_format_has_a_sample() -> None:
+    assert set(FORMAT_OF.values()) == {each.name for each in formats.found()}
+
+
+@pytest.mark.parametrize('kind', FORMAT_OF)
+def test_a_format_is_known_by_its_content(files: dict[str, Path], kind: str) -> None:
+    bare = files[kind].with_name('log')
+    bare.write_bytes(files[kind].read_bytes())
+    assert best_of(formats.found(), head_of(bare)).name == FORMAT_OF[kind]
+
+
+@pytest.mark.parametrize('kind', FORMAT_OF)
+def test_values_and_times_are_those_measured(files: dict[str, Path], kind: str) -> None:
+    needs(kind)
+    block = block_of(files[kind])
+    rows = range(made.ROWS)
+    stamps = np.array([made.epoch_ns(k) for k in rows])
+    expected = {
+        Channel.SPEED_THROUGH_WATER: [made.stw(k) for k in rows],
+        Channel.SPEED_OVER_GROUND: [made.sog(k) for k in rows],
+        Channel.POSITION_GEODETIC: [made.latitude(k) for k in rows],
+        Channel.HEADING: [
+            math.remainder(math.radians(90 - made.compass(k)), 2 * math.pi) for k in rows
+        ],
+    }
+    tolerance = {Channel.POSITION_GEODETIC: 2e-6}
+    seen = 0
+    for channel, numbers in expected.items():
+        found = values(block, channel)
+        if not len(found):
+            continue
+        seen += 1
+        assert found[:, 0] == pytest.approx(numbers, abs=tolerance.get(channel, 6e-3))
+        assert block.stamp_ns[block.channel == channel] == pytest.approx(stamps, abs=2000)
+    assert seen >= (1 if FORMAT_OF[kind] == 'rosbag' else 2)
+
+
+@pytest.mark.parametrize('kind', ['csv', 'csv_commas', 'candump', 'signalk', 'gpx', 'nmea'])
+def test_a_packed_log_is_the_log(files: dict[str, Path], tmp_path: Path, kind: str) -> None:
+    packed = tmp_path / 'log.gz'
+    packed.write_bytes(gzip.compress(files[kind].read_bytes()))
+    plain, unpacked = block_of(files[kind]), block_of(packed)
+    assert np.array_equal(plain.value, unpacked.value)
+    assert np.array_equal(plain.stamp_ns, unpacked.stamp_ns)
+
+
+def test_lines_may_be_led_by_the_time_of_their_day(files: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / 'led.log'
+    per_row = len(made.n2k_messages(0))
+    bare = [line.split('R ')[1] for line in files['yacht_devices'].read_text().splitlines()]
+    path.write_text(
+        '\n'.join(
+            f'({made.when(k // per_row):%Y-%m-%d %H:%M:%S.%f})  can0  '
+            f'{line.split()[0]}   [8]  {" ".join(line.split()[1:])}'
+            for k, line in enumerate(bare)
+        )
+    )
+    led, plain = block_of(path), block_of(files['yacht_devices'])
+    assert np.array_equal(led.stamp_ns, plain.stamp_ns)
+    assert np.array_equal(led.value, plain.value)
+
+
+def test_a_log_of_a_serial_line_may_begin_with_zeros(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    path = tmp_path / 'capture.txt'
+    path.write_bytes(b'\0\0\0' + files['nmea'].read_bytes())
+    first = block_of(path)
+    assert np.array_equal(first.value, block_of(files['nmea']).value)
+
+
+def test_lines_of_a_serial_adapter_may_end_with_a_carriage_return(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    path = tmp_path / 'slcan.log'
+    path.write_bytes(files['slcan'].read_bytes().replace(b'\n', b'\r'))
+    assert np.array_equal(block_of(path).value, block_of(files['slcan']).value)
+
+
+def test_a_coordinate_may_have_thirty_decimals(tmp_path: Path) -> None:
+    path = tmp_path / 'track.gpx'
+    points = (
+        f'<trkpt lat="{54.5 + k * 5e-5:.28f}" lon="10.2519999991953372955322265625">'
+        f'<time>{made.when(k):%Y-%m-%dT%H:%M:%S.000Z}</time></trkpt>'
+        for k in range(20)
+    )
+    path.write_text(f'<gpx><trk><trkseg>{"".join(points)}</trkseg></trk></gpx>')
+    assert values(block_of(path), Channel.POSITION_GEODETIC)[:, 1] == pytest.approx(10.252)
+
+
+def test_engine_revolutions_are_the_shaft_only_with_a_gear(files: dict[str, Path]) -> None:
+    assert not len(values(block_of(files['candump']), Channel.SHAFT))
+    found = values(block_of(files['candump'], gear=2.5), Channel.SHAFT)
+    assert found[:, 0] == pytest.approx(1500 / 2.5 * math.pi / 30)
+
+
+def test_the_first_line_is_shown(files: dict[str, Path]) -> None:
+    shown: list[Understanding] = []
+    read_any([files['csv']], show=shown.append)
+    lines = shown[0].lines()
+    assert "  speed_through_water <- 'STW [kn]' [kn], first 6 m/s" in lines
+    assert any(
+        "'Heading [deg]' is taken as degrees clockwise from north" in line for line in lines
+    )
+
+
+def test_files_of_one_instrument_each_are_one_run(files: dict[str, Path], tmp_path: Path) -> None:
+    bag = tmp_path / 'all.mcap'
+    log, track = files['csv'], files['gpx']
+    water = tmp_path / 'water.csv'
+    water.write_text(
+        'time,speed_through_water\n'
+        + '\n'.join(f'{made.epoch_ns(k) // 10**9 + 0.5},{made.stw(k)}' for k in range(60))
+    )
+    line = ['import', str(track), str(water), '-o', str(bag)]
+    assert main(line) == 0
+    (run,) = read_any([bag])
+    block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
+    assert len(values(block, Channel.POSITION_GEODETIC)) == 60
+    assert len(values(block, Channel.SPEED_THROUGH_WATER)) == 60
+    assert (np.diff(block.receive_ns) >= 0).all()
+    both = block_of(track, log)  # of an input that both hold, the first file's
+    assert len(values(both, Channel.POSITION_GEODETIC)) == 60
+    assert len(values(both, Channel.SPEED_THROUGH_WATER)) == 60
+
+
+def test_replay_of_a_log_is_replay_of_its_bag(
+    files: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ship = str(ROOT / 'config' / 'vitus_bering.yaml')
+    bag = tmp_path / 'log.mcap'
+    assert main(['import', str(files['csv']), '-o', str(bag)]) == 0
+    found = []
+    for source in (bag, files['csv']):
+        capsys.readouterr()
+        assert main(['replay', str(source), '--ship', ship, '--window', '0', '59', '--json']) == 0
+        document = json.loads(capsys.readouterr().out)
+        for coastdown in document['coastdowns']:
+            assert coastdown.pop('bag') == str(source)
+        document.pop('bags', None)
+        found.append(json.dumps(document).replace(str(source), 'SOURCE'))
+    assert found[0] == found[1]
+    assert json.loads(found[0])['coastdowns'][0]['resistance_m_s2']
+
+
+@pytest.mark.parametrize('kind', FORMAT_OF)
+def test_a_log_read_directly_gives_the_bits_of_its_bag(
+    files: dict[str, Path], tmp_path: Path, kind: str
+) -> None:
+    needs(kind)
+    bag = tmp_path / 'log.mcap'
+    assert main(['import', str(files[kind]), '-o', str(bag)]) == 0
+    from_bag, direct = block_of(bag), block_of(files[kind])
+    assert len(direct) >= made.ROWS
+    for name in ('channel', 'stamp_ns', 'receive_ns', 'value', 'variance'):
+        one, other = getattr(from_bag, name), getattr(direct, name)
+        assert one.tobytes() == other.tobytes(), name
+
+
+def test_nothing_is_written_while_a_log_is_read(
+    files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    empty = tmp_path / 'tmp'
+    empty.mkdir()
+    monkeypatch.setattr('tempfile.tempdir', str(empty))
+    monkeypatch.setattr('tempfile.mkdtemp', None)
+    assert len(block_of(files['csv'], files['gpx']))
+    assert not any(empty.iterdir())
+
+
+def test_a_library_that_is_not_there_is_named(
+    files: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for kind, library in (('ardupilot', 'pymavlink'), ('ulog', 'pyulog')):
+        monkeypatch.setitem(sys.modules, library, None)
+        monkeypatch.setitem(sys.modules, f'{library}.DFReader', None)
+        with pytest.raises(ImportDataError, match=r"pip install 'shipdrag_ros\[logs\]'"):
+            read_any([files[kind]])
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'why'),
+    [
+        (
+            'bomb.gpx',
+            '<?xml version="1.0"?><!DOCTYPE g [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]>'
+            '<gpx>&b;</gpx>',
+            'declares XML entities',
+        ),
+        ('far.gpx', '<!DOCTYPE gpx SYSTEM "http://example.org/x"><gpx></gpx>', 'declares XML'),
+        ('deep.gpx', '<gpx>' + '<a>' * 5000, 'more than 32 deep'),
+        ('deep.jsonl', '{"updates":' + '[' * 100_000, 'too long for a delta'),
+        ('cut.bag', '#ROSBAG V2.0\n', 'holds no message'),
+        ('cut.db3', 'SQLite format 3\0' + 'x' * 100, 'holds no message'),
+        ('spreadsheet.csv', 'PK\x03\x04', 'of no format known here'),
+        ('wide.csv', 'a,' * 2_000_000, 'of no format known here'),
+    ],
+)
+def test_hostile_files_are_refused(tmp_path: Path, name: str, content: str, why: str) -> None:
+    path = tmp_path / name
+    path.write_text(content)
+    with pytest.raises(ImportDataError, match=why):
+        read_any([path])
+
+
+def test_a_line_of_deep_brackets_is_counted(tmp_path: Path) -> None:
+    path = tmp_path / 'log.jsonl'
+    deep = '{"updates":' + '[' * 30_000
+    path.write_bytes(made.signalk() + b'\n' + deep.encode())
+    shown: list[Understanding] = []
+    read_any([path], show=shown.append)
+    assert any('more than 12 brackets deep' in line for line in shown[0].lines())
+
+
+def test_a_packed_bomb_ends_in_an_error(tmp_path: Path) -> None:
+    path = tmp_path / 'bomb.csv.gz'
+    with gzip.open(path, 'wb', compresslevel=9) as file:
+        file.write(b'time,speed_through_water\n')
+        for _ in range(80):
+            file.write(b'1,7\n' * (1 << 18))
+    with pytest.raises(ImportDataError, match='unpacks to more than 200 times its size'):
+        read_any([path])
+
+
+def test_times_that_jump_away_and_back_are_left_out(tmp_path: Path) -> None:
+    lines = made.candump().decode().splitlines()
+    lines[70] = lines[70].replace('(17', '(18', 1)
+    lines[140] = lines[140].replace('(17', '(16', 1)
+    path = tmp_path / 'log.txt'
+    path.write_text('\n'.join(lines))
+    shown: list[Understanding] = []
+    (run,) = read_any([path], show=shown.append)
+    span = run.span_ns
+    assert span is not None
+    assert span[1] - span[0] == (made.ROWS - 1) * 10**9
+    assert any('time: 2 rejected, jumps away and back' in line for line in shown[0].lines())
+
+
+def test_the_formats_load_no_library_before_it_is_needed() -> None:
+    code = (
+        'from shipdrag_ros.sources import formats; formats.found(); import sys; '
+        'print(*{"nmea2000", "pymavlink", "pyulog"} & set(sys.modules))'
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ''

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Columns of numbers: all of them, or every reason why not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.errors import DataError, ImportDataError
+from shipdrag_ros.sources.numbers import read_numbers
+
+
+@pytest.mark.parametrize('mark', [',', ';', '\t'])
+def test_reads_columns_by_name(tmp_path: Path, mark: str) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a,b,c\n1,x,-2e-3\n\n4,y,.5\n'.replace(',', mark))
+    found = read_numbers(path, ('c', 'a'), optional=('a', 'd'))
+    assert found.names == ('c', 'a')
+    np.testing.assert_array_equal(found.values, [[-2e-3, 1.0], [0.5, 4.0]])
+    np.testing.assert_array_equal(found.column('a'), [1.0, 4.0])
+    assert 'd' not in found
+    assert 'a' in found
+
+
+def test_optional_columns_are_read_where_they_are(tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a,lcb\n1,2\n')
+    np.testing.assert_array_equal(read_numbers(path, ('a',), optional=('lcb',)).values, [[1, 2]])
+
+
+def test_all_missing_columns_are_told(tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a,b,b\n1,2,3\n')
+    with pytest.raises(DataError) as raised:
+        read_numbers(path, ('x', 'a', 'b', 'y'))
+    told = raised.value.problems
+    assert len(told) == 3
+    assert "no column 'x'" in told[0]
+    assert "2 columns 'b'" in told[1]
+    assert "no column 'y'" in told[2]
+
+
+def test_all_bad_cells_are_told_with_their_lines(tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a,b\n1,2\nnan,inf\n3\n1e9999,1_0\n5,-2e30\n-1e-40,1e30\n')
+    with pytest.raises(DataError) as raised:
+        read_numbers(path, ('a', 'b'))
+    assert raised.value.problems == (
+        "line 3, a: 'nan', expected a number, at most 1e+30 in size",
+        "line 3, b: 'inf', expected a number, at most 1e+30 in size",
+        "line 4, b: '', expected a number, at most 1e+30 in size",
+        "line 5, a: '1e9999', expected a number, at most 1e+30 in size",
+        "line 5, b: '1_0', expected a number, at most 1e+30 in size",
+        "line 6, b: '-2e30', expected a number, at most 1e+30 in size",
+    )
+
+
+def test_a_decimal_comma_is_told(tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a;b\n1,5;1.5\n')
+    with pytest.raises(DataError, match=r"a: '1,5', expected a number, .*; write a decimal point"):
+        read_numbers(path, ('a', 'b'))
+
+
+def test_many_bad_cells_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a\n' + 'x\n' * 50)
+    with pytest.raises(DataError, match='and 30 more'):
+        read_numbers(path, ('a',))
+
+
+def test_no_rows_or_no_table(tmp_path: Path) -> None:
+    path = tmp_path / 'data.csv'
+    path.write_text('a,b\n')
+    with pytest.raises(DataError, match='no row below the header'):
+        read_numbers(path, ('a',))
+    with pytest.raises(ImportDataError, match='cannot be read'):
+        read_numbers(tmp_path / 'none.csv', ('a',))
