@@ -8,6 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap
+from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.ship import Ship
 
@@ -35,15 +36,7 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
         'advice': [asdict(each) for each in found.would_decide],
-        'limits': {
-            name: {
-                'parameter': each.parameter,
-                each.bound: each.value,
-                'would_be_named': each.would_be_named,
-                'percent_of_r': each.percent_of_r,
-            }
-            for name, each in found.limits.items()
-        },
+        'limits': _limits(found),
         'where': None if found.where is None else asdict(found.where),
         'gap': {
             'before': _gap(found.before),
@@ -66,16 +59,7 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
             }
             for each in found.runs_differ
         ],
-        'facts': [
-            {
-                **asdict(each.fact),
-                'bag': each.run or None,
-                'wrong': each.wrong,
-                'contradicted': each.contradicted,
-                'against': list(each.against),
-            }
-            for each in found.facts
-        ],
+        'facts': [_fact(each) for each in found.facts],
         'ship': None
         if ship is None
         else {
@@ -85,6 +69,28 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         },
         'runs': _runs(found.runs),
         'earlier': [_earlier(each) for each in found.earlier],
+    }
+
+
+def _limits(found: DiagnosisResult) -> dict[str, dict[str, Any]]:
+    return {
+        name: {
+            'parameter': each.parameter,
+            each.bound: each.value,
+            'would_be_named': each.would_be_named,
+            'percent_of_r': each.percent_of_r,
+        }
+        for name, each in found.limits.items()
+    }
+
+
+def _fact(weighed: WeighedFact) -> dict[str, Any]:
+    return {
+        **asdict(weighed.fact),
+        'bag': weighed.run or None,
+        'wrong': weighed.wrong,
+        'contradicted': weighed.contradicted,
+        'against': list(weighed.against),
     }
 
 

@@ -12,6 +12,7 @@ from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
+from shipdrag_ros.diagnosis.fitting import Fit
 from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.limits import limits_of
 from shipdrag_ros.diagnosis.nameless import with_nameless
@@ -29,7 +30,7 @@ from shipdrag_ros.diagnosis.seen_runs import SeenRun
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.diagnosis.swinging import swing_notes, with_swinging
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
-from shipdrag_ros.diagnosis.verdict import judge
+from shipdrag_ros.diagnosis.verdict import Judgement, judge
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
@@ -135,7 +136,6 @@ def diagnose(
     found = with_nameless(found, model)
     found = with_unnamed(found)
     best, judged = found.best, judge(found)
-    predicted = held_out(model, best) if judged.missing else None
     would_decide: tuple[Advice, ...] = ()
     if advise and judged.verdict is Verdict.ONE_OF:
         would_decide = advice(model, judged.posterior, judged.candidates, progress)
@@ -145,18 +145,14 @@ def diagnose(
         explained = found.posterior.best[UNKNOWN]
         notes = (*notes, *swing_notes(explained, model))
     differ = runs_differ(found) if judged.missing else ()
-    place: Where | None = None
-    if judged.verdict is not Verdict.NONE:
-        place = where(model, as_stated, found.smooth)
-    if place is not None and differ:  # a smooth error alike in all runs would pass for the log's
-        place = replace(place, channel=FORCE)
+    place = _where(model, as_stated, found, judged, differ=bool(differ))
     return judged.diagnosis(
         would_decide=would_decide,
         where=place,
         before=gap_of(model, as_stated.best),
         after=gap_of(model, best.best) if judged.missing else None,
         held_out_before=held_out(model, None),
-        held_out_after=predicted,
+        held_out_after=held_out(model, best) if judged.missing else None,
         baseline='stated',
         notes=notes,
         traces=traces(model, as_stated.best, explained.best),
@@ -168,6 +164,18 @@ def diagnose(
         earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
         limits=limits_of(found, model, [effect.name for effect in judged.effects]),
     )
+
+
+def _where(
+    model: CoastModel, as_stated: Fit, found: SearchResult, judged: Judgement, *, differ: bool
+) -> Where | None:
+    """Say where model and data are apart."""
+    if judged.verdict is Verdict.NONE:
+        return None
+    place = where(model, as_stated, found.smooth)
+    if differ and place is not None:  # an error alike in all runs would pass for the log's
+        return replace(place, channel=FORCE)
+    return place
 
 
 def _searched(

@@ -22,8 +22,9 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior import motion
 from shipdrag_ros.posterior.laplace import RunPosterior, infer
 from shipdrag_ros.posterior.problem import RunModel, StopPrior
-from shipdrag_ros.posterior.readout import read
+from shipdrag_ros.posterior.readout import ReadOut, read
 from shipdrag_ros.posterior.rows import condense
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 NAME = 'one'
@@ -105,34 +106,7 @@ def _result(
         )
     grid = np.linspace(low, high, _CURVE_POINTS)
     part = read(found, grid)
-    driving = np.flatnonzero(part.resistance_m_s2 <= 0.0)
-    use = slice(int(driving[-1]) + 1 if len(driving) else 0, None)
-    if len(grid[use]) < 3:
-        raise EstimationError(
-            f'the fitted force nowhere slows the ship from {high:.4g} to {low:.4g} m/s: give a '
-            'window in which she coasts'
-        )
-    # where the file states retardations, n_r is no unknown of the motion
-    of_n_r = part.parts_m_s2['n_r']
-    if not of_n_r.any():
-        of_n_r = part.resistance_m_s2 / (1.0 + ship.n_r(grid)) * ship.added_mass.sd
-    per_froude = float(ship.speed(1.0))
-    curve = ResistanceCurve(
-        grid[use].copy(),
-        part.resistance_m_s2[use],
-        np.hypot(part.repeatable_m_s2, of_n_r)[use],
-        part.repeatable_m_s2[use],
-        ship.froude(grid[use]),
-        per_froude * part.slope_1_s[use],
-        per_froude * part.slope_sigma_1_s[use],
-    )
-    at_end = read(found, np.array([last]))
-    row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
-    now = found.mean.copy()
-    now[k + motion.SCALE :] = 0.0  # the speed itself, not the log
-    by, _ = motion.predict(problem.forces, now, problem.grid_s, row)
-    by[1 + k + motion.SCALE :] = 0.0
-    speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
+    curve = _curve(part, grid, ship)
     stamps = np.concatenate(list(record.stamps.values()))
     tracks = {}
     for name, times in record.stamps.items():
@@ -145,12 +119,7 @@ def _result(
         NAME,
         curve,
         ValidRange.of_branch(curve),
-        AtEnd(
-            last,
-            speed_sd,
-            float(at_end.resistance_m_s2[0]),
-            float(at_end.sigma_m_s2[0]),
-        ),
+        _at_end(found, coast, last),
         start_ns=int(stamps.min()),
         end_ns=int(stamps.max()),
         order=None,
@@ -161,4 +130,47 @@ def _result(
         current_m_s=float(found.mean[current]) if several else None,
         current_sigma_m_s=float(np.sqrt(found.covariance[current, current])) if several else None,
         notes=(*window.notes, *ship.warnings, *notes),
+    )
+
+
+def _curve(part: ReadOut, grid: Float64, ship: Ship) -> ResistanceCurve:
+    """Return r(v) from where the force slows the ship."""
+    driving = np.flatnonzero(part.resistance_m_s2 <= 0.0)
+    use = slice(int(driving[-1]) + 1 if len(driving) else 0, None)
+    if len(grid[use]) < 3:
+        raise EstimationError(
+            f'the fitted force nowhere slows the ship from {grid[-1]:.4g} to {grid[0]:.4g} m/s: '
+            'give a window in which she coasts'
+        )
+    # where the file states retardations, n_r is no unknown of the motion
+    of_n_r = part.parts_m_s2['n_r']
+    if not of_n_r.any():
+        of_n_r = part.resistance_m_s2 / (1.0 + ship.n_r(grid)) * ship.added_mass.sd
+    per_froude = float(ship.speed(1.0))
+    return ResistanceCurve(
+        grid[use].copy(),
+        part.resistance_m_s2[use],
+        np.hypot(part.repeatable_m_s2, of_n_r)[use],
+        part.repeatable_m_s2[use],
+        ship.froude(grid[use]),
+        per_froude * part.slope_1_s[use],
+        per_froude * part.slope_sigma_1_s[use],
+    )
+
+
+def _at_end(found: RunPosterior, coast: Rows, last: float) -> AtEnd:
+    """Return speed and r at the end of the window."""
+    problem, k = found.problem, found.problem.coefficients
+    at_end = read(found, np.array([last]))
+    row = Rows(coast.time_s[-1:], np.array([LOG]), np.zeros(1))
+    now = found.mean.copy()
+    now[k + motion.SCALE :] = 0.0  # the speed itself, not the log
+    by, _ = motion.predict(problem.forces, now, problem.grid_s, row)
+    by[1 + k + motion.SCALE :] = 0.0
+    speed_sd = float(np.sqrt(by[1:, 0] @ found.covariance @ by[1:, 0]))
+    return AtEnd(
+        last,
+        speed_sd,
+        float(at_end.resistance_m_s2[0]),
+        float(at_end.sigma_m_s2[0]),
     )
