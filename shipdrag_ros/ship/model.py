@@ -41,6 +41,7 @@ from shipdrag_ros.ship.sections import Air, Economics, Propeller, Propulsion, St
 
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.225
+_SIZES = ('length_m', 'displaced_volume_m3', 'breadth_m', 'draught_m', 'wetted_surface_m2')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,13 +49,14 @@ class Ship:
     """
     A ship as its file states it.
 
-    Every value is checked, wherever it comes from. Only the length and the volume are
-    needed to estimate r(v); the baseline is needed to simulate.
+    `load` and `from_yaml` check every value and whether they fit each other; constructing
+    one directly only that sizes are above 0. Only the length and the volume are needed to
+    estimate r(v); the baseline is needed to simulate.
 
     Raises
     ------
     ShipFileError
-        Naming every value out of its range, and every two that contradict each other.
+        Naming every size that is not above 0.
 
     Examples
     --------
@@ -91,11 +93,12 @@ class Ship:
     facts: tuple[Fact, ...] = declare(fact_list(), 'what a log book knows of all runs', default=())
 
     def __post_init__(self) -> None:
-        problems: list[str] = []
-        keys = keys_of(type(self))
-        read_keys(keys, plain(self), '', problems)
-        if not problems:
-            problems.extend(inconsistencies({name: getattr(self, name) for name in keys}))
+        # particulars that are varied may leave what is plausible of a file, never what can be
+        problems = [
+            f'{name}: {value!r}, expected a number above 0'
+            for name in _SIZES
+            if (value := getattr(self, name)) is not None and not 0.0 < value < np.inf
+        ]
         if problems:
             raise ShipFileError('Ship(...)', problems)
 

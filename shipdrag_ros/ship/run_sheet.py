@@ -10,6 +10,7 @@ import numpy as np
 
 from shipdrag_ros.errors import ShipFileError
 from shipdrag_ros.fields import declare, keys_of, number, parse, read_keys, section, text_of
+from shipdrag_ros.ship.consistency import inconsistencies
 from shipdrag_ros.ship.facts import Fact, fact_list
 from shipdrag_ros.ship.model import Ship
 
@@ -103,15 +104,16 @@ class RunSheet:
             if self.water.temperature_c is not None:
                 viscosity = kinematic_viscosity(self.water.temperature_c, density)
             water = replace(ship.water, density_kg_m3=density, kinematic_viscosity_m2_s=viscosity)
-        try:
-            return replace(
-                ship,
-                draught_m=self.draught_m or ship.draught_m,
-                displaced_volume_m3=self.displaced_volume_m3 or ship.displaced_volume_m3,
-                water=water,
-            )
-        except ShipFileError as error:
-            raise ShipFileError(subject, error.problems) from error
+        changed = replace(
+            ship,
+            draught_m=self.draught_m or ship.draught_m,
+            displaced_volume_m3=self.displaced_volume_m3 or ship.displaced_volume_m3,
+            water=water,
+        )
+        problems = list(inconsistencies({name: getattr(changed, name) for name in keys_of(Ship)}))
+        if problems:
+            raise ShipFileError(subject, problems)
+        return changed
 
 
 def kinematic_viscosity(temperature_c: float, density_kg_m3: float) -> float:

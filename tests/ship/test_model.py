@@ -288,15 +288,14 @@ def test_a_ship_is_one_line(cargo: Ship) -> None:
     [
         ({'length_m': -80.0}, 'length_m'),
         ({'length_m': math.nan}, 'length_m'),
-        ({'displaced_volume_m3': 4e6}, 'displaced_volume_m3'),
-        ({'length_m': 262.0}, 'length_m'),  # feet: too slender for the volume
-        ({'water': Water(density_kg_m3=1.0)}, 'water.density_kg_m3'),
-        ({'propulsion': 8.0}, 'propulsion'),
+        ({'length_m': math.inf}, 'length_m'),
+        ({'displaced_volume_m3': 0.0}, 'displaced_volume_m3'),
+        ({'breadth_m': -13.0}, 'breadth_m'),
+        ({'draught_m': -5.0}, 'draught_m'),
+        ({'wetted_surface_m2': math.nan}, 'wetted_surface_m2'),
     ],
 )
-def test_a_ship_made_in_python_is_checked_as_one_of_a_file(
-    values: dict[str, Any], key: str
-) -> None:
+def test_a_ship_made_in_python_has_sizes_above_zero(values: dict[str, Any], key: str) -> None:
     with pytest.raises(ShipFileError, match=re.escape(key)):
         Ship(**{'length_m': 80.0, 'displaced_volume_m3': 4000.0} | values)
 
