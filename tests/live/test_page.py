@@ -98,7 +98,7 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
         assert viewer.page.evaluate(f'{DRAWN}("{chart}")') > 3
     assert 'speed through water' in viewer.text('#inputs')
     assert 'Steady lead' in viewer.text('#checks')
-    agreed = viewer.wait_for('#verdict', 'Model and data agree')
+    agreed = viewer.wait_for('#verdict', 'Nothing is missing')
     assert violations(viewer.page) == []
 
     # the page's process is gone and comes again; the node does not notice
