@@ -267,7 +267,7 @@ COMMANDS = (
     ),
     _use(
         '--remap to an input that is none',
-        _replay('--remap', '/position:=gps'),
+        _replay('--remap', '/fix:=gps'),
         1,
         "no input 'gps'; inputs are speed_through_water",
     ),

@@ -176,7 +176,8 @@ def test_broken_bytes_are_counted_and_spoil_no_neighbour(
     assert len(decoded.block) + sum(decoded.unreadable.values()) == 5
     assert {0, 4} <= set(decoded.kept.tolist())
     np.testing.assert_array_equal(decoded.block.receive_ns, decoded.kept + 1)
-    assert decoded.block.value[0].tolist() == decoded.block.value[-1].tolist()
+    # NaN where a DVL did not measure against this
+    np.testing.assert_array_equal(decoded.block.value[0], decoded.block.value[-1])
 
 
 def test_short_and_wrongly_encapsulated_messages_are_malformed(reference: Any) -> None:

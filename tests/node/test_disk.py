@@ -116,7 +116,10 @@ def test_a_directory_that_vanishes_is_told_and_made_again(start_node: Any, ship:
     ship.wait_recorded()
     shutil.rmtree(ship.directory)
     ship.send(5)
-    ship.wait_recorded()
+    status = ship.diagnostics.wait_for(PART, 'somebody removed 1 file(s)')
+    assert status.level == b'\x01'
+    ship.diagnostics.wait_for(PART, '5', value='messages')
+    assert ship.said('messages lost') == '6'  # five readings and an event were in it
     assert ship.said('part [1]') == '1'
     assert node.stop() == 0
     assert 'No such file or directory' in node.log
