@@ -28,7 +28,7 @@ _UNIT_RATIOS = {
     if shown != meant
 }
 # relative, as a current and the error of a log are in a ratio too; and of the way to one unit
-_UNITS_NEAR, _UNITS_NEARER = 0.1, 0.15
+_UNITS_NEAR, _UNITS_NEARER = 0.1, 0.14
 # what `float` takes too, 1_000 or nan or infinity, is no measured number
 NUMBER = re.compile(r'[-+]?(\d+(?:\.\d*)?|\.\d+)([eE][-+]?\d{1,4})?')
 LIGHT_KG = 1e4

@@ -72,7 +72,7 @@ def result_of(diagnosing: Diagnosing) -> DiagnosisStatus:
     ('settings', 'ship', 'state', 'reason'),
     [
         ({'diagnose': False}, SHIP_FILE, 'off', 'the parameter diagnose is false'),
-        ({}, None, 'impossible', 'has no baseline'),
+        ({}, None, 'impossible', 'states no `baseline`'),
         ({}, SHIP_FILE, 'none yet', 'none yet'),
     ],
 )
