@@ -89,10 +89,12 @@ def test_the_first_word_is_that_there_is_no_coastdown_and_why(
         why = 'it was none (turn): the ship turned by more than 20 deg'
     assert first.startswith(f"No coastdown was found in '{sailed}': ")
     assert why in first
-    assert 'nothing is missing' not in second
+    assert 'nothing is missing' not in second.lower()
     assert second.startswith('Log and track agree')
     found = json.loads(document.read_text())
-    assert found['verdict'] == 'none'
+    # legs of another speed, which leave room for something without a name: at 0.9 or near it
+    assert found['verdict'] == ('one_of' if slowing else 'none')
+    assert found['candidates'][0]['names'] == ['none']
     assert found['coastdowns_used'] == 0
     assert found['examined'] == ['log_track']
     assert found['no_coastdown'] == first
