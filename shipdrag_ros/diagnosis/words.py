@@ -85,6 +85,8 @@ def _verdict(found: DiagnosisResult) -> str:
                     f'Missing is one of these: {_listed(rest)}. These runs cannot separate them.'
                 )
             said = f'{"Nothing else" if fitted else "Nothing"} is missing'
+            if found.baseline == 'none':  # the force was not examined
+                said = 'Log and track agree'
             said = f'{said} ({probability(found.nothing)})'
             return (
                 f'{said}, or {_listed(rest)}. These runs cannot separate them.'

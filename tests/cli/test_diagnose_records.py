@@ -89,10 +89,12 @@ def test_the_first_word_is_that_there_is_no_coastdown_and_why(
         why = 'it was none (turn): the ship turned by more than 20 deg'
     assert first.startswith(f"No coastdown was found in '{sailed}': ")
     assert why in first
-    assert 'nothing is missing' not in second
+    assert 'nothing is missing' not in second.lower()
     assert second.startswith('Log and track agree')
     found = json.loads(document.read_text())
-    assert found['verdict'] == 'none'
+    # legs of another speed, which leave room for something without a name: at 0.9 or near it
+    assert found['verdict'] == ('one_of' if slowing else 'none')
+    assert found['candidates'][0]['names'] == ['none']
     assert found['coastdowns_used'] == 0
     assert found['examined'] == ['log_track']
     assert found['no_coastdown'] == first
@@ -159,8 +161,10 @@ def test_a_ship_file_of_two_values_does_not_hide_a_current(
     assert found['examined'] == ['force', 'log_track']
     # on one course a current and an offset of the log are the same
     assert found['verdict'] == 'one_of'
-    sizes = {each['names'][0]: each['effects'][0]['parameters'] for each in found['candidates']}
-    assert set(sizes) == {'current', 'log_offset'}
+    alone = [each for each in found['candidates'] if len(each['effects']) == 1]
+    sizes = {each['names'][0]: each['effects'][0]['parameters'] for each in alone}
+    assert {'current', 'log_offset'} <= set(sizes)
+    assert {each['names'][0] for each in found['candidates'][:2]} == {'current', 'log_offset'}
     along = sizes['current']['along_track_m_s']
     assert abs(along['value'] - 0.4) < 3.0 * along['sd']
     assert along['sd'] < 0.1

@@ -125,7 +125,12 @@ def test_the_diagnosis_is_told_in_full(diagnosis: sd.Diagnosis) -> None:
     assert abs(factor.value + 0.15) < 4.0 * factor.sd
     frame = diagnosis.to_frame()
     row = frame[frame['effect'] == 'log_scale'].iloc[0]
-    assert (row['parameter'], row['value'], row['sd']) == ('factor', factor.value, factor.sd)
+    # what is named is of all hypotheses that hold it, a row of its own candidate
+    (alone,) = diagnosis.candidates[0].effects
+    own = alone.parameters['factor']
+    assert (row['parameter'], row['value'], row['sd']) == ('factor', own.value, own.sd)
+    assert abs(own.value - factor.value) < factor.sd
+    assert own.sd < factor.sd
     better = diagnosis.ship_with_effects()
     assert [each.name for each in better.effects] == ['log_scale']
     assert diagnosis.gap_after is not None
