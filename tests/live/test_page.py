@@ -98,7 +98,9 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
         assert viewer.page.evaluate(f'{DRAWN}("{chart}")') > 3
     assert 'speed through water' in viewer.text('#inputs')
     assert 'Steady lead' in viewer.text('#checks')
-    agreed = viewer.wait_for('#verdict', 'Model and data agree')
+    # one run alone may leave a rest of probability
+    agreed = viewer.wait_for('#verdict', 'othing is missing')
+    assert agreed.startswith(('Model and data agree', 'Nothing is missing ('))
     assert violations(viewer.page) == []
 
     # the page's process is gone and comes again; the node does not notice
