@@ -16,8 +16,9 @@ from pynmeagps.nmeahelpers import calc_checksum
 pytest.importorskip('rclpy')
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.messages import types
+from shipdrag_ros.messages import encode, types
 from shipdrag_ros.replay import replay
+from shipdrag_ros.samples import Block, Channel
 
 SPEED_TYPE = 'geometry_msgs/msg/TwistWithCovarianceStamped'
 
@@ -122,7 +123,9 @@ def test_a_topic_that_is_there_feeds_and_nmea_is_counted(
     start_node(nmea=instruments.source)
     publisher = peer.advertise('/speed_through_water', SPEED_TYPE)
     peer.wait_for_listener(publisher)
-    publisher.publish(b'\x00\x01\x00\x00 whatever it is')
+    (good,) = encode(Block.of(Channel.SPEED_THROUGH_WATER, [time.time_ns()], [5.0]))
+    assert good.type == SPEED_TYPE
+    publisher.publish(good.payload)
     diagnostics.wait_for('input speed_through_water', '1', value='messages')
     part = f'nmea {instruments.source}'
     key = 'not used, a topic feeds speed_through_water'
