@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-The towed cable of S2: the paper's figures drawn anew, its numbers beside ours.
+The towed cable of S2: the paper's figures drawn again, its numbers beside ours.
 
 `python benchmarks/s2_cable.py` prints the page; with `--write` it goes to
 docs/s2_cable.md and the pictures beside it. No random numbers; some seconds.
@@ -261,7 +261,7 @@ C0 = 0.25 pi zeta0 d/l.
 - Components at an angle (6) are a rotation. C_x and C_y of an inclined cable are not given, so
   only the rotation is here.
 
-## Its figures, drawn anew
+## Its figures, drawn again
 
 The measured points of figure 2 are lost in the copy at hand. C0 of figures 3 to 5 is not stated;
 0.02 is taken.
