@@ -219,6 +219,12 @@ class Diagnostics:
                     return status
         return None
 
+    def forget(self) -> None:
+        """
+        Forget what was told so far, as by a node that is gone.
+        """
+        self._heard.clear()
+
     def set_clock(self, time_ns: int) -> None:
         """
         Publish simulated time until the node goes by it.
