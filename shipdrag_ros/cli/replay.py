@@ -10,9 +10,10 @@ from typing import Any
 
 from shipdrag_ros.cli import replay_json, replay_text
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, stop_time
 from shipdrag_ros.cli.output import Output, json_text
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.errors import BagError
 from shipdrag_ros.imports import need
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters
@@ -60,6 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='estimate from this part [s from the start of the bag], without looking for a '
         'coastdown, of each bag without a window of its own; what in it is no coastdown is cut',
     )
+    parser.add_argument(
+        '--stop',
+        type=stop_time,
+        metavar='TIME',
+        help='the engine was stopped then, within some seconds [s from the start of the bag, or '
+        'ISO 8601 with its zone]: evidence that the regimes weigh with the rest',
+    )
     add_remap(parser)
     parser.add_argument(
         '--compare',
@@ -89,8 +97,10 @@ def run(options: argparse.Namespace) -> int:
         need(*REPORT_MODULES)
         options.out.mkdir(parents=True, exist_ok=True)
     window = None if options.window is None else tuple(options.window)
+    if window is not None and options.stop is not None:
+        raise BagError('--window and --stop: give one of them')
     results = [
-        replay_run(each, output, ship=ship, parameters=parameters, window=own)
+        replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
         for each, own in open_windowed(
             options.bags, remap=dict(options.remap), window=window, output=output
         )

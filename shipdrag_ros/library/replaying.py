@@ -14,6 +14,7 @@ from shipdrag_ros.library.windowed import WindowSpan
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.told_stop import Stop
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
@@ -28,6 +29,7 @@ def replay_run(
     ship: Ship | None = None,
     parameters: Parameters | None = None,
     window: WindowSpan | None = None,
+    stop: Stop | None = None,
 ) -> RunResult:
     """
     Replay one run; its progress is shown.
@@ -39,7 +41,9 @@ def replay_run(
     """
     with listener.progress(f'replaying {each.name}') as progress:
         result = RunResult.of(
-            replay(each, ship=ship, parameters=parameters, window=window, progress=progress)
+            replay(
+                each, ship=ship, parameters=parameters, window=window, stop=stop, progress=progress
+            )
         )
     if not result.coastdowns:
         astern = _astern(each)

@@ -98,7 +98,9 @@ def test_a_few_stamps_far_back_are_late_and_no_clock_that_was_set(slips: int) ->
     expected = ['accepted'] * 200
     for slip in range(slips):
         at = 20 + 4 * slip
-        log.insert(at, sample(LOG, 50.0 + slip, 8.0, receive_s=(int(log[at].stamp_ns[0]) - NOW) / S))
+        log.insert(
+            at, sample(LOG, 50.0 + slip, 8.0, receive_s=(int(log[at].stamp_ns[0]) - NOW) / S)
+        )
         expected.insert(at, 'late')
     assert reasons(*log) == expected
 
