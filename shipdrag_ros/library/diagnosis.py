@@ -124,7 +124,7 @@ class Diagnosis(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """
-        Return what `shipdrag diagnose --json` writes; arrays are numpy's.
+        Return the JSON document of `shipdrag diagnose`; arrays are numpy's.
         """
         return document(self.found, self.ship)
 

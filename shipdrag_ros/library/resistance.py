@@ -222,7 +222,7 @@ class Resistance(ShownResistance):
 
     def to_dict(self) -> dict[str, Any]:
         """
-        Return what `shipdrag replay --json` writes; arrays are numpy's.
+        Return the JSON document of `shipdrag replay`; arrays are numpy's.
         """
         return document(self.runs)
 

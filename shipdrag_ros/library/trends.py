@@ -80,7 +80,7 @@ class Trends(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """
-        Return what `shipdrag trend --json` writes; arrays are numpy's.
+        Return the JSON document of `shipdrag trend`; arrays are numpy's.
         """
         return document(self.ships, self.skipped)
 
