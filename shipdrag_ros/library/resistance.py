@@ -323,7 +323,7 @@ def estimate(
 
     Notes
     -----
-    Source: S1 (1) to (13), docs/accuracy.md. The figures are those of the command line
+    Source: S1 (1) to (13), docs/figures.md. The figures are those of the command line
     and of the node, to the last bit.
 
     Examples
