@@ -13,6 +13,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
+from shipdrag_ros.library import forecasts
 from shipdrag_ros.library.coastdown import Coastdown, force_columns
 from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
@@ -96,6 +97,27 @@ class Resistance(ShownResistance):
                 'of each of `coastdowns`'
             )
         raise EstimationError(' '.join(self.summary().splitlines()))
+
+    def forecast(self, after: Sequence[float] = forecasts.AFTER_S) -> forecasts.Forecasts:
+        """
+        Foretell the rest of each glide, from what was known at some times after its stop.
+
+        Parameters
+        ----------
+        after
+            When, from the stop on [s].
+
+        Returns
+        -------
+        Forecasts
+            Beside what followed; `plot()` draws them.
+
+        Raises
+        ------
+        EstimationError
+            If a time is not above 0, or there is none.
+        """
+        return forecasts.forecast(self.runs, after)
 
     def _lines(self) -> Sequence[str]:
         lines = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]
