@@ -15,6 +15,7 @@ from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve
+from shipdrag_ros.library import forecasts
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import Notes, WindowSpan, replay_run
 from shipdrag_ros.library.shown import ShownResistance, writing
@@ -225,6 +226,27 @@ class Resistance(ShownResistance):
         Return the JSON document of `shipdrag replay`; arrays are numpy's.
         """
         return document(self.runs)
+
+    def forecast(self, after: Sequence[float] = forecasts.AFTER_S) -> forecasts.Forecasts:
+        """
+        Foretell the rest of each glide, from what was known at some times after its stop.
+
+        Parameters
+        ----------
+        after
+            When, from the stop on [s].
+
+        Returns
+        -------
+        Forecasts
+            Beside what followed; `plot()` draws them.
+
+        Raises
+        ------
+        EstimationError
+            If a time is not above 0, or there is none.
+        """
+        return forecasts.forecast(self.runs, after)
 
     def _lines(self) -> Sequence[str]:
         lines = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]
