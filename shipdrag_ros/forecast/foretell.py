@@ -108,8 +108,6 @@ def foretell(
         _variance(by_way, covariance),
         late * ground[0] ** 2 + reading * ground**2 + drift,
     )
-    at_time = by_way - ground[:, None] * weights
-    still = _variance(at_time, covariance) + late * (ground[0] - ground) ** 2 + drift
     return Forecast(
         estimate.end_ns,
         stop,
@@ -117,7 +115,8 @@ def foretell(
         times,
         ways,
         estimate.last_speed_sigma_m_s,
-        np.sqrt(still),
+        current,
+        np.sqrt(drift),
         targets,
         over_ground,
     )

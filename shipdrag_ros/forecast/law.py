@@ -4,7 +4,8 @@ The deceleration at speeds that a glide has not reached yet, with its covariance
 
 ln a(u) = ln a_0(u) + d(ln u), a_0 of the ship file or of a hull of her length and volume. d is a
 Gaussian process: an unknown level, an unknown exponent, a smooth rest and a constant force, which
-grows as the drag falls. It is given what the estimate says of r(v), and beyond that is the prior.
+grows as the drag falls. It is given what the estimate says of r(v), and beyond that is the prior:
+families from one of narrow sizes to one of a craft that is no hull, weighed by their evidence.
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ from shipdrag_ros.ship.baseline import ittc57
 # priors, chosen on world A (`benchmarks/forecast_worlds.py`)
 LEVEL = 1.0
 """Standard deviation of d at the highest speed: the size of r is what was measured."""
-EXPONENT = 0.25
+EXPONENT = 0.15
 """Standard deviation of the exponent of r over u, beside that of the hull."""
-SMOOTH, ALIKE = 0.03, 0.4
+SMOOTH, ALIKE = 0.06, 0.4
 """Standard deviation of the rest of d, and over how much of ln u it is alike."""
 CONSTANT = 0.03
 """Standard deviation of a constant force, of the deceleration at the stop."""
+SCALES = ((1.0, 0.85), (3.0, 0.12), (10.0, 0.03))
+"""Families in which the last three are so many times as wide, and their probabilities."""
 # a hull without a baseline, as in docs/model.md
 _FORM, _WAVE, _WAVE_FROUDE, _WAVE_POWER = 0.2, 8e-4, 0.22, 4
 _POINTS = 25  # of the curve, evenly in ln u
@@ -69,11 +72,23 @@ def deceleration(estimate: Estimate, ship: Ship, speed_m_s: Float64) -> Decelera
     u = np.concatenate([np.exp(x), speed_m_s])
     base = _log_hull(ship, u)
     base += measured[-1] - base[_POINTS - 1]
-    prior = _prior(np.log(u / top), np.exp(measured[-1] - base))
-    of_curve, to_others = prior[:_POINTS, :_POINTS] + error, prior[_POINTS:, :_POINTS]
-    gain = np.linalg.solve(of_curve, to_others.T).T
-    mean = base[_POINTS:] + gain @ (measured - base[:_POINTS])
-    return Deceleration(mean, prior[_POINTS:, _POINTS:] - gain @ to_others.T)
+    off = measured - base[:_POINTS]
+    means, covariances, logs = [], [], []
+    for scale, chance in SCALES:
+        prior = _prior(np.log(u / top), np.exp(measured[-1] - base), scale)
+        of_curve, to_others = prior[:_POINTS, :_POINTS] + error, prior[_POINTS:, :_POINTS]
+        lower = np.linalg.cholesky(of_curve)
+        gain = np.linalg.solve(of_curve, to_others.T).T
+        fit = np.linalg.solve(lower, off)
+        logs.append(np.log(chance) - 0.5 * fit @ fit - np.log(np.diag(lower)).sum())
+        means.append(base[_POINTS:] + gain @ off)
+        covariances.append(prior[_POINTS:, _POINTS:] - gain @ to_others.T)
+    weight = np.exp(np.array(logs) - max(logs))
+    weight /= weight.sum()
+    mean = weight @ np.array(means)
+    apart = np.array(means) - mean
+    covariance = np.tensordot(weight, covariances, 1) + (weight * apart.T) @ apart
+    return Deceleration(mean, covariance)
 
 
 def _log_hull(ship: Ship, u: Float64) -> Float64:
@@ -89,14 +104,15 @@ def _log_hull(ship: Ship, u: Float64) -> Float64:
     return np.asarray(np.log(drag / (1.0 + ship.n_r(u))))
 
 
-def _prior(x: Float64, weakness: Float64) -> Float64:
+def _prior(x: Float64, weakness: Float64, scale: float) -> Float64:
     """Return the covariance of d: `x` from the top, `weakness` of the drag against it."""
     apart = x[:, None] - x
+    constant = np.log1p(scale * CONSTANT * (weakness - 1.0))
     return np.asarray(
         LEVEL**2
-        + EXPONENT**2 * np.outer(x, x)
-        + SMOOTH**2 * np.exp(-0.5 * (apart / ALIKE) ** 2)
-        + CONSTANT**2 * np.outer(weakness, weakness)
+        + (scale * EXPONENT) ** 2 * np.outer(x, x)
+        + (scale * SMOOTH) ** 2 * np.exp(-0.5 * (apart / ALIKE) ** 2)
+        + np.outer(constant, constant)
     )
 
 

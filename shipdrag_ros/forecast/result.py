@@ -48,8 +48,10 @@ class Forecast:
         From `made_ns` on: median, low, high of when she has that speed and where.
     speed_sd_m_s
         Of the present speed.
-    way_sd_m : (n,)
-        Standard deviation of the distance at the median time of each speed.
+    current_m_s
+        Added to the speed for a way over ground.
+    drift_sd_m : (n,)
+        Standard deviation of the way that the water makes until then.
     targets_m_s
         Speeds that are spoken of, descending.
     over_ground
@@ -64,7 +66,8 @@ class Forecast:
     time_s: Float64
     distance_m: Float64
     speed_sd_m_s: float
-    way_sd_m: Float64
+    current_m_s: float
+    drift_sd_m: Float64
     targets_m_s: tuple[float, ...]
     over_ground: bool
 
@@ -84,32 +87,33 @@ class Forecast:
         """Of each of the targets."""
         return tuple(self.reaches(each) for each in self.targets_m_s)
 
-    def in_time(self) -> Float64:
+    def in_time(self, time_s: Float64 | None = None) -> Float64:
         """
-        Return the same by time (n, 7).
+        Return the same by time.
+
+        Parameters
+        ----------
+        time_s : (m,)
+            From `made_ns` on, ascending from 0; None: those at which she has each speed.
 
         Returns
         -------
-        (n, 7)
-            Time, speed, its low and high, distance, its low and high. In a band that reaches
-            beyond the last speed, that speed is its low end.
+        (m, 7)
+            Time, speed, its low and high, distance, its low and high. Where she is slower than
+            the last speed, that stands for her speed.
+
+        Notes
+        -----
+        At a time, a glide that has each speed earlier is slower; her way is the integral.
         """
-        time = self.time_s[:, 0]
-        spread = Z * self.speed_sd_m_s
-        # at a time, a glide that loses speed earlier is slower
-        low = np.interp(time, self.time_s[:, 1], self.speed_m_s)
-        high = np.interp(time, self.time_s[:, 2], self.speed_m_s)
-        low[0], high[0] = self.speed_m_s[0] - spread, self.speed_m_s[0] + spread
-        way = self.distance_m[:, 0]
-        half = Z * self.way_sd_m
-        return np.column_stack(
-            [
-                time,
-                self.speed_m_s,
-                np.minimum(low, self.speed_m_s),
-                np.maximum(high, self.speed_m_s),
-                way,
-                np.maximum(way - half, 0.0),
-                way + half,
-            ]
-        )
+        time = self.time_s[:, 0] if time_s is None else time_s
+        spread = np.array([0.0, -Z, Z])[:, None] * self.speed_sd_m_s
+        columns = (self.time_s[:, 0], self.time_s[:, 1], self.time_s[:, 2])
+        speed = np.stack([np.interp(time, each, self.speed_m_s) for each in columns])
+        speed[:, 0] += spread[:, 0]
+        steps = np.diff(time) * 0.5 * (speed[:, 1:] + speed[:, :-1] + 2.0 * self.current_m_s)
+        way = np.concatenate([np.zeros((3, 1)), np.cumsum(steps, axis=1)], axis=1)
+        beside = Z * np.interp(time, self.time_s[:, 0], self.drift_sd_m)
+        way[1] = way[0] - np.hypot(way[0] - way[1], beside)
+        way[2] = way[0] + np.hypot(way[2] - way[0], beside)
+        return np.column_stack([time, *speed, *way])

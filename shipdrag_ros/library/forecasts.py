@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.coastdown.running import too_vague
 from shipdrag_ros.display import Table, speed_unit, utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate
@@ -258,6 +259,8 @@ def _forecast(
         return none(f'the glide ends {(window.end_ns - stop_ns) / SECOND_NS:.0f} s after the stop')
     try:
         found = estimate(window.part(stop_ns, end_ns), ship, parameters)
+        if why := too_vague(found, parameters):
+            return none(why)
         forecast = foretell(found, ship, froude_min=parameters.froude_min)
     except EstimationError as error:
         return none(str(error))
