@@ -20,19 +20,11 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
     The candidate `none` says that nothing is missing, `unknown` that it is
     something without a name.
     """
-    candidates: list[dict[str, Any]] = [
-        {
-            'names': list(each.names) or ['none'],
-            'probability': each.probability,
-            'effects': [_sized(effect) for effect in each.effects],
-        }
-        for each in found.candidates
-    ]
     return {
         'question': found.question or None,
         'verdict': str(found.verdict),
-        'effects': [_sized(effect) for effect in found.effects],
-        'candidates': candidates,
+        'effects': sized(found.effects),
+        'candidates': candidates(found),
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
         'advice': [asdict(each) for each in found.would_decide],
@@ -108,14 +100,35 @@ def _earlier(given: WeighedEarlier) -> dict[str, Any]:
     }
 
 
-def _sized(effect: EffectEstimate) -> dict[str, Any]:
-    return {
-        'name': effect.name,
-        'probability': effect.probability,
-        'parameters': {
-            name: {'value': size.value, 'sd': size.sd} for name, size in effect.parameters.items()
-        },
-    }
+def sized(effects: Sequence[EffectEstimate]) -> list[dict[str, Any]]:
+    """
+    Return effects with their probabilities and sizes.
+    """
+    return [
+        {
+            'name': effect.name,
+            'probability': effect.probability,
+            'parameters': {
+                name: {'value': size.value, 'sd': size.sd}
+                for name, size in effect.parameters.items()
+            },
+        }
+        for effect in effects
+    ]
+
+
+def candidates(found: DiagnosisResult) -> list[dict[str, Any]]:
+    """
+    Return the candidates, each with its sizes.
+    """
+    return [
+        {
+            'names': list(each.names) or ['none'],
+            'probability': each.probability,
+            'effects': sized(each.effects),
+        }
+        for each in found.candidates
+    ]
 
 
 def _gap(gap: Gap | None) -> dict[str, Any] | None:
