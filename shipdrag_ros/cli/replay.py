@@ -11,8 +11,9 @@ from typing import Any
 from shipdrag_ros.cli import replay_json, replay_text
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number
-from shipdrag_ros.cli.output import Output, json_text
+from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.display import json_text
 from shipdrag_ros.imports import need
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.parameters import Parameters

@@ -20,19 +20,19 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected
-from shipdrag_ros.messages.heard import OK, Health, health_of
+from shipdrag_ros.messages.heard import OK, Health
 
 _CLEAR = '\x1b[K'
 
 
-def terminal_line(stream: TextIO) -> Callable[[Any], None] | None:
+def terminal_line(stream: TextIO) -> Callable[[Health], None] | None:
     """
-    Return what shows each message of /diagnostics on a terminal; None where there is none.
+    Return what shows the health on a terminal; None where there is none.
 
     Parameters
     ----------
@@ -42,12 +42,10 @@ def terminal_line(stream: TextIO) -> Callable[[Any], None] | None:
     if not stream.isatty():
         return None
 
-    def show(message: Any) -> None:
-        for health in health_of(message.status):
-            width = shutil.get_terminal_size().columns
-            text = line(health)
-            stream.write(f'{text[: width - 1]}{_CLEAR}\r')
-            stream.flush()
+    def show(health: Health) -> None:
+        width = shutil.get_terminal_size().columns
+        stream.write(f'{line(health)[: width - 1]}{_CLEAR}\r')
+        stream.flush()
 
     return show
 
@@ -85,7 +83,6 @@ with uncollected():
     from rclpy.utilities import remove_ros_args
 
     from shipdrag_ros.node.compiling import leave_if_compiling
-    from shipdrag_ros.node.main import terminal_line
     from shipdrag_ros.node.node import CoastdownNode
 
 USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import shipdrag_ros as sd
-from shipdrag_ros.cli import diagnose_json, main, replay_json
-from shipdrag_ros.cli.output import json_text
+from shipdrag_ros.cli import main, replay_json
+from shipdrag_ros.diagnosis.document import document
+from shipdrag_ros.display import json_text
 
 SCALE = {'name': 'log_scale', 'parameters': {'factor': {'value': -0.14, 'sd': 0.02}}}
 THEN = {
@@ -59,7 +60,7 @@ def test_a_diagnosis(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[st
     line = ['diagnose', str(bag), '--fact', 'no_towed_cable', '--earlier', str(then)]
     assert main([*line, f'--json={out}']) == 0
     found = sd.diagnose(sd.read(bag), facts=['no_towed_cable'], earlier=then)
-    assert json_text(diagnose_json.document(found.found, found.ship)) == out.read_text()
+    assert json_text(document(found.found, found.ship)) == out.read_text()
     printed = capsys.readouterr().out
     assert found.summary().splitlines()[0] in printed
     answer = json.loads(out.read_text())
