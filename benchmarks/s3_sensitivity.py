@@ -34,18 +34,19 @@ from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, s
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+    ManoeuvreMotion,
     Side,
     overshoots_rad,
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 from shipdrag_ros.studies.manoeuvring.simulate import steer
-from shipdrag_ros.studies.sensitivity import coasting_words, steering_words
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
+from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
+from shipdrag_ros.studies.sensitivity.face import steering as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, partial_contribution
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which values of a ship file must be known well, in sentences and tables."""
+"""Which values of a ship file must be known well, in sentences, tables and pictures."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
-from shipdrag_ros.display import Table
+from matplotlib.figure import Figure
+
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.studies.face import Presentation
 from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
+from shipdrag_ros.studies.sensitivity.face.pictures import mimic_picture, particulars_picture
 from shipdrag_ros.studies.sensitivity.mimics import WORST
 
 LOSSES = (
@@ -21,6 +26,41 @@ MIMICS = (
 _LOOKS_ALIKE = 0.05  # of an effect is left
 _CLOSE = 0.1  # relative error
 _LARGE = 0.5  # relative error; beyond it only that it is larger is said
+
+_KNOWN, _MISTAKEN = 'What must be known well', 'What a wrong value is taken for'
+
+
+def shown(found: CoastStudy) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+    """
+
+    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+        known = (
+            'How far the record moves when a value of the ship file is wrong by 10 per cent, and '
+            'by its stated standard deviation. The longest bars are to be measured well.'
+        )
+        mistaken = (
+            'What is left of each effect when the value beside its bar is blamed for it. A short '
+            'bar: a ship file that is so far wrong is taken for the effect, and no record '
+            'separates the two; a long bar: the effect looks like nothing else.'
+        )
+        return {
+            _KNOWN: [(particulars_picture(found), known)],
+            _MISTAKEN: [(mimic_picture(found), mistaken)],
+        }
+
+    return Presentation(
+        'Which particulars matter' + (f': {found.ship.name}' if found.ship.name else ''),
+        sentence(found),
+        [
+            Section(lines=notes(found)),
+            Section(_KNOWN, tables=((LOSSES, loss_table(found)),)),
+            Section(_MISTAKEN, tables=((MIMICS, mimic_table(found)),)),
+        ],
+        pictures,
+        source=found.ship.summary(),
+    )
 
 
 def sentence(found: CoastStudy) -> str:

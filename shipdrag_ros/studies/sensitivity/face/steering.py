@@ -1,12 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which derivatives of a steered ship matter, in sentences and tables."""
+"""Which derivatives of a steered ship matter, in sentences, tables and pictures."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Mapping, Sequence
 
-from shipdrag_ros.display import Table
+import numpy as np
+from matplotlib.figure import Figure
+
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.studies.face import Presentation
 from shipdrag_ros.studies.manoeuvring.ship import meaning
+from shipdrag_ros.studies.sensitivity.face.pictures import (
+    check_picture,
+    design_picture,
+    ranking_picture,
+)
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
     CONTROL_S,
@@ -30,6 +39,58 @@ DESIGN = (
 )
 
 MEANINGS = 'What the derivatives are: which force, and what it grows with'
+
+_RANKING, _CHECKED, _SAILED = (
+    'How much each matters',
+    'The model without the others',
+    'Which manoeuvre to sail',
+)
+
+
+def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+
+    Parameters
+    ----------
+    found
+        The losses and the reduced model.
+    sailed
+        Of several manoeuvres.
+    """
+
+    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+        ranking = (
+            'How much the motion changes when a derivative is wrong: the longer the bar, the '
+            'better it must be known. Pale bars, short of the line, may be left out of the model.'
+        )
+        checked = (
+            f'{found.check.manoeuvre.name} of the full and of the reduced models: lines that lie '
+            'on each other show that what was left out is not missed.'
+        )
+        design = (
+            'Loss of 10 per cent of each derivative in each manoeuvre: the darker, the better it '
+            'is seen. Dot: the manoeuvre that shows it best.'
+        )
+        return {
+            _RANKING: [(ranking_picture(found), ranking)],
+            _CHECKED: [(check_picture(found), checked)],
+            _SAILED: [(design_picture(sailed), design)],
+        }
+
+    return Presentation(
+        f'Which derivatives matter: {found.ship.name}',
+        sentence(found),
+        [
+            Section(lines=notes(found)),
+            Section(_RANKING, tables=((LOSSES, loss_table(found)),)),
+            Section(_CHECKED, tables=((CHECK, check_table(found)),)),
+            Section(_SAILED, tables=((DESIGN, design_table(sailed)),)),
+            Section('What the names mean', tables=((MEANINGS, meaning_table(found)),)),
+        ],
+        pictures,
+        source=found.ship.source,
+    )
 
 
 def sentence(found: SteeringStudy) -> str:
