@@ -14,11 +14,12 @@ import os
 import re
 import shutil
 import signal
+import socket
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
@@ -84,6 +85,26 @@ with uncollected():
 
     from shipdrag_ros.node.compiling import leave_if_compiling
     from shipdrag_ros.node.node import CoastdownNode
+
+
+def notify(state: str) -> None:
+    """
+    Tell the service manager, where there is one that listens (sd_notify).
+
+    Parameters
+    ----------
+    state
+        `READY=1` for instance; lines, one an assignment.
+    """
+    address = os.environ.get('NOTIFY_SOCKET', '')
+    if not address:
+        return
+    if address.startswith('@'):  # of the abstract namespace
+        address = f'\0{address[1:]}'
+    # a manager that is gone ends no node
+    with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.sendto(state.encode(), address)
+
 
 USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'
 STOPPING = (signal.SIGINT, signal.SIGTERM)
@@ -158,17 +179,31 @@ def _run(line: list[str]) -> int:
             node = CoastdownNode(context=context, arguments=line)
             try:
                 executor.add_node(node)
-                node.shown = terminal_line(sys.stderr)
+                node.shown = _shown(terminal_line(sys.stderr))
                 node.start()
+                notify('READY=1')
                 while not stop.is_set():
                     executor.spin_once()
             except ExternalShutdownException:
                 pass
             finally:
+                notify('STOPPING=1')
                 node.close()
     finally:
         rclpy.try_shutdown(context=context)
     return 0
+
+
+def _shown(terminal: Callable[[Health], None] | None) -> Callable[[Health], None]:
+    """Return what takes the health each second: it shows that the executor goes round."""
+
+    def show(health: Health) -> None:
+        state = health.of('state')
+        notify('WATCHDOG=1' + ('' if state is None else f'\nSTATUS={state.message}'))
+        if terminal is not None:
+            terminal(health)
+
+    return show
 
 
 @contextmanager
