@@ -20,7 +20,7 @@ from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.library.diagnosing import diagnose_runs
-from shipdrag_ros.library.windowed import refuse_overlaps
+from shipdrag_ros.library.replaying import refuse_overlaps
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.facts import RATE, usage
 

@@ -19,7 +19,7 @@ from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.onboard import ended_by_sigterm, onboard_node, sail
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.library import simulating
+from shipdrag_ros.library import simulated
 from shipdrag_ros.replay import replay, words
 from shipdrag_ros.replay.truth import TrueCurve
 from shipdrag_ros.ship import Ship
@@ -70,7 +70,7 @@ def _way(folder: Path) -> Iterator[RunStep]:
         raise no_ros(error) from error
     ship_file = folder / SHIP
     ship_file.write_bytes(files('shipdrag_ros').joinpath('data', SHIP).read_bytes())
-    block, truth = simulating.make(Ship.load(ship_file), SAILED)
+    block, truth = simulated.make(Ship.load(ship_file), SAILED)
     yield RunStep('run: simulated ship', True, f'{len(block)} readings')
     with ended_by_sigterm(), onboard_node(ship_file, folder, folder / 'node.log', *_NODE) as node:
         with Rehearsal(lambda _: None) as rehearsal:
