@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The JSON document of `diagnose`, whose keys others rely on."""
+"""The JSON document of `diagnose` and of `~/diagnosis`, whose keys others rely on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap
+from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, words
 from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import LIBRARY
 
 
 def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
@@ -21,13 +22,17 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
     something without a name.
     """
     return {
+        'sentence': words.sentence(found),
         'question': found.question or None,
         'verdict': str(found.verdict),
         'effects': sized(found.effects),
         'candidates': candidates(found),
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
-        'advice': [asdict(each) for each in found.would_decide],
+        'advice': [
+            {**asdict(each), 'text': line}
+            for each, line in zip(found.would_decide, words.advice(found), strict=True)
+        ],
         'limits': _limits(found),
         'where': None if found.where is None else asdict(found.where),
         'gap': {
@@ -108,13 +113,18 @@ def sized(effects: Sequence[EffectEstimate]) -> list[dict[str, Any]]:
         {
             'name': effect.name,
             'probability': effect.probability,
-            'parameters': {
-                name: {'value': size.value, 'sd': size.sd}
-                for name, size in effect.parameters.items()
-            },
+            'parameters': dict(_sizes(effect)),
         }
         for effect in effects
     ]
+
+
+def _sizes(effect: EffectEstimate) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the sizes of an effect by name, as figures and in words."""
+    declared = {quantity.name: quantity for quantity in LIBRARY[effect.name].parameters}
+    for name, size in effect.parameters.items():
+        text = f'{words.quantity_text(declared[name])}: {words.size(declared[name], size)}'
+        yield name, {'value': size.value, 'sd': size.sd, 'text': text}
 
 
 def candidates(found: DiagnosisResult) -> list[dict[str, Any]]:
