@@ -66,6 +66,7 @@ RESISTANCE_CURVE = OutputTopic('resistance_curve', types.POINT_CLOUD, latched=Tr
 FORECAST = OutputTopic('forecast', types.POINT_CLOUD, latched=True)
 FORECAST_PATH = OutputTopic('forecast_path', types.PATH, latched=True)
 EVENTS = OutputTopic('events', types.DIAGNOSTIC_ARRAY)
+DIAGNOSIS = OutputTopic('diagnosis', types.STRING, latched=True)
 OUTPUT_TOPICS: tuple[OutputTopic, ...] = (
     SPEED,
     RESISTANCE,
@@ -73,6 +74,7 @@ OUTPUT_TOPICS: tuple[OutputTopic, ...] = (
     FORECAST,
     FORECAST_PATH,
     EVENTS,
+    DIAGNOSIS,
 )
 
 
