@@ -19,11 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from shipdrag_ros.errors import ShipdragError
-    from shipdrag_ros.library.coastdown import Coastdown
     from shipdrag_ros.library.diagnosis import Diagnosis, diagnose
     from shipdrag_ros.library.reading import read
     from shipdrag_ros.library.record import Record
-    from shipdrag_ros.library.resistance import Resistance, estimate
+    from shipdrag_ros.library.resistance import Coastdown, Resistance, estimate
     from shipdrag_ros.library.simulated import simulate
     from shipdrag_ros.library.trends import Trends, trends
     from shipdrag_ros.parameters import Parameters
@@ -48,7 +47,7 @@ __all__ = [
 ]
 
 _HOME = {
-    'Coastdown': 'library.coastdown',
+    'Coastdown': 'library.resistance',
     'Diagnosis': 'library.diagnosis',
     'Parameters': 'parameters',
     'Record': 'library.record',

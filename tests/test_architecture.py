@@ -27,6 +27,7 @@ PICTURE = (
     ('regression', 'simulation'),
     ('posterior',),
     ('estimation',),
+    ('forecast',),
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
     ('bags', 'nmea'),

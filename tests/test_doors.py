@@ -36,7 +36,7 @@ DOORS = (
     ('diagnosis.diagnose', 'diagnose'),
     ('library.reading', 'read'),
     ('library.record', 'Record'),
-    ('library.coastdown', 'Coastdown'),
+    ('library.resistance', 'Coastdown'),
     ('library.resistance', 'Resistance'),
     ('library.resistance', 'estimate'),
     ('library.diagnosis', 'Diagnosis'),

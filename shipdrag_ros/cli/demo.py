@@ -28,11 +28,10 @@ from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import number
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, write_results
-from shipdrag_ros.cli.replay_text import show_run
+from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, show_run, write_results
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import need
-from shipdrag_ros.library import simulating
+from shipdrag_ros.library import simulated
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.replay import words
 from shipdrag_ros.replay.run_result import RunResult
@@ -44,7 +43,7 @@ if TYPE_CHECKING:  # help must not need ROS
     from shipdrag_ros.node.rehearsal import LiveEstimate, Rehearsal
 
 SHIP = 'vitus_bering.yaml'
-SETTINGS = simulating.SimulationSettings(
+SETTINGS = simulated.SimulationSettings(
     speed_m_s=8.2,
     duration_s=1500.0,
     lead_in_s=900.0,
@@ -102,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
         files('shipdrag_ros').joinpath('data', SHIP).read_text(encoding='utf-8'), encoding='utf-8'
     )
     ship = Ship.load(ship_file)
-    block, truth = simulating.make(ship, SETTINGS)
+    block, truth = simulated.make(ship, SETTINGS)
     seconds = SETTINGS.lead_in_s + SETTINGS.duration_s
     output.say(
         f'A simulated {ship.summary()},\n'

@@ -16,7 +16,6 @@ from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.live.app import FLEET, FleetPages, LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
 from shipdrag_ros.live.serve import listen, serve
@@ -151,6 +150,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
     """
     # Parquet and pictures take long to import
     from shipdrag_ros.fleet.store import read_coastdowns
+    from shipdrag_ros.library.trends import trends_of
     from shipdrag_ros.trend.coastdown_page import links
     from shipdrag_ros.trend.page import fleet_text
 

@@ -90,7 +90,7 @@ class RunningCoastdown:
             return NoEstimate(stamp_ns, str(error))
         # an estimator that is given may return what it likes
         if not self._estimated and isinstance(found, Estimate):
-            self._estimated = not (why := _too_vague(found, self._parameters))
+            self._estimated = not (why := too_vague(found, self._parameters))
             if why:
                 return NoEstimate(stamp_ns, why)
         return Update(stamp_ns, found)
@@ -162,8 +162,10 @@ class RunningCoastdown:
         return self._cut(start_ns, end_ns, first_ns)
 
 
-def _too_vague(found: Estimate, parameters: Parameters) -> str:
-    """Say why the first estimate of a coastdown is not given yet; '' if it is."""
+def too_vague(found: Estimate, parameters: Parameters) -> str:
+    """
+    Say why the first estimate of a coastdown is not given yet; '' if it is.
+    """
     sigma, resistance = found.last_sigma_m_s2, found.last_resistance_m_s2
     share = parameters.first_relative_sigma
     if sigma < share * resistance:

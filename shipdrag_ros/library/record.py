@@ -23,7 +23,7 @@ from shipdrag_ros.ship import Ship
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from shipdrag_ros.library.coastdown import Coastdown
+    from shipdrag_ros.library.resistance import Coastdown
 
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
 
