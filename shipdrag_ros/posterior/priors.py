@@ -93,6 +93,13 @@ LAW_ERROR = Declared(
     '',
     'residuals of model tests about two parts: 0.5 to 2 %',
 )
+SHAPE_OF_MORE = Declared(
+    's',
+    'size of s beside more friction, relative to it: what is added is seldom in proportion',
+    0.2,
+    '',
+    'roughness, locked propellers and shallow water over the speed, as formulas',
+)
 # the thrust
 THRUST = Declared(
     'q',
@@ -167,6 +174,7 @@ TABLE: tuple[Declared, ...] = (
     GENERIC_WAVE,
     GENERIC_HUMPS,
     LAW_ERROR,
+    SHAPE_OF_MORE,
     THRUST,
     RUN_DOWN,
     RUN_DOWN_SHAPE,

@@ -284,7 +284,8 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
     chance = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
     for more, (size, part) in product(priors.LOG_UNIFORM, priors.HALF_NORMAL):
         scales = ((more, math.hypot(more, sds[0])), (0.0, sds[1]))
-        yield priors.FRICTION_ALONE, chance * part, scales, size * unsure
+        shape = math.hypot(size * unsure, priors.SHAPE_OF_MORE.mean * more)
+        yield priors.FRICTION_ALONE, chance * part, scales, shape
     chance = priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM)
     for size in priors.LOG_UNIFORM:
         # friction, waves and shape all differ
