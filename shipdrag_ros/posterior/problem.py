@@ -289,8 +289,8 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
     chance = priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM)
     for size in priors.LOG_UNIFORM:
         # friction, waves and shape all differ
-        wave = math.hypot(size, sds[1]) if sds[1] > _EXACT else _EXACT
-        scales = ((0.0, math.hypot(size, sds[0])), (0.0, wave))
+        of_wave = math.hypot(size, sds[1]) if sds[1] > _EXACT else _EXACT
+        scales = ((0.0, math.hypot(size, sds[0])), (0.0, of_wave))
         yield priors.SMOOTH, chance, scales, size
 
 
