@@ -45,6 +45,7 @@ _OUTPUT_MEANING = {
     'variance at [0]',
     'resistance_curve': 'fields `speed, resistance, sigma, froude`, one point a speed; latched',
     'events': 'onsets, ends, resets, life cycle, clock jumps',
+    'diagnosis': 'JSON of `shipdrag diagnose` after each coastdown; latched',
 }
 
 
@@ -79,8 +80,8 @@ def outputs() -> str:
         for topic in OUTPUT_TOPICS
     ]
     diagnostics = (
-        'state, health of each input, the latest figures, what the last coastdown says is '
-        'missing in the model; 1 Hz on steady time'
+        'state, health of each input, the latest figures, the verdict in a sentence; 1 Hz on '
+        'steady time'
     )
     rows.append(['`/diagnostics`', 'diagnostic_msgs/DiagnosticArray', diagnostics])
     return _table(['topic', 'type', 'meaning'], rows)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from shipdrag_ros.errors import ShipdragError
     from shipdrag_ros.library.diagnosis import Diagnosis, diagnose
     from shipdrag_ros.library.reading import read
-    from shipdrag_ros.library.record import Record
-    from shipdrag_ros.library.resistance import Coastdown, Resistance, estimate
+    from shipdrag_ros.library.record import Coastdown, Record
+    from shipdrag_ros.library.resistance import Resistance, estimate
     from shipdrag_ros.library.simulated import simulate
     from shipdrag_ros.library.trends import Trends, trends
     from shipdrag_ros.parameters import Parameters
@@ -47,7 +47,7 @@ __all__ = [
 ]
 
 _HOME = {
-    'Coastdown': 'library.resistance',
+    'Coastdown': 'library.record',
     'Diagnosis': 'library.diagnosis',
     'Parameters': 'parameters',
     'Record': 'library.record',

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number
-from shipdrag_ros.cli.output import Output, json_text
+from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.force import Force

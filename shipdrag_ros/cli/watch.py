@@ -100,7 +100,6 @@ def run(options: argparse.Namespace) -> int:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
         source: PictureFeed = stack.enter_context(_source(options, ship, past, output))
         fleet = None if options.store is None else fleet_pages(output, options.store)
-        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet)
         for note in notes:
             output.log(note)
         name, port = page_socket.getsockname()[:2]
@@ -116,7 +115,8 @@ def run(options: argparse.Namespace) -> int:
                 )
             output.log('Ctrl-C ends it; the node is not touched')
 
-        serve(page, [page_socket], deltas=deltas, ready=announce)
+        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet, ready=announce)
+        serve(page, [page_socket], deltas=deltas)
     return 0
 
 

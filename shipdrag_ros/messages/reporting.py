@@ -28,6 +28,7 @@ from shipdrag_ros.messages import types
 from shipdrag_ros.messages.encoding import covariance6, vector3
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
+    DIAGNOSIS,
     EVENTS,
     RESISTANCE,
     RESISTANCE_CURVE,
@@ -92,6 +93,21 @@ class EventNote:
     stamp_ns: int
     text: str
     values: Mapping[str, str]
+
+
+def diagnosis_message(text: str, stamp_ns: int, *, node: str = DEFAULT_NODE) -> OutputMessage:
+    """
+    Encode the document of a diagnosis.
+
+    Parameters
+    ----------
+    text
+        JSON.
+    stamp_ns
+        End of the coastdown; the message itself holds no time [ns].
+    """
+    payload = types.serialize(DIAGNOSIS.type, types.make(DIAGNOSIS.type, data=text))
+    return OutputMessage(DIAGNOSIS.under(node), DIAGNOSIS.type, payload, stamp_ns)
 
 
 def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:

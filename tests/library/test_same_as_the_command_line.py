@@ -10,7 +10,7 @@ import pytest
 
 import shipdrag_ros as sd
 from shipdrag_ros.cli import main
-from shipdrag_ros.cli.output import json_text
+from shipdrag_ros.display import json_text
 
 SCALE = {'name': 'log_scale', 'parameters': {'factor': {'value': -0.14, 'sd': 0.02}}}
 THEN = {
