@@ -37,7 +37,7 @@ def window_only(window, ship, parameters):
 
 
 def events_of(ship, block: Block, places=()) -> list:
-    monitor = Monitor(ship, FILTER, estimate=window_only, final=window_only)
+    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
     events = []
     for first, last in zip([0, *places], [*places, len(block)], strict=True):
         events += monitor.update(block[first:last])
@@ -111,7 +111,7 @@ def test_a_stop_that_is_told_dates_a_glide_that_a_noisy_log_shows_late(ship, rec
     at = int(np.searchsorted(block.stamp_ns, START_NS + 900 * S))
     starts = []
     for told in (False, True):
-        monitor = Monitor(ship, FILTER, estimate=window_only, final=window_only)
+        monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
         events = monitor.update(block[:at])
         if told:
             monitor.engine_stopped(START_NS + 900 * S)
@@ -131,7 +131,7 @@ def test_a_stop_that_is_told_dates_a_glide_that_a_noisy_log_shows_late(ship, rec
 def test_a_stop_that_is_told_and_is_none_is_no_coastdown(ship, record) -> None:
     block = record(sensors=(LOG,), seed=2, orders=(), duration_s=900.0)
     at = int(np.searchsorted(block.stamp_ns, START_NS + 900 * S))
-    monitor = Monitor(ship, FILTER, estimate=window_only, final=window_only)
+    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
     events = monitor.update(block[:at])
     monitor.engine_stopped(START_NS + 900 * S)
     events += [*monitor.update(block[at:]), *monitor.finish()]
