@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from shipdrag_ros.bags.declarations import METADATA
 from shipdrag_ros.bags.locate import BagFiles, locate
 from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.bags.run import Run
-from shipdrag_ros.bags.writer import METADATA
 from shipdrag_ros.errors import BagError
 
 

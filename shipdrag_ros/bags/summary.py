@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shipdrag_ros.bags.run import Run, TopicInfo
-from shipdrag_ros.bags.writer import METADATA
 from shipdrag_ros.messages import TOPICS
 
 
@@ -84,10 +83,9 @@ def info(run: Run) -> BagInfo:
     start_ns, end_ns = run.span_ns or (None, None)
     duration_s = 0.0 if start_ns is None or end_ns is None else (end_ns - start_ns) * 1e-9
     found = {topic.input for topic in run.topics}
-    about = run.parts[0].contents.metadata.get(METADATA, {})
     compressions = {kind for part in run.parts for kind in part.contents.compressions}
     if run.paths != tuple(part.path for part in run.parts):
-        about, compressions = {}, set()  # those of a bag made for the moment, of a log
+        compressions = set()  # those of a bag made for the moment, of a log
     return BagInfo(
         name=run.name,
         paths=run.paths,
@@ -100,7 +98,7 @@ def info(run: Run) -> BagInfo:
         topics=tuple(TopicRate(topic, _rate_hz(topic, duration_s)) for topic in run.topics),
         missing=tuple(name for name in TOPICS if name not in found),
         attachments={name: len(text.encode()) for name, text in run.attachments.items()},
-        software=about.get('version'),
+        software=run.software,
         node=run.node,
         warnings=run.warnings,
     )

@@ -43,6 +43,7 @@ from mcap.records import (
 
 from shipdrag_ros.bags.declarations import (
     LIBRARY,
+    METADATA,
     PROFILE,
     as_bytes,
     attachment,
@@ -58,8 +59,6 @@ from shipdrag_ros.samples import Block
 _NUMBERED = struct.Struct('<BQH')  # opcode, length, channel
 CHUNK_RANGE = 1 << 14, 1 << 20
 """Least and most bytes of a chunk before it is packed."""
-METADATA = 'shipdrag_ros'
-"""Name of the metadata record that says which recording a file is part of."""
 
 
 def private_opener(path: str, flags: int) -> int:

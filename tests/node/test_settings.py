@@ -104,11 +104,12 @@ def test_the_launch_file_parses_and_sets_known_parameters() -> None:
     assert {'ship_file', 'output_directory', 'autostart'} <= names
 
 
-def test_a_former_name_is_accepted_and_listed_nowhere() -> None:
+def test_the_error_of_a_former_name_says_the_new_one() -> None:
     (estimator,) = [setting for setting in SETTINGS if setting.name == 'estimator']
     assert 'warped' not in estimator.choices
     problems: list[str] = []
-    assert estimator.key.kind.read('warped', 'estimator', problems) == 'warped'
+    estimator.key.kind.read('warped', 'estimator', problems)
+    assert "which is 'log_time' now" in problems.pop()
     assert problems == []
     estimator.key.kind.read('kalman', 'estimator', problems)
     assert 'log_time' in problems[0]
