@@ -7,7 +7,7 @@ columns and replayed twice, as the monitor finds it and in the window that a per
 would give, with the default estimators. A figure agrees if it lies within two
 joint standard deviations of the one that is known, and its own is at most 1.5
 times the other's; both without the uncertainty of n_r, which they share. `--write`
-puts the table into docs/real_records.md.
+puts the table into docs/results/real_records.txt.
 Nothing is random. Takes about a minute.
 """
 
@@ -34,7 +34,7 @@ from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main as shipdrag
 
-PAGE = ROOT / 'docs' / 'real_records.md'
+PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
 SECTION = re.compile('(?<=<!-- coastdowns -->\n).*?(?=<!-- end coastdowns -->)', re.DOTALL)
 HEAD = ('record', 'what it holds', 'found by itself', 'in the given window', 'known', 'judged')
 AGREES_SD = 2.0
@@ -273,7 +273,7 @@ def main() -> None:
     Print the table, and write it into the page if asked.
     """
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='into docs/real_records.md')
+    parser.add_argument('--write', action='store_true', help='into docs/results/real_records.txt')
     parser.add_argument(
         '--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'real_coastdowns'
     )

@@ -11,8 +11,8 @@ from pathlib import Path
 from shipdrag_ros.cli.arguments import add_json, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.library import simulating
-from shipdrag_ros.library.simulating import (
+from shipdrag_ros.library import simulated
+from shipdrag_ros.library.simulated import (
     SPEED_FRACTION,
     SimulationSettings,
     make,
@@ -213,6 +213,6 @@ def moment_ns(text: str) -> int:
     Read a date or a time of ISO 8601 [ns since the epoch].
     """
     try:
-        return simulating.moment_ns(text)
+        return simulated.moment_ns(text)
     except SimulationError as error:
         raise argparse.ArgumentTypeError(str(error)) from None

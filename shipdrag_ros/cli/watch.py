@@ -16,7 +16,6 @@ from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.live.app import FLEET, FleetPages, LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
 from shipdrag_ros.live.serve import listen, serve
@@ -101,7 +100,6 @@ def run(options: argparse.Namespace) -> int:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
         source: PictureFeed = stack.enter_context(_source(options, ship, past, output))
         fleet = None if options.store is None else fleet_pages(output, options.store)
-        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet)
         for note in notes:
             output.log(note)
         name, port = page_socket.getsockname()[:2]
@@ -117,7 +115,8 @@ def run(options: argparse.Namespace) -> int:
                 )
             output.log('Ctrl-C ends it; the node is not touched')
 
-        serve(page, [page_socket], deltas=deltas, ready=announce)
+        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet, ready=announce)
+        serve(page, [page_socket], deltas=deltas)
     return 0
 
 
@@ -151,6 +150,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
     """
     # Parquet and pictures take long to import
     from shipdrag_ros.fleet.store import read_coastdowns
+    from shipdrag_ros.library.trends import trends_of
     from shipdrag_ros.trend.coastdown_page import links
     from shipdrag_ros.trend.page import fleet_text
 

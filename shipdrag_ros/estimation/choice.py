@@ -60,7 +60,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
 
     Notes
     -----
-    Source: S1 for `s1_*`; docs/accuracy.md for `log_time`.
+    Source: S1 for `s1_*`; docs/method.md for `log_time`.
 
     Examples
     --------

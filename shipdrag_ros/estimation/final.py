@@ -64,7 +64,7 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
 
     Notes
     -----
-    Source: docs/accuracy.md; the equation of motion is (1 + n_r) dv/dt = -r(v), S1 (1).
+    Source: docs/method.md; the equation of motion is (1 + n_r) dv/dt = -r(v), S1 (1).
 
     Examples
     --------

@@ -197,7 +197,7 @@ class Experiment:
     loss : (p, m)
         Of 10 per cent, root mean square.
     partial_contribution : (p, m)
-        Part of it that no mixture of the other derivatives makes.
+        Part of it that is orthogonal to the responses of all others.
     partial_contribution_together : (p,)
         The same where all manoeuvres are made.
     """

@@ -89,7 +89,7 @@ def notes(found: CoastStudy) -> tuple[str, ...]:
         f'value changed at a time; noise of a sample: log {LOG_SD_M_S:g} m/s, position '
         f'{POSITION_SD_M:g} m.',
         'r(v) estimated from a record takes n_r alone from the ship file, hence the added mass, '
-        'length and volume; all else matters where a record is held against the baseline.',
+        'length and volume; all else matters where a record is compared with the baseline.',
         f'With every value that is not kept wrong by 10 %, so that they add up, a coastdown from '
         f'{check.coast.scenario.speed_m_s:.2f} m/s is off by {check.speed_m_s:.3f} m/s and '
         f'{check.position_m:.1f} m (root mean square).',

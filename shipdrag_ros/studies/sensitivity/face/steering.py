@@ -35,7 +35,7 @@ CHECK = (
 )
 DESIGN = (
     'Which manoeuvre shows which derivative: loss of 10 per cent, times 1000. Partial '
-    'contribution: what of it no mixture of the other derivatives makes'
+    'contribution: the part of it that is orthogonal to the responses of all others'
 )
 
 MEANINGS = 'What the derivatives are: which force, and what it grows with'

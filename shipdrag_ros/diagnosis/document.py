@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The JSON document of `diagnose`, whose keys others rely on."""
+"""The JSON document of `diagnose` and of `~/diagnosis`, whose keys others rely on."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap
+from shipdrag_ros.diagnosis import DiagnosisResult, EffectEstimate, Gap, words
 from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import LIBRARY
 
 
 def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
@@ -29,13 +30,17 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
         for each in found.candidates
     ]
     return {
+        'sentence': words.sentence(found),
         'question': found.question or None,
         'verdict': str(found.verdict),
         'effects': [_sized(effect) for effect in found.effects],
         'candidates': candidates,
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
-        'advice': [asdict(each) for each in found.would_decide],
+        'advice': [
+            {**asdict(each), 'text': line}
+            for each, line in zip(found.would_decide, words.advice(found), strict=True)
+        ],
         'limits': _limits(found),
         'where': None if found.where is None else asdict(found.where),
         'gap': {
@@ -109,11 +114,18 @@ def _earlier(given: WeighedEarlier) -> dict[str, Any]:
 
 
 def _sized(effect: EffectEstimate) -> dict[str, Any]:
+    declared = {quantity.name: quantity for quantity in LIBRARY[effect.name].parameters}
     return {
         'name': effect.name,
         'probability': effect.probability,
         'parameters': {
-            name: {'value': size.value, 'sd': size.sd} for name, size in effect.parameters.items()
+            name: {
+                'value': size.value,
+                'sd': size.sd,
+                'text': f'{words.quantity_text(quantity)}: {words.size(quantity, size)}',
+            }
+            for name, size in effect.parameters.items()
+            for quantity in (declared[name],)
         },
     }
 
