@@ -4,7 +4,8 @@ Salvage of a damaged bag: every whole message into a sound one.
 
 Messages of a chunk that is cut off or has a wrong checksum, messages whose bounds are
 inferred, and those of topics that are not known, go into a bag of their own, so that
-nothing doubtful is taken for data.
+nothing doubtful is taken for data. Sound chunks are copied as they are. A finished part
+is made compact in the same way: its name holds a whole file at every moment.
 """
 
 from __future__ import annotations
@@ -23,7 +24,6 @@ from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
 from shipdrag_ros.bags.declarations import as_bytes
 from shipdrag_ros.bags.live import sync_directory
 from shipdrag_ros.bags.locate import BagFiles, locate
@@ -38,6 +38,9 @@ from shipdrag_ros.bags.records import (
     MESSAGE_HEAD,
     TIME_LIMIT_NS,
     Buffer,
+    Damage,
+    DamageKind,
+    DamageList,
     Place,
     attachment_agrees,
     read,
@@ -51,7 +54,7 @@ from shipdrag_ros.progress import PartDone
 
 _FOOTER_BYTES = HEAD.size + 20
 _STATED = ((20, 8), (4, 4))  # before the last magic: start and checksum of the summary
-SUFFIX = '.part'
+_PART = '.part'
 
 
 @dataclass(frozen=True)
@@ -238,7 +241,7 @@ class _Salvaged:
         self._writer: RecordWriter | None = None
         self.numbers: dict[int, int] = {}
         self._written: set[bytes] = set()
-        self._part = path.with_name(f'.{path.name}{SUFFIX}')
+        self._part = path.with_name(f'.{path.name}{_PART}')
         if path.exists():
             raise BagError(f'{str(path)!r} exists; choose another name or remove it')
 
@@ -462,3 +465,43 @@ def _place_at(records: bytes, at: int) -> Place:
     """Return the place of a whole record in an unpacked chunk."""
     start = at + HEAD.size
     return Place(records[at], at, start, start + HEAD.unpack_from(records, at)[1])
+
+
+SUFFIX = '.compacting'
+
+
+def compact(path: Path, *, messages: int) -> None:
+    """
+    Rewrite a file that is no longer written into compressed chunks with an index.
+
+    Parameters
+    ----------
+    path
+        From `LiveFile`; afterwards the same messages.
+    messages
+        How many there are.
+
+    Raises
+    ------
+    BagError
+        If that is impossible; the file is then as it was.
+    """
+    compacted = path.with_name(path.name + SUFFIX)
+    made = [compacted]
+    try:
+        compacted.unlink(missing_ok=True)  # from an attempt that failed
+        written = recover(path, compacted)
+        made += [written.quarantine] if written.quarantine else []
+        if written.messages_recovered != messages or written.quarantine:
+            raise BagError(
+                f'{str(path)!r} cannot be compacted: it holds {written.messages_recovered} sound '
+                f'messages, {messages} were written'
+            )
+        compacted.replace(path)
+        sync_directory(path.parent)
+    except OSError as error:
+        raise BagError(f'{str(path)!r} cannot be compacted: {error}') from error
+    finally:
+        for each in made:
+            with suppress(OSError):
+                each.unlink()
