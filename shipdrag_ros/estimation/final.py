@@ -92,7 +92,8 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
 def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     asked = parameters.estimator
     if asked != 'auto' and named(asked) is not named(AFTER):
-        return estimate(window, ship, parameters)
+        check_size(window)
+        return named(asked).estimate(window, ship, parameters)
     try:
         found = _fitted(window, ship, parameters)
     except EstimationError as error:
