@@ -47,7 +47,7 @@ def write_csv(path: Path, columns: Sequence[str], rows: Float64) -> None:
     path.write_text('\n'.join([','.join(columns), *lines]) + '\n', encoding='utf-8')
 
 
-def publish(page: Path, lines: Sequence[str], *, rows: int) -> None:
+def publish(page: Path, lines: Sequence[str], *, rows: int, keep: int = 0) -> None:
     """
     Write a page; long tables and what scripts print go into a file beside it.
 
@@ -59,13 +59,17 @@ def publish(page: Path, lines: Sequence[str], *, rows: int) -> None:
         Markdown.
     rows
         Longest table [rows] that stays on the page.
+    keep
+        Tables at the top that stay, however long.
     """
     kept: list[str] = []
     aside: list[str] = []
     heading, link = '', f'([table](results/{page.stem}.txt))'
     for block in re.split(r'\n{2,}(?![^`]*\n```(?:\n|$))', '\n'.join(lines).strip()):
         heading = block if block.startswith('#') else heading
-        if block.startswith('```text') or (block.startswith('|') and block.count('\n') > rows + 1):
+        keep -= block.startswith('|')
+        is_long = block.startswith('|') and block.count('\n') > rows + 1 and keep < 0
+        if block.startswith('```text') or is_long:
             aside += ['', heading.lstrip('# '), '', block.removeprefix('```text\n').rstrip('`\n')]
             if kept[-1].endswith('.txt))'):
                 continue

@@ -153,8 +153,8 @@ FIGURES = tuple(
 )
 MORE = {
     'accuracy_beside_peers': 'the final curve beside twelve other estimators',
-    'accuracy_0_1': 'the error of r(v), release 0.1: a log that is off, thrust after the stop, '
-    'unseen hulls, short coasts, calibration',
+    'accuracy_0_1': 'the error of r(v), release 0.1: thrust after the stop, unseen hulls, more '
+    'information, the band on two simulated worlds',
     'effects_speed': 'simulating each effect: time and error of a step',
     'house': 'lines and modules of the package',
     'real_records': 'measured records, by themselves and beside what is known of them',

@@ -504,7 +504,7 @@ def main() -> None:
     print('\n'.join(lines))
     if not options.write:
         return
-    publish(DOCS / 's3_sensitivity.md', lines, rows=8)
+    publish(DOCS / 's3_sensitivity.md', lines, rows=4, keep=1)
     time_s = found.check.full.time_s
     for name, figure in (
         ('surge', _surge_picture(time_s, surge())),

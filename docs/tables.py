@@ -44,6 +44,11 @@ _OUTPUT_MEANING = {
     'resistance': 'specific resistance r as `linear.x` [m/s² = N/kg], retarding positive, '
     'variance at [0]',
     'resistance_curve': 'fields `speed, resistance, sigma, froude`, one point a speed; latched',
+    'forecast': 'the rest of the glide with a band of 90 %: fields `time, speed, speed_low, '
+    'speed_high, distance, distance_low, distance_high` from the stamp on, one point a time; '
+    'empty when withdrawn; latched',
+    'forecast_path': 'positions to come, in metres as `position` sends them, or east and north of '
+    'the first since the stop; empty when withdrawn; latched',
     'events': 'onsets, ends, resets, life cycle, clock jumps',
     'diagnosis': 'JSON of `shipdrag diagnose` after each coastdown; latched',
 }
@@ -96,6 +101,8 @@ def parameters() -> str:
         kind = key.kind
         if kind.choices:
             allowed = ', '.join(f'`{choice}`' for choice in kind.choices)
+        elif kind.low is None:
+            allowed = kind.expectation
         else:
             allowed = f'{kind.low:g} .. {kind.high:g}'
         default = f'`{key.default}` {kind.unit}'.strip()

@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, number
+from shipdrag_ros.cli.arguments import add_json, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library import simulated
@@ -133,7 +133,7 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--seed',
-        type=_seed,
+        type=whole(0),
         default=0,
         metavar='N',
         help='seed of the noise: the same seed gives the same readings',
@@ -200,12 +200,6 @@ def _inputs(text: str) -> tuple[str, ...]:
     if unknown := [name for name in names if name not in known]:
         raise argparse.ArgumentTypeError(f'{unknown}, expected some of {", ".join(known)}')
     return names
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number, 0 or more')
-    return int(text)
 
 
 def moment_ns(text: str) -> int:

@@ -11,7 +11,7 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_remap, bag, number
+from shipdrag_ros.cli.arguments import add_remap, bag, number, whole
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_sources
@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'this network, which may come and go; with bags or logs it plays them. It only reads.'
     )
     parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='bag or log to play')
-    parser.add_argument('--port', type=_port, default=8088, help='of the page, 0: any free one')
+    parser.add_argument(
+        '--port', type=whole(0, 65535), default=8088, help='of the page, 0: any free one'
+    )
     parser.add_argument(
         '--listen',
         default=LOOPBACK,
@@ -73,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--signal-k',
-        type=_port,
+        type=whole(0, 65535),
         metavar='PORT',
         help='send Signal K deltas, a line each, to who connects to this TCP port of this machine',
     )
@@ -197,10 +199,3 @@ def _token(address: str, file: Path | None) -> str | None:
             'characters, for instance of `openssl rand -hex 16`'
         )
     return token
-
-
-def _port(text: str) -> int:
-    value = int(text) if text.isdecimal() else -1
-    if not 0 <= value <= 65535:
-        raise argparse.ArgumentTypeError(f'{text!r}, expected a port, 0 to 65535')
-    return value

@@ -24,6 +24,8 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.forecast.path import PathAhead
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
@@ -84,8 +86,9 @@ class RunningCoastdown:
         """
         Estimate from what there is up to a stamp [ns], or say why that cannot be.
         """
+        window = self._window(stamp_ns)
         try:
-            found = estimator(self._window(stamp_ns), self._ship, self._parameters)
+            found = estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             return NoEstimate(stamp_ns, str(error))
         # an estimator that is given may return what it likes
@@ -93,7 +96,19 @@ class RunningCoastdown:
             self._estimated = not (why := too_vague(found, self._parameters))
             if why:
                 return NoEstimate(stamp_ns, why)
-        return Update(stamp_ns, found)
+        return self._with_forecast(stamp_ns, found, window)
+
+    def _with_forecast(self, stamp_ns: int, found: Estimate, window: Window) -> Update:
+        try:
+            forecast = foretell(
+                found,
+                self._ship,
+                froude_min=self._parameters.froude_min,
+                speeds_m_s=self._parameters.forecast_speeds,
+            )
+        except EstimationError:  # nothing is left to foretell
+            return Update(stamp_ns, found)
+        return Update(stamp_ns, found, forecast, PathAhead.of(window, forecast))
 
     def end(
         self,

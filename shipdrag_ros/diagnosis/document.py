@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -21,20 +21,12 @@ def document(found: DiagnosisResult, ship: Ship | None) -> dict[str, Any]:
     The candidate `none` says that nothing is missing, `unknown` that it is
     something without a name.
     """
-    candidates: list[dict[str, Any]] = [
-        {
-            'names': list(each.names) or ['none'],
-            'probability': each.probability,
-            'effects': [_sized(effect) for effect in each.effects],
-        }
-        for each in found.candidates
-    ]
     return {
         'sentence': words.sentence(found),
         'question': found.question or None,
         'verdict': str(found.verdict),
-        'effects': [_sized(effect) for effect in found.effects],
-        'candidates': candidates,
+        'effects': sized(found.effects),
+        'candidates': candidates(found),
         'would_decide': [each.measure for each in found.would_decide],
         'resolves': {each.measure: each.probability for each in found.would_decide},
         'advice': [
@@ -113,21 +105,40 @@ def _earlier(given: WeighedEarlier) -> dict[str, Any]:
     }
 
 
-def _sized(effect: EffectEstimate) -> dict[str, Any]:
+def sized(effects: Sequence[EffectEstimate]) -> list[dict[str, Any]]:
+    """
+    Return effects with their probabilities and sizes.
+    """
+    return [
+        {
+            'name': effect.name,
+            'probability': effect.probability,
+            'parameters': dict(_sizes(effect)),
+        }
+        for effect in effects
+    ]
+
+
+def _sizes(effect: EffectEstimate) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the sizes of an effect by name, as figures and in words."""
     declared = {quantity.name: quantity for quantity in LIBRARY[effect.name].parameters}
-    return {
-        'name': effect.name,
-        'probability': effect.probability,
-        'parameters': {
-            name: {
-                'value': size.value,
-                'sd': size.sd,
-                'text': f'{words.quantity_text(quantity)}: {words.size(quantity, size)}',
-            }
-            for name, size in effect.parameters.items()
-            for quantity in (declared[name],)
-        },
-    }
+    for name, size in effect.parameters.items():
+        text = f'{words.quantity_text(declared[name])}: {words.size(declared[name], size)}'
+        yield name, {'value': size.value, 'sd': size.sd, 'text': text}
+
+
+def candidates(found: DiagnosisResult) -> list[dict[str, Any]]:
+    """
+    Return the candidates, each with its sizes.
+    """
+    return [
+        {
+            'names': list(each.names) or ['none'],
+            'probability': each.probability,
+            'effects': sized(each.effects),
+        }
+        for each in found.candidates
+    ]
 
 
 def _gap(gap: Gap | None) -> dict[str, Any] | None:

@@ -95,7 +95,8 @@ def test_what_is_latched_is_and_every_channel_has_its_type_hash(tmp_path: Path) 
         for topic, each in metadata.items()
         if 'transient_local' in each['offered_qos_profiles']
     }
-    assert latched == {'/node/resistance_curve', '/node/diagnosis'}
+    kept = ('resistance_curve', 'forecast', 'forecast_path', 'diagnosis')
+    assert latched == {f'/node/{name}' for name in kept}
     assert all(each['topic_type_hash'].startswith('RIHS01_') for each in metadata.values())
 
 

@@ -30,12 +30,15 @@ PARAMETERS = {
     'slope_window_s': 30.0,
     'confirm_s': 60.0,
     'window_s': 600.0,
+    'forecast_speeds': [3.0, 1.5],
 }
 SPEED = 100.0  # times as fast as life
 TYPES = {
     'speed': 'geometry_msgs/msg/TwistWithCovarianceStamped',
     'resistance': 'geometry_msgs/msg/AccelWithCovarianceStamped',
     'resistance_curve': 'sensor_msgs/msg/PointCloud2',
+    'forecast': 'sensor_msgs/msg/PointCloud2',
+    'forecast_path': 'nav_msgs/msg/Path',
     'events': 'diagnostic_msgs/msg/DiagnosticArray',
 }
 
@@ -89,6 +92,7 @@ def test_live_figures_are_recorded_and_replayed(
     start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
 ) -> None:
     from geometry_msgs.msg import AccelWithCovarianceStamped, TwistWithCovarianceStamped
+    from nav_msgs.msg import Path as Ahead
     from rclpy.serialization import deserialize_message
     from sensor_msgs.msg import PointCloud2
 
@@ -106,15 +110,22 @@ def test_live_figures_are_recorded_and_replayed(
     )
     peer.spin_until(lambda: late)
     assert node.stop() == 0
-    peer.spin_for(0.5)
 
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    for name in ('speed', 'resistance', 'resistance_curve'):
+    names = ('speed', 'resistance', 'resistance_curve', 'forecast', 'forecast_path')
+    sent = {name: len(list(recorded(bag, f'/coastdown_node/{name}'))) for name in names}
+    peer.spin_until(lambda: all(len(heard[name]) >= sent[name] for name in names))
+    peer.spin_until(lambda: read_event(heard['events'][-1]).kind is EventKind.COASTDOWN)
+    for name in names:
         assert len(heard[name]) > 20
         assert heard[name] == [
             on_the_wire(payload) for payload in recorded(bag, f'/coastdown_node/{name}')
         ]
     assert heard['resistance_curve'][-2] == late[0]
+    *_, made, withdrawn = (deserialize_message(each, PointCloud2) for each in heard['forecast'])
+    assert made.width > 0 == withdrawn.width
+    *_, made, withdrawn = (deserialize_message(each, Ahead) for each in heard['forecast_path'])
+    assert len(made.poses) > 0 == len(withdrawn.poses)
     kinds = [read_event(payload).kind for payload in heard['events']]
     # first what is too vague to be given, and says so
     vague = kinds.count(EventKind.NO_ESTIMATE)

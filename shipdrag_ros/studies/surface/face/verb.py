@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from shipdrag_ros.cli.arguments import add_json, add_report, new_file
+from shipdrag_ros.cli.arguments import add_json, add_report, new_file, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Section
 from shipdrag_ros.errors import DataError
@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--max-degree',
-        type=_degree,
+        type=whole(LOWEST),
         default=MAX_DEGREE,
         metavar='N',
         help='highest degree to try',
@@ -217,12 +217,6 @@ def _names(text: str) -> tuple[str, ...]:
             f'{text!r}, expected different columns separated by commas'
         )
     return names
-
-
-def _degree(text: str) -> int:
-    if not text.isdecimal() or int(text) < LOWEST:
-        raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number, {LOWEST} or more')
-    return int(text)
 
 
 def _check_names(names: Sequence[str]) -> None:
