@@ -2,6 +2,7 @@
 """Package description for pip and for colcon (ament_python)."""
 
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -80,6 +81,14 @@ setup(
     name=PACKAGE,
     version='0.2.0',
     description='Hydrodynamic resistance of a ship from its coastdowns, live and from bags',
+    long_description=Path(__file__).with_name('README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    keywords=['ship resistance', 'coastdown', 'hull fouling', 'ROS 2'],
+    classifiers=[
+        'License :: OSI Approved :: Apache Software License',
+        'Programming Language :: Python :: 3',
+        'Topic :: Scientific/Engineering',
+    ],
     author='shipdrag_ros maintainers',
     license='Apache-2.0',
     python_requires='>=3.11',

@@ -2,9 +2,9 @@
 """
 Error and coverage of r(v) beside other ways to differentiate, on the same simulated records.
 
-Prints Markdown; `--write` puts it into benchmarks/results/accuracy_beside_peers.md, and the short
-table into docs/figures.md. All of it takes half an hour of a processor: `--parts FOLDER` keeps
-what is done, goes on from there, and with `--group` does a part only.
+Prints Markdown; `--write` puts it into benchmarks/results/accuracy_beside_peers.md, the short
+table into the .txt of that name in docs/results. It takes half an hour of a processor:
+`--parts FOLDER` keeps what is done, goes on from there, and with `--group` does a part only.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ from shipdrag_ros.samples import Float64
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'benchmarks' / 'results' / 'accuracy_beside_peers.md'
-FIGURES = ROOT / 'docs' / 'figures.md'
+FIGURES = ROOT / 'docs' / 'results' / 'accuracy_beside_peers.txt'
 BEGIN, END = '<!-- beside peers -->', '<!-- end beside peers -->'
 HULLS = (CARGO, TANKER, YACHT)
 COUNTS = (100, 500, 2000)
@@ -379,7 +379,7 @@ def table(counts: list[int], by_count: list[Figures]) -> list[str]:
 
 def short_table(results: dict[Case, Figures]) -> list[str]:
     """
-    Return the table of docs/figures.md: the cargo ship, three cases, RMSE, top, cover.
+    Return the short table: the cargo ship, three cases, RMSE, top, cover.
     """
     cases = (WHITE, CURRENT, GUSTS)
     lines = head(['RMSE / at the top / cover', *(case.name for case in cases)])
@@ -427,7 +427,7 @@ def preface(runs: int) -> list[str]:
         '  package). A smaller or a fitting family, or a biased estimator, may lie below it.',
         '- What is expected of r beforehand was chosen, among some dozens of ways, in view of '
         'these three ships and seeds, so ours are flattered here; on hulls that',
-        '  nothing was chosen on: [accuracy.md](../../docs/accuracy.md), Unseen hulls.',
+        '  nothing was chosen on: docs/results/accuracy_0_1.txt, Unseen hulls.',
         '- Peers differentiate; r = -(1 + n_r) dv/dt with the true n_r, sorted by v. Chebyshev: '
         'degree by BIC. Savitzky-Golay: cubic, window by leave-one-out',
         '  on evenly spaced speeds. Spline: `make_smoothing_spline`. Kalman: log and position '
@@ -460,7 +460,7 @@ def main() -> None:
     parser.add_argument('--runs', type=int, default=200, help='coastdowns of each case')
     parser.add_argument('--n', type=int, choices=COUNTS, nargs='+', default=list(COUNTS))
     parser.add_argument('--hull', choices=[hull.name for hull in HULLS], help='this one alone')
-    parser.add_argument('--write', action='store_true', help='the page and docs/figures.md')
+    parser.add_argument('--write', action='store_true', help='the page and the short table')
     parser.add_argument('--jobs', type=int, default=1, help='processes')
     parser.add_argument('--parts', type=Path, metavar='FOLDER', help='keep and reuse what is done')
     parser.add_argument('--group', choices=list(GROUPS), help='fill the parts with this one alone')

@@ -7,7 +7,7 @@ Damaged logs of every format: never a traceback, a hang, a blow-up or a wrong va
 Each file of `_log_samples.py` is damaged: bytes flipped, lines cut, swapped, doubled
 or left out, fields swapped, the end cut off. What is read of it is held against what
 is read of the whole file: a value that stands nowhere in the whole file must come from
-a line that was touched. With `--write` the table goes into docs/import.md.
+a line that was touched. With `--write` the table goes into docs/results/import.txt.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.samples import Block
 from shipdrag_ros.sources.reading import read_any
 
-PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'import.md'
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'results' / 'import.txt'
 BEGIN, END = '<!-- bad_imports begin -->', '<!-- bad_imports end -->'
 LIMIT_S = 20
 MEMORY_MB = 300

@@ -3,7 +3,7 @@
 Every kind of bad input, tried for real: what the user sees.
 
 `python benchmarks/bad_input.py` makes each kind in a folder of its own, runs the
-command and prints a table; with `--write` it also goes into docs/bad_input.md. No
+command and prints a table; with `--write` it also goes into docs/results/bad_input.txt. No
 random numbers but the noise of the simulated records (seed 1).
 """
 
@@ -21,7 +21,7 @@ import _bad_tables
 import _bad_use
 from _bad_case import ROOT, Case, Seen, run
 
-PAGE = ROOT / 'docs' / 'bad_input.md'
+PAGE = ROOT / 'docs' / 'results' / 'bad_input.txt'
 CASES: tuple[Case, ...] = (
     *_bad_bags.CASES,
     *_bad_files.CASES,

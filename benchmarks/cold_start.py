@@ -4,7 +4,7 @@ The first start of a machine: nothing compiled is kept.
 
 Starts the node with an empty cache, sends readings at 10 Hz over DDS on loopback, and
 asks it to end after some seconds, each time anew, the last time when it is ready. Prints
-the table of docs/node_faults.md, `--write` puts it there; a few minutes.
+the table of docs/results/node_faults.txt, `--write` puts it there; a few minutes.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from shipdrag_ros.messages.heard import health_of
 
-PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'node_faults.md'
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'results' / 'node_faults.txt'
 RATE_HZ = 10.0
 ENDS_S = (1.0, 4.0, 15.0, None)  # after the first words of the node; None: when it is ready
 LONGEST_S = 900.0

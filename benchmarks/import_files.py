@@ -6,7 +6,7 @@ Files of other people, imported as they are: how many without an option, how man
 
 A file counts as understood where a speed or a position of it becomes samples. The
 option beside a file is the one that its refusal asks for. With `--write` the table
-goes into docs/import.md.
+goes into docs/results/import.txt.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from pathlib import Path
 
 from shipdrag_ros.cli import main as shipdrag
 
-PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'import.md'
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'results' / 'import.txt'
 BEGIN, END = '<!-- import_files begin -->', '<!-- import_files end -->'
 FILES = (  # and the one option, '' where none is needed or none helps
     ('irene_2014_20140611.nmea.gz', ''),

@@ -4,7 +4,7 @@ What the node keeps of what is sent to it, and what it keeps of memory.
 
 Bursts and floods over DDS on loopback, a node that is stopped meanwhile; a thousand
 cycles of its life; a day of sailing at 10 Hz through monitor and recorder. Prints the
-tables of docs/node_faults.md, `--write` puts them there: some ten minutes of one core,
+tables of docs/results/node_faults.txt, `--write` puts them there: some ten minutes of one core,
 most of it the day (`--hours 6` for less; the table says how many).
 """
 
@@ -51,7 +51,7 @@ from shipdrag_ros.simulation import (
     standard_sensors,
 )
 
-PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'node_faults.md'
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'results' / 'node_faults.txt'
 SEED = 1
 BURST = 473
 KEPT = 1000  # messages that the publisher keeps for who is late

@@ -3,7 +3,7 @@
 Faults on the topics of a running node, and what /diagnostics says of each.
 
 Starts the node as a user does, talks to it over DDS on loopback, and prints the
-table of docs/node_faults.md, `--write` puts it there: about two minutes.
+table of docs/results/node_faults.txt, `--write` puts it there: about two minutes.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped, TwistStamped
 from rclpy.executors import SingleThreadedExecutor
 
-PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'node_faults.md'
+PAGE = Path(__file__).resolve().parents[1] / 'docs' / 'results' / 'node_faults.txt'
 SHIP = 'name: test\nlength_m: 150.0\ndisplaced_volume_m3: 20200.0\n'
 LEVELS = ('OK', 'WARN', 'ERROR', 'STALE')
 SECONDS = 6.0

@@ -7,7 +7,7 @@ columns and replayed twice, as the monitor finds it and in the window that a per
 would give, with the default estimators. A figure agrees if it lies within two
 joint standard deviations of the one that is known, and its own is at most 1.5
 times the other's; both without the uncertainty of n_r, which they share. `--write`
-puts the table into docs/real_records.md.
+puts the table into docs/results/real_records.txt.
 Nothing is random. Takes about a minute.
 """
 
@@ -34,7 +34,7 @@ from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main as shipdrag
 
-PAGE = ROOT / 'docs' / 'real_records.md'
+PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
 SECTION = re.compile('(?<=<!-- coastdowns -->\n).*?(?=<!-- end coastdowns -->)', re.DOTALL)
 HEAD = ('record', 'what it holds', 'found by itself', 'in the given window', 'known', 'judged')
 AGREES_SD = 2.0
@@ -95,7 +95,7 @@ class Said:
         return found | {each['reason'] for each in self.dismissed}
 
 
-def replayed(coast: KnownCoast, out: Path, start_ns: int, *, window: bool) -> Said:
+def replayed(coast: KnownCoast, out: Path, start_ns: int, *, window: bool, estimator: str) -> Said:
     """
     Replay by the command line and read what it says.
     """
@@ -105,6 +105,13 @@ def replayed(coast: KnownCoast, out: Path, start_ns: int, *, window: bool) -> Sa
     arguments = [
         str(out / word) if word.endswith('.mcap') else word for word in shlex.split(line)[1:]
     ]
+    at = arguments.index('--parameters') + 1
+    stated = (ROOT / arguments[at]).read_text(encoding='utf-8')
+    changed = out / f'{coast.record.name}.parameters.yaml'
+    if 'estimator:' not in stated:  # where another cannot work, the record names its own
+        stated += f'\nestimator: {estimator}\n'
+    changed.write_text(stated, encoding='utf-8')
+    arguments[at] = str(changed)
     said = io.StringIO()
     to = contextlib.redirect_stdout(said), contextlib.redirect_stderr(said)
     with contextlib.chdir(ROOT), to[0], to[1]:
@@ -228,14 +235,15 @@ def judged_words(coast: KnownCoast, said: Said) -> str:
     return '<br>'.join(line.replace('|', '/') for line in lines)
 
 
-def row(coast: KnownCoast, out: Path) -> str:
+def row(coast: KnownCoast, out: Path, estimator: str = 'auto') -> str:
     """
     Replay a record both ways and return its line of the table.
     """
     (run,) = open_runs([out / f'{coast.record.name}.mcap'])
     assert run.span_ns is not None
     itself, window = (
-        replayed(coast, out, run.span_ns[0], window=given) for given in (False, True)
+        replayed(coast, out, run.span_ns[0], window=given, estimator=estimator)
+        for given in (False, True)
     )
     known = [
         f'{_speed(each)}: {display.plus_minus(each.r_m_s2, each.two_sd_m_s2)}'
@@ -252,7 +260,7 @@ def row(coast: KnownCoast, out: Path) -> str:
     return f'| {" | ".join(cells)} |'
 
 
-def table(data: Path, out: Path) -> str:
+def table(data: Path, out: Path, estimator: str) -> str:
     """
     Import and replay all records; return the table.
     """
@@ -260,7 +268,7 @@ def table(data: Path, out: Path) -> str:
     for coast in COASTS:
         (out / f'{coast.record.name}.mcap').unlink(missing_ok=True)
         run_command(coast.record.import_command(), data=data, out=out)
-        lines.append(row(coast, out))
+        lines.append(row(coast, out, estimator))
         print(lines[-1].replace('<br>', '\n    ').replace(' | ', '\n  '), flush=True)
     yes = sum('| yes' in line for line in lines)
     no = sum('| NO' in line for line in lines)
@@ -273,16 +281,17 @@ def main() -> None:
     Print the table, and write it into the page if asked.
     """
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--write', action='store_true', help='into docs/real_records.md')
+    parser.add_argument('--write', action='store_true', help='into docs/results/real_records.txt')
     parser.add_argument(
         '--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'real_coastdowns'
     )
+    parser.add_argument('--estimator', default='auto', help='the parameter of that name')
     options = parser.parse_args()
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')
         return
     options.out.mkdir(parents=True, exist_ok=True)
-    found = table(Path(os.environ[DATA]), options.out.resolve())
+    found = table(Path(os.environ[DATA]), options.out.resolve(), options.estimator)
     print('\n' + found)
     if options.write:
         text = PAGE.read_text(encoding='utf-8')

@@ -4,7 +4,7 @@ What `shipdrag diagnose` says of measured records, as a user would run it.
 
 Logs of two yachts with no coastdown in them, and the coast of a model ship without
 a stated baseline. Reads the folder that SHIPDRAG_DATA names and draws nothing at
-random. `--write` puts it into docs/real_records.md.
+random. `--write` puts it into docs/results/real_records.txt.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def diagnosed(name: str, *, data: Path, out: Path) -> dict[str, Any]:
 
 def block(found: dict[str, Any]) -> str:
     """
-    Return what was found as it stands in docs/real_records.md.
+    Return what was found as it stands in docs/results/real_records.txt.
     """
     first = found['no_coastdown'] or f'{found["coastdowns_used"]} coastdown(s) used.'
     lines = [f'{first} Verdict `{found["verdict"]}`, baseline `{found["baseline"]}`.', '']

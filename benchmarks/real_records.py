@@ -5,7 +5,7 @@ Measured records, imported and replayed as a user would.
 Reads the folder that SHIPDRAG_DATA names. Prints what became of each record, and
 a second opinion on each r(v); writes bags, reports and pictures. Nothing is
 drawn at random but the noise of the simulated ship (seed 1). `--write` puts the
-tables into docs/real_records.md.
+tables into docs/results/real_records.txt.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.report import drawing
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / 'docs' / 'real_records.md'
+PAGE = ROOT / 'docs' / 'results' / 'real_records.txt'
 DATA = 'SHIPDRAG_DATA'
 SIMULATED = 'config/vitus_bering.yaml'
 

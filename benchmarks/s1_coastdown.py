@@ -24,7 +24,7 @@ import s1_accuracy
 import s1_experiment
 import s1_order
 import s1_time
-from _tables import table
+from _tables import publish, table
 from s1_experiment import RUNS, SEED, YACHT_NOISE, Stated, coastdowns, inflection, maxima
 
 from shipdrag_ros.ship import Ship
@@ -149,7 +149,7 @@ def main() -> None:
     page = '\n'.join(lines) + '\n'
     print(page)
     if write:
-        PAGE.write_text(page, encoding='utf-8')
+        publish(PAGE, lines, rows=6)
         (DOCS / 'pictures' / PICTURE).write_bytes(picture)
 
 

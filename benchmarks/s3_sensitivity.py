@@ -25,6 +25,7 @@ from pathlib import Path
 import _plain_mariner
 import matplotlib
 import numpy as np
+from _tables import publish
 from _tables import table as markdown
 from _wrong_values import COAST_S, LEAD_IN_S, SPEED_M_S, verdicts
 from matplotlib.figure import Figure
@@ -34,18 +35,19 @@ from shipdrag_ros.report.drawing import BLUE, GREEN, ORANGE, STYLE, VERMILION, s
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+    ManoeuvreMotion,
     Side,
     overshoots_rad,
     turn,
     zigzag,
 )
-from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
 from shipdrag_ros.studies.manoeuvring.ship import FORM, mariner
 from shipdrag_ros.studies.manoeuvring.simulate import steer
-from shipdrag_ros.studies.sensitivity import coasting_words, steering_words
 from shipdrag_ros.studies.sensitivity.coast import coast_from
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
+from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
+from shipdrag_ros.studies.sensitivity.face import steering as steering_words
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, partial_contribution
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
@@ -371,7 +373,7 @@ def page(
         'a little, and of the 15/15 the largest to starboard is taken, the third.',
         'Ordered at once the looks of the helmsman fall otherwise: one is worth up to '
         '0.1 degrees.',
-        '`tests/studies/manoeuvring` holds the runs against a solve_ivp of their own: u and v '
+        '`tests/studies/manoeuvring` compares the runs with a solve_ivp of their own: u and v '
         'to 2e-6 m/s, r to 1e-7 rad/s.',
         '',
         f'**Speed.** {timed.runs} runs of 600 s in one call: {1e3 * timed.batched:.0f} ms; a '
@@ -415,8 +417,8 @@ def page(
         '',
         'Most derivatives are seen best where rudder and drift are largest; the side force of the '
         'propeller (Y0, N0) and the linear ones of sway in the gentlest.',
-        "To be seen is not to be identified: the own share is what of a derivative's trace no "
-        f'mixture of the other 39 makes. Where it is seen best it is {np.median(single):.1%}',
+        'To be seen is not to be identified: the partial contribution is the part of a trace that '
+        f'is orthogonal to the other 39. Where it is seen best it is {np.median(single):.1%}',
         f'(median; {np.median(shown.partial_contribution[:, circle]):.1g} in a 35 degree circle, '
         'which ends as three constants), in all nine together '
         f'{np.median(shown.partial_contribution_together):.1%}. '
@@ -424,8 +426,8 @@ def page(
         'trial identifies, as the paper hopes (after Rhee and Kim); the multiples are, for good '
         'reason, stated and not fitted.',
         '',
-        'A gentle and a hard zigzag with the multiples tied show more than all nine without; own '
-        'shares:',
+        'A gentle and a hard zigzag with the multiples tied show more than all nine without; '
+        'partial contributions:',
         '',
         *lines_of(sets_of_manoeuvres()),
         '',
@@ -502,7 +504,7 @@ def main() -> None:
     print('\n'.join(lines))
     if not options.write:
         return
-    (DOCS / 's3_sensitivity.md').write_text('\n'.join(lines) + '\n', encoding='utf-8')
+    publish(DOCS / 's3_sensitivity.md', lines, rows=4, keep=1)
     time_s = found.check.full.time_s
     for name, figure in (
         ('surge', _surge_picture(time_s, surge())),

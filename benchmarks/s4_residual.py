@@ -33,7 +33,7 @@ from _river_ships import (
     models,
     sweep,
 )
-from _tables import table, write_csv
+from _tables import publish, table, write_csv
 from matplotlib.figure import Figure
 
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
@@ -371,7 +371,7 @@ def main() -> None:
         lines += ['', *of_delft]
     print('\n'.join(lines))
     if options.write:
-        PAGE.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        publish(PAGE, lines, rows=3)
         hulls, values = models(FLEETS[-1], np.random.default_rng(SEED))
         places = [getattr(hulls, name) for name in NAMES]
         write_csv(TABLE, (*NAMES, 'c_R'), np.column_stack([*places, 1e-3 * values]))

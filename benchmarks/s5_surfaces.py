@@ -20,7 +20,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')  # matrices too small for thr
 
 import matplotlib
 import numpy as np
-from _tables import table, write_csv
+from _tables import publish, table, write_csv
 from matplotlib.figure import Figure
 from numpy.polynomial.polynomial import polyval2d
 
@@ -451,7 +451,7 @@ def main() -> None:
     ]
     print('\n'.join(lines))
     if options.write:
-        PAGE.write_text('\n'.join(lines) + '\n', encoding='utf-8')
+        publish(PAGE, lines, rows=3)
         points = grid(17)
         noisy = c_x(points) + NOISE * np.random.default_rng(SEED).normal(size=len(points))
         write_csv(TABLE, (*ANGLES, 'c_x'), np.column_stack([points, noisy]))

@@ -44,7 +44,13 @@ _OUTPUT_MEANING = {
     'resistance': 'specific resistance r as `linear.x` [m/s² = N/kg], retarding positive, '
     'variance at [0]',
     'resistance_curve': 'fields `speed, resistance, sigma, froude`, one point a speed; latched',
+    'forecast': 'the rest of the glide with a band of 90 %: fields `time, speed, speed_low, '
+    'speed_high, distance, distance_low, distance_high` from the stamp on, one point a time; '
+    'empty when withdrawn; latched',
+    'forecast_path': 'positions to come, in metres as `position` sends them, or east and north of '
+    'the first since the stop; empty when withdrawn; latched',
     'events': 'onsets, ends, resets, life cycle, clock jumps',
+    'diagnosis': 'JSON of `shipdrag diagnose` after each coastdown; latched',
 }
 
 
@@ -79,8 +85,8 @@ def outputs() -> str:
         for topic in OUTPUT_TOPICS
     ]
     diagnostics = (
-        'state, health of each input, the latest figures, what the last coastdown says is '
-        'missing in the model; 1 Hz on steady time'
+        'state, health of each input, the latest figures, the verdict in a sentence; 1 Hz on '
+        'steady time'
     )
     rows.append(['`/diagnostics`', 'diagnostic_msgs/DiagnosticArray', diagnostics])
     return _table(['topic', 'type', 'meaning'], rows)

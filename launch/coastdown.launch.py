@@ -4,8 +4,9 @@ Start the onboard node.
 
     ros2 launch shipdrag_ros coastdown.launch.py ship_file:=ship.yaml output_directory:=bags
 
-The topics of other drivers are connected from a launch file of yours that includes
-this one after `SetRemap('speed_through_water', '/log/velocity')`.
+The topics of drivers are named by arguments, `position:=/fix` for instance. Each sets a
+remap of the node; without it the input keeps its name. `onboard.launch.py` is an example that
+starts the drivers of a ship, the node and the page together.
 """
 
 from launch import LaunchDescription
@@ -27,6 +28,16 @@ ARGUMENTS = (
     ('autostart', 'true', 'configure and activate without being asked to'),
     ('namespace', '', 'namespace of the node and of its inputs'),
 )
+INPUTS = (
+    'speed_through_water',
+    'speed_over_ground',
+    'position',
+    'heading',
+    'shaft',
+    'rudder',
+    'wind_apparent',
+    'depth',
+)
 
 
 def generate_launch_description():
@@ -37,12 +48,17 @@ def generate_launch_description():
         DeclareLaunchArgument(name, default_value=default, description=text)
         for name, default, text in ARGUMENTS
     ]
+    declared += [
+        DeclareLaunchArgument(name, default_value=name, description=f'topic of the input {name}')
+        for name in INPUTS
+    ]
     node = LifecycleNode(
         package='shipdrag_ros',
         executable='coastdown_node',
         name='coastdown_node',
         namespace=LaunchConfiguration('namespace'),
         output='screen',
+        remappings=[(name, LaunchConfiguration(name)) for name in INPUTS],
         parameters=[
             LaunchConfiguration('params_file'),
             {

@@ -19,10 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from shipdrag_ros.errors import ShipdragError
-    from shipdrag_ros.library.coastdown import Coastdown
     from shipdrag_ros.library.diagnosis import Diagnosis, diagnose
     from shipdrag_ros.library.reading import read
-    from shipdrag_ros.library.record import Record
+    from shipdrag_ros.library.record import Coastdown, Record
     from shipdrag_ros.library.resistance import Resistance, estimate
     from shipdrag_ros.library.simulated import simulate
     from shipdrag_ros.library.trends import Trends, trends
@@ -48,7 +47,7 @@ __all__ = [
 ]
 
 _HOME = {
-    'Coastdown': 'library.coastdown',
+    'Coastdown': 'library.record',
     'Diagnosis': 'library.diagnosis',
     'Parameters': 'parameters',
     'Record': 'library.record',

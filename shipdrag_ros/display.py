@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import reprlib
@@ -289,3 +290,34 @@ def _shown(value: Any) -> str:
     if isinstance(value, tuple | list | Mapping) and len(value) > 1:
         return f'<{len(value)} items>'
     return _SHORT.repr(value)
+
+
+def json_text(document: object, *, indent: int | None = 2) -> str:
+    """
+    Return a document as JSON; arrays are lists, and what is not finite is null.
+
+    Parameters
+    ----------
+    indent
+        None for one line without blanks, as programs send it.
+    """
+    separators = (',', ': ') if indent else (',', ':')
+    try:
+        text = json.dumps(document, indent=indent, separators=separators, allow_nan=False)
+    except (TypeError, ValueError):
+        plain = _plain(document)
+        text = json.dumps(plain, indent=indent, separators=separators, allow_nan=False)
+    return f'{text}\n' if indent else text
+
+
+def _plain(value: Any) -> Any:
+    """Turn arrays into lists, and what is not finite into None."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -25,7 +25,6 @@ from shipdrag_ros.plain_file import read_small_text
 Problems = list[str]
 Reader = Callable[[object, str, Problems], Any]
 
-_NUMBERS = (int, float, np.integer, np.floating)
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 _SHORT.maxlevel = 2  # lists that hold themselves would fill pages

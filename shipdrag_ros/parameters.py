@@ -80,42 +80,48 @@ class Parameters:
 
     frozen_s: float = _parameter(
         120.0,
-        'a speed or position that repeats unchanged for longer is rejected as frozen',
+        'a speed or position that repeats unchanged for longer is rejected as frozen; shorter: a '
+        'coarse sensor in a calm is rejected too; longer: a stuck one is believed for longer',
         unit='s',
         low=1.0,
         high=86400.0,
     )
     late_s: float = _parameter(
         5.0,
-        'a sample stamped this much before the newest stamp of any input is rejected as late',
+        'a sample stamped this much before the newest stamp of any input is rejected as late; '
+        'longer: slow networks are borne, and events are told later',
         unit='s',
         low=0.1,
         high=3600.0,
     )
     data_stop_s: float = _parameter(
         60.0,
-        'a coastdown ends when the speed source is silent for longer',
+        'a coastdown ends when the speed source is silent for longer; shorter: a short loss of '
+        'the signal ends it',
         unit='s',
         low=1.0,
         high=3600.0,
     )
     steady_s: float = _parameter(
         1800.0,
-        'record before the present from which the noise of the speed is learnt; kept in memory',
+        'record before the present from which the noise of the speed is learnt; kept in memory; '
+        'shorter: wider bands, and effects are harder to name',
         unit='s',
         low=60.0,
         high=7200.0,
     )
     slope_window_s: float = _parameter(
         60.0,
-        'length of the slope test that proposes an onset from speed alone',
+        'length of the slope test that proposes an onset from speed alone; longer: fewer false '
+        'alarms in a seaway, and a later onset',
         unit='s',
         low=5.0,
         high=600.0,
     )
     false_alarms_per_day: float = _parameter(
         0.1,
-        'rate of chance proposals in steady sailing that sets the threshold of the slope test',
+        'rate of chance proposals in steady sailing that sets the threshold of the slope test; '
+        'larger: gentler stops are seen, and more are proposed that are none',
         unit='1/day',
         low=1e-3,
         high=100.0,
@@ -123,7 +129,7 @@ class Parameters:
     confirm_s: float = _parameter(
         120.0,
         'length of deceleration that must look like a coastdown before one is confirmed '
-        'without shaft speed',
+        'without shaft speed; shorter: figures come sooner, and slow-downs are taken for stops',
         unit='s',
         low=10.0,
         high=1200.0,
@@ -131,33 +137,36 @@ class Parameters:
     shaft_stopped_fraction: float = _parameter(
         0.5,
         'shaft speed, as a fraction of the steady one, below half of which a propeller counts as '
-        'standing',
+        'standing; larger: a windmilling propeller counts as standing',
         low=0.05,
         high=0.9,
     )
     turn_rad: float = _parameter(
         0.35,
-        'a change of heading, or of course over ground, that ends a coastdown',
+        'a change of heading, or of course over ground, that ends a coastdown; larger: turning '
+        'slows the ship and is counted as resistance',
         unit='rad',
         low=0.05,
         high=3.0,
     )
     froude_min: float = _parameter(
         0.05,
-        'Froude number at which a coastdown ends and below which no resistance is given',
+        'Froude number at which a coastdown ends and below which no resistance is given; smaller: '
+        'longer runs, in which wind and current weigh more',
         low=0.001,
         high=1.0,
     )
     window_s: float = _parameter(
         3600.0,
-        'longest record behind one estimate; an older part of a longer coastdown rolls out',
+        'longest record behind one estimate; an older part of a longer coastdown rolls out; '
+        'longer: each estimate takes more memory and time',
         unit='s',
         low=60.0,
         high=21600.0,
     )
     update_s: float = _parameter(
         10.0,
-        'spacing of the estimates during a coastdown, in stamps',
+        'spacing of the estimates during a coastdown, in stamps; shorter: more load on the CPU',
         unit='s',
         low=0.1,
         high=3600.0,
@@ -165,13 +174,15 @@ class Parameters:
     first_relative_sigma: float = _parameter(
         0.25,
         'standard deviation of the resistance, as a fraction of it, below which the first '
-        'estimate of a coastdown is given; those after it are all given',
+        'estimate of a coastdown is given; those after it are all given; larger: it comes sooner '
+        'and is worth less',
         low=0.01,
         high=10.0,
     )
     heading_convention: str = _parameter(
         'rep103',
-        'rep103: yaw from east, anticlockwise; compass: from north, clockwise',
+        'rep103: yaw from east, anticlockwise; compass: from north, clockwise; the wrong one '
+        'turns current and wind into the wrong quarter',
         choices=('rep103', 'compass'),
     )
     estimator: str = _parameter(
@@ -188,12 +199,16 @@ class Parameters:
         choices=('rules', 'filter'),
     )
     order_max: int = _parameter(
-        20, 'largest number of coefficients that the order search tries', low=3, high=40
+        20,
+        'largest number of coefficients that the order search of the published estimators tries; '
+        'larger: more detail, more time',
+        low=3,
+        high=40,
     )
     speed_sigma_m_s: float = _parameter(
         0.0,
         'known standard deviation of the speed reading, for the order search and the weights; '
-        '0: unknown',
+        '0: unknown; one that is too small makes bands too narrow',
         unit='m/s',
         low=0.0,
         high=10.0,
@@ -201,7 +216,7 @@ class Parameters:
     position_sigma_m: float = _parameter(
         0.0,
         'known standard deviation of the position, for the order search and the weights; '
-        '0: unknown',
+        '0: unknown; one that is too small makes bands too narrow',
         unit='m',
         low=0.0,
         high=1000.0,

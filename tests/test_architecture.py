@@ -27,6 +27,7 @@ PICTURE = (
     ('regression', 'simulation'),
     ('posterior',),
     ('estimation',),
+    ('forecast',),
     ('coastdown', 'diagnosis', 'studies'),
     ('messages',),
     ('bags', 'nmea'),
@@ -139,6 +140,38 @@ def test_the_picture_shows_every_room() -> None:
     names = set(re.findall(r'\w+/|\w+\.py', shown))
     wanted = {room.rpartition('.')[2] for room in FLOORS}
     assert {room for room in wanted if not {f'{room}/', f'{room}.py'} & names} == set()
+
+
+def in_circles() -> set[str]:
+    """Return the modules that import themselves, by way of others of their room."""
+    modules = {dotted(path): path for path in SOURCES if room(dotted(path))}
+    below: dict[str, set[str]] = {}
+    direct = {
+        name: {
+            found
+            for each in imports(path)
+            if (found := each if each in modules else each.rpartition('.')[0]) in modules
+            and room(found) == room(name)
+        }
+        - {name}
+        for name, path in modules.items()
+    }
+    for name in modules:
+        left = set(direct[name])
+        reached: set[str] = set()
+        while left:
+            each = left.pop()
+            reached.add(each)
+            left |= direct[each] - reached
+        below[name] = reached
+    return {name for name in modules if name in below[name]}
+
+
+IN_CIRCLES = {'diagnosis', 'estimation', 'regression', 'replay'}  # the list only shrinks
+
+
+def test_no_room_imports_itself_in_a_circle() -> None:
+    assert {room(name) for name in in_circles()} == IN_CIRCLES
 
 
 def named(path: Path) -> Iterator[str]:

@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / 'docs' / 'bad_input.md').read_text(encoding='utf-8')
+PAGE = (ROOT / 'docs' / 'results' / 'bad_input.txt').read_text(encoding='utf-8')
 
 
 def _script() -> ModuleType:

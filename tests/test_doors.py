@@ -36,7 +36,7 @@ DOORS = (
     ('diagnosis.diagnose', 'diagnose'),
     ('library.reading', 'read'),
     ('library.record', 'Record'),
-    ('library.coastdown', 'Coastdown'),
+    ('library.record', 'Coastdown'),
     ('library.resistance', 'Resistance'),
     ('library.resistance', 'estimate'),
     ('library.diagnosis', 'Diagnosis'),

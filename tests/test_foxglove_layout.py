@@ -17,6 +17,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from shipdrag_ros.messages import DEFAULT_NODE, OUTPUT_TOPICS, input_type
 from shipdrag_ros.messages.reporting import CURVE_FIELDS
+from shipdrag_ros.node.health import Standing, state_status
 from shipdrag_ros.samples import Channel
 
 CONFIG = Path(__file__).resolve().parents[1] / 'config'
@@ -115,12 +116,9 @@ def test_a_path_to_nothing_is_found() -> None:
 
 
 def test_the_state_has_the_name_that_the_node_gives_it() -> None:
-    diagnostics = pytest.importorskip('shipdrag_ros.node.diagnostics')
-    standing = diagnostics.Standing('active', None, clock_ns=1, sim_time=False)
-    (status,) = diagnostics.label(
-        [diagnostics.state_status(standing, [])], node=DEFAULT_NODE, hardware_id=''
-    )
-    assert any(f'{{name=="{status.name}"}}' in path for path in paths())
+    status = state_status(Standing('active', None, clock_ns=1, sim_time=False), [])
+    name = f'{DEFAULT_NODE.lstrip("/")}: {status.part}'
+    assert any(f'{{name=="{name}"}}' in path for path in paths())
 
 
 def test_the_script_unpacks_the_curve(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ast
 import compileall
 import os
 import re
@@ -16,10 +17,17 @@ from pathlib import Path
 import pytest
 
 import shipdrag_ros
+from shipdrag_ros.messages import TOPICS
 
 ROOT = Path(__file__).resolve().parents[1]
 COLCON = Path(sys.executable).with_name('colcon')
 PARTS = ('package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml', 'LICENSE', 'README.md')
+# read in rosdep/python.yaml of ros/rosdistro, commit 000730dc5f91: for any Ubuntu. python3-numba
+# is there for Ubuntu up to focal alone, python3-rich and python3-starlette are not
+ROSDEP_KEYS = {
+    *('python3-jinja2', 'python3-matplotlib', 'python3-numpy', 'python3-ruamel.yaml'),
+    *('python3-scipy', 'python3-serial', 'python3-uvicorn', 'python3-pytest'),
+}
 FOLDERS = ('resource', 'shipdrag_ros', 'launch', 'config')
 
 
@@ -82,8 +90,21 @@ def test_colcon_build_has_all_that_ros2_run_and_launch_need(built: Path) -> None
         assert {path.name for path in (share / folder).iterdir()} == expected != set()
 
 
-def test_launch_files_compile() -> None:
+def test_launch_files_compile_and_every_input_has_a_remap() -> None:
     assert compileall.compile_dir(ROOT / 'launch', quiet=1, force=True)
+    tree = ast.parse((ROOT / 'launch' / 'coastdown.launch.py').read_text())
+    (names,) = (
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == 'INPUTS'
+    )
+    assert set(names) == set(TOPICS)
+    example = (ROOT / 'launch' / 'onboard.launch.py').read_text()
+    given = re.search(r'launch_arguments=(\{.*?\})', example, flags=re.DOTALL)
+    assert given is not None
+    keys = set(re.findall(r"'(\w+)':", given[1]))
+    declared = set(re.findall(r"\('(\w+)', ", ast.unparse(tree)))
+    assert keys <= declared | set(names)
 
 
 def test_package_xml_and_setup_agree() -> None:
@@ -133,6 +154,16 @@ def test_every_dependency_is_installed_under_ros_too() -> None:
     by_hand = set(line.split())
     assert set(names) & from_pip == by_hand
     assert by_hand <= set(names)
+
+
+def test_every_key_of_rosdep_resolves_and_no_package_of_ros_is_forgotten() -> None:
+    xml = ElementTree.parse(ROOT / 'package.xml').getroot()
+    keys = {item.text for item in xml.iter() if item.tag.endswith('depend')}
+    assert {key for key in keys if str(key).startswith('python3-')} <= ROSDEP_KEYS
+    lines = ' '.join(path.read_text() for path in (ROOT / 'shipdrag_ros').rglob('*.py'))
+    used = set(re.findall(r'(?:from|import) ([a-z]+_(?:msgs|srvs|interfaces)|rclpy)\b', lines))
+    assert {'rclpy', 'rcl_interfaces', 'std_srvs'} <= used
+    assert used <= keys
 
 
 def test_console_scripts_are_installed() -> None:

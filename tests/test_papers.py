@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
+import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -22,3 +25,23 @@ def test_the_page_is_as_its_script_makes_it(name: str) -> None:
     assert shown == script.page(), f'run: python benchmarks/{name}.py --write'
     for picture in script.PICTURES:
         assert (ROOT / 'docs' / 'pictures' / picture).stat().st_size < 150_000
+
+
+def test_the_page_of_figures_is_as_its_result_files_make_it() -> None:
+    sys.path.insert(0, str(ROOT / 'benchmarks'))
+    try:
+        figures = importlib.import_module('figures')
+    finally:
+        sys.path.remove(str(ROOT / 'benchmarks'))
+    shown = (ROOT / 'docs' / 'figures.md').read_text(encoding='utf-8')
+    assert shown == figures.page(), 'run: python benchmarks/figures.py'
+    missing = figures.FIGURES[0]._replace(pattern='no such row (.)')
+    with pytest.raises(SystemExit, match='does not answer'):
+        figures.found(missing)
+    # what the README says of the final curve
+    readme = (ROOT / 'README.md').read_text(encoding='utf-8')
+    for figure, words in zip(figures.FIGURES, ('is within', 'under gusts within'), strict=False):
+        error = float(figures.found(figure).split()[2])
+        said = re.search(rf'{words} ([\d.]+) %', readme.replace('\n', ' '))
+        assert said is not None
+        assert float(said[1]) == pytest.approx(error, abs=0.051)

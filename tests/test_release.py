@@ -110,6 +110,52 @@ def test_the_wheel_holds_all_of_the_package(built: Path) -> None:
     assert f'{share}shipdrag_ros/package.xml' in held
 
 
+def test_the_wheel_describes_itself(built: Path) -> None:
+    (wheel,) = built.glob('*.whl')
+    with zipfile.ZipFile(wheel) as file:
+        (name,) = (name for name in file.namelist() if name.endswith('METADATA'))
+        about = file.read(name).decode('utf-8')
+    assert 'Description-Content-Type: text/markdown' in about
+    assert (ROOT / 'README.md').read_text(encoding='utf-8').strip() in about
+
+
+@pytest.mark.parametrize(
+    ('heading', 'tag', 'found'),
+    [
+        ('## [0.3.0] - 2026-12-01', '', 'tag=v0.3.0\n'),
+        ('## [0.3.0] - 2026-12-01', 'v0.3.0', ''),  # tagged already
+        ('## [Unreleased]', '', ''),
+        ('## [0.2.0] - 2026-10-01', '', ''),  # of another version
+    ],
+)
+def test_a_dated_version_without_a_tag_is_released(
+    heading: str, tag: str, found: str, tmp_path: Path
+) -> None:
+    text = (ROOT / '.github' / 'workflows' / 'release.yml').read_text(encoding='utf-8')
+    (job,) = yaml.safe_load(text)['jobs'].values()
+    (step,) = (step for step in job['steps'] if step.get('id') == 'version')
+    (tmp_path / 'shipdrag_ros').mkdir()
+    (tmp_path / 'shipdrag_ros' / '__init__.py').write_text("__version__ = '0.3.0'\n")
+    (tmp_path / 'CHANGELOG.md').write_text(f'{heading}\n')
+    git = ['git', '-C', str(tmp_path), '-c', 'user.name=n', '-c', 'user.email=n@localhost']
+    subprocess.run([*git, 'init', '-q'], check=True)
+    subprocess.run([*git, 'commit', '-q', '--allow-empty', '-m', 'all'], check=True)
+    if tag:
+        subprocess.run([*git, 'tag', tag], check=True)
+    output = tmp_path / 'output'
+    output.touch()
+    subprocess.run(
+        ['bash', '-e', '-c', step['run']],
+        cwd=tmp_path,
+        env=os.environ | {'GITHUB_OUTPUT': str(output)},
+        check=True,
+    )
+    assert output.read_text() == found
+    # nothing is built or tagged without it
+    later = job['steps'][job['steps'].index(step) + 1 :]
+    assert all(each['if'] == "steps.version.outputs.tag != ''" for each in later)
+
+
 def test_the_sdist_holds_what_colcon_needs(built: Path) -> None:
     (sdist,) = built.glob('*.tar.gz')
     with tarfile.open(sdist) as file:

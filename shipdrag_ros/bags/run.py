@@ -183,13 +183,17 @@ class Run:
 
     def outputs(self) -> Iterator[OutputMessage]:
         """
-        Yield the outputs that the node recorded, in order of arrival.
+        Yield the outputs that the node recorded and a replay gives too, in order of arrival.
 
         Those that cannot be read have stamp 0.
         """
         if self.node is None:
             return
-        wanted = [(topic.under(self.node), topic.type) for topic in OUTPUT_TOPICS]
+        wanted = [
+            (topic.under(self.node), topic.type)
+            for topic in OUTPUT_TOPICS
+            if types.is_stamped(topic.type)
+        ]
         for batch in self.messages(wanted):
             for number, place in enumerate(batch.channel.tolist()):
                 topic, type_name = wanted[place]

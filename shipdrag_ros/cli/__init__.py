@@ -52,6 +52,7 @@ _OWN = (
         '.diagnose',
         'where model and data disagree, and which effect is missing',
     ),
+    Verb('forecast', '.forecast', 'the rest of each glide foretold, beside what followed'),
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
     Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
     Verb('import', '.import_', 'logs and tables of other programs -> bag'),

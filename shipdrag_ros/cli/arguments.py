@@ -70,6 +70,20 @@ def number(
     return read
 
 
+def whole(low: int, high: float = math.inf) -> Callable[[str], int]:
+    """
+    Return a reader of whole numbers low <= n <= high.
+    """
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or not low <= int(text) <= high:
+            within = f' from {low} to {high:g}' if math.isfinite(high) else f', {low} or more'
+            raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number{within}')
+        return int(text)
+
+    return read
+
+
 def add_remap(parser: argparse.ArgumentParser) -> None:
     """
     Add `--remap FROM:=TO`.

@@ -17,7 +17,7 @@ from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, LearntBaseline, learn_
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.library.diagnosing import coasts_of
-from shipdrag_ros.library.windowed import refuse_overlaps
+from shipdrag_ros.library.replaying import refuse_overlaps
 from shipdrag_ros.ship import Ship
 
 

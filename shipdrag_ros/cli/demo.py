@@ -10,29 +10,23 @@ truth of the simulation.
 from __future__ import annotations
 
 import argparse
-import os
-import signal
-import subprocess
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from types import FrameType
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from shipdrag_ros import display
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
 from shipdrag_ros.cli.arguments import number
 from shipdrag_ros.cli.node import no_ros
+from shipdrag_ros.cli.onboard import ended_by_sigterm, onboard_node, sail
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, write_results
-from shipdrag_ros.cli.replay_text import show_run
+from shipdrag_ros.cli.replay import CURVES, JSON, REPORT, show_run, write_results
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import need
-from shipdrag_ros.library import simulating
+from shipdrag_ros.library import simulated
 from shipdrag_ros.library.replaying import replay_run
 from shipdrag_ros.replay import words
 from shipdrag_ros.replay.run_result import RunResult
@@ -41,10 +35,10 @@ from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:  # help must not need ROS
-    from shipdrag_ros.node.rehearsal import LiveEstimate, Rehearsal
+    from shipdrag_ros.node.rehearsal import LiveEstimate
 
 SHIP = 'vitus_bering.yaml'
-SETTINGS = simulating.SimulationSettings(
+SETTINGS = simulated.SimulationSettings(
     speed_m_s=8.2,
     duration_s=1500.0,
     lead_in_s=900.0,
@@ -53,10 +47,6 @@ SETTINGS = simulating.SimulationSettings(
     noise=1.0,
     seed=1,
 )
-_CONNECT_S = 120.0  # the first start on a machine compiles the kernels
-_ANSWER_S = 1.0
-_END_S = 30.0
-_FIRST_DOMAIN, _DOMAINS = 61, 41  # above 101 the ports run into those for outgoing traffic
 _SHOWN_NS = 100_000_000_000  # an estimate every 10 s of data is too much to read
 
 
@@ -102,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         files('shipdrag_ros').joinpath('data', SHIP).read_text(encoding='utf-8'), encoding='utf-8'
     )
     ship = Ship.load(ship_file)
-    block, truth = simulating.make(ship, SETTINGS)
+    block, truth = simulated.make(ship, SETTINGS)
     seconds = SETTINGS.lead_in_s + SETTINGS.duration_s
     output.say(
         f'A simulated {ship.summary()},\n'
@@ -111,10 +101,16 @@ def run(options: argparse.Namespace) -> int:
     )
     output.log('starting the node; the first start on a machine compiles for some seconds')
     before = set(recordings.glob('*.mcap'))
-    with _ended_by_sigterm(), _node(ship_file, recordings, out / 'node.log') as node:
+    with ended_by_sigterm(), onboard_node(ship_file, recordings, out / 'node.log') as node:
         live = _Live(truth, block, output)
         with Rehearsal(live.show) as rehearsal:
-            _sail(rehearsal, node, block, speed_up=options.speed_up, output=output)
+            sail(
+                rehearsal,
+                node,
+                block,
+                speed_up=options.speed_up,
+                begins=lambda: output.heading('Live from the node, over ROS topics'),
+            )
     bags = sorted(set(recordings.glob('*.mcap')) - before)
     if not bags:
         raise node.failed('the node recorded nothing')
@@ -145,23 +141,6 @@ def _verdict(results: Sequence[RunResult]) -> int:
     return 0
 
 
-def _sail(
-    rehearsal: Rehearsal, node: _Node, block: Block, *, speed_up: float, output: Output
-) -> None:
-    """Send the readings and let the node end."""
-    rehearsal.wait_for_node(block, alive=node.check, timeout_s=_CONNECT_S)
-    output.heading('Live from the node, over ROS topics')
-    rehearsal.play(block, speed=speed_up, progress=lambda _: node.check())
-    # the answers to the last samples are on their way
-    rehearsal.listen(timeout_s=_ANSWER_S)
-    node.interrupt()
-    rehearsal.listen(until=lambda: not node.is_running, timeout_s=_END_S)
-    if node.is_running:
-        raise node.failed(f'the node did not end within {_END_S:g} s of SIGINT')
-    if not rehearsal.estimates:
-        raise node.failed('no estimate was received')
-
-
 class _Live:
     """Prints estimates beside the truth as they come, but not all of them."""
 
@@ -181,79 +160,3 @@ class _Live:
             f'{display.plus_minus(estimate.resistance_m_s2, 2.0 * estimate.sigma_m_s2)} m/s², '
             f'true {self._truth.at(estimate.speed_m_s):.5f}'
         )
-
-
-class _Node:
-    """The node in a process of its own, on a domain that nobody else uses."""
-
-    def __init__(self, ship_file: Path, recordings: Path, log: Path) -> None:
-        self.log = log
-        with log.open('w') as file:
-            self._process = subprocess.Popen(
-                [
-                    *(sys.executable, '-m', 'shipdrag_ros.cli', 'node'),
-                    *('--ship', ship_file, '--out', recordings),
-                    *('--ros-args', '-p', 'use_sim_time:=true'),
-                ],
-                stdin=subprocess.DEVNULL,
-                stdout=file,
-                stderr=subprocess.STDOUT,
-            )
-
-    @property
-    def is_running(self) -> bool:
-        return self._process.poll() is None
-
-    def check(self) -> None:
-        """Raise if the process has ended."""
-        if not self.is_running:
-            raise self.failed(f'the node ended with status {self._process.returncode}')
-
-    def interrupt(self) -> None:
-        self._process.send_signal(signal.SIGINT)
-
-    def end(self) -> None:
-        """Leave no process behind, whatever happens meanwhile."""
-        try:
-            if self.is_running:
-                self.interrupt()
-                self._process.wait(timeout=_END_S)
-        except subprocess.TimeoutExpired:
-            pass
-        finally:
-            if self.is_running:
-                self._process.kill()
-                self._process.wait()
-
-    def failed(self, what: str) -> ShipdragError:
-        """Return an error that shows the end of the log."""
-        lines = self.log.read_text(encoding='utf-8', errors='replace').splitlines()[-10:]
-        return ShipdragError('\n  '.join([f'{what}; the end of {str(self.log)!r}:', *lines]))
-
-
-@contextmanager
-def _node(ship_file: Path, recordings: Path, log: Path) -> Iterator[_Node]:
-    # nothing leaves this machine, and no other ROS on it is received or receives
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    os.environ['ROS_DOMAIN_ID'] = str(_FIRST_DOMAIN + os.getpid() % _DOMAINS)
-    os.environ.pop('ROS_STATIC_PEERS', None)
-    os.environ.setdefault('ROS_LOG_DIR', str(log.parent / 'ros'))
-    node = _Node(ship_file, recordings, log)
-    try:
-        yield node
-    finally:
-        node.end()
-
-
-@contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Unwind on SIGTERM as on Ctrl-C, so that the node's process is ended too."""
-
-    def leave(number: int, frame: FrameType | None) -> NoReturn:
-        sys.exit(128 + number)
-
-    before = signal.signal(signal.SIGTERM, leave)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -7,7 +7,6 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli import diagnose_json
 from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.progress import stages
@@ -15,12 +14,13 @@ from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis import DiagnosisResult, Verdict, with_effects
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
 from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.document import document
 from shipdrag_ros.diagnosis.earlier_file import read_earlier
 from shipdrag_ros.diagnosis.score import Score
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.library.diagnosing import diagnose_runs
-from shipdrag_ros.library.windowed import refuse_overlaps
+from shipdrag_ros.library.replaying import refuse_overlaps
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.ship.facts import RATE, usage
 
@@ -116,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
         output.log(f'ship file with the effect in {options.write}')
     elif options.write is not None:
         output.log(f'nothing is named, so {options.write} is not written')
-    output.json(diagnose_json.document(found, ship))
+    output.json(document(found, ship))
     return 0
 
 

@@ -37,6 +37,10 @@ EXAMPLES = {
         'shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml',
         'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
     ),
+    'forecast': (
+        'shipdrag forecast run.mcap --after 120 300',
+        'shipdrag forecast run.mcap --ship ship.yaml --json forecast.json',
+    ),
     'fleet': (
         'shipdrag fleet records -o store --workers 1',
         'shipdrag fleet records -o store --json fleet.json',

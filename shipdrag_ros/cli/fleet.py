@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from shipdrag_ros.cli.arguments import add_json
+from shipdrag_ros.cli.arguments import add_json, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.progress import ProgressLines
 from shipdrag_ros.display import Table
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     engine = parser.add_mutually_exclusive_group()
     engine.add_argument(
         '--workers',
-        type=_count,
+        type=whole(1, 1024),
         metavar='N',
         help='processes on this machine (default: one a core)',
     )
@@ -164,9 +164,3 @@ def _progress(output: Output) -> Iterator[Progress]:
             yield lambda text, done, total: bar(done, total)
         return
     yield ProgressLines(output.log, every_s=_EVERY_S, at_once=False).show
-
-
-def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 1024:
-        raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number from 1 to 1024')
-    return int(text)

@@ -4,22 +4,19 @@
 from __future__ import annotations
 
 import io
-import json
-import math
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as RichProgress
 from rich.table import Table as RichTable
 
 from shipdrag_ros.cli.arguments import STDOUT
-from shipdrag_ros.display import Table
+from shipdrag_ros.display import Table, json_text
 from shipdrag_ros.progress import PartDone, Progress
 
 _PIPE_WIDTH = 160  # a file or a pipe has no width of its own; tables must not be cut there
@@ -141,29 +138,9 @@ class Output:
             self.log(f'JSON in {self._json_to}')
 
 
-def json_text(document: Mapping[str, Any]) -> str:
-    """
-    Return a document as JSON; arrays are lists, and what is not finite is null.
-    """
-    return json.dumps(_plain(document), indent=2, allow_nan=False) + '\n'
-
-
 def _console(stream: TextIO) -> _Console:
     if isinstance(stream, io.TextIOWrapper):
         stream.reconfigure(errors='replace')  # a terminal without ± must not end the program
     width = None if stream.isatty() else _PIPE_WIDTH
     # names from outside are text, whatever brackets and colons they hold
     return _Console(file=stream, width=width, markup=False, highlight=False, emoji=False)
-
-
-def _plain(value: Any) -> Any:
-    """Turn arrays into lists, and what is not finite into None."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

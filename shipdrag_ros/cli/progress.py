@@ -12,6 +12,7 @@ from shipdrag_ros.display import duration
 from shipdrag_ros.progress import Progress
 
 _EVERY_S = 3.0  # between lines
+_COMPILES = 'compiling, once after an installation or an update; this takes about a minute'
 
 
 @contextmanager
@@ -29,14 +30,35 @@ def stages(output: Output) -> Iterator[Progress]:
     Progress
         Called with each stage, how much of it is done, and of how much.
     """
+    with output.bar() as bar, compiling_said(output.log):
+        yield bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).show
+
+
+@contextmanager
+def compiling_said(log: Callable[[str], None]) -> Iterator[None]:
+    """
+    Say once that something is compiled, when the first function is.
+
+    Parameters
+    ----------
+    log
+        Where it is said; not of what is kept from an earlier start.
+    """
     from numba.core import event  # long to import, and help must come at once
 
-    from shipdrag_ros.cli.compiling import CompilingNotice
+    class Notice(event.Listener):  # type: ignore[misc]
+        said = False
 
-    with output.bar() as bar:
-        show = bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).show
-        with event.install_listener('numba:compile', CompilingNotice(output.log)):
-            yield show
+        def on_start(self, event: object) -> None:
+            if not self.said:
+                log(_COMPILES)
+            self.said = True
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    with event.install_listener('numba:compile', Notice()):
+        yield
 
 
 class ProgressLines:

@@ -8,11 +8,11 @@ import math
 from collections import Counter
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, number
+from shipdrag_ros.cli.arguments import add_json, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
-from shipdrag_ros.library import simulating
-from shipdrag_ros.library.simulating import (
+from shipdrag_ros.library import simulated
+from shipdrag_ros.library.simulated import (
     SPEED_FRACTION,
     SimulationSettings,
     make,
@@ -133,7 +133,7 @@ def _add_sensors(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--seed',
-        type=_seed,
+        type=whole(0),
         default=0,
         metavar='N',
         help='seed of the noise: the same seed gives the same readings',
@@ -202,17 +202,11 @@ def _inputs(text: str) -> tuple[str, ...]:
     return names
 
 
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number, 0 or more')
-    return int(text)
-
-
 def moment_ns(text: str) -> int:
     """
     Read a date or a time of ISO 8601 [ns since the epoch].
     """
     try:
-        return simulating.moment_ns(text)
+        return simulated.moment_ns(text)
     except SimulationError as error:
         raise argparse.ArgumentTypeError(str(error)) from None

@@ -16,7 +16,7 @@ import numpy as np
 
 from shipdrag_ros import strict_yaml
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.cli.arguments import add_json, number
+from shipdrag_ros.cli.arguments import add_json, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.ship import Ship
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '-o', '--out', required=True, type=Path, metavar='DIR', help='folder; must be empty or new'
     )
     parser.add_argument(
-        '--ships', type=_whole(1, 1000), default=3, metavar='N', help='how many ships'
+        '--ships', type=whole(1, 1000), default=3, metavar='N', help='how many ships'
     )
     parser.add_argument(
         '--months',
@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--seed',
-        type=_whole(0, 1 << 63),
+        type=whole(0),
         default=0,
         metavar='S',
         help='the same seed gives the same files',
@@ -227,12 +227,3 @@ def _date(change: HullChange) -> str:
     return datetime.fromtimestamp(
         FLEET_START_NS // 1_000_000_000 + round(change.day * 86_400), UTC
     ).strftime('%Y-%m-%d')
-
-
-def _whole(low: int, high: int) -> Any:
-    def read(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number, {low} or more')
-        return int(text)
-
-    return read

@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from shipdrag_ros.cli import trend_json
 from shipdrag_ros.cli.arguments import add_json, add_report, new_file
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
-from shipdrag_ros.library.trending import trends_of
 
 if TYPE_CHECKING:
     from shipdrag_ros.trend import ShipTrend
@@ -79,6 +77,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     if options.pages is not None and options.report is None:
         raise FleetError('--pages DIR: give --report FILE.html too, whose rows lead there')
+    from shipdrag_ros.library.trends import Trends, trends_of
+
     trends, skipped = trends_of(output, options.store)
     for file in filter(None, (options.csv, options.parquet)):
         from shipdrag_ros.trend.export import write_rows
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         links = None if options.pages is None else _write_pages(output, options)
         write_trends(options.report, trends, skipped, links=links)
         output.log(f'report in {options.report}')
-    output.json(trend_json.document(trends, skipped))
+    output.json(Trends(tuple(trends), tuple(skipped)).to_dict())
     return 0
 
 
@@ -149,6 +149,7 @@ def _answer(output: Output, store: Path, query: str) -> None:
     import duckdb
 
     from shipdrag_ros.fleet.store import read_bags, read_coastdowns
+    from shipdrag_ros.library.trends import trends_of
     from shipdrag_ros.trend.export import run_table, ship_table
 
     trends, _ = trends_of(output, store)

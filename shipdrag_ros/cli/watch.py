@@ -11,12 +11,11 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_remap, bag, number
+from shipdrag_ros.cli.arguments import add_remap, bag, number, whole
 from shipdrag_ros.cli.node import no_ros
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import open_sources
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.live.app import FLEET, FleetPages, LivePage
 from shipdrag_ros.live.earlier import PastRun, recorded_runs
 from shipdrag_ros.live.serve import listen, serve
@@ -37,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'this network, which may come and go; with bags or logs it plays them. It only reads.'
     )
     parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='bag or log to play')
-    parser.add_argument('--port', type=_port, default=8088, help='of the page, 0: any free one')
+    parser.add_argument(
+        '--port', type=whole(0, 65535), default=8088, help='of the page, 0: any free one'
+    )
     parser.add_argument(
         '--listen',
         default=LOOPBACK,
@@ -74,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--signal-k',
-        type=_port,
+        type=whole(0, 65535),
         metavar='PORT',
         help='send Signal K deltas, a line each, to who connects to this TCP port of this machine',
     )
@@ -101,7 +102,6 @@ def run(options: argparse.Namespace) -> int:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
         source: PictureFeed = stack.enter_context(_source(options, ship, past, output))
         fleet = None if options.store is None else fleet_pages(output, options.store)
-        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet)
         for note in notes:
             output.log(note)
         name, port = page_socket.getsockname()[:2]
@@ -117,7 +117,8 @@ def run(options: argparse.Namespace) -> int:
                 )
             output.log('Ctrl-C ends it; the node is not touched')
 
-        serve(page, [page_socket], deltas=deltas, ready=announce)
+        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet, ready=announce)
+        serve(page, [page_socket], deltas=deltas)
     return 0
 
 
@@ -151,6 +152,7 @@ def fleet_pages(output: Output, store: Path) -> FleetPages:
     """
     # Parquet and pictures take long to import
     from shipdrag_ros.fleet.store import read_coastdowns
+    from shipdrag_ros.library.trends import trends_of
     from shipdrag_ros.trend.coastdown_page import links
     from shipdrag_ros.trend.page import fleet_text
 
@@ -197,10 +199,3 @@ def _token(address: str, file: Path | None) -> str | None:
             'characters, for instance of `openssl rand -hex 16`'
         )
     return token
-
-
-def _port(text: str) -> int:
-    value = int(text) if text.isdecimal() else -1
-    if not 0 <= value <= 65535:
-        raise argparse.ArgumentTypeError(f'{text!r}, expected a port, 0 to 65535')
-    return value

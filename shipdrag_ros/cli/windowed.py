@@ -13,7 +13,7 @@ from shipdrag_ros.bags import Run, open_runs
 from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.cli.arguments import bag
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.library.windowed import WindowedRun, WindowSpan
+from shipdrag_ros.library.replaying import WindowedRun, WindowSpan
 
 HELP = 'BAG@START:END takes this part alone [s from its start], as --window does'
 

@@ -10,6 +10,8 @@ from enum import Enum
 from shipdrag_ros.display import short_repr
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.forecast.path import PathAhead
+from shipdrag_ros.forecast.result import Forecast
 
 BRAKED = (
     'something but the water slows her in a part of it, and no instrument shows what; r(v) is '
@@ -97,10 +99,17 @@ class Onset:
 
 @dataclass(frozen=True)
 class Update:
-    """An estimate during a coastdown, of all samples from its start to `stamp_ns`."""
+    """
+    An estimate during a coastdown, of all samples from its start to `stamp_ns`.
+
+    `forecast` is the rest of the glide, None where nothing is left to foretell; `path` the
+    positions to come, None without positions.
+    """
 
     stamp_ns: int
     estimate: Estimate
+    forecast: Forecast | None = None
+    path: PathAhead | None = None
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.forecast.path import PathAhead
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
@@ -84,16 +86,24 @@ class RunningCoastdown:
         """
         Estimate from what there is up to a stamp [ns], or say why that cannot be.
         """
+        window = self._window(stamp_ns)
         try:
-            found = estimator(self._window(stamp_ns), self._ship, self._parameters)
+            found = estimator(window, self._ship, self._parameters)
         except EstimationError as error:
             return NoEstimate(stamp_ns, str(error))
         # an estimator that is given may return what it likes
         if not self._estimated and isinstance(found, Estimate):
-            self._estimated = not (why := _too_vague(found, self._parameters))
+            self._estimated = not (why := too_vague(found, self._parameters))
             if why:
                 return NoEstimate(stamp_ns, why)
-        return Update(stamp_ns, found)
+        return self._with_forecast(stamp_ns, found, window)
+
+    def _with_forecast(self, stamp_ns: int, found: Estimate, window: Window) -> Update:
+        try:
+            forecast = foretell(found, self._ship, froude_min=self._parameters.froude_min)
+        except EstimationError:  # nothing is left to foretell
+            return Update(stamp_ns, found)
+        return Update(stamp_ns, found, forecast, PathAhead.of(window, forecast))
 
     def end(
         self,
@@ -162,8 +172,10 @@ class RunningCoastdown:
         return self._cut(start_ns, end_ns, first_ns)
 
 
-def _too_vague(found: Estimate, parameters: Parameters) -> str:
-    """Say why the first estimate of a coastdown is not given yet; '' if it is."""
+def too_vague(found: Estimate, parameters: Parameters) -> str:
+    """
+    Say why the first estimate of a coastdown is not given yet; '' if it is.
+    """
     sigma, resistance = found.last_sigma_m_s2, found.last_resistance_m_s2
     share = parameters.first_relative_sigma
     if sigma < share * resistance:

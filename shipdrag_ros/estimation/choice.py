@@ -60,7 +60,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
 
     Notes
     -----
-    Source: S1 for `s1_*`; docs/accuracy.md for `log_time`.
+    Source: S1 for `s1_*`; docs/method.md for `log_time`.
 
     Examples
     --------
@@ -80,4 +80,5 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     ('log_time', True)
     """
     check_size(window)
-    return named(parameters.estimator).estimate(window, ship, parameters)
+    chosen = named(parameters.estimator)
+    return (chosen.live or chosen.estimate)(window, ship, parameters)

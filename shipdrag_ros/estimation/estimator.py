@@ -31,6 +31,8 @@ class Estimator:
     meaning
         What it is, for a report.
     estimate
+    live
+        The same in less time, while a coastdown runs; None where it takes none.
     learns_noise
         Whether slow disturbances are learnt, or a note says that they are not.
     constant_order
@@ -43,6 +45,7 @@ class Estimator:
     name: str
     meaning: str
     estimate: WindowEstimator
+    live: WindowEstimator | None = None
     learns_noise: bool = False
     constant_order: int | None = None
     caveat: str = ''

@@ -64,7 +64,7 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
 
     Notes
     -----
-    Source: docs/accuracy.md; the equation of motion is (1 + n_r) dv/dt = -r(v), S1 (1).
+    Source: docs/method.md; the equation of motion is (1 + n_r) dv/dt = -r(v), S1 (1).
 
     Examples
     --------
@@ -92,7 +92,8 @@ def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estima
 def _estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     asked = parameters.estimator
     if asked != 'auto' and named(asked) is not named(AFTER):
-        return estimate(window, ship, parameters)
+        check_size(window)
+        return named(asked).estimate(window, ship, parameters)
     try:
         found = _fitted(window, ship, parameters)
     except EstimationError as error:

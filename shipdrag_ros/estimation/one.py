@@ -53,10 +53,32 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     -----
     Source: docs/model.md.
     """
+    return _estimate(window, ship, parameters, quick=False)
+
+
+def estimate_live(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    """
+    Estimate the same in less time; as `estimate`.
+
+    Raises
+    ------
+    EstimationError
+        As `estimate`.
+
+    Notes
+    -----
+    Times of the noise are the usual ones, and its sizes are averaged over fewer settings.
+    """
+    return _estimate(window, ship, parameters, quick=True)
+
+
+def _estimate(window: Window, ship: Ship, parameters: Parameters, *, quick: bool) -> Estimate:
     run_down = RunDown.of(window, ship)
     record = RunRows.of(window, run_down, parameters)
     guess = InitialGuess.of(record.coast, float(ship.n_r(1.0)))
-    coast, variance = condense(record.coast, record.variance(record.coast, record.coast_weight))
+    halved_s = (1.0 + float(ship.n_r(1.0))) / (guess.quadratic_1_m * guess.speed_m_s)
+    white = record.variance(record.coast, record.coast_weight)
+    coast, variance = condense(record.coast, white, guess.speed_m_s, halved_s)
     steady = record.steady
     problem = RunModel.of(
         Rows(*(np.concatenate([a, b]) for a, b in zip(steady, coast))),
@@ -67,7 +89,7 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
         speed_m_s=guess.speed_m_s,
         low_m_s=guess.lowest * guess.speed_m_s,
     )
-    found = infer(problem)
+    found = infer(problem, quick=quick)
     return _result(found, record, window, ship, parameters, (*run_down.notes, *_notes(found)))
 
 

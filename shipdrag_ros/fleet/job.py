@@ -26,7 +26,7 @@ from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, Shipd
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.fleet.find import RUN_FILE, SHIP_FILE, BagToRead
 from shipdrag_ros.fleet.local import fetched
-from shipdrag_ros.fleet.rows import BagResult, Row, coastdown_row
+from shipdrag_ros.fleet.rows import BagResult, Row, bag_row, coastdown_row
 from shipdrag_ros.replay import ReplayResult, clocks_apart, coast_windows, replay, why_no_coastdown
 from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
 from shipdrag_ros.replay.warnings import run_warnings
@@ -229,22 +229,12 @@ def _name(ship: Ship, source: BagToRead) -> str:
     return name
 
 
-def _bag_row(job: BagJob) -> Row:
-    return {
-        'root': job.sources[0].root,
-        'bag': job.sources[0].bag,
-        'content_hash': job.content_hash,
-        'software_version': __version__,
-        'ship': None,
-        'coastdowns': 0,
-        'messages': 0,
-        'warnings': [],
-        'error': None,
-    }
+def _bag_row(job: BagJob, *, error: str | None = None) -> Row:
+    return bag_row(job.sources[0].root, job.sources[0].bag, job.content_hash, error=error)
 
 
 def _failed(job: BagJob, why: str) -> BagResult:
-    return BagResult(_bag_row(job) | {'error': why})
+    return BagResult(_bag_row(job, error=why))
 
 
 @contextmanager

@@ -15,8 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from shipdrag_ros import __version__
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
-from shipdrag_ros.diagnosis.result import DiagnosisResult, EffectEstimate
+from shipdrag_ros.diagnosis.document import candidates, sized
+from shipdrag_ros.diagnosis.result import DiagnosisResult
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -56,6 +58,23 @@ class BagResult:
     bag: Row
     coastdowns: tuple[Row, ...] = ()
     ship_file: str = ''
+
+
+def bag_row(root: str, bag: str, digest: str, *, error: str | None = None) -> Row:
+    """
+    Return the row of a bag of which nothing is read yet, or nothing can be.
+    """
+    return {
+        'root': root,
+        'bag': bag,
+        'content_hash': digest,
+        'software_version': __version__,
+        'ship': None,
+        'coastdowns': 0,
+        'messages': 0,
+        'warnings': [],
+        'error': error,
+    }
 
 
 def coastdown_row(
@@ -100,8 +119,8 @@ def coastdown_row(
         'displaced_volume_m3': ship.displaced_volume_m3,
         'water_density_kg_m3': ship.water.density_kg_m3,
         'verdict': None if diagnosis is None else diagnosis.verdict.value,
-        'effects': None if diagnosis is None else _json(_named(diagnosis.effects)),
-        'candidates': None if diagnosis is None else _candidates(diagnosis),
+        'effects': None if diagnosis is None else _json(sized(diagnosis.effects)),
+        'candidates': None if diagnosis is None else _json(candidates(diagnosis)),
         'flags': sorted(set(own_flags)),
         'error': _error(coastdown),
     }
@@ -207,32 +226,6 @@ def _error(coastdown: EndedCoastdown) -> str | None:
     if coastdown.estimate is None:
         return coastdown.failure or 'no estimate was possible'
     return None
-
-
-def _named(effects: Sequence[EffectEstimate]) -> list[Row]:
-    return [
-        {
-            'name': effect.name,
-            'probability': effect.probability,
-            'parameters': {
-                name: {'value': each.value, 'sd': each.sd}
-                for name, each in effect.parameters.items()
-            },
-        }
-        for effect in effects
-    ]
-
-
-def _candidates(diagnosis: DiagnosisResult) -> str:
-    found: list[Row] = [
-        {
-            'names': list(each.names) or ['none'],
-            'probability': each.probability,
-            'effects': _named(each.effects),
-        }
-        for each in diagnosis.candidates
-    ]
-    return _json(found)
 
 
 def _json(value: object) -> str:

@@ -11,8 +11,8 @@ The same rows give the same bytes.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, unquote
@@ -26,6 +26,26 @@ if TYPE_CHECKING:  # pyarrow takes long to import
 COASTDOWNS, BAGS, SHIPS = 'coastdowns', 'bags', 'ships'
 _PARTITION = 'ship='
 _ROWS_AT_ONCE = 1 << 16
+_OF_COASTDOWN = (
+    ('string', 'ship bag content_hash software_version'),
+    ('int64', 'time_ns end_ns'),
+    ('string', 'ended_by estimator'),
+    ('float64', 'heading_rad speed_at_stop_m_s'),
+    ('list of float64', 'froude speed_m_s resistance_m_s2 sigma_m_s2 sigma_repeatable_m_s2'),
+    ('list of float64', 'clean_m_s2'),
+    ('float64', 'froude_valid_min froude_valid_max length_m draught_m displaced_volume_m3'),
+    ('float64', 'water_temperature_c water_density_kg_m3'),
+    ('string', 'verdict effects candidates'),
+    ('list of string', 'facts flags'),
+    ('string', 'error'),
+)
+"""Columns of a coastdown in their order, by type."""
+_OF_BAG = (
+    ('string', 'root bag content_hash software_version ship'),
+    ('int64', 'coastdowns messages'),
+    ('list of string', 'warnings'),
+    ('string', 'error'),
+)
 
 
 @dataclass(frozen=True)
@@ -91,15 +111,7 @@ class Store:
         FleetError
             If a file of the store cannot be read.
         """
-        columns = [
-            'content_hash',
-            'root',
-            'bag',
-            'software_version',
-            'ship',
-            'coastdowns',
-            'error',
-        ]
+        columns = ['content_hash', *(item.name for item in fields(Done))]
         rows = read_bags(self.path).select(columns).to_pylist()
         return {row.pop('content_hash'): Done(**row) for row in rows}
 
@@ -235,63 +247,26 @@ def coastdown_schema(*, partitioned: bool = False) -> pa.Schema:
     """
     Return the columns of a coastdown; `partitioned`: without the ship, which the folder shows.
     """
-    import pyarrow as pa
-
-    curve = pa.list_(pa.float64())
-    columns: dict[str, Any] = {
-        'ship': pa.string(),
-        'bag': pa.string(),
-        'content_hash': pa.string(),
-        'software_version': pa.string(),
-        'time_ns': pa.int64(),
-        'end_ns': pa.int64(),
-        'ended_by': pa.string(),
-        'estimator': pa.string(),
-        'heading_rad': pa.float64(),
-        'speed_at_stop_m_s': pa.float64(),
-        'froude': curve,
-        'speed_m_s': curve,
-        'resistance_m_s2': curve,
-        'sigma_m_s2': curve,
-        'sigma_repeatable_m_s2': curve,
-        'clean_m_s2': curve,
-        'froude_valid_min': pa.float64(),
-        'froude_valid_max': pa.float64(),
-        'length_m': pa.float64(),
-        'draught_m': pa.float64(),
-        'displaced_volume_m3': pa.float64(),
-        'water_temperature_c': pa.float64(),
-        'water_density_kg_m3': pa.float64(),
-        'verdict': pa.string(),
-        'effects': pa.string(),
-        'candidates': pa.string(),
-        'facts': pa.list_(pa.string()),
-        'flags': pa.list_(pa.string()),
-        'error': pa.string(),
-    }
-    if partitioned:
-        del columns['ship']
-    return pa.schema(columns)
+    return _schema(_OF_COASTDOWN, without='ship' if partitioned else '')
 
 
 def bag_schema() -> pa.Schema:
     """
     Return the columns of a bag.
     """
+    return _schema(_OF_BAG)
+
+
+def _schema(columns: Sequence[tuple[str, str]], *, without: str = '') -> pa.Schema:
     import pyarrow as pa
 
+    def kind(name: str) -> pa.DataType:
+        inner = name.removeprefix('list of ')
+        alone = pa.type_for_alias(inner)
+        return alone if inner == name else pa.list_(alone)
+
     return pa.schema(
-        {
-            'root': pa.string(),
-            'bag': pa.string(),
-            'content_hash': pa.string(),
-            'software_version': pa.string(),
-            'ship': pa.string(),
-            'coastdowns': pa.int64(),
-            'messages': pa.int64(),
-            'warnings': pa.list_(pa.string()),
-            'error': pa.string(),
-        }
+        (name, kind(of)) for of, names in columns for name in names.split() if name != without
     )
 
 

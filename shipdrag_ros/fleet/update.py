@@ -22,7 +22,7 @@ from shipdrag_ros.fleet.events import HullEvent, read_events, write_events
 from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE, BagToRead, FoundBags, Skipped
 from shipdrag_ros.fleet.job import BagJob, work
 from shipdrag_ros.fleet.local import Identity, content_hash, identify
-from shipdrag_ros.fleet.rows import BagResult, same_time
+from shipdrag_ros.fleet.rows import BagResult, bag_row, same_time
 from shipdrag_ros.fleet.store import Done, Store, read_coastdowns
 from shipdrag_ros.progress import Progress
 
@@ -213,19 +213,8 @@ def _unread(skipped: Skipped, job: BagJob | None = None) -> BagResult:
     source = None if job is None else job.sources[0]
     root, bag = (skipped.root, skipped.bag) if source is None else (source.root, source.bag)
     digest = hashlib.sha256(f'unread\0{root}\0{bag}'.encode('utf-8', 'replace')).hexdigest()
-    return BagResult(
-        {
-            'root': root,
-            'bag': bag,
-            'content_hash': digest if job is None else job.content_hash,
-            'software_version': __version__,
-            'ship': None,
-            'coastdowns': 0,
-            'messages': 0,
-            'warnings': [],
-            'error': skipped.reason,
-        }
-    )
+    digest = digest if job is None else job.content_hash
+    return BagResult(bag_row(root, bag, digest, error=skipped.reason))
 
 
 def _keep_ships(

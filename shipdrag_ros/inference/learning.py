@@ -24,7 +24,9 @@ from shipdrag_ros.inference.settings import HOLD, SIZE, WHITE_OF, NoisePosterior
 from shipdrag_ros.samples import Float64
 
 KEPT = 24  # settings
+_QUICK, _QUICK_KEPT = 13, 8  # of the points about the most probable setting, and of settings
 _NEGLIGIBLE = 2e-3  # weight of a setting
+_FINE, _ROUGH = 0.02, 0.3  # of the logarithm of the evidence: how near the most probable one is
 LEAST_S = 300.0  # of record from which noise can be learnt; of less most is the prior's
 # At steady speed an engine that holds torque, power or revs gives more thrust to a ship that is
 # slowed: the speed is damped 1 to 2 times as much as the hull's resistance says.
@@ -88,7 +90,7 @@ def of_steady(rows: Rows, variance: Float64, damping_1_s: float, inertia: float)
     return Seen(rows, np.array(columns), none, none, noise, n)
 
 
-def learn(seen: Seen, speed_m_s: float) -> NoisePosterior:
+def learn(seen: Seen, speed_m_s: float, *, quick: bool = False) -> NoisePosterior:
     """
     Learn the noise of a record.
 
@@ -97,6 +99,8 @@ def learn(seen: Seen, speed_m_s: float) -> NoisePosterior:
     seen
     speed_m_s
         At the stop; with the damping it sets the scale of the priors.
+    quick
+        Times as they usually are, and a third of the settings.
 
     Returns
     -------
@@ -110,11 +114,17 @@ def learn(seen: Seen, speed_m_s: float) -> NoisePosterior:
     root of their number times their mean (Ionides 2008).
     """
     prior = _prior(seen, speed_m_s)
-    z, log_weight = sample(seen, prior, spread_points(len(prior.which)))
+    if quick:
+        sizes = prior.which[(prior.which >= WHITE_OF) | (prior.which % 2 == 0)]
+        prior = prior._replace(which=sizes)
+    points = spread_points(len(prior.which))
+    points, close = (points[:_QUICK], _ROUGH) if quick else (points, _FINE)
+    z, log_weight = sample(seen, prior, points, close)
     if not np.isfinite(log_weight).any():
         return _of_prior(prior)
     length_s = float(np.ptp(seen.rows.time_s)) if len(seen.rows.time_s) else 0.0
-    return replace(_posterior(z, log_weight, prior), learnt=length_s >= LEAST_S)
+    kept = _QUICK_KEPT if quick else KEPT
+    return replace(_posterior(z, log_weight, prior, kept), learnt=length_s >= LEAST_S)
 
 
 def prior(seen: Seen, speed_m_s: float) -> NoisePosterior:
@@ -150,14 +160,14 @@ def _of_prior(prior: SizePrior) -> NoisePosterior:
     return NoisePosterior(_settings(z, np.full(len(z), 1.0 / len(z)), prior), False)
 
 
-def _posterior(z: Float64, log_weight: Float64, prior: SizePrior) -> NoisePosterior:
+def _posterior(z: Float64, log_weight: Float64, prior: SizePrior, kept: int) -> NoisePosterior:
     """Keep what counts, the most probable first."""
     usable = np.isfinite(log_weight)
     z, log_weight = z[usable], log_weight[usable]
     weight = np.exp(log_weight - log_weight.max())
     weight = np.minimum(weight, np.sqrt(len(weight)) * weight.mean())
     weight /= weight.sum()
-    order = np.argsort(-weight, kind='stable')[:KEPT]
+    order = np.argsort(-weight, kind='stable')[:kept]
     order = order[weight[order] > _NEGLIGIBLE]
     return NoisePosterior(_settings(z[order], weight[order] / weight[order].sum(), prior), True)
 

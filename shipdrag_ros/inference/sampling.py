@@ -28,7 +28,6 @@ _PAIRS = 24  # of points about the most probable setting
 _WIDER = 1.1  # than the curvature says
 _ITERATIONS, _HALVINGS = 25, 5  # of the search
 _LONGEST_STEP = 2.5  # in standard deviations of the prior
-_CLOSE = 0.02  # of the logarithm of the evidence
 _NEAR, _APART = 1e-2, 0.3  # steps of differences, for slope and curvature
 _FLOOR = 0.4  # of the curvature, in which the prior has 1
 
@@ -160,7 +159,7 @@ def _slope(z: Float64, value: float, seen: Seen, prior: SizePrior) -> Float64:
 
 
 @compiled
-def _mode(start: Float64, seen: Seen, prior: SizePrior) -> tuple[Float64, float]:
+def _mode(start: Float64, seen: Seen, prior: SizePrior, close: float) -> tuple[Float64, float]:
     """Climb to the most probable setting by a quasi-Newton search (BFGS)."""
     p = len(prior.which)
     z, value = start.copy(), _log_posterior(start, seen, prior)
@@ -177,7 +176,7 @@ def _mode(start: Float64, seen: Seen, prior: SizePrior) -> tuple[Float64, float]
         if length > _LONGEST_STEP:
             step *= _LONGEST_STEP / length
         expected = np.sum(step * slope)
-        if not expected > _CLOSE:
+        if not expected > close:
             break
         part, better = 1.0, False
         trial, at_trial = z, value
@@ -271,8 +270,12 @@ def _root(matrix: Float64) -> Float64:
 
 
 @compiled
-def sample(seen: Seen, prior: SizePrior, points: Float64) -> tuple[Float64, Float64]:
-    """Return settings about the most probable one, and the logarithms of their weights."""
+def sample(seen: Seen, prior: SizePrior, points: Float64, close: float) -> tuple[Float64, Float64]:
+    """
+    Return settings about the most probable one, and the logarithms of their weights.
+
+    `close` is how near it is sought, by the logarithm of the evidence.
+    """
     p = len(prior.which)
     start, least = np.zeros(SIZE), -np.inf
     # sources in turn large and small: the search climbs from the best
@@ -283,7 +286,7 @@ def sample(seen: Seen, prior: SizePrior, points: Float64) -> tuple[Float64, Floa
         value = _log_posterior(trial, seen, prior)
         if value > least:
             start, least = trial, value
-    z, value = _mode(start, seen, prior)
+    z, value = _mode(start, seen, prior, close)
     lower = _root(_curvature(z, value, seen, prior))
     count = len(points)
     found, log_weight = np.zeros((count, SIZE)), np.full(count, -np.inf)

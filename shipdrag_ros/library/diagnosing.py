@@ -26,8 +26,7 @@ from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.library.listener import Listener
-from shipdrag_ros.library.windowed import WindowedRun, WindowSpan, refuse_two_ships
+from shipdrag_ros.library.replaying import Listener, WindowedRun, WindowSpan, refuse_two_ships
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.replay import (

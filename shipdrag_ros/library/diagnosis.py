@@ -18,21 +18,22 @@ from shipdrag_ros.diagnosis import (
     with_effects,
 )
 from shipdrag_ros.diagnosis import words as diagnosis_words
+from shipdrag_ros.diagnosis.document import document
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.earlier_file import read_earlier
 from shipdrag_ros.display import Table, speed_unit
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.library.diagnosing import diagnose_runs
-from shipdrag_ros.library.listener import Notes
 from shipdrag_ros.library.record import Record
-from shipdrag_ros.library.resistance import records_of
-from shipdrag_ros.library.shown import Shown, drawing, writing
-from shipdrag_ros.library.windowed import (
+from shipdrag_ros.library.replaying import (
+    Notes,
     WindowedRun,
     WindowSpan,
     refuse_overlaps,
     refuse_two_ships,
 )
+from shipdrag_ros.library.resistance import records_of
+from shipdrag_ros.library.shown import Shown, drawing, writing
 from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.ship import Fact, Ship, parse_fact
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -120,6 +121,12 @@ class Diagnosis(Shown):
                 'summary() says what would decide'
             )
         return with_effects(self.ship, self.found.effects)
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        Return the JSON document of `shipdrag diagnose`; arrays are numpy's.
+        """
+        return document(self.found, self.ship)
 
     def _lines(self) -> Sequence[str]:
         return (*self.found.summary(), *diagnosis_words.advice(self.found), *self.notes)

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.sources.table import LogRow, LogTable
+from shipdrag_ros.sources.table import Cells, LogTable, TableRows, texts_of
 
 NANOSECONDS = 'ns'
 FRAME = 'frame'
-_ROWS = 1 << 14  # made text at a time
+_ROWS = 1 << 14  # at a time
 INDEX = 'time'
 """Column of a frame's own dates, where its index has no name."""
 
@@ -73,15 +73,18 @@ class FrameTable(LogTable):
             name for (name, _), array in zip(named, self._arrays) if array.dtype.kind == 'M'
         )
 
-    def rows(self, progress: PartDone | None = None) -> Iterator[LogRow]:
+    def rows(self, progress: PartDone | None = None, *, most: int = _ROWS) -> Iterator[TableRows]:
         """
-        Yield the rows; those without any value are skipped.
+        Yield the rows, some at a time; those without any value are skipped.
         """
-        for first in range(0, len(self._arrays[0]), _ROWS):
-            some = [_cells(array[first : first + _ROWS]) for array in self._arrays]
-            for number, cells in enumerate(zip(*some, strict=True), start=first + 1):
-                if any(cells):
-                    yield LogRow(number, cells)
+        total = len(self._arrays[0])
+        for first in range(0, total, most):
+            columns = [_cells(array[first : first + most]) for array in self._arrays]
+            valued = np.zeros(len(columns[0]), np.bool_)
+            for cells in columns:
+                texts = not isinstance(cells, np.ndarray)
+                valued |= [*map(bool, cells)] if texts else cells == cells  # NaN is no value
+            yield TableRows(range(first + 1, first + 1 + len(valued)), columns)[valued]
 
 
 def _free(name: str, named: Sequence[tuple[str, Any]]) -> str:
@@ -99,13 +102,12 @@ def _array(values: Any) -> NDArray[Any]:
     return np.asarray(values.to_numpy() if hasattr(values, 'to_numpy') else values)
 
 
-def _cells(array: NDArray[Any]) -> list[str]:
-    """Return the text of each value; nothing where there is none."""
-    if array.dtype.kind == 'M':
-        stamps = array.astype('datetime64[ns]')
-        missing = np.isnat(stamps).tolist()
-        texts = map(str, stamps.astype(np.int64).tolist())
-        return ['' if none else text for none, text in zip(missing, texts)]
-    # the shortest text that reads back as the same number; NaN is no value
-    found = ['' if value is None or value != value else str(value) for value in array.tolist()]
-    return found if array.dtype.kind in 'fiub' else [text.strip() for text in found]
+def _cells(array: NDArray[Any]) -> Cells:
+    """Return numbers as they are, dates in ns, and the text of other values."""
+    if array.dtype.kind != 'M':
+        return array if array.dtype.kind in 'fiu' else texts_of(array)
+    stamps = array.astype('datetime64[ns]')
+    missing, counts = np.isnat(stamps), stamps.astype(np.int64)
+    if not missing.any():
+        return counts
+    return ['' if none else text for none, text in zip(missing.tolist(), texts_of(counts))]

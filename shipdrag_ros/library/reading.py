@@ -12,7 +12,7 @@ from shipdrag_ros.bags import open_runs
 from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.library.record import Record
-from shipdrag_ros.library.windowed import refuse_two_ships
+from shipdrag_ros.library.replaying import refuse_two_ships
 from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.ship import Ship

@@ -1,24 +1,130 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run, or a window of it, replayed and put into words."""
+"""Runs, or windows of them, replayed: which may go together, and who is told on the way."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from shipdrag_ros.bags import Run
-from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.library.listener import Listener
-from shipdrag_ros.library.windowed import WindowSpan
+from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
+from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
+WindowSpan = tuple[float, float]
 _LATE_S = 10.0
 _MOVING_M_S = 0.5
+
+
+class Listener(Protocol):
+    """Receives lines, and how far the work is."""
+
+    def log(self, text: str) -> None:
+        """
+        Take a line that is not part of the result.
+        """
+
+    def progress(self, text: str) -> AbstractContextManager[PartDone]:
+        """
+        Receive how far the work is that `text` names.
+        """
+
+
+class Notes:
+    """
+    A listener that shows nothing and keeps the lines.
+
+    Attributes
+    ----------
+    lines
+        In the order they came.
+    """
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def log(self, text: str) -> None:
+        """
+        Keep a line.
+        """
+        self.lines.append(text)
+
+    def progress(self, text: str) -> AbstractContextManager[PartDone]:
+        """
+        Show nothing.
+        """
+        return nullcontext(lambda done, total: None)
+
+
+class WindowedRun(NamedTuple):
+    """A run, and the window of it that was given, [s] from its start."""
+
+    run: Run
+    window: WindowSpan | None
+
+
+def refuse_overlaps(runs: Sequence[WindowedRun]) -> None:
+    """
+    Refuse windows of one bag that overlap: what they share would count twice.
+
+    Raises
+    ------
+    BagError
+        If two runs hold the same part of a recording.
+    """
+    for number, one in enumerate(runs):
+        for other in runs[:number]:
+            if set(one.run.paths).isdisjoint(other.run.paths):
+                continue
+            first, second = (each.window or (0.0, math.inf) for each in (other, one))
+            if first[0] < second[1] and second[0] < first[1]:
+                raise BagError(
+                    f'{one.run.name!r} is given twice, {_text(first)} and {_text(second)}: they '
+                    'share a part, which is one run and not two; give windows that do not overlap'
+                )
+
+
+def refuse_two_ships(runs: Iterable[tuple[Run, Ship | None]]) -> None:
+    """
+    Refuse runs that name different ships; one without a name may be any.
+
+    Parameters
+    ----------
+    runs
+        Each with the ship that was given for it; None: the one attached.
+
+    Raises
+    ------
+    BagError
+        If two names are found.
+    """
+    named: dict[str, str] = {}
+    for run, given in runs:
+        text = run.attachments.get(SHIP_FILE)
+        if given is None and text is not None:
+            given = Ship.from_yaml(text, subject=f'{run.name}: {SHIP_FILE}')
+        if given is not None and given.name:
+            named.setdefault(given.name, run.name)
+    if len(named) > 1:
+        (one, first), (other, second), *_ = named.items()
+        raise BagError(
+            f'{first!r} is of {one!r} and {second!r} of {other!r}; take the runs of each ship by '
+            'themselves, or say which ship it is with --ship FILE'
+        )
+
+
+def _text(window: WindowSpan) -> str:
+    return 'whole' if math.isinf(window[1]) else f'{window[0]:g} to {window[1]:g} s'
 
 
 def replay_run(

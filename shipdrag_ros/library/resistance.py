@@ -13,15 +13,14 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
-from shipdrag_ros.library.coastdown import Coastdown, force_columns
-from shipdrag_ros.library.listener import Notes
-from shipdrag_ros.library.record import Record
-from shipdrag_ros.library.replaying import replay_run
+from shipdrag_ros.library import forecasts
+from shipdrag_ros.library.record import Coastdown, Record, force_columns
+from shipdrag_ros.library.replaying import Notes, WindowSpan, replay_run
 from shipdrag_ros.library.shown import ShownResistance, writing
-from shipdrag_ros.library.windowed import WindowSpan
 from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import tables, words
+from shipdrag_ros.replay.document import document
 from shipdrag_ros.replay.run_result import RunResult
 from shipdrag_ros.replay.together import together
 from shipdrag_ros.ship import Ship
@@ -96,6 +95,33 @@ class Resistance(ShownResistance):
                 'of each of `coastdowns`'
             )
         raise EstimationError(' '.join(self.summary().splitlines()))
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        Return the JSON document of `shipdrag replay`; arrays are numpy's.
+        """
+        return document(self.runs)
+
+    def forecast(self, after: Sequence[float] = forecasts.AFTER_S) -> forecasts.Forecasts:
+        """
+        Foretell the rest of each glide, from what was known at some times after its stop.
+
+        Parameters
+        ----------
+        after
+            When, from the stop on [s].
+
+        Returns
+        -------
+        Forecasts
+            Beside what followed; `plot()` draws them.
+
+        Raises
+        ------
+        EstimationError
+            If a time is not above 0, or there is none.
+        """
+        return forecasts.forecast(self.runs, after)
 
     def _lines(self) -> Sequence[str]:
         lines = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]
@@ -194,7 +220,7 @@ def estimate(
 
     Notes
     -----
-    Source: S1 (1) to (13), docs/accuracy.md. The figures are those of the command line
+    Source: S1 (1) to (13), docs/figures.md. The figures are those of the command line
     and of the node, to the last bit.
 
     Examples

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from shipdrag_ros import __version__
 from shipdrag_ros.display import Table
-from shipdrag_ros.errors import FleetError
-from shipdrag_ros.library.listener import Notes
+from shipdrag_ros.errors import FleetError, ShipFileError
+from shipdrag_ros.library.replaying import Listener, Notes
 from shipdrag_ros.library.resistance import Resistance
 from shipdrag_ros.library.shown import Shown, drawing, time_column, writing
-from shipdrag_ros.library.trending import trends_of
 from shipdrag_ros.library.wording import says_it_in_python
+from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
+from shipdrag_ros.trend.document import document
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,6 +77,12 @@ class Trends(Shown):
                 return each
         known = ', '.join(repr(each.series.name) for each in self.ships) or 'none'
         raise FleetError(f'no ship is called {ship!r}; there are: {known}')
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        Return the JSON document of `shipdrag trend`; arrays are numpy's.
+        """
+        return document(self.ships, self.skipped)
 
     def _lines(self) -> Sequence[str]:
         lines = [
@@ -212,6 +219,54 @@ def trends(
     ships = {_name(run.ship.name): run.ship for each in results for run in each.runs}
     rows = list(_rows(results))
     return Trends(tuple(fleet_trends(rows, ships, _events(events or {}))))
+
+
+def trends_of(listener: Listener, store: Path) -> tuple[list[ShipTrend], list[tuple[str, str]]]:
+    """
+    Return the trend of every ship of a store, and what the fleet could not use.
+
+    Parameters
+    ----------
+    listener
+        Called with what of the ship files and of the events cannot be used.
+    store
+        Folder that `shipdrag fleet` has written.
+
+    Returns
+    -------
+    trends, skipped
+        In the order of their rank; bag and reason.
+    """
+    # Parquet takes long to import
+    from shipdrag_ros.fleet.store import read_bags, read_coastdowns
+
+    ships, events = _ships(listener, store)
+    rows = read_coastdowns(store).to_pylist()
+    bags = read_bags(store).to_pylist()
+    skipped = [(row['bag'], row['error']) for row in bags if row['error'] is not None]
+    return fleet_trends(rows, ships, events), skipped
+
+
+def _ships(
+    listener: Listener, store: Path
+) -> tuple[dict[str, Ship], dict[str, Sequence[HullEvent]]]:
+    """Return ship files and events that the store keeps; say which cannot be used."""
+    from shipdrag_ros.fleet.events import read_events
+    from shipdrag_ros.fleet.find import EVENTS_FILE, SHIP_FILE
+    from shipdrag_ros.fleet.store import ship_texts
+
+    ships: dict[str, Ship] = {}
+    events: dict[str, Sequence[HullEvent]] = {}
+    for name, files in ship_texts(store).items():
+        if SHIP_FILE in files:
+            try:
+                ships[name] = Ship.from_yaml(files[SHIP_FILE], subject=f'ship file of {name!r}')
+            except ShipFileError as error:
+                listener.log(f'{error}\nits prices are not used')
+        events[name], problems = read_events(files.get(EVENTS_FILE, ''))
+        for problem in problems:
+            listener.log(f'{name}: {problem}')
+    return ships, events
 
 
 def _rows(results: Sequence[Resistance]) -> Iterator[dict[str, Any]]:

@@ -7,7 +7,7 @@ import asyncio
 import json
 import threading
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +15,6 @@ from typing import Any
 from urllib.parse import parse_qs
 
 from starlette.applications import Starlette
-from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import (
     FileResponse,
@@ -24,10 +23,11 @@ from starlette.responses import (
     PlainTextResponse,
     RedirectResponse,
     Response,
+    StreamingResponse,
 )
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp
 
 from shipdrag_ros import __version__
 from shipdrag_ros.errors import ShipdragError
@@ -102,6 +102,8 @@ class LivePage:
         Lines about how the page was started, shown below it.
     fleet
         Shown under /fleet; None: none.
+    ready
+        Called once it answers.
 
     Attributes
     ----------
@@ -117,7 +119,9 @@ class LivePage:
         token: str | None = None,
         notes: tuple[str, ...] = (),
         fleet: FleetPages | None = None,
+        ready: Callable[[], None] = lambda: None,
     ) -> None:
+        self._ready = ready
         self.frames = Frames(lambda: source.bridge.trace.rows())
         self._source = source
         self._token = token
@@ -132,18 +136,18 @@ class LivePage:
     def _routes(self) -> Starlette:
         return Starlette(
             routes=[
-                Route('/', self._page),
                 Route('/fleet', self._fleet_page),
                 Route('/fleet/{name}', self._fleet_page),
                 Route('/login', self._login, methods=['GET', 'POST']),
-                Route('/stream', _Stream(self._stream)),
+                Route('/stream', self._stream),
                 Route('/player', self._control, methods=['POST']),
                 Route('/signalk', self._signal_k),
                 Route('/signalk/v1/deltas', self._deltas),
                 Route('/state.json', self._state),
-                Mount('/', StaticFiles(directory=PAGE)),
+                Mount('/', StaticFiles(directory=PAGE, html=True)),
             ],
             lifespan=self._lifespan,
+            max_body_size=LARGEST_BODY,
         )
 
     def tick(self) -> None:
@@ -163,6 +167,7 @@ class LivePage:
     @asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
         ticking = asyncio.create_task(self._tick_for_ever())
+        self._ready()
         try:
             yield
         finally:
@@ -178,9 +183,6 @@ class LivePage:
             await asyncio.sleep(due_s - time.monotonic())
 
     # the page
-
-    async def _page(self, request: Request) -> Response:
-        return FileResponse(PAGE / 'index.html')
 
     async def _fleet_page(self, request: Request) -> Response:
         if self._fleet is None:
@@ -199,7 +201,7 @@ class LivePage:
             return RedirectResponse('/', 303)
         if request.method == 'GET':
             return FileResponse(PAGE / 'login.html')
-        form = parse_qs((await _body(request)).decode(errors='replace'))
+        form = parse_qs((await request.body()).decode(errors='replace'))
         if not same(form.get('token', [''])[0].strip(), self._token):
             await asyncio.sleep(_WRONG_TOKEN_S)
             return FileResponse(PAGE / 'login.html', status_code=403)
@@ -216,7 +218,7 @@ class LivePage:
 
     async def _control(self, request: Request) -> Response:
         try:
-            asked = json.loads(await _body(request))
+            asked = json.loads(await request.body())
             self._source.control(str(asked['action']), float(asked.get('value', 0)))
         except ShipdragError as error:
             return PlainTextResponse(f'{error}\n', 400)
@@ -226,14 +228,17 @@ class LivePage:
 
     # streams
 
-    async def _stream(self, send: Callable[[bytes], Awaitable[None]]) -> None:
+    async def _stream(self, request: Request) -> Response:
         """Server-sent events, until the viewer goes."""
+        return StreamingResponse(self._frames_on(), media_type='text/event-stream')
+
+    async def _frames_on(self) -> AsyncIterator[bytes]:
         self.frames.viewers += 1
         seen: int | None = None
         try:
             while True:
                 seen, data = self.frames.after(seen)
-                await send(data)
+                yield data
                 await self.frames.more(seen)
         finally:
             self.frames.viewers -= 1
@@ -257,49 +262,3 @@ class LivePage:
         Return the latest figures as Signal K deltas.
         """
         return signal_k.deltas(self._source.bridge, time.monotonic())
-
-
-class _Stream:
-    """
-    Server-sent events in plain ASGI: each frame goes out as it is, and a viewer who leaves or is
-    stuck ends here.
-    """
-
-    def __init__(
-        self, feed: Callable[[Callable[[bytes], Awaitable[None]]], Awaitable[None]]
-    ) -> None:
-        self._feed = feed
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        headers = [(b'content-type', b'text/event-stream'), (b'cache-control', b'no-store')]
-        await send({'type': 'http.response.start', 'status': 200, 'headers': headers})
-
-        async def body(data: bytes) -> None:
-            await send({'type': 'http.response.body', 'body': data, 'more_body': True})
-
-        async def feed() -> None:
-            await self._feed(body)
-
-        feeding = asyncio.create_task(feed())
-        leaving = asyncio.create_task(_left(receive))
-        try:
-            with suppress(asyncio.CancelledError):  # the process ends
-                await asyncio.wait({feeding, leaving}, return_when=asyncio.FIRST_COMPLETED)
-        finally:
-            for task in (feeding, leaving):
-                task.cancel()
-            await asyncio.gather(feeding, leaving, return_exceptions=True)
-
-
-async def _left(receive: Receive) -> None:
-    while (await receive())['type'] != 'http.disconnect':
-        pass
-
-
-async def _body(request: Request) -> bytes:
-    body = b''
-    async for piece in request.stream():
-        body += piece
-        if len(body) > LARGEST_BODY:
-            raise HTTPException(413, 'too long')
-    return body

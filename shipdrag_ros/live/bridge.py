@@ -7,12 +7,14 @@ Plain figures in SI units; the page turns them into knots, kN and kW.
 
 from __future__ import annotations
 
+import json
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import acceptance, verdicts
+from shipdrag_ros.live import acceptance
 from shipdrag_ros.live.acceptance import Check, Held
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.figures import (
@@ -26,8 +28,8 @@ from shipdrag_ros.live.figures import (
 from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
 from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
 from shipdrag_ros.live.trace import Trace
-from shipdrag_ros.live.verdicts import VerdictView
-from shipdrag_ros.messages import EventKind, MalformedMessage, read_event
+from shipdrag_ros.live.verdicts import verdict_part
+from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, types
 from shipdrag_ros.messages.heard import (
     ERROR,
     OK,
@@ -91,7 +93,8 @@ class Bridge:
         self._speed: Figure | None = None
         self._resistance: Figure | None = None
         self._curve: Curve | None = None
-        self._verdict = VerdictView('', '')
+        self._verdict: PagePart = {'state': '', 'sentence': ''}  # as the health says it
+        self._found: PagePart | None = None  # the last diagnosis
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
         self._noted: EventKind | None = None
         self._unread = 0
@@ -113,7 +116,7 @@ class Bridge:
             case NodeMessage(name, payload):
                 try:
                     self._take_output(name, payload)
-                except (MalformedMessage, ValueError):
+                except (MalformedMessage, ValueError, RecursionError):
                     self._unread += 1
             case ShipFile(text):
                 try:
@@ -128,11 +131,25 @@ class Bridge:
         if self._heard_s is not None:
             self._heard_s = now_s
 
-    def show_verdict(self, view: VerdictView) -> None:
+    def show_verdict(self, state: str, sentence: str) -> None:
         """
-        Show a verdict that no node gave.
+        Show how far the diagnosis is, and why there is none; `done`: the last one is shown.
         """
-        self._verdict = view
+        self._verdict = {'state': state, 'sentence': sentence}
+
+    def take_diagnosis(self, found: Mapping[str, Any]) -> None:
+        """
+        Take the document of a diagnosis.
+
+        Raises
+        ------
+        MalformedMessage
+            If it is none of this package.
+        """
+        try:
+            self._found = verdict_part(found)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise MalformedMessage(f'no document of a diagnosis: {error!r}') from error
 
     def add_past(self, run: PastRun) -> None:
         """
@@ -206,7 +223,7 @@ class Bridge:
             self._coast_ns = None
         found = health.of('diagnosis')
         if found is not None:
-            self._verdict = verdicts.of_status(found)
+            self.show_verdict(found.values.get('state', ''), found.message)
 
     def _take_output(self, name: str, payload: bytes) -> None:
         if name == 'speed':
@@ -223,6 +240,8 @@ class Bridge:
                     self._bands.append((age_s, curve.band(self._ship)))
         elif name == 'events':
             self._take_event(payload)
+        elif name == 'diagnosis':
+            self.take_diagnosis(json.loads(types.deserialize(types.STRING, payload).data))
 
     def _take_event(self, payload: bytes) -> None:
         note = read_event(payload)
@@ -275,10 +294,14 @@ class Bridge:
             'curve': curve_part(self._curve),
             'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now, now_s),
-            'verdict': self._verdict_part(),
+            'verdict': self._found if self._done else self._verdict,
             'past': [past_part(run, self._ship) for run in self.past[-PAST_RUNS:]],
             'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
         }
+
+    @property
+    def _done(self) -> bool:
+        return self._found is not None and self._verdict['state'] == 'done'
 
     def _situation(self, now_s: float) -> Situation:
         state = None if self._health is None else self._health.of('state')
@@ -416,13 +439,3 @@ class Bridge:
         if status is None or status.level != STALE:
             return check
         return replace(check, held=Held.SILENT, text=status.message)
-
-    def _verdict_part(self) -> _AnyPart:
-        view = self._verdict
-        return {
-            'state': view.state,
-            'sentence': view.sentence,
-            'sizes': [list(each) for each in view.sizes],
-            'probabilities': [list(each) for each in view.probabilities],
-            'decide': list(view.decide),
-        }

@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import asyncio
 import json
-import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
+
+from shipdrag_ros.display import json_text
 
 KEPT = 50  # frames: five seconds
 HISTORY = 'rows'  # part of a frame that adds up; all others replace what was
@@ -63,7 +64,7 @@ class Frames:
         anew
             Everybody must forget what was: the picture jumps.
         """
-        texts = {name: encode(part) for name, part in parts.items()}
+        texts = {name: json_text(part, indent=None) for name, part in parts.items()}
         changed = {name: text for name, text in texts.items() if self._parts.get(name) != text}
         if not changed and not rows and not anew:
             return
@@ -113,25 +114,5 @@ class Frames:
     def _frame(self, kind: str, parts: Mapping[str, str], rows: list[Any]) -> bytes:
         body = ','.join(f'{json.dumps(name)}:{text}' for name, text in parts.items())
         if rows or kind == 'whole':
-            body += f'{"," if body else ""}"{HISTORY}":{encode(rows)}'
+            body += f'{"," if body else ""}"{HISTORY}":{json_text(rows, indent=None)}'
         return f'event: {kind}\nid: {self.number}\ndata: {{{body}}}\n\n'.encode()
-
-
-def encode(value: Any) -> str:
-    """
-    Return JSON; what is not finite is null.
-    """
-    try:
-        return json.dumps(value, separators=(',', ':'), allow_nan=False)
-    except ValueError:
-        return json.dumps(_finite(value), separators=(',', ':'), allow_nan=False)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _finite(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -11,6 +11,7 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any
 
 import uvicorn
@@ -99,38 +100,12 @@ def listen(address: str, port: int) -> socket.socket:
     return found
 
 
-class _Server(uvicorn.Server):
-    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
-        super().__init__(config)
-        self._ready = ready
-
-    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Begin to answer; signals are captured by now."""
-        await super().startup(sockets)
-        self._ready()
-
-    @contextmanager
-    def capture_signals(self) -> Iterator[None]:
-        """End on SIGINT and SIGTERM, and return to whoever called."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
-        kinds = (signal.SIGINT, signal.SIGTERM)
-        before = {kind: signal.signal(kind, self.handle_exit) for kind in kinds}
-        try:
-            yield
-        finally:
-            for kind, handler in before.items():
-                signal.signal(kind, handler)
-
-
 def serve(
     page: LivePage,
     sockets: list[socket.socket],
     *,
     deltas: socket.socket | None = None,
     until: threading.Event | None = None,
-    ready: Callable[[], None] = lambda: None,
 ) -> None:
     """
     Serve until a signal.
@@ -143,8 +118,6 @@ def serve(
         The same for Signal K; None for none.
     until
         Ends it too, for a caller in another thread.
-    ready
-        Called once it answers, and a signal ends it in order.
     """
     _allow_files()
     config = uvicorn.Config(
@@ -157,7 +130,7 @@ def serve(
         timeout_graceful_shutdown=_GOODBYE_S,
         timeout_keep_alive=5,
     )
-    server = _Server(config, ready)
+    server = uvicorn.Server(config)
 
     async def run() -> None:
         sending = None
@@ -169,7 +142,26 @@ def serve(
         if sending is not None:
             sending.cancel()
 
-    asyncio.run(run())
+    with _signals_to(server):
+        asyncio.run(run())
+
+
+@contextmanager
+def _signals_to(server: uvicorn.Server) -> Iterator[None]:
+    """Let a signal end the server and return; uvicorn raises it again for whoever was before."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: FrameType | None) -> None:
+        server.should_exit = True
+
+    before = {kind: signal.signal(kind, end) for kind in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for kind, handler in before.items():
+            signal.signal(kind, handler)
 
 
 async def _end_when(event: threading.Event, server: uvicorn.Server) -> None:

@@ -15,9 +15,8 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.timeline import Timeline
-from shipdrag_ros.live.verdicts import VerdictView, of_diagnosis
 from shipdrag_ros.messages.heard import Heard, Samples
-from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisState
+from shipdrag_ros.node.diagnosing import Diagnosing
 from shipdrag_ros.replay.playback import settings_of
 from shipdrag_ros.samples import SECOND_NS, concatenate
 from shipdrag_ros.ship import Ship
@@ -265,7 +264,6 @@ class BagSource:
         of, found = status.coastdown, status.found
         if of is not None and of.end_ns > self._at_ns:  # read ahead, and not played yet
             return
-        if status.state is DiagnosisState.DONE and found is not None:
-            self.bridge.show_verdict(of_diagnosis(found, status.caveat))
-        else:
-            self.bridge.show_verdict(VerdictView(status.state.value, status.reason))
+        if found is not None:
+            self.bridge.take_diagnosis(found)
+        self.bridge.show_verdict(status.state.value, status.reason)

@@ -17,27 +17,18 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.bags.run import Mark, Run
-from shipdrag_ros.coastdown import InputHealth, Monitor
+from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown, Event, OnCoastdown
 from shipdrag_ros.messages import outputs
-from shipdrag_ros.messages.heard import (
-    OK,
-    STALE,
-    WARN,
-    Health,
-    Heard,
-    NodeMessage,
-    Samples,
-    Status,
-)
+from shipdrag_ros.messages.heard import Health, Heard, NodeMessage, Samples
+from shipdrag_ros.node.health import InputStates, Standing, state_status
+from shipdrag_ros.node.judging import Counts, InputFacts
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay.playback import feed
-from shipdrag_ros.samples import Block
+from shipdrag_ros.samples import SECOND_NS, Block, Channel
 from shipdrag_ros.ship import Ship
 
-SECOND_NS = 1_000_000_000
 _HEALTH_NS = 5 * SECOND_NS
-_SILENT_S = 10.0
 
 
 class Moment(NamedTuple):
@@ -81,6 +72,7 @@ class Timeline:
         self._ended = ended
         self._moments: list[Moment] = []
         self._times: list[int] = []
+        self._last_ns: dict[str, int] = {}  # arrival, by input
         self._stop = threading.Event()
 
     @property
@@ -108,6 +100,7 @@ class Timeline:
         Read the bag; for a thread of its own.
         """
         monitor = Monitor(self._ship, self._parameters)
+        inputs = InputStates()
         health_ns = 0
         for piece in self._pieces():
             if self._stop.is_set():
@@ -116,15 +109,17 @@ class Timeline:
             if isinstance(piece, Block):
                 at_ns = int(piece.receive_ns[-1])
                 heard.append(Samples(piece))
+                for code in np.unique(piece.channel).tolist():
+                    self._last_ns[Channel(code).input] = at_ns
             else:
                 at_ns = piece.receive_ns
             heard += self._heard(monitor, feed(monitor, piece))
             if at_ns - health_ns >= _HEALTH_NS or len(heard) > 1:
                 health_ns = at_ns
-                heard.append(_health(monitor, at_ns))
+                heard.append(self._health(monitor, inputs, at_ns))
             self._add(at_ns, heard)
         last = self._heard(monitor, monitor.finish())
-        self._add(self.end_ns, [*last, _health(monitor, self.end_ns)])
+        self._add(self.end_ns, [*last, self._health(monitor, inputs, self.end_ns)])
         self.done = True
 
     def _pieces(self) -> Iterator[Block | Mark]:
@@ -152,30 +147,30 @@ class Timeline:
                 self._ended(event, monitor.ended_window(event))
         return heard
 
-
-def _health(monitor: Monitor, now_ns: int) -> Health:
-    """Say what a node would say of itself."""
-    values = {'lifecycle': 'active', 'monitor': monitor.state.value}
-    values |= monitor.progress.values
-    state = Status('bag', 'state', OK, monitor.state.value, values)
-    inputs = [
-        _input(name, health, now_ns)
-        for name, health in monitor.health().items()
-        if health.messages
-    ]
-    return Health((state, *inputs))
-
-
-def _input(name: str, health: InputHealth, now_ns: int) -> Status:
-    level, text = OK, 'receiving'
-    values = {f'rejected {reason}': str(count) for reason, count in health.rejected.items()}
-    if health.rate_hz is not None:
-        values['rate [Hz]'] = f'{health.rate_hz:.6g}'
-    if health.last_receive_ns is None:
-        level, text = WARN, 'nothing of it could be used'
-    else:
-        age_s = (now_ns - health.last_receive_ns) * 1e-9
-        values['age [s]'] = f'{age_s:.6g}'
-        if age_s > _SILENT_S:
-            level, text = STALE, f'no data for {age_s:.0f} s'
-    return Status('bag', f'input {name}', level, text, values)
+    def _health(self, monitor: Monitor, inputs: InputStates, now_ns: int) -> Health:
+        """Say what a node would say of itself."""
+        doubts, last_ns = monitor.doubts(), self._last_ns
+        facts = [
+            InputFacts(
+                name,
+                type=name,
+                senders=('the record',),
+                age_s=(now_ns - last_ns[name]) * 1e-9,
+                doubt=doubts.get(name, ''),
+                total=Counts(health.messages, health.used, health.rejected),
+            )
+            for name, health in monitor.health().items()
+            if name in last_ns
+        ]
+        states = inputs.tick(facts, simulated=True, now_s=now_ns * 1e-9)
+        standing = Standing(
+            'active',
+            monitor.state,
+            now_ns,
+            sim_time=False,
+            hint='the record is silent here',
+            steady_lead_s=monitor.steady_lead_s,
+            steady_needed_s=self._parameters.slope_window_s,
+            progress=monitor.progress,
+        )
+        return Health((state_status(standing, states), *(each.status for each in states)))

@@ -66,6 +66,15 @@ class Status:
     message: str
     values: Mapping[str, str]
 
+    @classmethod
+    def of(
+        cls, part: str, level: int, message: str, values: Mapping[str, object], *, node: str = ''
+    ) -> Status:
+        """
+        Make a status of values of any kind.
+        """
+        return cls(node, part, int(level), message, {k: _text(v) for k, v in values.items()})
+
     @property
     def input(self) -> str:
         """Name of the input that it is of; '' of none."""
@@ -140,6 +149,12 @@ def health_of(statuses: Iterable[Any]) -> list[Health]:
         for found in sorted_by_node.values()
         if any({'lifecycle', 'monitor'} <= status.values.keys() for status in found)
     ]
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return 'none'
+    return f'{value:.6g}' if isinstance(value, float) else str(value)
 
 
 def _read(status: Any) -> Status:

@@ -8,7 +8,8 @@ replayed can be compared byte by byte.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -24,19 +25,36 @@ from shipdrag_ros.coastdown.events import (
     Update,
 )
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.forecast.path import PathAhead
+from shipdrag_ros.forecast.result import Forecast
 from shipdrag_ros.messages import types
 from shipdrag_ros.messages.encoding import covariance6, vector3
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
+    DIAGNOSIS,
     EVENTS,
+    FORECAST,
+    FORECAST_PATH,
     RESISTANCE,
     RESISTANCE_CURVE,
     SPEED,
     OutputTopic,
 )
+from shipdrag_ros.samples import Float64
 
 FRAME = 'base_link'
+PLANE = 'position'
+"""Frame of `~/forecast_path`: metres as `position` sends them, or east and north of its first."""
 CURVE_FIELDS = ('speed', 'resistance', 'sigma', 'froude')
+FORECAST_FIELDS = (
+    'time',
+    'speed',
+    'speed_low',
+    'speed_high',
+    'distance',
+    'distance_low',
+    'distance_high',
+)
 _FLOAT64_BYTES = 8
 
 
@@ -94,6 +112,21 @@ class EventNote:
     values: Mapping[str, str]
 
 
+def diagnosis_message(text: str, stamp_ns: int, *, node: str = DEFAULT_NODE) -> OutputMessage:
+    """
+    Encode the document of a diagnosis.
+
+    Parameters
+    ----------
+    text
+        JSON.
+    stamp_ns
+        End of the coastdown; the message itself holds no time [ns].
+    """
+    payload = types.serialize(DIAGNOSIS.type, types.make(DIAGNOSIS.type, data=text))
+    return OutputMessage(DIAGNOSIS.under(node), DIAGNOSIS.type, payload, stamp_ns)
+
+
 def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
     """
     Encode an event of the monitor, in the order to publish.
@@ -106,11 +139,16 @@ def outputs(event: Event, *, node: str = DEFAULT_NODE) -> list[OutputMessage]:
         Full name of the node, the `~` of its topics.
     """
     match event:
-        case Update(stamp_ns, estimate):
-            return _figures(stamp_ns, estimate, node)
+        case Update(stamp_ns, estimate, forecast, path):
+            return [
+                *_figures(stamp_ns, estimate, node),
+                _forecast(stamp_ns, forecast, node),
+                _path(stamp_ns, path, node),
+            ]
         case EndedCoastdown():
             curve = [] if event.estimate is None else [_curve(event.end_ns, event.estimate, node)]
-            return [*curve, event_message(_coastdown_note(event), node=node)]
+            told = event_message(_coastdown_note(event), node=node)
+            return [*curve, *_withdrawn(event.end_ns, node), told]
         case Onset(start_ns, detected_ns):
             note = EventNote(
                 EventKind.ONSET,
@@ -239,17 +277,52 @@ def _curve(stamp_ns: int, estimate: Estimate, node: str) -> OutputMessage:
     curve = estimate.valid_curve
     points = np.column_stack(
         [curve.speed_m_s, curve.resistance_m_s2, curve.sigma_m_s2, curve.froude]
-    ).astype('<f8')
+    )
+    return _cloud(RESISTANCE_CURVE, CURVE_FIELDS, points, stamp_ns, node)
+
+
+def _forecast(stamp_ns: int, forecast: Forecast | None, node: str) -> OutputMessage:
+    """Return the rest of the glide, one point a time; none where it is withdrawn."""
+    points = np.empty((0, len(FORECAST_FIELDS))) if forecast is None else forecast.in_time()
+    return _cloud(FORECAST, FORECAST_FIELDS, points, stamp_ns, node)
+
+
+def _withdrawn(stamp_ns: int, node: str) -> list[OutputMessage]:
+    return [_forecast(stamp_ns, None, node), _path(stamp_ns, None, node)]
+
+
+def _path(stamp_ns: int, path: PathAhead | None, node: str) -> OutputMessage:
+    """Return the positions to come, each with the time at which she is there."""
+    poses = []
+    if path is not None:
+        half = 0.5 * path.course_rad
+        ahead = types.make(
+            'geometry_msgs/msg/Quaternion', x=0.0, y=0.0, z=math.sin(half), w=math.cos(half)
+        )
+        for time_ns, (x, y) in zip(path.time_ns, path.position_m, strict=True):
+            place = types.make('geometry_msgs/msg/Point', x=float(x), y=float(y), z=0.0)
+            pose = types.make('geometry_msgs/msg/Pose', position=place, orientation=ahead)
+            head = types.header(int(time_ns), PLANE)
+            poses.append(types.make(types.POSE, header=head, pose=pose))
+    message = types.make(FORECAST_PATH.type, header=types.header(stamp_ns, PLANE), poses=poses)
+    return _message(FORECAST_PATH, message, stamp_ns, node)
+
+
+def _cloud(
+    topic: OutputTopic, names: Sequence[str], values: Float64, stamp_ns: int, node: str
+) -> OutputMessage:
+    """Return points (n, k) with their k fields."""
+    points = values.astype('<f8')
     field = types.class_of('sensor_msgs/msg/PointField')
-    point_step = _FLOAT64_BYTES * len(CURVE_FIELDS)
+    point_step = _FLOAT64_BYTES * len(names)
     cloud = types.make(
-        RESISTANCE_CURVE.type,
+        topic.type,
         header=types.header(stamp_ns, FRAME),
         height=1,
         width=len(points),
         fields=[
             field(name=name, offset=_FLOAT64_BYTES * index, datatype=field.FLOAT64, count=1)
-            for index, name in enumerate(CURVE_FIELDS)
+            for index, name in enumerate(names)
         ],
         is_bigendian=False,
         point_step=point_step,
@@ -257,7 +330,7 @@ def _curve(stamp_ns: int, estimate: Estimate, node: str) -> OutputMessage:
         data=np.frombuffer(points.tobytes(), np.uint8),
         is_dense=True,
     )
-    return _message(RESISTANCE_CURVE, cloud, stamp_ns, node)
+    return _message(topic, cloud, stamp_ns, node)
 
 
 def _coastdown_note(event: EndedCoastdown) -> EventNote:

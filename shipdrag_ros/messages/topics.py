@@ -63,8 +63,19 @@ DEFAULT_NODE = '/coastdown_node'
 SPEED = OutputTopic('speed', types.TWIST_WITH_COVARIANCE)
 RESISTANCE = OutputTopic('resistance', types.ACCEL_WITH_COVARIANCE)
 RESISTANCE_CURVE = OutputTopic('resistance_curve', types.POINT_CLOUD, latched=True)
+FORECAST = OutputTopic('forecast', types.POINT_CLOUD, latched=True)
+FORECAST_PATH = OutputTopic('forecast_path', types.PATH, latched=True)
 EVENTS = OutputTopic('events', types.DIAGNOSTIC_ARRAY)
-OUTPUT_TOPICS: tuple[OutputTopic, ...] = (SPEED, RESISTANCE, RESISTANCE_CURVE, EVENTS)
+DIAGNOSIS = OutputTopic('diagnosis', types.STRING, latched=True)
+OUTPUT_TOPICS: tuple[OutputTopic, ...] = (
+    SPEED,
+    RESISTANCE,
+    RESISTANCE_CURVE,
+    FORECAST,
+    FORECAST_PATH,
+    EVENTS,
+    DIAGNOSIS,
+)
 
 
 @dataclass(frozen=True)

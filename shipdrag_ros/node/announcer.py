@@ -12,8 +12,6 @@ import time
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from diagnostic_msgs.msg import DiagnosticStatus
-
 from shipdrag_ros.coastdown.events import (
     BY_SPEED,
     EndedBy,
@@ -26,9 +24,9 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.display import duration, plus_minus, utc
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.messages.heard import ERROR, OK, WARN, Status
 from shipdrag_ros.node.compiling import Compiling
 from shipdrag_ros.node.health import InputState
-from shipdrag_ros.node.judging import Level
 from shipdrag_ros.samples import MOTION_INPUTS
 
 SILENCE_SAID_AFTER_S = 10.0
@@ -122,8 +120,8 @@ class Announcer:
 
     def __init__(self, logger: Any) -> None:
         self._logger = logger
-        self._levels: dict[str, bytes] = {}
-        self._inputs: dict[str, tuple[Level, float]] = {}
+        self._levels: dict[str, int] = {}
+        self._inputs: dict[str, tuple[int, float]] = {}
         self._silent_since_s: float | None = None
         self._silence_said = False
         self._compiling_said = False
@@ -162,18 +160,18 @@ class Announcer:
         if line is not None:
             self._say(line.text, warning=line.warning)
 
-    def status(self, status: DiagnosticStatus) -> None:
+    def status(self, status: Status) -> None:
         """
         Say that a part of the node is worse or better than before.
         """
-        before = self._levels.get(status.name, DiagnosticStatus.OK)
-        self._levels[status.name] = status.level
+        before = self._levels.get(status.part, OK)
+        self._levels[status.part] = status.level
         if status.level == before:
             return
-        if status.level == DiagnosticStatus.ERROR:
+        if status.level == ERROR:
             self._logger.error(status.message)
         else:
-            self._say(status.message, warning=status.level == DiagnosticStatus.WARN)
+            self._say(status.message, warning=status.level == WARN)
 
     def inputs(self, states: Sequence[InputState]) -> None:
         """
@@ -181,12 +179,12 @@ class Announcer:
         """
         now_s = time.monotonic()
         for state in states:
-            topic, finding = state.topic, state.finding
-            before, said_s = self._inputs.get(topic.name, (Level.OK, -AGAIN_S))
-            if topic.age_s is None or finding.level is before or now_s < said_s + AGAIN_S:
+            name, finding = state.name, state.finding
+            before, said_s = self._inputs.get(name, (OK, -AGAIN_S))
+            if state.facts.age_s is None or finding.level == before or now_s < said_s + AGAIN_S:
                 continue
-            self._inputs[topic.name] = (finding.level, now_s)
-            self._say(f'{topic.name}: {finding.text}', warning=finding.level is not Level.OK)
+            self._inputs[name] = (finding.level, now_s)
+            self._say(f'{name}: {finding.text}', warning=finding.level != OK)
 
     def silence(self, states: Sequence[InputState], candidates: str) -> None:
         """
@@ -198,7 +196,7 @@ class Announcer:
             Topics that may be meant.
         """
         now_s = time.monotonic()
-        if any(state.fresh for state in states if state.topic.name in MOTION_INPUTS):
+        if any(state.fresh for state in states if state.name in MOTION_INPUTS):
             if self._silence_said:
                 self._logger.info('an input of the motion is heard')
             self._silent_since_s, self._silence_said = None, False

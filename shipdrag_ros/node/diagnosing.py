@@ -9,6 +9,7 @@ whatever goes wrong in it stops no estimate.
 
 from __future__ import annotations
 
+import json
 import os
 import pickle
 import subprocess
@@ -17,17 +18,15 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from enum import Enum
 from threading import Lock
-from typing import TYPE_CHECKING
+from typing import Any
 
 from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.baseline import NO_CLEAN_HULL
-
-if TYPE_CHECKING:  # the process that diagnoses imports it, the node need not
-    from shipdrag_ros.diagnosis import DiagnosisResult
 
 _GOES_ON = (
     'The coastdown alone is diagnosed here; `shipdrag diagnose BAG` of the recording holds all of '
@@ -61,13 +60,14 @@ class DiagnosisStatus:
     coastdown
         The one that it is of, None before the first.
     found
-        None unless done.
+        The document of `shipdrag diagnose --json`, with the times of the coastdown and what was
+        not looked at; None unless done.
     """
 
     state: DiagnosisState
     reason: str = ''
     coastdown: EndedCoastdown | None = None
-    found: DiagnosisResult | None = None
+    found: dict[str, Any] | None = None
 
     @property
     def caveat(self) -> str:
@@ -142,21 +142,24 @@ class Diagnosing:
 
     def _diagnose(self, task: _Task, running: DiagnosisStatus) -> None:
         """Wait for a process, in a thread."""
+        assert running.coastdown is not None
         try:
-            found = self._answer(task)
-        except (OSError, subprocess.SubprocessError, pickle.UnpicklingError) as error:
-            self._status = replace(running, state=DiagnosisState.FAILED, reason=str(error))
+            answer = self._answer(task)
+        except (OSError, subprocess.SubprocessError, ValueError) as error:
+            answer = {'state': 'failed', 'reason': str(error)}
+        if 'reason' in answer:
+            state = DiagnosisState(answer['state'])
+            self._status = replace(running, state=state, reason=answer['reason'])
             return
-        if isinstance(found, str):
-            self._status = replace(running, state=DiagnosisState.IMPOSSIBLE, reason=found)
-        else:
-            self._status = replace(running, state=DiagnosisState.DONE, found=found)
+        about = {'start_ns': running.coastdown.start_ns, 'end_ns': running.coastdown.end_ns}
+        found = {**answer, 'coastdown': about, 'caveat': running.caveat}
+        self._status = replace(running, state=DiagnosisState.DONE, found=found)
 
-    def _answer(self, task: _Task) -> DiagnosisResult | str:
-        """Return what a process says; str: why it can say nothing."""
+    def _answer(self, task: _Task) -> dict[str, Any]:
+        """Return what a process says."""
         with self._lock:
             if self._closed:
-                return 'the node has ended'
+                raise subprocess.SubprocessError('the node has ended')
             self._process = subprocess.Popen(
                 [sys.executable, '-c', f'from {__name__} import main; main()'],
                 stdin=subprocess.PIPE,
@@ -173,26 +176,23 @@ class Diagnosing:
         if self._process.returncode != 0:
             last = complaint.decode(errors='replace').strip().rpartition('\n')[2]
             raise subprocess.SubprocessError(f'exit {self._process.returncode}: {last}')
-        found: DiagnosisResult | str = pickle.loads(answer)
+        found: dict[str, Any] = json.loads(answer)
         return found
 
 
 def main() -> None:
     """
-    Diagnose what comes from stdin, and write the result, or why there is none, to stdout.
+    Diagnose what comes from stdin, and write the document, or why there is none, to stdout.
     """
     os.nice(_NICE)
     from shipdrag_ros.diagnosis import CoastRun, diagnose
+    from shipdrag_ros.diagnosis.document import document
 
     task = pickle.load(sys.stdin.buffer)
     assert isinstance(task, _Task)
     run = CoastRun('the coastdown', task.window)
     try:
-        answer: DiagnosisResult | str = diagnose([run], task.ship, task.parameters)
+        answer = document(diagnose([run], task.ship, task.parameters), task.ship)
     except ShipdragError as error:
-        answer = str(error)
-    sys.stdout.buffer.write(pickle.dumps(answer))
-
-
-if __name__ == '__main__':
-    main()
+        answer = {'state': DiagnosisState.IMPOSSIBLE.value, 'reason': str(error)}
+    sys.stdout.write(json_text(answer))

@@ -32,10 +32,12 @@ from rclpy.qos import (
 )
 from rclpy.subscription import Subscription
 
+from shipdrag_ros.coastdown import InputHealth
 from shipdrag_ros.display import printable
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.messages import Decoded, Source
 from shipdrag_ros.messages.types import is_stamped
+from shipdrag_ros.node.judging import Counts, InputFacts
 from shipdrag_ros.node.losses import Sequences
 
 # As deep as Fast DDS goes unless set otherwise, some seconds of a flood: one estimate may take
@@ -258,6 +260,51 @@ class InputTopic:
     def clock_offset_s(self) -> float | None:
         """Median of arrival minus stamp of the last readings, used or not [s]."""
         return median(self._offsets_s) if self._offsets_s else None
+
+    def facts(self, health: InputHealth | None, doubt: str) -> InputFacts:
+        """
+        Return what the input is judged by.
+
+        Parameters
+        ----------
+        health
+            By the monitor; None while the node is not active.
+        doubt
+            What is odd about it besides.
+        """
+        about: dict[str, object] = {
+            'topic': self.topic if self.fed is None else self.fed.input,
+            'type': (self.type if self.fed is None else self.fed.type) or 'not yet known',
+            **({'fed by': self.fed_by} if self.fed_by else {}),
+            'publishers': sum(self.publishers.values()),
+            'published by': ', '.join(self.senders) or 'none',
+            'reliability': 'reliable' if self.reliable else 'best effort',
+            'messages': self.received,
+            'messages lost': self.lost,
+            'clock offset [s]': self.clock_offset_s,
+            'not used, node inactive or without clock': self.unused,
+            **{f'unreadable {reason}': times for reason, times in self.unreadable.items()},
+        }
+        used = 0 if health is None else health.used
+        rejected = dict(self.unreadable) | ({} if health is None else health.rejected)
+        return InputFacts(
+            self.name,
+            type=self.type or self.fed_by or None,
+            stamped=self.type is None or is_stamped(self.type),
+            fed=bool(self.fed_by),
+            may_be_fed=self.may_be_fed,
+            other_types=self.other_types,
+            accepted=self.accepted,
+            absent=self.absent,
+            senders=self.senders,
+            misfit=self.incompatible_qos,
+            active=health is not None,
+            age_s=self.age_s,
+            total=Counts(self.received, used, rejected, self.lost, self.unstamped),
+            offset_s=self.clock_offset_s,
+            doubt=doubt,
+            about=about,
+        )
 
     def least_lag_s(self) -> float | None:
         """

@@ -12,8 +12,8 @@ import math
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from enum import IntEnum
 
+from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN
 from shipdrag_ros.samples import MOTION_INPUTS
 
 RECENT_S = 30.0
@@ -26,20 +26,11 @@ AHEAD_S = 1.0
 SKEW_S = 2.0  # between two inputs of the motion: 1 % of a coastdown's time scale
 
 
-class Level(IntEnum):
-    """As in diagnostic_msgs/DiagnosticStatus."""
-
-    OK = 0
-    WARN = 1
-    ERROR = 2
-    STALE = 3
-
-
 @dataclass(frozen=True)
 class Finding:
     """One thing to say of an input."""
 
-    level: Level
+    level: int
     text: str
 
 
@@ -67,6 +58,11 @@ class Counts:
     rejected: Mapping[str, int] = field(default_factory=dict)
     lost: int = 0
     unstamped: int = 0
+
+    @property
+    def readings(self) -> int:
+        """Used and rejected."""
+        return self.used + sum(self.rejected.values())
 
     def since(self, before: Counts) -> Counts:
         """
@@ -143,6 +139,8 @@ class InputFacts:
         Whether readings are judged at all.
     age_s
         Since the last message; None before the first.
+    total
+        Since it is an input.
     recent, seconds
         Over the last while.
     offset_s
@@ -152,10 +150,12 @@ class InputFacts:
         one is behind it [s]; None where it is that one, or nothing is known.
     doubt
         What else is odd about it, '' if nothing is.
+    about
+        What else is to be shown of it, by key.
     """
 
     name: str
-    needed: bool
+    needed: bool = False
     type: str | None = None
     stamped: bool = True
     fed: bool = False
@@ -167,11 +167,18 @@ class InputFacts:
     misfit: str | None = None
     active: bool = True
     age_s: float | None = None
+    total: Counts = Counts()
     recent: Counts = Counts()
     seconds: float = 0.0
     offset_s: float | None = None
     behind: tuple[str, float] | None = None
     doubt: str = ''
+    about: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def fresh(self) -> bool:
+        """Whether it was received lately."""
+        return self.age_s is not None and self.age_s < SILENT_S
 
 
 def judge(facts: InputFacts) -> Finding:
@@ -181,7 +188,7 @@ def judge(facts: InputFacts) -> Finding:
     found = sorted(_findings(facts), key=lambda finding: -finding.level)
     if not found:
         stamped = '' if facts.stamped else '; its type holds no time: it counts from its arrival'
-        return Finding(Level.OK, f'receiving{stamped}')
+        return Finding(OK, f'receiving{stamped}')
     return Finding(found[0].level, '; '.join(finding.text for finding in found))
 
 
@@ -193,10 +200,10 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
         for name in set(facts.other_types).intersection(facts.absent):
             package = name.partition('/')[0]
             text = f'{name} is published, and its package is not here: install {package}'
-        yield Finding(Level.ERROR, text)
+        yield Finding(ERROR, text)
         return
     if facts.type is None or (facts.age_s is None and not facts.senders and not others):
-        level = Level.WARN if facts.needed else Level.OK
+        level = WARN if facts.needed else OK
         nor = ', and nothing by NMEA so far' if facts.may_be_fed else ''
         yield Finding(level, f'no publisher{nor}')
         return
@@ -205,23 +212,23 @@ def _findings(facts: InputFacts) -> Iterator[Finding]:
             f'wrong type: also published as {others}, heard is only {facts.type}: stop one, or '
             f'name the one to hear in the parameter {facts.name}.type'
         )
-        yield Finding(Level.WARN, text)
+        yield Finding(WARN, text)
     if facts.misfit is not None:
         text = f'a publisher is not heard: its {facts.misfit} QoS does not fit'
-        yield Finding(Level.WARN, text)
+        yield Finding(WARN, text)
     if len(facts.senders) > 1:
-        yield Finding(Level.WARN, _one_stream(facts.senders))
+        yield Finding(WARN, _one_stream(facts.senders))
     if facts.age_s is None:
-        yield Finding(Level.WARN, 'no data')
+        yield Finding(WARN, 'no data')
         return
     if facts.age_s > SILENT_S:
         gone = '' if facts.senders or facts.fed else ', no publisher any more'
-        yield Finding(Level.STALE, f'no data for {facts.age_s:.0f} s{gone}')
+        yield Finding(STALE, f'no data for {facts.age_s:.0f} s{gone}')
         return
     yield from _of_readings(facts)
     yield from _of_time(facts)
     if facts.doubt:
-        yield Finding(Level.WARN, facts.doubt)
+        yield Finding(WARN, facts.doubt)
 
 
 def _one_stream(senders: tuple[str, ...]) -> str:
@@ -237,8 +244,8 @@ def _of_readings(facts: InputFacts) -> Iterator[Finding]:
     recent = facts.recent
     if recent.lost:
         text = f'{recent.lost} messages lost in {facts.seconds:.0f} s: sent and not heard'
-        yield Finding(Level.WARN, text)
-    readings = recent.used + sum(recent.rejected.values())
+        yield Finding(WARN, text)
+    readings = recent.readings
     if not facts.active or not readings:
         return
     share = recent.used / readings
@@ -249,7 +256,7 @@ def _of_readings(facts: InputFacts) -> Iterator[Finding]:
             and recent.used < RATE_MIN_HZ * facts.seconds
         ):
             rate = recent.used / facts.seconds
-            yield Finding(Level.WARN, f'{rate:.2g} Hz is too slow, at least 0.2 Hz is needed')
+            yield Finding(WARN, f'{rate:.2g} Hz is too slow, at least 0.2 Hz is needed')
         return
     motion = facts.name in MOTION_INPUTS
     grave = share < MOTION_USED_MIN if motion else not recent.used
@@ -263,7 +270,7 @@ def _of_readings(facts: InputFacts) -> Iterator[Finding]:
         advice = _ADVICE.get(reasons[0][0], '')
         if reasons[0][0] in ('future', 'late') and facts.offset_s is not None:
             advice = f'its clock is {_offset(facts.offset_s)}; set it'
-    yield Finding(Level.ERROR if grave else Level.WARN, f'{text}; {advice}' if advice else text)
+    yield Finding(ERROR if grave else WARN, f'{text}; {advice}' if advice else text)
 
 
 _ADVICE = {
@@ -290,11 +297,11 @@ def _of_time(facts: InputFacts) -> Iterator[Finding]:
         return  # said with the readings
     if offset_s is not None and (offset_s > BEHIND_S or offset_s < -AHEAD_S):
         text = f'its clock is {_offset(offset_s)}: set either'
-        yield Finding(Level.WARN, text)
+        yield Finding(WARN, text)
     elif facts.behind is not None and facts.behind[1] > SKEW_S:
         other, seconds = facts.behind
         text = f'its stamps are {seconds:.1f} s behind those of {other}: set its clock'
-        yield Finding(Level.WARN, text)
+        yield Finding(WARN, text)
 
 
 def _offset(offset_s: float) -> str:

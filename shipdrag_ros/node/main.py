@@ -14,25 +14,26 @@ import os
 import re
 import shutil
 import signal
+import socket
 import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 from shipdrag_ros.display import M_S_PER_KNOT
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.imports import uncollected
-from shipdrag_ros.messages.heard import OK, Health, health_of
+from shipdrag_ros.messages.heard import OK, Health
 
 _CLEAR = '\x1b[K'
 
 
-def terminal_line(stream: TextIO) -> Callable[[Any], None] | None:
+def terminal_line(stream: TextIO) -> Callable[[Health], None] | None:
     """
-    Return what shows each message of /diagnostics on a terminal; None where there is none.
+    Return what shows the health on a terminal; None where there is none.
 
     Parameters
     ----------
@@ -42,12 +43,10 @@ def terminal_line(stream: TextIO) -> Callable[[Any], None] | None:
     if not stream.isatty():
         return None
 
-    def show(message: Any) -> None:
-        for health in health_of(message.status):
-            width = shutil.get_terminal_size().columns
-            text = line(health)
-            stream.write(f'{text[: width - 1]}{_CLEAR}\r')
-            stream.flush()
+    def show(health: Health) -> None:
+        width = shutil.get_terminal_size().columns
+        stream.write(f'{line(health)[: width - 1]}{_CLEAR}\r')
+        stream.flush()
 
     return show
 
@@ -85,8 +84,27 @@ with uncollected():
     from rclpy.utilities import remove_ros_args
 
     from shipdrag_ros.node.compiling import leave_if_compiling
-    from shipdrag_ros.node.main import terminal_line
     from shipdrag_ros.node.node import CoastdownNode
+
+
+def notify(state: str) -> None:
+    """
+    Tell the service manager, where there is one that listens (sd_notify).
+
+    Parameters
+    ----------
+    state
+        `READY=1` for instance; lines, one an assignment.
+    """
+    address = os.environ.get('NOTIFY_SOCKET', '')
+    if not address:
+        return
+    if address.startswith('@'):  # of the abstract namespace
+        address = f'\0{address[1:]}'
+    # a manager that is gone ends no node
+    with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.sendto(state.encode(), address)
+
 
 USAGE = 'usage: coastdown_node --ros-args -p ship_file:=FILE [-p NAME:=VALUE]... [-r FROM:=TO]...'
 STOPPING = (signal.SIGINT, signal.SIGTERM)
@@ -161,17 +179,31 @@ def _run(line: list[str]) -> int:
             node = CoastdownNode(context=context, arguments=line)
             try:
                 executor.add_node(node)
-                node.shown = terminal_line(sys.stderr)
+                node.shown = _shown(terminal_line(sys.stderr))
                 node.start()
+                notify('READY=1')
                 while not stop.is_set():
                     executor.spin_once()
             except ExternalShutdownException:
                 pass
             finally:
+                notify('STOPPING=1')
                 node.close()
     finally:
         rclpy.try_shutdown(context=context)
     return 0
+
+
+def _shown(terminal: Callable[[Health], None] | None) -> Callable[[Health], None]:
+    """Return what takes the health each second: it shows that the executor goes round."""
+
+    def show(health: Health) -> None:
+        state = health.of('state')
+        notify('WATCHDOG=1' + ('' if state is None else f'\nSTATUS={state.message}'))
+        if terminal is not None:
+            terminal(health)
+
+    return show
 
 
 @contextmanager

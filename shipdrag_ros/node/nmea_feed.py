@@ -18,18 +18,17 @@ from contextlib import suppress
 from time import monotonic
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from shipdrag_ros.messages import Source, decode
+from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN, Status
 from shipdrag_ros.nmea.address import Address, parse_addresses
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
 from shipdrag_ros.nmea.listener import SourceCounts
 from shipdrag_ros.nmea.live import LiveNmea
 from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
-from shipdrag_ros.node.diagnostics import ERROR, OK, STALE, WARN, nmea_status
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.judging import SILENT_S
 from shipdrag_ros.node.session import Session
@@ -209,7 +208,7 @@ class NmeaFeed:
             return f'no line for {counts.age_s:.0f} s'
         return f'{counts.lines} lines heard, none of use yet for speed or position ({_MOTION})'
 
-    def statuses(self) -> list[DiagnosticStatus]:
+    def statuses(self) -> list[Status]:
         """
         Say how each source is doing; a change of the line is logged too.
         """
@@ -261,7 +260,7 @@ class NmeaFeed:
         self._published[source].publish(payload)
         return Source(self._published[source].topic_name, source.type)
 
-    def _status(self, address: str, counts: SourceCounts) -> DiagnosticStatus:
+    def _status(self, address: str, counts: SourceCounts) -> Status:
         level, text = self._health(counts)
         found = self._interpreter
         values: dict[str, object] = {
@@ -289,9 +288,9 @@ class NmeaFeed:
         )
         for group, entries in groups:
             values |= {f'{group} {name}': value for name, value in entries.items()}
-        return nmea_status(address, level, text, values)
+        return Status.of(f'nmea {address}', level, text, values)
 
-    def _health(self, counts: SourceCounts) -> tuple[bytes, str]:
+    def _health(self, counts: SourceCounts) -> tuple[int, str]:
         found = self._interpreter
         bad = found.rejected.total() + counts.too_long + counts.binary
         if counts.problem:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.context import Context
@@ -24,15 +24,26 @@ from std_msgs.msg import String
 from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.bags.retention import Keep
 from shipdrag_ros.coastdown import Monitor
+from shipdrag_ros.display import json_text
 from shipdrag_ros.errors import ShipdragError, ShipFileError
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, OutputMessage, OutputTopic, Source
-from shipdrag_ros.node import diagnostics
+from shipdrag_ros.messages.heard import ERROR, Health, Status
+from shipdrag_ros.messages.reporting import diagnosis_message
 from shipdrag_ros.node.announcer import Announcer
 from shipdrag_ros.node.compiling import Compiling
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisStatus
-from shipdrag_ros.node.health import InputState, InputStates, candidates, candidates_text
+from shipdrag_ros.node.health import (
+    InputState,
+    InputStates,
+    Standing,
+    candidates,
+    candidates_text,
+    diagnosis_status,
+    estimate_status,
+    recording_status,
+    state_status,
+)
 from shipdrag_ros.node.inputs import InputTopic, message_class
-from shipdrag_ros.node.judging import Level
 from shipdrag_ros.node.mailbox import Mailbox
 from shipdrag_ros.node.nmea_feed import NmeaFeed
 from shipdrag_ros.node.node_parameters import NodeParameters, check_sections
@@ -66,7 +77,7 @@ class CoastdownNode(LifecycleNode):
     Attributes
     ----------
     shown
-        Called with each message of /diagnostics, for a terminal; None: nobody looks.
+        Called with the health every second, for a terminal; None: nobody looks.
 
     Raises
     ------
@@ -95,7 +106,7 @@ class CoastdownNode(LifecycleNode):
         self._mailbox = Mailbox((), ahead=False)
         self._watching: Watching | None = None
         self._outputs: dict[str, Publisher] = {}
-        self.shown: Callable[[DiagnosticArray], None] | None = None
+        self.shown: Callable[[Health], None] | None = None
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         steady = Clock(clock_type=ClockType.STEADY_TIME)  # runs without /clock
         self.create_timer(DIAGNOSTICS_S, self._publish_diagnostics, clock=steady)
@@ -239,7 +250,7 @@ class CoastdownNode(LifecycleNode):
         self._session.note_lifecycle('active', self._now_ns())
         recording = self._recorder.status()
         self.get_logger().info(f'active; {recording.text}; {recording.kept}')
-        self._announcer.status(diagnostics.recording_status(recording))
+        self._announcer.status(recording_status(recording))
 
     def _deactivate(self, why: str) -> None:
         if self._session is not None:
@@ -331,54 +342,68 @@ class CoastdownNode(LifecycleNode):
         if session is not None and self._watching is not None:
             self._watching.tick(session, health, now_ns)
             session.note_removed(now_ns, self.get_logger().warning)
-        states = self._input_states.tick(
-            self._input_topics,
-            health,
-            doubts=self._doubts(),
-            simulated=self._simulated,
-        )
+        doubts = self._doubts()
+        facts = [
+            topic.facts(health.get(topic.name), doubts.get(topic.name, ''))
+            for topic in self._input_topics
+        ]
+        states = self._input_states.tick(facts, simulated=self._simulated)
         self._rebind(states, now_ns)
-        standing = self._standing(now_ns)
-        statuses = [diagnostics.state_status(standing, states)]
-        statuses += map(diagnostics.input_status, states)
+        standing = self._standing(states, now_ns)
+        statuses = [state_status(standing, states), *(state.status for state in states)]
         if self._nmea is not None:
             statuses += self._nmea.statuses()
         if self._recorder is not None:
-            statuses.append(diagnostics.recording_status(self._recorder.status()))
+            statuses.append(recording_status(self._recorder.status()))
             self._announcer.status(statuses[-1])
         if session is not None:
-            statuses.append(diagnostics.estimate_status(session.latest, session.why_none))
+            statuses.append(estimate_status(session.latest, session.why_none))
             self._announcer.inputs(states)
             self._announcer.silence(states, standing.candidates)
         if self._diagnosing is not None:
             found = self._diagnosing.status
-            statuses.append(diagnostics.diagnosis_status(found))
+            statuses.append(diagnosis_status(found))
             if found is not self._diagnosed:
                 self._diagnosed = found
+                self._publish_diagnosis(found, now_ns)
                 self.get_logger().info(f'diagnosis: {statuses[-1].message}')
-        message = DiagnosticArray()
+        message = DiagnosticArray(status=[self._labelled(each) for each in statuses])
         message.header.stamp = self.get_clock().now().to_msg()
-        message.status = diagnostics.label(
-            statuses,
-            node=self.get_fully_qualified_name(),
-            hardware_id='' if self._ship is None else self._ship.name,
-        )
         self._diagnostics.publish(message)
         if self.shown is not None:
-            self.shown(message)
-
+            self.shown(Health(tuple(statuses)))
         if self._compiling is not None:
             self._compiling.begin()
 
+    def _labelled(self, status: Status) -> DiagnosticStatus:
+        """Return a status as a message that says whose it is, as diagnostic_updater has it."""
+        return DiagnosticStatus(
+            level=bytes([status.level]),
+            name=f'{self.get_fully_qualified_name().lstrip("/")}: {status.part}',
+            message=status.message,
+            hardware_id='' if self._ship is None else self._ship.name,
+            values=[KeyValue(key=key, value=text) for key, text in status.values.items()],
+        )
+
+    def _publish_diagnosis(self, status: DiagnosisStatus, now_ns: int) -> None:
+        if status.found is None or status.coastdown is None:
+            return
+        text = json_text(status.found, indent=None)
+        node = self.get_fully_qualified_name()
+        message = diagnosis_message(text, status.coastdown.end_ns, node=node)
+        if self._session is None:
+            self._send(message)
+        else:
+            self._session.note_diagnosis(message, now_ns)
+
     def _rebind(self, states: Sequence[InputState], now_ns: int) -> None:
         """Give up a type that is no use where another is published; said and recorded."""
-        if self._compiling_s is not None:
+        if self._session is None or self._compiling_s is not None:
             return  # nothing was judged yet
-        for state in states:
+        for topic, state in zip(self._input_topics, states, strict=True):
             text = state.finding.text
-            unsound = not state.fresh or state.finding.level >= Level.ERROR
-            if self._session is not None and unsound and state.topic.rebind(text):
-                said = f'{state.topic.name}: now {state.topic.type}; before: {text}'
+            if (not state.fresh or state.finding.level >= ERROR) and topic.rebind(text):
+                said = f'{topic.name}: now {topic.type}; before: {text}'
                 self._session.note_source(said, now_ns)
 
     def _publish_first(self) -> None:
@@ -395,22 +420,21 @@ class CoastdownNode(LifecycleNode):
         own = (self.get_name(), self.get_namespace())
         return max(int(self.get_node_names_and_namespaces().count(own)) - 1, 0)
 
-    def _standing(self, now_ns: int) -> diagnostics.Standing:
-        session, states = self._session, self._input_states.seen
-        motion = [each for each in states if each.topic.name in MOTION_INPUTS]
+    def _standing(self, states: Sequence[InputState], now_ns: int) -> Standing:
+        session, settings = self._session, self._settings
         hint = ''
-        if not any(each.fresh for each in motion):
+        if not any(each.fresh for each in states if each.name in MOTION_INPUTS):
             name = self.get_fully_qualified_name()
-            taken = [each.topic.topic for each in states]
             others = [
                 (topic, types)
                 for topic, types in self.get_topic_names_and_types()
                 if not topic.startswith(f'{name}/')  # what NMEA feeds is published there
             ]
-            found = candidates(others, MOTION_INPUTS, taken=taken)
+            taken = [topic.topic for topic in self._input_topics]
             by_nmea = '' if self._nmea is None else self._nmea.silence()
-            hint = '; '.join(filter(None, [by_nmea, candidates_text(found)]))
-        return diagnostics.Standing(
+            fitting = candidates_text(candidates(others, MOTION_INPUTS, taken=taken))
+            hint = '; '.join(filter(None, [by_nmea, fitting]))
+        return Standing(
             self._state_machine.current_state[1],
             None if session is None else session.monitor.state,
             now_ns,
@@ -421,7 +445,5 @@ class CoastdownNode(LifecycleNode):
             waiting=0 if session is None else session.waiting,
             namesakes=self._namesakes(),
             steady_lead_s=0.0 if session is None else session.monitor.steady_lead_s,
-            steady_needed_s=0.0
-            if self._settings is None
-            else self._settings.parameters.slope_window_s,
+            steady_needed_s=0.0 if settings is None else settings.parameters.slope_window_s,
         )

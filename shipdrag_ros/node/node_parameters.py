@@ -24,7 +24,7 @@ from rclpy.parameter import Parameter
 
 from shipdrag_ros.errors import ParameterError
 from shipdrag_ros.fields import parse, text_of
-from shipdrag_ros.node.settings import SETTINGS, NodeSettings, Setting
+from shipdrag_ros.node.settings import KEYS, START_ONLY, NodeSettings, about
 
 ROS_OWN = ('use_sim_time', 'start_type_description_service')  # declared by rclpy itself
 SUBJECT = 'node parameters'
@@ -57,10 +57,8 @@ class NodeParameters:
         values = NodeSettings.from_mapping(given, subject=SUBJECT).to_mapping()
         for name in given:
             node.undeclare_parameter(name)
-        for setting in SETTINGS:
-            node.declare_parameter(
-                setting.name, values[setting.name], _descriptor(setting), ignore_override=True
-            )
+        for name, value in values.items():
+            node.declare_parameter(name, value, _descriptor(name), ignore_override=True)
         node.add_on_set_parameters_callback(self._on_set)
 
     def settings(self) -> NodeSettings:
@@ -70,10 +68,10 @@ class NodeParameters:
         return NodeSettings.from_mapping(self._values(), subject=SUBJECT)
 
     def _values(self) -> dict[str, Any]:
-        return {setting.name: self._node.get_parameter(setting.name).value for setting in SETTINGS}
+        return {name: self._node.get_parameter(name).value for name in KEYS}
 
     def _on_set(self, changes: list[Parameter]) -> SetParametersResult:
-        ours = {setting.name for setting in SETTINGS} | {'use_sim_time'}
+        ours = {*KEYS, 'use_sim_time'}
         changed = {change.name: change.value for change in changes if change.name in ours}
         if not changed:
             return SetParametersResult(successful=True)
@@ -90,28 +88,27 @@ class NodeParameters:
         return SetParametersResult(successful=True)
 
 
-def _descriptor(setting: Setting) -> ParameterDescriptor:
-    about = f'{setting.text} [{setting.unit}]' if setting.unit else setting.text
+def _descriptor(name: str) -> ParameterDescriptor:
+    kind, start_only = KEYS[name].kind, name in START_ONLY
     descriptor = ParameterDescriptor(
-        name=setting.name,
-        description=about,
+        name=name,
+        description=about(name),
         additional_constraints=(
-            'set at the start alone' if setting.start_only else 'read-only while configured'
+            'set at the start alone' if start_only else 'read-only while configured'
         ),
-        read_only=setting.start_only,
+        read_only=start_only,
     )
-    if setting.choices:
-        allowed = ', '.join(choice for choice in setting.choices if choice)
+    if kind.choices:
+        allowed = ', '.join(filter(None, kind.choices))
         descriptor.additional_constraints += f'; one of {allowed}'
-    if setting.low is None or setting.high is None:
+    if kind.low is None or kind.high is None:
         return descriptor
-    if isinstance(setting.default, int):
-        descriptor.integer_range = [
-            IntegerRange(from_value=int(setting.low), to_value=int(setting.high))
-        ]
+    if isinstance(KEYS[name].default, int):
+        limits = IntegerRange(from_value=int(kind.low), to_value=int(kind.high))
+        descriptor.integer_range = [limits]
     else:
         descriptor.floating_point_range = [
-            FloatingPointRange(from_value=float(setting.low), to_value=float(setting.high))
+            FloatingPointRange(from_value=float(kind.low), to_value=float(kind.high))
         ]
     return descriptor
 

@@ -85,10 +85,26 @@ def guard_services(
     change_state
         The one that is asked for transitions, which rclpy does not list among them.
     warn
-        Called with what is refused.
+        Called with each refusal.
     """
     _refuse_illegal(change_state, warn)
     limit_services((*services, change_state), warn)
+
+
+def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
+    """
+    Let each service refuse what comes too often or is too long.
+
+    Parameters
+    ----------
+    services
+        Those that change something have the narrower limit.
+    warn
+        Called once a burst with the service that refuses.
+    """
+    for service in services:
+        limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))
+        service.callback = _limited(service.callback, limit, service.srv_name, warn)
 
 
 def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> None:
@@ -97,11 +113,9 @@ def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> Non
 
     def refuse_or_change(request: Any, response: Any) -> Any:
         label = request.transition.label
-        if not label.isprintable():  # rcl would print it as it is
-            warn(f'transition refused: no transition is named {printable(label)!r}')
-            response.success = False
-            return response
         try:
+            if not label.isprintable():  # rcl would print it as it is
+                raise rclpy_implementation.RCLError(f'no transition is named {label!r}')
             return change(request, response)
         except rclpy_implementation.RCLError as error:
             warn(f'transition refused: {printable(str(error))}')
@@ -109,22 +123,6 @@ def _refuse_illegal(change_state: Service, warn: Callable[[str], object]) -> Non
             return response
 
     change_state.callback = refuse_or_change
-
-
-def limit_services(services: Iterable[Service], warn: Callable[[str], object]) -> None:
-    """
-    Let each service refuse what is asked too often.
-
-    Parameters
-    ----------
-    services
-        Of the node; those that change something have the narrower limit.
-    warn
-        Called once a burst with the service refuses.
-    """
-    for service in services:
-        limit = RateLimit(*_LIMITS.get(service.srv_type.__name__, READS))
-        service.callback = _limited(service.callback, limit, service.srv_name, warn)
 
 
 def _limited(

@@ -250,6 +250,13 @@ class Session:
         self.watch_clock(now_ns)
         self._note(EventKind.SOURCE, text)
 
+    def note_diagnosis(self, message: OutputMessage, now_ns: int) -> None:
+        """
+        Publish and record what a coastdown says is missing in the model.
+        """
+        self.watch_clock(now_ns)
+        self._send(message)
+
     def finish(self) -> None:
         """
         Give the last figures and close the recording; needs no ROS.

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from shipdrag_ros.bags.durable import PartLimits
 from shipdrag_ros.errors import ParameterError, ShipdragError
 from shipdrag_ros.fields import (
     Key,
-    Kind,
     choice,
+    declare,
     flag,
     keys_of,
     number,
@@ -36,145 +36,6 @@ ParameterValue = bool | int | float | str
 
 
 @dataclass(frozen=True)
-class Setting:
-    """One parameter of the node, as documented and as declared."""
-
-    name: str
-    default: ParameterValue
-    text: str
-    unit: str = ''
-    low: float | None = None
-    high: float | None = None
-    choices: tuple[str, ...] = ()
-    kind: Kind | None = None  # how it is checked, where that is known elsewhere
-    start_only: bool = False  # nobody on the network may say which files or lines are touched
-
-    @property
-    def key(self) -> Key:
-        """How a value of it is checked."""
-        return Key(self._kind, self.text, self.default)
-
-    @property
-    def _kind(self) -> Kind:
-        if self.kind is not None:
-            return self.kind
-        if self.choices:
-            return choice(*self.choices)
-        if isinstance(self.default, bool):
-            return flag()
-        if isinstance(self.default, str):
-            return text()
-        assert self.low is not None
-        assert self.high is not None
-        if isinstance(self.default, int):
-            return whole_number(int(self.low), int(self.high), self.unit)
-        return number(self.low, self.high, self.unit)
-
-
-OWN: tuple[Setting, ...] = (
-    Setting('ship_file', '', 'path of the ship file (YAML); required', start_only=True),
-    Setting('record', True, 'record inputs, outputs and events while active'),
-    Setting(
-        'output_directory',
-        '.',
-        'where recordings are written; made if missing, nothing there is ever overwritten',
-        start_only=True,
-    ),
-    Setting(
-        'nmea',
-        '',
-        f'where NMEA 0183 is heard, besides topics: any of {NMEA_FORMS}, separated by blanks',
-        start_only=True,
-    ),
-    Setting(
-        'nmea_transducer_m',
-        -1.0,
-        'depth of the echo sounder below the surface, added to DBT, and to DPT without an offset '
-        'from the surface; negative: not known, and such a depth is not used',
-        unit='m',
-        low=-1.0,
-        high=50.0,
-    ),
-    Setting(
-        'part_size_bytes',
-        PartLimits().size_bytes,
-        'a recording goes on in a new file when one has grown to this; it is then rewritten '
-        'several times smaller',
-        unit='B',
-        low=1e5,
-        high=1e10,
-    ),
-    Setting(
-        'part_duration_s',
-        PartLimits().duration_s,
-        'a recording goes on in a new file when one covers this time',
-        unit='s',
-        low=1.0,
-        high=604800.0,
-    ),
-    Setting(
-        'keep_days',
-        0.0,
-        'parts of a recording that are older are removed, unless they hold a coastdown; 0: none',
-        unit='d',
-        low=0.0,
-        high=36500.0,
-        start_only=True,
-    ),
-    Setting(
-        'keep_bytes',
-        0,
-        'when all recordings are larger together, the oldest parts are removed, those that hold '
-        'a coastdown last; 0: half of the disk, and none that holds a coastdown; 1e15: no limit',
-        unit='B',
-        low=0,
-        high=1e15,
-        start_only=True,
-    ),
-    Setting(
-        'path_roots',
-        '',
-        'folders, separated by colons, in which ship_file and output_directory must lie; empty: '
-        'any',
-        start_only=True,
-    ),
-    Setting('autostart', True, 'configure and activate without being asked to'),
-    Setting(
-        'diagnose',
-        True,
-        'name the effect that is missing in the model after each coastdown, in a process of its '
-        'own, if the ship file has a baseline',
-    ),
-)
-TYPES: tuple[Setting, ...] = tuple(
-    Setting(
-        f'{name}.type',
-        '',
-        'message type of the topic; empty: the type found in the graph',
-        choices=('', *accepted),
-    )
-    for name, accepted in TOPICS.items()
-)
-SETTINGS: tuple[Setting, ...] = (
-    *OWN,
-    *TYPES,
-    *(
-        Setting(
-            name,
-            key.default,
-            key.text,
-            unit=key.kind.unit,
-            low=key.kind.low,
-            high=key.kind.high,
-            choices=key.kind.choices,
-            kind=key.kind,
-        )
-        for name, key in keys_of(Parameters).items()
-    ),
-)
-
-
-@dataclass(frozen=True)
 class NodeSettings:
     """
     All settings of the node, checked.
@@ -185,20 +46,77 @@ class NodeSettings:
         Message type fixed by the user, by input; inputs without one are absent.
     """
 
-    ship_file: str
-    record: bool
-    output_directory: str
-    nmea: str
-    nmea_transducer_m: float
-    part_size_bytes: int
-    part_duration_s: float
-    keep_days: float
-    keep_bytes: int
-    path_roots: str
-    autostart: bool
-    diagnose: bool
-    types: Mapping[str, str]
-    parameters: Parameters
+    ship_file: str = declare(
+        text(),
+        'path of the ship file (YAML); required, without it the node does not start',
+        default='',
+    )
+    record: bool = declare(
+        flag(),
+        'record inputs, outputs and events while active; false: a coastdown can be neither '
+        'replayed nor diagnosed again',
+        default=True,
+    )
+    output_directory: str = declare(
+        text(),
+        'where recordings are written; made if missing, nothing there is ever overwritten',
+        default='.',
+    )
+    nmea: str = declare(
+        text(),
+        f'where NMEA 0183 is received, besides topics: any of {NMEA_FORMS}, separated by blanks; '
+        'whoever reaches such an address can feed the node',
+        default='',
+    )
+    nmea_transducer_m: float = declare(
+        number(-1.0, 50.0, 'm'),
+        'depth of the echo sounder below the surface, added to DBT, and to DPT without an offset '
+        'from the surface; negative: not known, and such a depth is not used',
+        default=-1.0,
+    )
+    part_size_bytes: int = declare(
+        whole_number(int(1e5), int(1e10), 'B'),
+        'a recording goes on in a new file when one has grown to this; it is then rewritten '
+        'several times smaller; larger: fewer files, and a longer work on the disk at the end',
+        default=PartLimits().size_bytes,
+    )
+    part_duration_s: float = declare(
+        number(1.0, 604800.0, 's'),
+        'a recording goes on in a new file when one covers this time; files are removed as a '
+        'whole',
+        default=PartLimits().duration_s,
+    )
+    keep_days: float = declare(
+        number(0.0, 36500.0, 'd'),
+        'parts of a recording that are older are removed, unless they hold a coastdown; 0: none',
+        default=0.0,
+    )
+    keep_bytes: int = declare(
+        whole_number(0, int(1e15), 'B'),
+        'when all recordings are larger together, the oldest parts are removed, those that hold '
+        'a coastdown last; 0: half of the disk, and none that holds a coastdown; 1e15: no limit',
+        default=0,
+    )
+    path_roots: str = declare(
+        text(),
+        'folders, separated by colons, in which ship_file and output_directory must lie; empty: '
+        'any',
+        default='',
+    )
+    autostart: bool = declare(
+        flag(),
+        'configure and activate without being asked to; false: nothing is recorded or estimated '
+        'until a lifecycle manager asks for both',
+        default=True,
+    )
+    diagnose: bool = declare(
+        flag(),
+        'name the effect that is missing in the model after each coastdown, in a process of its '
+        'own, if the ship file has a baseline; takes a core for some seconds and 300 MB',
+        default=True,
+    )
+    types: Mapping[str, str] = field(default_factory=dict)
+    parameters: Parameters = field(default_factory=Parameters)
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, object], *, subject: str) -> NodeSettings:
@@ -211,17 +129,17 @@ class NodeSettings:
             Naming every unknown key and every bad value at once.
         """
         problems: list[str] = []
-        keys = {setting.name: setting.key for setting in SETTINGS}
-        given = read_keys(keys, dict(values), '', problems)
-        problems += _nmea_problems(given.get('nmea', ''))
+        given = read_keys(KEYS, dict(values), '', problems)
+        try:
+            parse_addresses(given.get('nmea', ''))
+        except ShipdragError as error:
+            problems.append(f'nmea: {error}')
         if problems:
             raise ParameterError(subject, problems)
-        chosen = {name: given.get(name, key.default) for name, key in keys.items()}
-        return cls(
-            **{setting.name: chosen[setting.name] for setting in OWN},
-            types={name: chosen[f'{name}.type'] for name in TOPICS if chosen[f'{name}.type']},
-            parameters=Parameters(**{name: chosen[name] for name in keys_of(Parameters)}),
-        )
+        types = {name: given.pop(f'{name}.type', '') for name in TOPICS}
+        own = {name: given.pop(name) for name in keys_of(cls) if name in given}
+        fixed = {name: kind for name, kind in types.items() if kind}
+        return cls(**own, types=fixed, parameters=Parameters(**given))
 
     def paths(self) -> tuple[Path, Path]:
         """
@@ -247,27 +165,44 @@ class NodeSettings:
         """
         Return the value in effect of every setting, by name.
         """
-        values: dict[str, ParameterValue] = {}
-        for setting in SETTINGS:
-            if setting.name.endswith('.type'):
-                values[setting.name] = self.types.get(setting.name.removesuffix('.type'), '')
-            else:
-                owner = self if hasattr(self, setting.name) else self.parameters
-                values[setting.name] = getattr(owner, setting.name)
-        return values
+        return {
+            **{name: getattr(self, name) for name in keys_of(type(self))},
+            **{f'{name}.type': self.types.get(name, '') for name in TOPICS},
+            **{name: getattr(self.parameters, name) for name in keys_of(Parameters)},
+        }
 
 
-def _nmea_problems(sources: object) -> list[str]:
-    try:
-        parse_addresses(str(sources))
-    except ShipdragError as error:
-        return [f'nmea: {error}']
-    return []
+KEYS: Mapping[str, Key] = {
+    **keys_of(NodeSettings),
+    **{
+        f'{name}.type': Key(
+            choice('', *accepted),
+            'message type of the topic; empty: the type found in the graph; fixed: another one '
+            'is never received, even where this one is silent',
+            '',
+        )
+        for name, accepted in TOPICS.items()
+    },
+    **keys_of(Parameters),
+}
+"""Every parameter of the node, by name."""
+START_ONLY = frozenset(
+    ('ship_file', 'output_directory', 'nmea', 'keep_days', 'keep_bytes', 'path_roots')
+)
+"""Nobody on the network may say which files or lines are touched."""
+
+
+def about(name: str) -> str:
+    """
+    Return what a parameter means and what follows of it, its unit behind.
+    """
+    key = KEYS[name]
+    return f'{key.text} [{key.kind.unit}]' if key.kind.unit else key.text
 
 
 def parameters_file() -> str:
     """
-    Return the text of `config/parameters.yaml`: every default.
+    Return the text of `config/parameters.yaml`: every default, and what follows of it.
     """
     lines = [
         '# SPDX-License-Identifier: Apache-2.0',
@@ -276,25 +211,18 @@ def parameters_file() -> str:
         '/**:',
         '  ros__parameters:',
     ]
-    for setting in SETTINGS:
-        about = setting.text
-        if setting.unit:
-            about += f' [{setting.unit}]'
-        if setting.low is not None:
-            about += f'; {setting.low:g} to {setting.high:g}'
-        if setting.start_only:
-            about += '; set at the start alone'
-        if setting.choices:
-            about += f'; one of {", ".join(choice for choice in setting.choices if choice)}'
-        lines += textwrap.wrap(about, 99, initial_indent='    # ', subsequent_indent='    # ')
-        lines.append(f'    {setting.name}: {_yaml(setting.default)}')
+    for name, key in KEYS.items():
+        said = about(name)
+        if key.kind.low is not None:
+            said += f'; {key.kind.low:g} to {key.kind.high:g}'
+        if name in START_ONLY:
+            said += '; set at the start alone'
+        if key.kind.choices:
+            said += f'; one of {", ".join(filter(None, key.kind.choices))}'
+        lines += textwrap.wrap(said, 99, initial_indent='    # ', subsequent_indent='    # ')
+        value = str(key.default).lower() if isinstance(key.default, bool) else repr(key.default)
+        lines.append(f'    {name}: {value}')
     return '\n'.join(lines) + '\n'
-
-
-def _yaml(value: ParameterValue) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return repr(value)
 
 
 if __name__ == '__main__':

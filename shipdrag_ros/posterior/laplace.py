@@ -24,13 +24,13 @@ from shipdrag_ros.inference.rows import Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.posterior.motion import damping_of, predict
-from shipdrag_ros.posterior.problem import RunModel
+from shipdrag_ros.posterior.problem import Family, RunModel
 from shipdrag_ros.samples import Float64
 
 _ITERATIONS = 12  # of Gauss and Newton, to where the noise is learnt
 _ROUNDS = 6  # linearisations about the mean of the mixture
 _CLOSE = 0.05  # of chi^2, between one mean and the next
-_LEAST = 1e-4  # weight of a model; less is left out of the spread
+_LEAST = 1e-3  # weight of a model; less is left out of the spread
 _LARGEST_STEP = 3.0  # of a Gauss-Newton step, in standard deviations of the prior
 
 
@@ -120,6 +120,7 @@ def mix(
     steady: int,
     settings: Settings,
     families: Families,
+    taught: Families,
 ) -> tuple[Float64, Float64, Float64]:
     """
     Average linear models over settings of the noise and families of priors.
@@ -131,8 +132,8 @@ def mix(
     rows, white, steady
         See `noise_of`.
     settings
-        Weighted by the mean evidence of the families, as `learn` does.
-    families
+        Weighted by the mean evidence of `taught`, as `learn` does.
+    families, taught
         Means count from where the model is linear.
 
     Returns
@@ -141,7 +142,8 @@ def mix(
         Of the mixture; `weight` (s, f) sums to 1.
     """
     s, f, p = len(settings.weight), len(families.log_chance), len(table) - 1
-    logs, steps = np.full((s, f), -np.inf), np.zeros((s, f, p))
+    t = len(taught.log_chance)
+    logs, of_taught = np.full((s, f), -np.inf), np.full((s, t), -np.inf)
     every = np.empty((s, p + 1, p + 1))
     for k in range(s):
         noise = noise_of(settings, k, rows, white, steady)
@@ -149,16 +151,20 @@ def mix(
         log_det = whiten(rows, copy, noise)
         every[k] = products_of(copy)
         for q in range(f):
-            solved, log_evidence, step, _, _ = of_family(
+            solved, log_evidence, _, _, _ = of_family(
                 every[k], families.mean[q], families.precision[q]
             )
             if solved and np.isfinite(log_evidence):
-                logs[k, q], steps[k, q] = log_evidence - 0.5 * log_det, step
+                logs[k, q] = log_evidence - 0.5 * log_det
+        for q in range(t):
+            solved, log_evidence, _, _, _ = of_family(
+                every[k], taught.mean[q], taught.precision[q]
+            )
+            if solved and np.isfinite(log_evidence):
+                of_taught[k, q] = log_evidence - 0.5 * log_det
     weight, top = np.zeros((s, f)), logs.max()
     for k in range(s):
-        alike = 0.0
-        for q in range(f):
-            alike += np.exp(logs[k, q] - top) / f
+        alike = np.exp(of_taught[k] - top).sum() / t
         for q in range(f):
             if alike > 0.0:
                 of_family_q = np.exp(logs[k, q] - top + families.log_chance[q])
@@ -185,16 +191,18 @@ def mix(
     return mean, second, weight
 
 
-def _families(problem: RunModel, now: Float64) -> Families:
+def _families(problem: RunModel, families: tuple[Family, ...], now: Float64) -> Families:
+    """Return what families say of the unknowns that are free, from some unknowns on."""
+    free = problem.free
     return Families(
-        np.array([each.mean for each in problem.families]) - now,
-        np.array([each.precision for each in problem.families]),
-        np.log(np.array([each.chance for each in problem.families])),
+        np.array([each.mean[free] - now[free] for each in families]),
+        np.array([each.precision[free] for each in families]),
+        np.log(np.array([each.chance for each in families])),
     )
 
 
 def _linear(problem: RunModel, now: Float64) -> tuple[Float64, Noise]:
-    """Return residual and columns at some unknowns, and the noise as the hull damps there."""
+    """Return residual and columns of what is free, and the noise as the hull damps there."""
     table, speed = predict(problem.forces, now, problem.grid_s, problem.rows)
     if not np.all(np.isfinite(table)):
         raise EstimationError(
@@ -203,12 +211,29 @@ def _linear(problem: RunModel, now: Float64) -> tuple[Float64, Noise]:
         )
     theta = now[: problem.coefficients]
     damping, inertia = damping_of(problem.forces, theta, np.maximum(speed, 0.0))
-    return table, problem.white._replace(damping_1_s=damping, inertia=inertia)
+    kept = np.concatenate([[0], 1 + problem.free])
+    return table[kept], problem.white._replace(damping_1_s=damping, inertia=inertia)
+
+
+def _mixed(
+    problem: RunModel, now: Float64, settings: Settings
+) -> tuple[Float64, Float64, Float64]:
+    """Return step, covariance and weights at some unknowns."""
+    table, white = _linear(problem, now)
+    families = _families(problem, problem.families, now)
+    taught = _families(problem, problem.taught, now)
+    of_free, spread, weight = mix(
+        table, problem.rows, white, problem.steady, settings, families, taught
+    )
+    step, covariance = np.zeros(len(now)), np.diag(1.0 / problem.families[0].precision)
+    step[problem.free] = of_free
+    covariance[np.ix_(problem.free, problem.free)] = spread
+    return step, covariance, weight
 
 
 def _seen(problem: RunModel, now: Float64) -> Seen:
     table, white = _linear(problem, now)
-    families = _families(problem, now)
+    families = _families(problem, problem.taught, now)
     return Seen(problem.rows, table, families.mean, families.precision, white, problem.steady)
 
 
@@ -217,9 +242,7 @@ def _typical(problem: RunModel, noise: NoisePosterior) -> Float64:
     now = problem.start.copy()
     sd = 1.0 / np.sqrt(problem.widest.precision)
     for _ in range(_ITERATIONS):
-        table, white = _linear(problem, now)
-        families = _families(problem, now)
-        step, _, _ = mix(table, problem.rows, white, problem.steady, noise.typical, families)
+        step, _, _ = _mixed(problem, now, noise.typical)
         length = float(np.max(np.abs(step[: problem.coefficients]) / sd[: problem.coefficients]))
         now += step * min(1.0, _LARGEST_STEP / max(length, 1e-12))
         if length < _CLOSE:
@@ -227,7 +250,7 @@ def _typical(problem: RunModel, noise: NoisePosterior) -> Float64:
     return now
 
 
-def infer(problem: RunModel) -> RunPosterior:
+def infer(problem: RunModel, *, quick: bool = False) -> RunPosterior:
     """
     Return the posterior of a run.
 
@@ -235,6 +258,8 @@ def infer(problem: RunModel) -> RunPosterior:
     ----------
     problem
         Rows, motion and priors.
+    quick
+        Times of the noise as they usually are, and fewer settings.
 
     Raises
     ------
@@ -243,15 +268,14 @@ def infer(problem: RunModel) -> RunPosterior:
     """
     first = prior_of(_seen(problem, problem.start), problem.speed_m_s)
     now = _typical(problem, first)
-    noise = learn(_seen(problem, now), problem.speed_m_s)
+    noise = learn(_seen(problem, now), problem.speed_m_s, quick=quick)
     away = np.inf
     for _ in range(_ROUNDS):
-        table, white = _linear(problem, now)
-        step, covariance, weight = mix(
-            table, problem.rows, white, problem.steady, noise.settings, _families(problem, now)
-        )
+        step, covariance, weight = _mixed(problem, now, noise.settings)
         now = now + step
-        away = float(step @ np.linalg.solve(covariance, step))
+        moved = step[problem.free]
+        spread = covariance[np.ix_(problem.free, problem.free)]
+        away = float(moved @ np.linalg.solve(spread, moved))
         if away < _CLOSE:
             break
     settings = noise.settings._replace(weight=weight.sum(axis=1))

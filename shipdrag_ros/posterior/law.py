@@ -3,7 +3,7 @@
 The one law of the hull, r(u) = (1 + theta_f) r_f + (1 + theta_w) r_w + s(u), as tables.
 
 r_f and r_w are those of the ship file; without a baseline the same two parts from length and
-volume alone. s is a spline relative to r, orthogonal to both parts.
+volume alone, whose waves have humps. s is a spline relative to r, orthogonal to both parts.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.posterior.motion import Forces
 from shipdrag_ros.samples import Float64
@@ -22,8 +23,8 @@ from shipdrag_ros.simulation.hydrodynamics import drag_n, friction_n, viscous_n
 _NODES = 97  # of the grid of speeds
 _ABOVE = 1.25  # of the highest speed that a fit may try
 _SPLINE_FROUDE, _FEWEST, _MOST = 0.02, 6, 14  # spacing and number of splines
-_ALIKE = 5.0  # spacings over which neighbours are alike, but for the humps of wave making
-_OWN = 0.02  # of their variance, with the share of waves more
+_ALIKE, _OWN = 5.0, 0.02  # spacings over which neighbours are alike, and the part that is not
+_NEGLIGIBLE = 0.03  # size of a column, of the largest
 # C_W = _WAVE (Fr / _WAVE_FROUDE)^4 without a baseline
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
 
@@ -39,7 +40,10 @@ class HullLaw:
     parts : (2, m)
         r_f and r_w [m/s^2].
     shapes : (k, m)
-        Columns of s per unit size [m/s^2], alike in size.
+        Columns of s per unit size [m/s^2].
+    humps : (h, m)
+        Columns of the humps of the wave part, per unit of it [m/s^2]; none where a
+        baseline states that part.
     stated
         Whether the ship file states a baseline.
     """
@@ -47,6 +51,7 @@ class HullLaw:
     speed_m_s: Float64
     parts: Float64
     shapes: Float64
+    humps: Float64
     stated: bool
 
     @classmethod
@@ -63,14 +68,16 @@ class HullLaw:
         speed = np.linspace(0.0, _ABOVE * top_m_s, _NODES)
         stated = ship.baseline is not None
         parts = (_stated(ship, speed) if stated else _generic(ship, speed)) / ship.mass_kg
-        return cls(speed, parts, _shapes(ship, speed, parts, low_m_s, top_m_s), stated)
+        spacing = _SPLINE_FROUDE * float(ship.speed(1.0))
+        shapes, humps = _shapes(speed, spacing, parts, low_m_s, top_m_s)
+        return cls(speed, parts, shapes, humps[: 0 if stated else None], stated)
 
     def forces(self, ship: Ship, tau_s: float) -> Forces:
         """
         Return what the motion takes.
         """
         step = float(self.speed_m_s[1])
-        columns = np.concatenate([self.parts, self.shapes])
+        columns = np.concatenate([self.parts, self.shapes, self.humps])
 
         def with_slope(value: Float64) -> Float64:
             return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
@@ -107,26 +114,38 @@ def _generic(ship: Ship, speed: Float64) -> Float64:
     return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
 
 
-def _shapes(ship: Ship, speed: Float64, parts: Float64, low_m_s: float, top_m_s: float) -> Float64:
-    """Return columns of s: cubic B-splines of neighbours that are alike, less both parts."""
-    froude = float(ship.froude(top_m_s - low_m_s))
-    count = int(np.clip(np.ceil(froude / _SPLINE_FROUDE), _FEWEST, _MOST))
+def _shapes(
+    speed: Float64, spacing: float, parts: Float64, low_m_s: float, top_m_s: float
+) -> tuple[Float64, Float64]:
+    """
+    Return columns of s, and of the humps of the wave part: cubic B-splines, less both parts.
+
+    Neighbours of s are alike; humps stand by themselves, in proportion to the wave part.
+    """
+    total = np.maximum(parts.sum(axis=0), 1e-12)
+    inside = (speed >= 0.9 * low_m_s) & (speed <= 1.05 * top_m_s)
+    count = int(np.clip(np.ceil((1.05 * top_m_s - 0.9 * low_m_s) / spacing) + 1, _FEWEST, _MOST))
     spacing = (1.05 * top_m_s - 0.9 * low_m_s) / (count - 1)
     d = np.abs((speed - 0.9 * low_m_s) / spacing - np.arange(count)[:, None])
     splines = np.where(d < 1.0, 2 / 3 - d**2 + d**3 / 2, np.maximum(2.0 - d, 0.0) ** 3 / 6)
     apart = np.arange(count)[:, None] - np.arange(count)
-    middle = 0.9 * low_m_s + spacing * np.arange(count)
-    waves = np.interp(middle, speed, parts[1] / np.maximum(parts.sum(axis=0), 1e-12))
-    alike = np.exp(-0.5 * (apart / _ALIKE) ** 2) + np.diag(_OWN + waves**2)
-    found = np.linalg.cholesky(alike).T @ splines
-    inside = (speed >= 0.9 * low_m_s) & (speed <= 1.05 * top_m_s)
-    total = np.maximum(parts.sum(axis=0), 1e-12)
-    shares = parts[parts.any(axis=1)] / total
-    of_parts = np.linalg.lstsq(shares[:, inside].T, found[:, inside].T, rcond=None)[0]
-    found = found - of_parts.T @ shares
+    alike = np.exp(-0.5 * (apart / _ALIKE) ** 2) + _OWN * np.eye(count)
+    rooted = np.asarray(np.linalg.cholesky(alike).T @ splines, np.float64)
+    smooth = _columns(rooted, parts / total, inside)
+    size = np.sqrt(np.mean(np.sum(smooth[:, inside] ** 2, axis=0)))
+    humps = splines * (parts[1] / total)
+    return smooth / size * total, _columns(humps, parts / total, inside) * total
+
+
+def _columns(shapes: Float64, shares: Float64, inside: NDArray[np.bool_]) -> Float64:
+    """Return the same sums of squares by few columns, less what both parts say."""
+    shares = shares[shares.any(axis=1)]
+    of_parts = np.linalg.lstsq(shares[:, inside].T, shapes[:, inside].T, rcond=None)[0]
+    shapes = shapes - of_parts.T @ shares
     # a flat end beyond the speeds of the run: nothing is known there
     first, last = np.flatnonzero(inside)[[0, -1]]
-    found = found[:, np.clip(np.arange(len(speed)), first, last)]
-    size = np.sqrt(np.mean(np.sum(found[:, inside] ** 2, axis=0)))
-    result: Float64 = found / size * total
+    shapes = shapes[:, np.clip(np.arange(shapes.shape[1]), first, last)]
+    left, size, _ = np.linalg.svd(shapes, full_matrices=False)
+    kept = size > _NEGLIGIBLE * size[0]
+    result: Float64 = left[:, kept].T @ shapes
     return result

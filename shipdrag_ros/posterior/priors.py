@@ -68,7 +68,7 @@ WAVE = Declared(
 GENERIC_FRICTION = Declared(
     'theta_f',
     'the same without a baseline: ITTC-57, k = 0.2, wetted surface from length and volume',
-    normal(0.4, mean=0.1),
+    normal(0.6, mean=0.4),
     '',
     'form factors 0.1 to 0.5, roughness, dragged propeller, appendages',
 )
@@ -79,6 +79,13 @@ GENERIC_WAVE = Declared(
     '',
     'C_W of 25 model tests at Fr 0.22: 0 to 0.002',
 )
+GENERIC_HUMPS = Declared(
+    's_w',
+    'humps of that wave part, relative to it, at each Fr/50 by itself',
+    normal(0.2),
+    '',
+    'C_W of model tests about a power of Fr: half to twice',
+)
 LAW_ERROR = Declared(
     's',
     'size of the error of the law, relative to r, in every hypothesis',
@@ -86,12 +93,12 @@ LAW_ERROR = Declared(
     '',
     'residuals of model tests about two parts: 0.5 to 2 %',
 )
-FOULED = Declared(
-    'theta_f',
-    'the same where the hull differs from the baseline in her friction',
-    normal(0.25, mean=0.25),
+SHAPE_OF_MORE = Declared(
+    's',
+    'size of s beside more friction, relative to it: what is added is seldom in proportion',
+    0.2,
     '',
-    'fouling of years in service: 10 to 60 % of friction',
+    'roughness, locked propellers and shallow water over the speed, as formulas',
 )
 # the thrust
 THRUST = Declared(
@@ -126,7 +133,12 @@ STOP = Declared(
 # the instruments
 LOG_SCALE = Declared('b_1', 'scale of a log, less one', normal(0.02), '', 'Doppler logs: 2 %')
 LOG_OFFSET = Declared('b_0', 'offset of a log', normal(0.02), 'm/s', 'zeroed logs')
-LOG_LAG = Declared('lambda', 'filter of a log', normal(5.0, mean=2.0), 's', '3 to 10 s, or none')
+LOG_UNFILTERED = Declared(
+    'lambda', 'delay of a log without a filter: half of the logs', normal(0.3), 's', _REALITY
+)
+LOG_LAG = Declared(
+    'lambda', 'filter of a log that has one', normal(4.0, mean=5.0), 's', '3 to 10 s'
+)
 GROUND_LAG = Declared(
     'lambda_g', 'filter of a speed over ground', normal(3.0, mean=1.0), 's', '1 to 8 s, or none'
 )
@@ -157,14 +169,17 @@ SMALL_COMPONENTS = 0.25
 """Size of the components of a weak current or wind, which is as probable as a usual one."""
 # what a hull may differ by: probabilities, and points of what a size is averaged over
 NOTHING, FRICTION_ALONE, SMOOTH = 'nothing', 'friction', 'smooth in u'
-CHANCES = {NOTHING: 0.5, FRICTION_ALONE: 0.2, SMOOTH: 0.3}
+CHANCES = {NOTHING: 0.4, FRICTION_ALONE: 0.3, SMOOTH: 0.3}
 """Prior probability of each, where a baseline is stated."""
-HALF_NORMAL = ((0.3, 0.35), (0.9, 0.45), (1.8, 0.20))
+HALF_NORMAL = ((0.4, 0.6), (1.4, 0.4))
 """Points and weights of a half-normal size, in its standard deviation."""
-LOG_UNIFORM = (0.03, 0.09, 0.27)
-"""Points of the size of s where something smooth in u is missing, all alike."""
-WIDE = (0.01, 0.03, 0.1, 0.3)
+LOG_UNIFORM = (0.03, 0.1, 0.3)
+"""Points of a size in which the hull differs from the baseline, all alike: of more friction, or of
+friction, waves and s where something smooth in u is missing."""
+WIDE = (0.01, 0.03, 0.1)
 """The same without a baseline."""
+UNFILTERED_CHANCE = 0.5
+"""Of a log."""
 WIDER, WIDER_CHANCE = 3.0, 0.1
 """A baseline is so many times worse than stated, so often."""
 
@@ -173,14 +188,16 @@ TABLE: tuple[Declared, ...] = (
     WAVE,
     GENERIC_FRICTION,
     GENERIC_WAVE,
+    GENERIC_HUMPS,
     LAW_ERROR,
-    FOULED,
+    SHAPE_OF_MORE,
     THRUST,
     RUN_DOWN,
     RUN_DOWN_SHAPE,
     STOP,
     LOG_SCALE,
     LOG_OFFSET,
+    LOG_UNFILTERED,
     LOG_LAG,
     GROUND_LAG,
     CURRENT,

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -20,7 +21,7 @@ from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.posterior import motion, priors
 from shipdrag_ros.posterior.law import HullLaw
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
 
 _STEPS = 80  # of the integration, longer as the ship slows down
@@ -96,6 +97,20 @@ class RunModel:
         """How many of the unknowns are coefficients of forces."""
         return int(self.forces.columns.shape[1])
 
+    @cached_property
+    def free(self) -> Int64:
+        """Which unknowns some family leaves open."""
+        least = np.min([each.precision for each in self.families], axis=0)
+        return np.flatnonzero(least < _EXACT**-2.0 / 4.0)
+
+    @cached_property
+    def taught(self) -> tuple[Family, ...]:
+        """One family a hypothesis, with its mean and variance: noise is learnt by these."""
+        names = dict.fromkeys(each.name for each in self.families)
+        return tuple(
+            _merged(name, [each for each in self.families if each.name == name]) for name in names
+        )
+
     @property
     def widest(self) -> Family:
         """The family that holds the coefficients least."""
@@ -161,6 +176,16 @@ class RunModel:
         return found
 
 
+def _merged(name: str, families: list[Family]) -> Family:
+    """Return a normal prior with the mean and variance of a mixture."""
+    chance = np.array([each.chance for each in families])
+    total, part = float(chance.sum()), chance / chance.sum()
+    means = np.array([each.mean for each in families])
+    mean = part @ means
+    variance = part @ (1.0 / np.array([each.precision for each in families]) + (means - mean) ** 2)
+    return Family(name, total, mean, 1.0 / variance)
+
+
 def _tau_s(stop: StopPrior) -> float:
     if stop.run_down_s > 0.0:
         return stop.run_down_s
@@ -201,7 +226,6 @@ def _extras(
     if LOG in kinds:
         sd[motion.SCALE] = priors.LOG_SCALE.sd
         sd[motion.OFFSET] = priors.LOG_OFFSET.sd
-        mean[motion.LAG], sd[motion.LAG] = priors.LOG_LAG.mean, priors.LOG_LAG.sd
     if ground:
         sd[motion.CURRENT] = priors.CURRENT.sd
     if ground - {POSITION}:
@@ -214,11 +238,25 @@ def _all_families(
     ship: Ship, law: HullLaw, stop: StopPrior, start: Float64, kinds: frozenset[int]
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
-    count = len(law.shapes)
-    for name, chance, scales, size in _hulls(ship):
-        mean = np.concatenate([[each[0] for each in scales], np.zeros(count), extra_mean])
-        sd = np.concatenate([[each[1] for each in scales], np.full(count, size), extra_sd])
-        yield Family(name, chance, mean, 1.0 / sd**2)
+    humps = np.full(len(law.humps), priors.GENERIC_HUMPS.sd)
+    zeros = np.zeros(len(law.shapes) + len(humps))
+    for (name, chance, scales, size), (part, lag) in product(_hulls(ship), _lags(kinds)):
+        mean = np.concatenate([[each[0] for each in scales], zeros, extra_mean])
+        sizes = np.full(len(law.shapes), size)
+        sd = np.concatenate([[each[1] for each in scales], sizes, humps, extra_sd])
+        if lag is not None:
+            at = motion.LAG - EXTRAS
+            mean[at], sd[at] = lag.mean, lag.sd
+        yield Family(name, chance * part, mean, 1.0 / sd**2)
+
+
+def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, priors.Declared | None]]:
+    """Yield probability and prior of the filter of a log: none, or one."""
+    if LOG not in kinds:
+        yield 1.0, None
+        return
+    yield priors.UNFILTERED_CHANCE, priors.LOG_UNFILTERED
+    yield 1.0 - priors.UNFILTERED_CHANCE, priors.LOG_LAG
 
 
 _Hull = tuple[str, float, tuple[tuple[float, float], tuple[float, float]], float]
@@ -243,18 +281,17 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
     ):
         stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
         yield priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
-    fouled = priors.FOULED
-    for size, part in priors.HALF_NORMAL:
-        scales = ((fouled.mean, fouled.sd), (0.0, priors.WIDER * sds[1]))
-        yield (
-            priors.FRICTION_ALONE,
-            priors.CHANCES[priors.FRICTION_ALONE] * part,
-            scales,
-            size * unsure,
-        )
+    chance = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
+    for more, (size, part) in product(priors.LOG_UNIFORM, priors.HALF_NORMAL):
+        scales = ((more, math.hypot(more, sds[0])), (0.0, sds[1]))
+        shape = math.hypot(size * unsure, priors.SHAPE_OF_MORE.mean * more)
+        yield priors.FRICTION_ALONE, chance * part, scales, shape
+    chance = priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM)
     for size in priors.LOG_UNIFORM:
-        scales = ((0.0, sds[0]), (0.0, sds[1]))
-        yield priors.SMOOTH, priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM), scales, size
+        # friction, waves and shape all differ
+        of_wave = math.hypot(size, sds[1]) if sds[1] > _EXACT else _EXACT
+        scales = ((0.0, math.hypot(size, sds[0])), (0.0, of_wave))
+        yield priors.SMOOTH, chance, scales, size
 
 
 def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
@@ -269,6 +306,6 @@ def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
     ship = Ship.example()
     for which in (ship, replace(ship, baseline=None)):
         for name, chance, scales, size in _hulls(which):
-            friction, wave = (f'{mean:g} ± {sd:g}' for mean, sd in scales)
+            friction, wave = (f'{mean:g} ± {sd:.2g}' for mean, sd in scales)
             beside = name if which.baseline is not None else f'{name}, no baseline'
             yield beside, chance, friction, wave, f'{size:.2g}'

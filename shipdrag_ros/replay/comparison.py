@@ -15,10 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.messages import MalformedMessage, OutputMessage, types
-from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE, SPEED
+from shipdrag_ros.messages.topics import (
+    FORECAST,
+    FORECAST_PATH,
+    RESISTANCE,
+    RESISTANCE_CURVE,
+    SPEED,
+)
 from shipdrag_ros.samples import Float64
 
-COMPARED = (SPEED, RESISTANCE, RESISTANCE_CURVE)
+COMPARED = (SPEED, RESISTANCE, RESISTANCE_CURVE, FORECAST, FORECAST_PATH)
 
 
 @dataclass(frozen=True)
@@ -163,6 +169,9 @@ def _figures(message: OutputMessage | None) -> Float64:
             return np.array([content.twist.twist.linear.x, content.twist.covariance[0]])
         case RESISTANCE.type:
             return np.array([content.accel.accel.linear.x, content.accel.covariance[0]])
+        case FORECAST_PATH.type:
+            places = [each.pose.position for each in content.poses]
+            return np.array([axis for place in places for axis in (place.x, place.y)])
         case _:
             return np.frombuffer(content.data.tobytes(), '<f8')
 
@@ -182,6 +191,8 @@ def _content(message: OutputMessage | None) -> str:
             return (
                 f'{content.accel.accel.linear.x!r} m/s^2 (variance {content.accel.covariance[0]})'
             )
+        case FORECAST_PATH.type:
+            return f'{len(content.poses)} positions'
         case _:
             total = np.sum(content.data, dtype=np.int64)
             return f'{content.width} points (sum of bytes {total})'

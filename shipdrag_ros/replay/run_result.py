@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from shipdrag_ros.coastdown.events import EndedCoastdown, NotCoastdown
 from shipdrag_ros.display import Table, short_repr
@@ -62,6 +62,7 @@ class RunResult:
     not_coastdowns: tuple[NotCoastdown, ...] = ()
     steady_lead_s: float | None = None
     why_none: str = ''
+    replayed: ReplayResult | None = field(default=None, repr=False)
 
     @property
     def dismissed(self) -> tuple[NotCoastdown, ...]:
@@ -117,6 +118,7 @@ class RunResult:
             not_coastdowns=result.not_coastdowns,
             steady_lead_s=result.steady_lead_s,
             why_none=_why_none(result),
+            replayed=result,
         )
 
 

@@ -77,20 +77,10 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
             problems.append(str(error))
     if problems:
         raise DataError(str(path), problems)
-    rows = []
-    for line, cells in table.rows():
-        row = []
-        for name, place in zip(wanted, places):
-            cell = cells[place] if place < len(cells) else ''
-            if NUMBER.fullmatch(cell) and abs(value := float(cell)) <= _MOST:
-                row.append(value)
-            else:
-                comma = NUMBER.fullmatch(cell.replace(',', '.', 1)) and ',' in cell
-                problems.append(
-                    f'line {line}, {name}: {cell!r}, expected a number, at most {_MOST:g} in size'
-                    + ('; write a decimal point' if comma else '')
-                )
-        rows.append(row)
+    rows: list[list[float]] = []
+    for some in table.rows():
+        for line, *cells in zip(some.lines, *(some.texts(place) for place in places)):
+            rows.append([_number(line, *each, problems) for each in zip(wanted, cells)])
     if not rows:
         problems.append('no row below the header, expected a line a measurement')
     if problems:
@@ -98,3 +88,15 @@ def read_numbers(path: Path, names: Sequence[str], *, optional: Sequence[str] = 
         shown = [*problems[:_SHOWN], f'and {more} more'] if more > 0 else problems
         raise DataError(str(path), shown)
     return Numbers(wanted, np.array(rows, np.float64).reshape(len(rows), len(wanted)))
+
+
+def _number(line: int, name: str, cell: str, problems: list[str]) -> float:
+    """Return the number of a cell; of one that holds none, what is wrong goes to the problems."""
+    if NUMBER.fullmatch(cell) and abs(value := float(cell)) <= _MOST:
+        return value
+    comma = NUMBER.fullmatch(cell.replace(',', '.', 1)) and ',' in cell
+    problems.append(
+        f'line {line}, {name}: {cell!r}, expected a number, at most {_MOST:g} in size'
+        + ('; write a decimal point' if comma else '')
+    )
+    return 0.0

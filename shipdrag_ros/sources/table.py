@@ -9,21 +9,29 @@ import gzip
 import re
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from io import BufferedReader, TextIOWrapper
+from itertools import compress, islice, zip_longest
 from pathlib import Path
-from typing import IO, NamedTuple, cast
+from typing import IO, Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.display import NUMBER
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.sources.formats.csv.names import role_and_unit
+from shipdrag_ros.sources.formats.csv.columns import role_and_unit
 from shipdrag_ros.sources.opened import check_unpacked, opened
 
 DELIMITERS = ',;\t|'
 BLANKS = ' '
 """Delimiter of a table whose columns stand apart by blanks alone."""
+
+ROWS = 1 << 10
+"""Read at a time."""
 
 _SAMPLE_LINES = 400
 _LINE = 1 << 20  # characters; no row of a table is as long
@@ -44,6 +52,65 @@ class LogRow(NamedTuple):
 
     line: int
     cells: Sequence[str]
+
+
+Cells = Sequence[str] | NDArray[Any]
+"""Of a column: texts, stripped, or numbers."""
+
+
+@dataclass(frozen=True)
+class TableRows:
+    """
+    Rows of a table, by their columns.
+
+    Attributes
+    ----------
+    lines : (n,)
+        On which each row ends.
+    columns
+        Cells (n,) of each column; '' where a row is too short.
+    beyond
+        By line, the text of a row that has more cells than the table has columns.
+    """
+
+    lines: Sequence[int] = ()
+    columns: Sequence[Cells] = ()
+    beyond: Mapping[int, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __getitem__(self, chosen: NDArray[np.bool_]) -> TableRows:
+        """Return the rows that are chosen, (n,)."""
+        if chosen.all():
+            return self
+        columns = [
+            each[chosen] if isinstance(each, np.ndarray) else list(compress(each, chosen))
+            for each in self.columns
+        ]
+        return TableRows(list(compress(self.lines, chosen)), columns, self.beyond)
+
+    def texts(self, place: int) -> Sequence[str]:
+        """
+        Return the cells (n,) of a column as text.
+        """
+        cells = self.columns[place] if self.columns else ()
+        return texts_of(cells) if isinstance(cells, np.ndarray) else cells
+
+    def joined(self, places: Sequence[int]) -> Sequence[str]:
+        """
+        Return the text (n,) of one or two columns, as a date and its time of day stand in them.
+        """
+        some = [self.texts(place) for place in places]
+        return [' '.join(cells).strip() for cells in zip(*some, strict=True)]
+
+
+def texts_of(cells: NDArray[Any]) -> list[str]:
+    """
+    Return the shortest text that reads back as the same value; '' where there is none.
+    """
+    found = ['' if value is None or value != value else str(value) for value in cells.tolist()]
+    return found if cells.dtype.kind in 'fiub' else [text.strip() for text in found]
 
 
 class _Layout(NamedTuple):
@@ -180,14 +247,16 @@ class LogTable:
             f'{str(self.path)!r} has no column {name!r}; it has {listed}, {hint}'
         )
 
-    def rows(self, progress: PartDone | None = None) -> Iterator[LogRow]:
+    def rows(self, progress: PartDone | None = None, *, most: int = ROWS) -> Iterator[TableRows]:
         """
-        Yield the rows below the header; lines without any cell are skipped.
+        Yield the rows below the header, some at a time; lines without any cell are skipped.
 
         Parameters
         ----------
         progress
             Called with how many bytes are read, and of how many.
+        most
+            Rows at a time.
         """
         total = self.path.stat().st_size
         above = (self.header is not None) + (self.units is not None)
@@ -196,12 +265,25 @@ class LogTable:
             lines = self._lines(file, raw)
             for _ in range(self._skip):
                 next(lines, None)
-            for count, row in enumerate(self._rows(lines, self.delimiter, self._skip)):
-                if count < above:
-                    continue
-                if progress is not None and count % 1000 == 0:
+            rows = islice(self._rows(lines, self.delimiter, self._skip), above, None)
+            while some := list(islice(rows, most)):
+                if progress is not None:
                     progress(raw.tell(), total)
-                yield row
+                yield self._by_column(some)
+
+    def first_rows(self, most: int) -> TableRows:
+        """
+        Return the first rows.
+        """
+        return next(self.rows(most=most), TableRows(columns=[()] * self.width))
+
+    def _by_column(self, rows: Sequence[LogRow]) -> TableRows:
+        columns: list[Cells] = [*zip_longest(*(row.cells for row in rows), fillvalue='')]
+        columns += [('',) * len(rows)] * (self.width - len(columns))
+        beyond = {}
+        if len(columns) > self.width:  # as decimal commas make it
+            beyond = {r.line: ','.join(r.cells) for r in rows if any(r.cells[self.width :])}
+        return TableRows([row.line for row in rows], columns[: self.width], beyond)
 
     def _cells(self, line: str, delimiter: str) -> Sequence[str]:
         return next((row.cells for row in self._rows([line], delimiter)), ())

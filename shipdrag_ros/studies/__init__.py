@@ -14,12 +14,19 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from pkgutil import iter_modules
-
-from shipdrag_ros.studies.study import Study
+from typing import NamedTuple
 
 __all__ = ['GROUP', 'Study', 'found']
 
 GROUP = 'shipdrag.papers'
+
+
+class Study(NamedTuple):
+    """The verb of a study, what it does in one line, and command lines to try."""
+
+    verb: str
+    summary: str
+    examples: tuple[str, ...]
 
 
 @cache

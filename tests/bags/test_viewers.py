@@ -24,7 +24,7 @@ TYPES = sorted(
     {type_name for accepted in TOPICS.values() for type_name in accepted}
     | {topic.type for topic in OUTPUT_TOPICS}
 )
-UNSTAMPED = ('std_msgs/msg/Float64',)
+UNSTAMPED = ('std_msgs/msg/Float64', 'std_msgs/msg/String')
 PRIMITIVE = re.compile(r'(bool|byte|char|u?int(8|16|32|64)|float(32|64)|w?string)(<=\d+)?')
 
 

@@ -82,7 +82,7 @@ def test_attachments_and_version_come_first(tmp_path: Path) -> None:
     assert [channel.topic for channel in summary.channels.values()] == ['/shaft']
 
 
-def test_only_the_curve_is_latched_and_every_channel_has_its_type_hash(tmp_path: Path) -> None:
+def test_what_is_latched_is_and_every_channel_has_its_type_hash(tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'a.mcap') as bag:
         for topic in OUTPUT_TOPICS:
             bag.register(topic.under('/node'), topic.type)
@@ -95,7 +95,8 @@ def test_only_the_curve_is_latched_and_every_channel_has_its_type_hash(tmp_path:
         for topic, each in metadata.items()
         if 'transient_local' in each['offered_qos_profiles']
     }
-    assert latched == {'/node/resistance_curve'}
+    kept = ('resistance_curve', 'forecast', 'forecast_path', 'diagnosis')
+    assert latched == {f'/node/{name}' for name in kept}
     assert all(each['topic_type_hash'].startswith('RIHS01_') for each in metadata.values())
 
 

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import json
+import os
 import socket
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.cli import doctor, main
+from shipdrag_ros.cli import doctor, doctor_run, main
 from shipdrag_ros.cli.doctor import CheckState, findings
 
 
@@ -54,3 +56,36 @@ def test_a_missing_package_is_told_with_what_does_not_work(
     monkeypatch.setattr(doctor, '_NEEDED', ('numpy', 'no.such.package'))
     assert by_name(tmp_path)['packages'].state is CheckState.BROKEN
     assert main(['doctor', '--out', str(tmp_path)]) == 1
+
+
+def test_a_ship_sails_past_the_node_and_live_is_replay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip('rclpy')
+    monkeypatch.setenv('TMPDIR', str(tmp_path))
+    monkeypatch.setattr(tempfile, 'tempdir', None)
+    for name in ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
+        monkeypatch.setenv(name, os.environ.get(name, '0'))  # put back, as the run sets them
+    assert main(['doctor', '--run', '--out', str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert said.splitlines()[-1] == 'PASS'
+    for part in ('simulated ship', 'node', 'bag', 'replay', 'figures'):
+        assert f'run: {part}' in said
+    assert list(tmp_path.glob('shipdrag-doctor-*')) == []
+
+
+def test_a_node_that_fails_is_told_with_its_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip('rclpy')
+    monkeypatch.setattr(doctor_run, '_NODE', ('steady_s:=nonsense',))
+    for name in ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
+        monkeypatch.setenv(name, os.environ.get(name, '0'))
+    assert main(['doctor', '--run', '--out', str(tmp_path), '--json']) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found['works'] is False
+    failed = found['findings'][-1]
+    assert (failed['what'], failed['state']) == ('run: node', 'broken')
+    assert 'steady_s' in failed['found']
+    folder = Path(failed['found'].rpartition('files in ')[2])
+    assert (folder / 'node.log').is_file()

@@ -13,11 +13,9 @@ from pathlib import Path
 
 import numba
 import pytest
-from numba.core import event
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.cli.compiling import CompilingNotice
-from shipdrag_ros.cli.progress import ProgressLines
+from shipdrag_ros.cli.progress import ProgressLines, compiling_said
 
 
 @pytest.fixture(scope='module')
@@ -63,7 +61,7 @@ def test_the_first_word_comes_at_once_and_the_others_wait(
 def test_compiling_is_said_once_and_only_when_something_is_compiled() -> None:
     said: list[str] = []
     first, second = numba.njit(lambda x: x + 1.0), numba.njit(lambda x: x - 1.0)
-    with event.install_listener('numba:compile', CompilingNotice(said.append)):
+    with compiling_said(said.append):
         assert said == []
         assert first(1.0) == 2.0
         assert second(1.0) == 0.0

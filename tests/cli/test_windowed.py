@@ -14,7 +14,7 @@ import pytest
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.windowed import WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.errors import BagError
-from shipdrag_ros.library.windowed import WindowedRun, refuse_overlaps
+from shipdrag_ros.library.replaying import WindowedRun, refuse_overlaps
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shipdrag_ros.coastdown import validate
 from shipdrag_ros.coastdown.past import KEPT
+from shipdrag_ros.coastdown.validate import validate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Reason
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.coastdown import validate
+from shipdrag_ros.coastdown.validate import validate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Reason, concatenate
 

@@ -73,6 +73,14 @@ def test_the_unit_and_the_container_give_arguments_that_there_are(
     assert '/etc/shipdrag/ship.yaml' in capsys.readouterr().err
 
 
+def test_the_unit_waits_for_the_node_and_starts_it_again_where_it_hangs() -> None:
+    assert of_unit('Type') == ['notify']  # tests/node/test_notify.py speaks to such a manager
+    assert of_unit('NotifyAccess') == ['main']
+    (seconds,) = of_unit('WatchdogSec')
+    assert 60 <= int(seconds) <= 120
+    assert of_unit('Restart') == ['on-failure']  # which a watchdog that bites is
+
+
 def test_nothing_runs_as_root_or_writes_outside() -> None:
     container = (DEPLOY / 'Containerfile').read_text()
     assert re.search(r'^USER 10001', container, flags=re.MULTILINE)

@@ -31,8 +31,8 @@ from shipdrag_ros.fleet.store import (
     ship_texts,
 )
 from shipdrag_ros.fleet.update import update
-from shipdrag_ros.library.listener import Notes
-from shipdrag_ros.library.trending import trends_of
+from shipdrag_ros.library.replaying import Notes
+from shipdrag_ros.library.trends import trends_of
 
 from .conftest import SHIP
 

@@ -14,7 +14,7 @@ import pytest
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.errors import ShipdragError
-from shipdrag_ros.live import acceptance, signal_k, verdicts
+from shipdrag_ros.live import acceptance, signal_k
 from shipdrag_ros.live.acceptance import Held
 from shipdrag_ros.live.bridge import Bridge
 from shipdrag_ros.live.earlier import recorded_runs
@@ -189,29 +189,9 @@ def test_an_estimate_that_still_waits_is_one_line_of_the_log(bags: list[Path]) -
 def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
     bridge = Bridge(Ship.load(SHIP))
     before = bridge.parts(0.0)
-    for name in ('speed', 'resistance', 'resistance_curve', 'events'):
+    for name in ('speed', 'resistance', 'resistance_curve', 'events', 'diagnosis'):
         bridge.hear(NodeMessage(name, b'\x00\x01'), 0.0)
     assert bridge.parts(0.0) == before
-
-
-def test_a_verdict_is_read_from_the_status_of_the_node() -> None:
-    values = {
-        'state': 'done',
-        'probability that nothing is missing [1]': '0.01',
-        'probability of fouling [1]': '0.98',
-        'fouling, friction_factor [1]': '0.31',
-        'standard deviation of fouling, friction_factor [1]': '0.02',
-        'mean square of whitened residuals, before [1]': '9',
-        'if towed_cable, drag_area [m^2]': '4.5',
-        'advice 1': 'look at the hull (--fact hull_cleaned=DATE); costs a look',
-    }
-    view = verdicts.of_status(Status('n', 'diagnosis', 1, 'Missing: fouling.', values))
-    assert view.sizes == (
-        ('fouling, friction factor', '0.31 ± 0.04'),
-        ('if towed cable, drag area', '4.5 m^2'),
-    )
-    assert view.probabilities == (('fouling', 0.98), ('nothing is missing', 0.01))
-    assert view.decide == ('look at the hull; costs a look',)  # no options of a command line
 
 
 @pytest.mark.parametrize(

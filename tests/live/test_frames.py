@@ -9,7 +9,8 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipdrag_ros.live.frames import HISTORY, KEPT, Frames, encode
+from shipdrag_ros.display import json_text
+from shipdrag_ros.live.frames import HISTORY, KEPT, Frames
 
 
 def events(data: bytes) -> list[tuple[str, dict[str, Any]]]:
@@ -75,4 +76,4 @@ def test_nothing_new_is_no_frame_and_what_is_not_finite_is_null() -> None:
     frames.add({'value': float('nan')}, [])
     frames.add({'value': float('nan')}, [])
     assert frames.number == 1
-    assert json.loads(encode({'a': [float('inf'), 1.5]})) == {'a': [None, 1.5]}
+    assert json.loads(json_text({'a': [float('inf'), 1.5]}, indent=None)) == {'a': [None, 1.5]}

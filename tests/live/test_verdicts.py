@@ -9,9 +9,15 @@ import pytest
 
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.diagnosis import Candidate, DiagnosisResult, EffectEstimate, Gap, Verdict
+from shipdrag_ros.diagnosis.document import document
 from shipdrag_ros.diagnosis.result import Advice
-from shipdrag_ros.live.verdicts import of_diagnosis, of_status
-from shipdrag_ros.messages.heard import Status
+from shipdrag_ros.display import json_text
+from shipdrag_ros.live.bridge import Bridge
+from shipdrag_ros.live.verdicts import verdict_part
+from shipdrag_ros.messages.heard import OK, WARN, Health, NodeMessage, Status
+from shipdrag_ros.messages.reporting import diagnosis_message
+from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
+from shipdrag_ros.node.health import diagnosis_status
 from shipdrag_ros.parameter import Parameter
 
 FOULING = EffectEstimate('fouling', 0.6, {'friction_factor': Parameter(0.4, 0.02)})
@@ -36,45 +42,62 @@ FOUND = DiagnosisResult(
 )
 
 
-def test_of_a_bag() -> None:
-    view = of_diagnosis(FOUND)
-    assert view.sizes == (
-        ('if fouling, friction factor', '0.400 ± 0.040'),
-        ('if towed cable, drag area', '(2.50 ± 0.80) m^2'),
+def heard(text: str) -> NodeMessage:
+    """Return JSON as the topic brings it."""
+    return NodeMessage('diagnosis', diagnosis_message(text, 0).payload)
+
+
+def told(state: str, sentence: str) -> Health:
+    states = {'lifecycle': 'active', 'monitor': 'steady'}
+    return Health(
+        (
+            Status.of('state', 0, 'steady', states),
+            Status.of('diagnosis', 1, sentence, {'state': state}),
+        )
     )
-    (line,) = view.decide
+
+
+def test_a_set_has_the_size_that_each_would_have_and_no_options() -> None:
+    part = verdict_part(document(FOUND, None))
+    assert part['sizes'] == [
+        'if fouling, friction factor: 0.400 ± 0.040',
+        'if towed cable, drag area: (2.50 ± 0.80) m^2',
+    ]
+    assert part['probabilities'] == [['fouling', 0.6], ['towed_cable', 0.4]]
+    (line,) = part['decide']
     assert line.startswith('look whether a cable was out; costs a look')
 
 
-def test_of_a_node() -> None:
-    pytest.importorskip('diagnostic_msgs')
-    from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
-    from shipdrag_ros.node.diagnostics import diagnosis_status
+def test_the_page_shows_the_document_of_the_topic_once_the_node_is_done() -> None:
+    bridge = Bridge()
+    bridge.hear(heard(json_text(document(FOUND, None))), 0.0)
+    bridge.hear(told('running', 'running'), 0.0)
+    assert bridge.parts(0.0)['verdict'] == {'state': 'running', 'sentence': 'running'}
+    bridge.hear(told('done', 'Missing is one of these'), 0.0)
+    assert bridge.parts(0.0)['verdict'] == verdict_part(document(FOUND, None))
 
-    told = diagnosis_status(DiagnosisStatus(DiagnosisState.DONE, found=FOUND))
-    values = {each.key: each.value for each in told.values}
-    view = of_status(Status('node', 'diagnosis', 1, told.message, values))
-    assert view.sizes == (
-        ('if fouling, friction factor', '0.4 ± 0.04'),
-        ('if towed cable, drag area m2', '2.5 ± 0.8 m^2'),
-    )
-    assert view.decide == of_diagnosis(FOUND).decide
+
+@pytest.mark.parametrize(
+    'text', ['', '[]', '{}', 'null', '{"effects": 1}', '[' * 100_000, '{"effects": [1]}']
+)
+def test_a_document_of_somebody_else_changes_nothing(text: str) -> None:
+    bridge = Bridge()
+    bridge.hear(told('done', 'Missing: fouling.'), 0.0)
+    bridge.hear(heard(text), 0.0)
+    assert bridge.parts(0.0)['verdict'] == {'state': 'done', 'sentence': 'Missing: fouling.'}
 
 
 def test_a_coastdown_that_something_braked_says_that_its_glide_goes_on() -> None:
-    pytest.importorskip('diagnostic_msgs')
-    from shipdrag_ros.node.diagnosing import DiagnosisState, DiagnosisStatus
-    from shipdrag_ros.node.diagnostics import OK, WARN, diagnosis_status
-
     nothing = replace(FOUND, verdict=Verdict.NONE, nothing=1.0, candidates=(Candidate((), 1.0),))
     ended = EndedCoastdown(0, 10**12, 1, EndedBy.SPEED, None)
-    sound = DiagnosisStatus(DiagnosisState.DONE, coastdown=ended, found=nothing)
+    found = document(nothing, None)
+    sound = DiagnosisStatus(DiagnosisState.DONE, coastdown=ended, found=found)
     braked = replace(sound, coastdown=replace(ended, ended_by=EndedBy.BRAKE))
     assert diagnosis_status(sound).level == OK
     assert sound.caveat == ''
     shown = diagnosis_status(braked)
     assert shown.level == WARN
-    for text in (shown.message, of_diagnosis(nothing, braked.caveat).sentence):
+    for text in (shown.message, verdict_part({**found, 'caveat': braked.caveat})['sentence']):
         assert 'nothing is missing' in text
         assert '`shipdrag diagnose BAG` of the recording holds all of the glide' in text
     failed = replace(braked, state=DiagnosisState.IMPOSSIBLE, found=None, reason='no estimate')

@@ -20,6 +20,8 @@ from shipdrag_ros.coastdown.events import (
     Update,
 )
 from shipdrag_ros.estimation.result import Estimate, FroudeMax, ResistanceCurve
+from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.forecast.path import PathAhead
 from shipdrag_ros.messages import (
     EventKind,
     EventNote,
@@ -29,6 +31,7 @@ from shipdrag_ros.messages import (
     read_event,
     reset_request,
 )
+from shipdrag_ros.ship import Ship
 
 STAMP_NS = 1_700_000_000_000_000_001
 
@@ -67,7 +70,7 @@ def estimate() -> Estimate:
 
 
 def test_an_update_is_speed_resistance_and_curve(reference: Any, estimate: Estimate) -> None:
-    speed, resistance, curve = outputs(Update(STAMP_NS, estimate))
+    speed, resistance, curve, *_ = outputs(Update(STAMP_NS, estimate))
     assert [m.topic for m in (speed, resistance, curve)] == [
         '/coastdown_node/speed',
         '/coastdown_node/resistance',
@@ -110,7 +113,7 @@ def test_rclpy_reads_what_is_published(estimate: Estimate) -> None:
         read = serialization.deserialize_message(message.payload, kind)
         stamp = read.header.stamp
         assert stamp.sec * 10**9 + stamp.nanosec == message.stamp_ns
-        if name == 'PointCloud2':
+        if name == 'PointCloud2' and message.topic.endswith('curve'):
             assert len(read.data) == read.row_step == 32 * read.width > 0
         if name == 'DiagnosticArray':
             assert read.status[0].level == b'\0'
@@ -121,13 +124,18 @@ def test_rclpy_reads_what_is_published(estimate: Estimate) -> None:
 
 def test_the_node_name_is_that_given(estimate: Estimate) -> None:
     topics = {m.topic for m in outputs(Update(STAMP_NS, estimate), node='/mv/drag')}
-    assert topics == {'/mv/drag/speed', '/mv/drag/resistance', '/mv/drag/resistance_curve'}
+    names = ('speed', 'resistance', 'resistance_curve', 'forecast', 'forecast_path')
+    assert topics == {f'/mv/drag/{name}' for name in names}
 
 
 def test_a_coastdown_gives_its_curve_and_an_event(estimate: Estimate) -> None:
     event = EndedCoastdown(1, STAMP_NS, 3, EndedBy.TURN, estimate, heading_rad=0.5)
-    curve, note = outputs(event)
+    curve, forecast, path, note = outputs(event)
     assert curve.topic.endswith('/resistance_curve')
+    assert [each.topic for each in (forecast, path)] == [
+        '/coastdown_node/forecast',
+        '/coastdown_node/forecast_path',
+    ]
     assert curve.stamp_ns == STAMP_NS
     read = read_event(note.payload)
     assert read.kind is EventKind.COASTDOWN
@@ -143,8 +151,49 @@ def test_a_coastdown_gives_its_curve_and_an_event(estimate: Estimate) -> None:
     }
 
 
+def test_a_forecast_and_its_path(reference: Any, estimate: Estimate) -> None:
+    forecast = foretell(estimate, Ship.example())
+    ahead = forecast.in_time()
+    places = np.column_stack([3.0 * ahead[:, 4], 4.0 * ahead[:, 4]]) / 5.0
+    stamps = STAMP_NS + np.round(1e9 * ahead[:, 0]).astype(np.int64)
+    path = PathAhead(stamps, places, float(np.arctan2(4.0, 3.0)))
+    *_, rest, where = outputs(Update(STAMP_NS, estimate, forecast, path))
+    cloud = reference.deserialize(rest.type, rest.payload)
+    assert [each.name for each in cloud.fields] == [
+        'time',
+        'speed',
+        'speed_low',
+        'speed_high',
+        'distance',
+        'distance_low',
+        'distance_high',
+    ]
+    assert cloud.row_step == 56 * len(ahead) == len(cloud.data)
+    np.testing.assert_array_equal(cloud.data.view('<f8').reshape(-1, 7), ahead)
+    read = reference.deserialize(where.type, where.payload)
+    last = read.poses[-1]
+    assert (last.pose.position.x, last.pose.position.y) == tuple(places[-1])
+    stamp = last.header.stamp
+    assert stamp.sec * 10**9 + stamp.nanosec == stamps[-1]
+    assert last.pose.orientation.z == pytest.approx(np.sin(0.5 * path.course_rad))
+
+
+def test_a_forecast_is_withdrawn_when_the_coastdown_ends(
+    reference: Any, estimate: Estimate
+) -> None:
+    for event in (
+        Update(STAMP_NS, estimate),  # nothing is left to foretell
+        EndedCoastdown(1, STAMP_NS, 3, EndedBy.ENGINE, estimate),
+        EndedCoastdown(1, STAMP_NS, 3, EndedBy.RESET, None, failure='reset'),
+    ):
+        found = {each.topic.rpartition('/')[2]: each for each in outputs(event)}
+        rest, where = found['forecast'], found['forecast_path']
+        assert reference.deserialize(rest.type, rest.payload).width == 0
+        assert reference.deserialize(where.type, where.payload).poses == []
+
+
 def test_a_coastdown_without_estimate_says_why() -> None:
-    (note,) = outputs(EndedCoastdown(1, 2, None, EndedBy.GIVEN, None, failure='too short'))
+    *_, note = outputs(EndedCoastdown(1, 2, None, EndedBy.GIVEN, None, failure='too short'))
     assert 'too short' in read_event(note.payload).text
 
 

@@ -4,29 +4,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from rclpy.logging import get_logger
 
 from shipdrag_ros.coastdown.events import Dismissal, NotCoastdown
+from shipdrag_ros.messages.heard import ERROR, OK, WARN
 from shipdrag_ros.node.announcer import Announcer, line_of
-from shipdrag_ros.node.judging import Finding, Level
+from shipdrag_ros.node.health import InputState
+from shipdrag_ros.node.judging import Finding, InputFacts
 
 
-def seen(name: str, level: Level, text: str, *, age_s: float | None = 0.1) -> Any:
-    """Return an input as the announcer looks at it."""
-    return SimpleNamespace(
-        topic=SimpleNamespace(name=name, age_s=age_s), finding=Finding(level, text)
-    )
+def seen(name: str, level: int, text: str, *, age_s: float | None = 0.1) -> InputState:
+    """Return an input as it was judged."""
+    return InputState(InputFacts(name, age_s=age_s), Finding(level, text), rate_hz=1.0)
 
 
 def test_an_input_that_is_worse_is_logged_once(capfd: pytest.CaptureFixture[str]) -> None:
     announcer = Announcer(get_logger('announcer_of_a_test'))
-    well = seen('speed_through_water', Level.OK, 'receiving')
-    stuck = seen('position', Level.ERROR, 'it is stuck')
-    never = seen('depth', Level.WARN, 'no publisher', age_s=None)
+    well = seen('speed_through_water', OK, 'receiving')
+    stuck = seen('position', ERROR, 'it is stuck')
+    never = seen('depth', WARN, 'no publisher', age_s=None)
     for _ in range(3):
         announcer.inputs([well, stuck, never])
     lines = [line for line in capfd.readouterr().err.splitlines() if 'announcer_of_a_test' in line]

@@ -36,6 +36,8 @@ TYPES = {
     'speed': 'geometry_msgs/msg/TwistWithCovarianceStamped',
     'resistance': 'geometry_msgs/msg/AccelWithCovarianceStamped',
     'resistance_curve': 'sensor_msgs/msg/PointCloud2',
+    'forecast': 'sensor_msgs/msg/PointCloud2',
+    'forecast_path': 'nav_msgs/msg/Path',
     'events': 'diagnostic_msgs/msg/DiagnosticArray',
 }
 
@@ -89,6 +91,7 @@ def test_live_figures_are_recorded_and_replayed(
     start_node: Any, peer: Any, diagnostics: Any, tmp_path: Path
 ) -> None:
     from geometry_msgs.msg import AccelWithCovarianceStamped, TwistWithCovarianceStamped
+    from nav_msgs.msg import Path as Ahead
     from rclpy.serialization import deserialize_message
     from sensor_msgs.msg import PointCloud2
 
@@ -109,12 +112,16 @@ def test_live_figures_are_recorded_and_replayed(
     peer.spin_for(0.5)
 
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    for name in ('speed', 'resistance', 'resistance_curve'):
+    for name in ('speed', 'resistance', 'resistance_curve', 'forecast', 'forecast_path'):
         assert len(heard[name]) > 20
         assert heard[name] == [
             on_the_wire(payload) for payload in recorded(bag, f'/coastdown_node/{name}')
         ]
     assert heard['resistance_curve'][-2] == late[0]
+    *_, made, withdrawn = (deserialize_message(each, PointCloud2) for each in heard['forecast'])
+    assert made.width > 0 == withdrawn.width
+    *_, made, withdrawn = (deserialize_message(each, Ahead) for each in heard['forecast_path'])
+    assert len(made.poses) > 0 == len(withdrawn.poses)
     kinds = [read_event(payload).kind for payload in heard['events']]
     # first what is too vague to be given, and says so
     vague = kinds.count(EventKind.NO_ESTIMATE)

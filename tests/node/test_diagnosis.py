@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from dataclasses import replace
@@ -10,13 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import make_reader
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import EndedCoastdown
-from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
+from shipdrag_ros.diagnosis import CoastRun, diagnose
+from shipdrag_ros.diagnosis.document import document
 from shipdrag_ros.diagnosis.words import sentence
+from shipdrag_ros.display import json_text
 from shipdrag_ros.estimation import Window
+from shipdrag_ros.messages import types
 from shipdrag_ros.node.diagnosing import Diagnosing, DiagnosisState, DiagnosisStatus
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import coast_windows, replay
@@ -36,6 +41,7 @@ SETTINGS = {
 }
 PARAMETERS = Parameters.from_mapping(SETTINGS, subject='test')
 SHIP = Ship.load(SHIP_FILE)
+TOPIC = '/coastdown_node/diagnosis'
 SPEED = 120.0  # times as fast as life
 WITHIN_S = 400.0  # the first diagnosis of a machine compiles
 
@@ -99,12 +105,12 @@ def test_node_names_what_is_missing_as_the_verb_does(
     peer.player.connect(block)
     peer.player.play(block, speed=SPEED)
 
-    def verdict() -> Any:
-        status = diagnostics.of('diagnosis')
-        return status if status is not None and 'verdict' in values_of(status) else None
-
-    status = peer.spin_until(verdict, within_s=WITHIN_S)
-    assert 'Missing in the model: current' in status.message
+    heard = peer.listen(TOPIC, 'std_msgs/msg/String', latched=True)
+    (told,) = peer.spin_until(lambda: heard, within_s=WITHIN_S)
+    status = diagnostics.wait_for('diagnosis', 'Missing in the model: current')
+    late = peer.listen(TOPIC, 'std_msgs/msg/String', latched=True)
+    peer.spin_until(lambda: late)  # who joins late gets it too
+    assert late == heard
     assert node.stop() == 0
 
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
@@ -112,15 +118,22 @@ def test_node_names_what_is_missing_as_the_verb_does(
     assert result.recorded.first_difference is None
     assert result.recorded.compared == result.recorded.identical > 60
     ((_, window),) = coast_windows(result)
-    found = diagnose([CoastRun('', window)], result.ship, result.parameters)
+    found = diagnose([CoastRun('the coastdown', window)], result.ship, result.parameters)
     assert status.message == sentence(found)
     assert status.level == b'\x01'
-    values = values_of(status)
-    size = found.effects[0].parameters['along_track_m_s']
-    assert values['current, along_track_m_s [m/s]'] == f'{size.value:.6g}'
-    assert values['standard deviation of current, along_track_m_s [m/s]'] == f'{size.sd:.6g}'
-    assert values['verdict'] == 'named'
+    assert values_of(status)['verdict'] == 'named'
     assert 'diagnosis: Missing in the model: current' in node.log
+    # the document of the verb to the last digit, on the topic and in the bag
+    expected = json.loads(json_text(document(found, result.ship)))
+    answer = json.loads(told.data)
+    assert answer.pop('coastdown')['end_ns'] == int(values_of(status)['end of the coastdown [ns]'])
+    assert answer.pop('caveat') == ''
+    assert answer == expected
+    with bag.open('rb') as file:
+        recorded = [each for _, _, each in make_reader(file).iter_messages(topics=[TOPIC])]
+    assert [types.deserialize('std_msgs/msg/String', each.data).data for each in recorded] == [
+        told.data
+    ]
 
 
 def test_monitor_hands_out_what_a_replay_reads_again() -> None:
@@ -145,7 +158,7 @@ def test_nothing_hidden_gives_no_warning() -> None:
     assert diagnosing.status.state is DiagnosisState.RUNNING
     status = result_of(diagnosing)
     assert status.found is not None
-    assert status.found.verdict is Verdict.NONE
+    assert status.found['verdict'] == 'none'
 
 
 def test_too_little_steady_record_is_told() -> None:

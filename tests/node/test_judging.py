@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from shipdrag_ros.errors import ShipdragError
+from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN
 from shipdrag_ros.node.judging import (
     Counts,
     InputFacts,
-    Level,
     Recently,
     behind_others,
     convention_doubt,
@@ -36,46 +36,46 @@ def counts(used: int, **rejected: int) -> Counts:
 
 
 def test_what_is_well_is_receiving() -> None:
-    assert (judge(WELL).level, judge(WELL).text) == (Level.OK, 'receiving')
+    assert (judge(WELL).level, judge(WELL).text) == (OK, 'receiving')
 
 
 @pytest.mark.parametrize(
     ('changed', 'level', 'said'),
     [
-        ({'recent': counts(0, nan=300)}, Level.ERROR, 'none of 300 readings used in 30 s'),
-        ({'recent': counts(0, nan=300)}, Level.ERROR, ': 300 nan; the sensor'),
-        ({'recent': counts(0, frozen=300)}, Level.ERROR, 'it is stuck, look at it'),
-        ({'recent': counts(100, outlier=200)}, Level.ERROR, '33% of 300'),
-        ({'recent': counts(285, absurd=15)}, Level.WARN, '95% of 300'),
-        ({'recent': counts(299, absurd=1)}, Level.OK, 'receiving'),
+        ({'recent': counts(0, nan=300)}, ERROR, 'none of 300 readings used in 30 s'),
+        ({'recent': counts(0, nan=300)}, ERROR, ': 300 nan; the sensor'),
+        ({'recent': counts(0, frozen=300)}, ERROR, 'it is stuck, look at it'),
+        ({'recent': counts(100, outlier=200)}, ERROR, '33% of 300'),
+        ({'recent': counts(285, absurd=15)}, WARN, '95% of 300'),
+        ({'recent': counts(299, absurd=1)}, OK, 'receiving'),
         (
             {'recent': counts(0, future=300), 'offset_s': -3600.0},
-            Level.ERROR,
+            ERROR,
             'its clock is 3600.0 s ahead of that of this computer',
         ),
-        ({'recent': Counts(300, 1, {'duplicate': 299}, 0, 300)}, Level.ERROR, 'holds no time'),
-        ({'recent': Counts(300, 300, {}, 7)}, Level.WARN, '7 messages lost in 30 s'),
-        ({'recent': counts(3)}, Level.WARN, '0.1 Hz is too slow'),
-        ({'behind': ('position', 6.0)}, Level.WARN, '6.0 s behind those of position'),
-        ({'behind': ('position', 1.0)}, Level.OK, 'receiving'),
-        ({'offset_s': 8.0}, Level.WARN, '8.0 s behind that of this computer'),
-        ({'senders': ('/a', '/a', '/b')}, Level.WARN, '3 publishers, /a 2 times, /b'),
-        ({'age_s': None}, Level.WARN, 'no data'),
-        ({'age_s': 99.0}, Level.STALE, 'no data for 99 s'),
-        ({'age_s': 99.0, 'senders': ()}, Level.STALE, 'no publisher any more'),
-        ({'type': None, 'age_s': None, 'senders': ()}, Level.WARN, 'no publisher'),
+        ({'recent': Counts(300, 1, {'duplicate': 299}, 0, 300)}, ERROR, 'holds no time'),
+        ({'recent': Counts(300, 300, {}, 7)}, WARN, '7 messages lost in 30 s'),
+        ({'recent': counts(3)}, WARN, '0.1 Hz is too slow'),
+        ({'behind': ('position', 6.0)}, WARN, '6.0 s behind those of position'),
+        ({'behind': ('position', 1.0)}, OK, 'receiving'),
+        ({'offset_s': 8.0}, WARN, '8.0 s behind that of this computer'),
+        ({'senders': ('/a', '/a', '/b')}, WARN, '3 publishers, /a 2 times, /b'),
+        ({'age_s': None}, WARN, 'no data'),
+        ({'age_s': 99.0}, STALE, 'no data for 99 s'),
+        ({'age_s': 99.0, 'senders': ()}, STALE, 'no publisher any more'),
+        ({'type': None, 'age_s': None, 'senders': ()}, WARN, 'no publisher'),
         (
             {'type': None, 'age_s': None, 'senders': (), 'needed': False},
-            Level.OK,
+            OK,
             'no publisher',
         ),
-        ({'misfit': 'DURABILITY'}, Level.WARN, 'its DURABILITY QoS does not fit'),
-        ({'doubt': 'it is off'}, Level.WARN, 'it is off'),
+        ({'misfit': 'DURABILITY'}, WARN, 'its DURABILITY QoS does not fit'),
+        ({'doubt': 'it is off'}, WARN, 'it is off'),
     ],
 )
-def test_what_is_wrong_is_said(changed: dict[str, Any], level: Level, said: str) -> None:
+def test_what_is_wrong_is_said(changed: dict[str, Any], level: int, said: str) -> None:
     found = judge(replace(WELL, **changed))
-    assert found.level is level
+    assert found.level == level
     assert said in found.text
 
 
@@ -83,7 +83,7 @@ def test_a_type_whose_package_is_not_here_says_what_to_install() -> None:
     dvl = 'marine_acoustic_msgs/msg/Dvl'
     facts = InputFacts('speed_over_ground', needed=True, other_types=(dvl,), absent=(dvl,))
     finding = judge(facts)
-    assert finding.level is Level.ERROR
+    assert finding.level == ERROR
     assert finding.text.endswith('its package is not here: install marine_acoustic_msgs')
 
 
@@ -99,13 +99,13 @@ def test_a_class_of_a_package_that_is_not_here_is_told() -> None:
 
 def test_context_may_be_worse_than_motion() -> None:
     rudder = replace(WELL, name='rudder', needed=False)
-    assert judge(replace(rudder, recent=counts(100, nan=200))).level is Level.WARN
-    assert judge(replace(rudder, recent=counts(0, nan=200))).level is Level.ERROR
+    assert judge(replace(rudder, recent=counts(100, nan=200))).level == WARN
+    assert judge(replace(rudder, recent=counts(0, nan=200))).level == ERROR
 
 
 def test_the_gravest_comes_first_and_none_is_left_out() -> None:
     found = judge(replace(WELL, senders=('/a', '/b'), recent=counts(0, nan=30)))
-    assert found.level is Level.ERROR
+    assert found.level == ERROR
     assert found.text.startswith('none of 30')
     assert '2 publishers' in found.text
 

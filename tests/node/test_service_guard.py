@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from time import monotonic
+
 import pytest
 
 pytest.importorskip('rclpy')
@@ -51,11 +53,13 @@ def test_each_service_refuses_in_its_own_words(kind: type) -> None:
     request = kind.Request()
     if hasattr(request, 'parameters'):
         request.parameters = [Parameter(name='a'), Parameter(name='b')]
-    responses = [service.callback(request, kind.Response()) for _ in range(500)]
-    _, at_once = TRIGGERS if kind is Trigger else CHANGES
-    assert service.answered in (int(at_once), int(at_once) + 1)
-    assert len(warned) == 1
-    last = responses[-1]
+    per_second, at_once = TRIGGERS if kind is Trigger else CHANGES
+    began_s = monotonic()
+    while not warned:
+        last = service.callback(request, kind.Response())
+        assert service.answered <= 500
+    later = per_second * (monotonic() - began_s)  # allowed meanwhile, on a busy machine
+    assert at_once <= service.answered <= at_once + later + 1
     if kind is SetParameters:
         assert [one.successful for one in last.results] == [False, False]
     elif kind is SetParametersAtomically:
@@ -66,11 +70,12 @@ def test_each_service_refuses_in_its_own_words(kind: type) -> None:
 
 def test_what_only_reads_may_be_asked_more_often() -> None:
     for kind in (GetParameters, ListParameters):
-        service = Served(kind)
-        limit_services([service], print)
+        service, warned = Served(kind), []
+        limit_services([service], warned.append)
         for _ in range(150):
             service.callback(kind.Request(), kind.Response())
         assert service.answered == 150
-        refused = [service.callback(kind.Request(), kind.Response()) for _ in range(500)]
-        assert service.answered < 300
-        assert refused[-1] == kind.Response()  # nothing, which can be sent
+        while not warned:
+            last = service.callback(kind.Request(), kind.Response())
+            assert service.answered <= 5000
+        assert last == kind.Response()  # nothing, which can be sent

@@ -12,7 +12,7 @@ import yaml
 
 from shipdrag_ros.errors import ParameterError
 from shipdrag_ros.messages import TOPICS
-from shipdrag_ros.node.settings import SETTINGS, NodeSettings, parameters_file
+from shipdrag_ros.node.settings import KEYS, START_ONLY, NodeSettings, parameters_file
 from shipdrag_ros.parameters import Parameters
 
 ROOT = Path(__file__).parents[2]
@@ -23,7 +23,7 @@ def settings(**values: object) -> NodeSettings:
 
 
 def test_every_parameter_and_input_is_a_setting() -> None:
-    names = {setting.name for setting in SETTINGS}
+    names = set(KEYS)
     assert {field.name for field in fields(Parameters)} <= names
     assert {f'{name}.type' for name in TOPICS} <= names
 
@@ -85,31 +85,30 @@ def test_sources_of_nmea_are_checked() -> None:
 
 
 def test_no_path_or_line_can_be_set_over_a_service() -> None:
-    fixed = {setting.name for setting in SETTINGS if setting.start_only}
-    assert fixed == {
+    assert {
         'ship_file',
         'output_directory',
         'nmea',
         'keep_days',
         'keep_bytes',
         'path_roots',
-    }
+    } == START_ONLY
 
 
 def test_the_launch_file_parses_and_sets_known_parameters() -> None:
     tree = ast.parse((ROOT / 'launch' / 'coastdown.launch.py').read_text())
     dicts = [node for node in ast.walk(tree) if isinstance(node, ast.Dict)]
     names = {key.value for node in dicts for key in node.keys if isinstance(key, ast.Constant)}
-    assert names - {'use_sim_time'} <= {setting.name for setting in SETTINGS}
+    assert names - {'use_sim_time'} <= set(KEYS)
     assert {'ship_file', 'output_directory', 'autostart'} <= names
 
 
 def test_a_former_name_is_accepted_and_listed_nowhere() -> None:
-    (estimator,) = [setting for setting in SETTINGS if setting.name == 'estimator']
+    estimator = KEYS['estimator'].kind
     assert 'warped' not in estimator.choices
     problems: list[str] = []
-    assert estimator.key.kind.read('warped', 'estimator', problems) == 'warped'
+    assert estimator.read('warped', 'estimator', problems) == 'warped'
     assert problems == []
-    estimator.key.kind.read('kalman', 'estimator', problems)
+    estimator.read('kalman', 'estimator', problems)
     assert 'log_time' in problems[0]
     assert 'warped' not in problems[0]

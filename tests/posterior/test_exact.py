@@ -81,7 +81,7 @@ def test_a_linear_model_has_its_closed_form() -> None:
     noise = Noise(np.full(n, variance), WHITE, ones, ones)
     families = Families(mean[None], 1.0 / sd[None] ** 2, np.zeros(1))
     table = np.concatenate([value[None], columns])
-    step, covariance, weight = mix(table, rows, noise, 0, SENSORS_ALONE, families)
+    step, covariance, weight = mix(table, rows, noise, 0, SENSORS_ALONE, families, families)
     exact = np.linalg.inv(columns @ columns.T / variance + np.diag(sd**-2.0))
     np.testing.assert_allclose(covariance, exact, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(

@@ -36,9 +36,10 @@ def found(ship: Ship) -> Estimate:
     return estimate_final(window_of(ship, seed=1), ship, ONE)
 
 
-def test_live_and_final_are_one(ship: Ship, found: Estimate) -> None:
+def test_live_and_final_agree(ship: Ship, found: Estimate) -> None:
     live = estimate(window_of(ship, seed=1), ship, ONE)
-    np.testing.assert_array_equal(live.curve.resistance_m_s2, found.curve.resistance_m_s2)
+    r, sigma = at(found, SPEEDS)
+    assert np.all(np.abs(at(live, SPEEDS)[0] - r) < 0.2 * sigma)
     assert found.estimator == live.estimator == 'one'
 
 

@@ -69,7 +69,8 @@ def test_a_figure_that_differs_is_shown(recording: tuple[Path, list[Event]]) -> 
         for each in outputs(event):
             comparison.add(each)
     found = comparison.finish()
-    assert found.compared - found.identical == 2  # and the final curve, which was not given
+    # and the final curve and both withdrawals, which were not given
+    assert found.compared - found.identical == 4
     assert found.largest_difference == np.inf  # of that curve
     assert found.first_difference is not None
     assert 'replayed 0.125 m/s^2' in found.first_difference

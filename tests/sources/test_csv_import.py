@@ -22,8 +22,12 @@ from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel, concatenate
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.sources.formats.csv.columns import parse_input, parse_time
-from shipdrag_ros.sources.formats.csv.importer import BASE_NS, TableColumns, read_csv
-from shipdrag_ros.sources.formats.csv.result import TableResult
+from shipdrag_ros.sources.formats.csv.importer import (
+    BASE_NS,
+    TableColumns,
+    TableResult,
+    read_csv,
+)
 from shipdrag_ros.sources.table import LogTable
 
 from .conftest import into_bag

@@ -33,4 +33,5 @@ def named(name: str) -> Estimator:
     known = DURING if name == 'auto' else FORMER_ESTIMATORS.get(name, name)
     found = import_module(f'{__name__}.{known}').ESTIMATOR
     assert isinstance(found, Estimator)
-    return replace(found, estimate=shielded(found.estimate))
+    live = None if found.live is None else shielded(found.live)
+    return replace(found, estimate=shielded(found.estimate), live=live)

@@ -196,7 +196,7 @@ function showVerdict(part) {
   const shown = [];
   if (part.state === 'done') {
     shown.push(make('p', part.sentence));
-    if (part.sizes.length) shown.push(make('h3', 'How large'), make('ul', part.sizes.map(([name, size]) => make('li', `${name}: ${size}`))));
+    if (part.sizes.length) shown.push(make('h3', 'How large'), make('ul', part.sizes.map(size => make('li', size))));
     // what the sentence says already is not said twice
     const probable = part.probabilities.filter(([name, share]) => share >= 0.005 && !part.sentence.includes(`${name.replaceAll('_', ' ')} (`)).slice(0, 6);
     if (probable.length) shown.push(make('h3', 'How probable'), make('ul', probable.map(([name, share]) => make('li', `${name.replaceAll('_', ' ')}: ${(100 * share).toFixed(0)} %`))));

@@ -68,7 +68,7 @@ def confounders(name: str) -> tuple[str, ...]:
 
 def discriminating_measurements(one: str, other: str) -> tuple[Measure, ...]:
     """
-    Return what separates two look-alikes; nothing: no record can.
+    Return what separates two confounders; nothing: no record can.
     """
     declared = (*LIBRARY[one].confounders.get(other, ()), *LIBRARY[other].confounders.get(one, ()))
     return tuple(dict.fromkeys(declared))

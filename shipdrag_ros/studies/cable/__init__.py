@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drag of a towed cable, and the lines that may replace it: S2."""
 
-from shipdrag_ros.studies.study import Study
+from shipdrag_ros.studies import Study
 
 STUDY = Study(
     'cable',

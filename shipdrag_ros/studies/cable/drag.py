@@ -16,7 +16,6 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shipdrag_ros.display import Table
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.hydrodynamics import ROPES, QuadraticDrag
@@ -178,32 +177,6 @@ class Tangent:
 
     drag: QuadraticDrag
     speed_m_s: float
-
-    def summary(self, tolerance: float = 0.1) -> tuple[str, ...]:
-        """
-        Say which line may replace the drag, and where.
-
-        Parameters
-        ----------
-        tolerance
-            Relative error that it may have.
-        """
-        from shipdrag_ros.studies.cable import words  # it speaks of this module
-
-        return (words.line(self, tolerance),)
-
-    def table(self, tolerance: float = 0.1) -> Table:
-        """
-        Show what the lines err at speeds about V0.
-
-        Parameters
-        ----------
-        tolerance
-            Relative error that the tangent may have.
-        """
-        from shipdrag_ros.studies.cable import words
-
-        return words.errors(self, tolerance)
 
     def __post_init__(self) -> None:
         if not 0.0 < self.speed_m_s < math.inf:

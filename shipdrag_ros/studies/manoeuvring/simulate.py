@@ -8,8 +8,7 @@ import numpy as np
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.studies.manoeuvring.kernel import STATES, Helm, HullModel, follow_columns
-from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre
-from shipdrag_ros.studies.manoeuvring.motion import Motions
+from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, Motions
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
 
 _STEP_S = 0.5  # of the integration; the rudder, quickest of all, is followed exactly
@@ -34,7 +33,6 @@ def steer(
     ship
         What they have in common; they begin in steady sailing at its speed.
     manoeuvre
-        Rudder angles [rad], and the headings [rad] at which they are ordered.
         Rudder angles [rad] and headings [rad] at which they are ordered.
     derivatives : (k, 40), optional
         In the order of `FORM`; those of the ship alone by default.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Residual resistance from shape: the forms of S4, and where they may not be used."""
 
-from shipdrag_ros.studies.study import Study
+from shipdrag_ros.studies import Study
 
 STUDY = Study(
     'residual',

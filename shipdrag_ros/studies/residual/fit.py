@@ -8,17 +8,17 @@ for all others. So what leaves here says where it may be used.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipdrag_ros.display import Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression import Domain, LinearFit, Prediction, least_squares
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.expectations import EXPECTATIONS
 from shipdrag_ros.studies.residual.forms import FORMS, RegressionForm
 from shipdrag_ros.studies.residual.hulls import Hulls
 
@@ -27,6 +27,43 @@ OPEN = 1e-6  # which part of a row the data may leave open: the digits of printe
 FIRM = 2.0  # standard deviations by which a trend must be wrong
 _STEP = 1e-4  # of a ratio, for derivatives
 _ENOUGH = 3  # hulls left out that say how far a new hull scatters
+_HUMP = 0.3  # Froude number of the first hump that a hollow follows
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """
+    A trend that physics gives.
+
+    Attributes
+    ----------
+    text
+        What is expected, to be stated where it is not met.
+    move
+        Multiplies a ratio of hulls, the ratios tied to it along.
+    sign
+        +1 where resistance rises with the ratio, -1 where it falls.
+    froude_max
+        Beyond this nothing is expected.
+
+    Notes
+    -----
+    After Guldhammer and Harvald, Ship Resistance (1974): their diagrams of C_R
+    rise with Fr up to the first hump and fall with L / V^(1/3) throughout, and
+    10^3 C_R rises by 0.16 for each unit of B/T at the same L / V^(1/3).
+    """
+
+    text: str
+    move: Callable[[Hulls, float], Hulls]
+    sign: int
+    froude_max: float = float('inf')
+
+
+EXPECTATIONS = (
+    Expectation(f'rises with Fr below {_HUMP:g}', Hulls.faster, 1, _HUMP),
+    Expectation('falls with L/B at the same B/T and C_B', Hulls.longer, -1),
+    Expectation('rises with B/T at the same slenderness and C_B', Hulls.flatter, 1),
+)
 
 
 @dataclass(frozen=True)
@@ -63,26 +100,27 @@ class ResidualFit:
     left_out: float
     notes: tuple[str, ...]
 
-    def summary(self, target: str = 'c_R') -> tuple[str, ...]:
+    def to_dict(self) -> dict[str, Any]:
         """
-        Say what was fitted, how well the data determine it, and what must be known of it.
-
-        Parameters
-        ----------
-        target
-            Name of what was measured.
+        Return the document of the fit, as JSON has it.
         """
-        from shipdrag_ros.studies.residual import words  # it shows what this module holds
 
-        return (words.sentence(self, target, ()), words.technical(self), *self.notes)
+        def named(values: Sequence[float]) -> dict[str, float]:
+            return {f'b{i}': value for i, value in enumerate(values)}
 
-    def table(self) -> Table:
-        """
-        Show the coefficients, by the terms that they stand before.
-        """
-        from shipdrag_ros.studies.residual import words
-
-        return words.coefficients(self)
+        return {
+            'form': self.form.name,
+            'terms': {f'b{i}': term for i, term in enumerate(self.form.terms)},
+            'coefficients': named(self.fit.coefficients.tolist()),
+            'coefficient_sd': named(self.coefficient_sd.tolist()),
+            'F': self.criterion,
+            'left_out_rms': math.sqrt(self.left_out),
+            'rank': self.fit.rank,
+            'condition': self.fit.condition,
+            'hulls': self.count,
+            'domain': self.domain.ranges,
+            'notes': self.notes,
+        }
 
     @property
     def coefficient_sd(self) -> Float64:

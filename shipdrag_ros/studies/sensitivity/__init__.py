@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which parameters of a simulation matter: S3."""
 
-from shipdrag_ros.studies.study import Study
+from shipdrag_ros.studies import Study
 
 STUDY = Study(
     'sensitivity',

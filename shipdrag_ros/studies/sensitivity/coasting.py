@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -106,23 +106,44 @@ class CoastStudy:
     mimics: tuple[Mimic, ...]
     check: CoastCheck
 
-    def summary(self) -> tuple[str, ...]:
+    def to_dict(self) -> dict[str, Any]:
         """
-        Say what matters most, what was done and what it means, a paragraph each.
+        Return the document of a ship file; no manoeuvre of hers has an overshoot.
         """
-        from shipdrag_ros.studies.sensitivity import (
-            coasting_words as words,  # it speaks of this module
-        )
-
-        return (words.sentence(self), *words.notes(self))
-
-    def table(self) -> Table:
-        """
-        Show what each value does, the most important first.
-        """
-        from shipdrag_ros.studies.sensitivity import coasting_words as words
-
-        return words.loss_table(self)
+        check = self.check
+        return {
+            'manoeuvre': self.coast.name,
+            'loss': {
+                name: {**row, 'mean': mean}
+                for (name, row), mean in zip(self.losses.to_dict().items(), self.mean.tolist())
+            },
+            **asdict(self.selection),
+            'check': {
+                'manoeuvre': check.coast.name,
+                'overshoot_full_deg': [],
+                'overshoot_reduced_deg': [],
+                'rms_difference': {'speed_m_s': check.speed_m_s, 'position_m': check.position_m},
+            },
+            'resistance': {
+                one.particular.key: {
+                    'estimated': one.estimated,
+                    'stated': one.stated,
+                    'know_within': one.tolerable,
+                }
+                for one in self.importance
+            },
+            'mimics': [
+                {
+                    'effect': mimic.effect.name,
+                    'size': mimic.size,
+                    'distance_sd': mimic.distance,
+                    'value': mimic.particular.key,
+                    'wrong_by': mimic.error,
+                    'left': mimic.left,
+                }
+                for mimic in self.mimics
+            ],
+        }
 
     @property
     def mean(self) -> Float64:

@@ -21,6 +21,7 @@ from shipdrag_ros.samples import Float64
 Simulator = Callable[[Float64], Float64]
 
 CHANGES = (0.1, -0.1, 0.5, -0.5)  # of a parameter, relative
+_COLUMNS = ('+10', '-10', '+50', '-50', '+sd', '-sd')  # of a table of losses
 _ROUNDING = 1e-12
 
 
@@ -81,6 +82,15 @@ class Losses:
         if not common.any():
             return np.full(len(self.names), np.nan)
         return np.asarray(self.table[:, common].mean(axis=1))
+
+    def to_dict(self) -> dict[str, dict[str, float]]:
+        """
+        Return the losses of each parameter by the names of the changes, and their mean.
+        """
+        return {
+            name: {**dict(zip(_COLUMNS, row)), 'mean': mean}
+            for name, row, mean in zip(self.names, self.table.tolist(), self.mean.tolist())
+        }
 
     @property
     def ranking(self) -> tuple[str, ...]:

@@ -9,14 +9,19 @@ length.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.display import Table
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, overshoots_rad, turn, zigzag
-from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
+from shipdrag_ros.studies.manoeuvring.manoeuvre import (
+    Manoeuvre,
+    ManoeuvreMotion,
+    overshoots_rad,
+    turn,
+    zigzag,
+)
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
 from shipdrag_ros.studies.manoeuvring.simulate import steer
 from shipdrag_ros.studies.sensitivity.loss import (
@@ -141,21 +146,25 @@ class SteeringStudy:
     group_selection: Selection
     group_check: ReducedModelCheck
 
-    def summary(self) -> tuple[str, ...]:
+    def to_dict(self) -> dict[str, Any]:
         """
-        Say what is kept, what was done and what it means, a paragraph each.
+        Return the document of the analysis, as JSON has it.
         """
-        from shipdrag_ros.studies.sensitivity import steering_words as words  # it speaks of this
-
-        return (words.sentence(self), *words.notes(self))
-
-    def table(self) -> Table:
-        """
-        Show the losses, the most important derivative first.
-        """
-        from shipdrag_ros.studies.sensitivity import steering_words as words
-
-        return words.loss_table(self)
+        full, reduced = self.check.overshoots_rad
+        return {
+            'manoeuvre': self.manoeuvre.name,
+            'loss': self.losses.to_dict(),
+            **asdict(self.selection),
+            'check': {
+                'manoeuvre': self.check.manoeuvre.name,
+                'overshoot_full_deg': np.degrees(full),
+                'overshoot_reduced_deg': np.degrees(reduced),
+                'rms_difference': self.check.rms_difference,
+            },
+            'mean_norm': self.mean_norms.to_dict(),
+            'independent': self.independent,
+            'multiples': self.ship.multiples,
+        }
 
     @property
     def independent(self) -> int:
@@ -188,7 +197,7 @@ class Experiment:
     loss : (p, m)
         Of 10 per cent, root mean square.
     partial_contribution : (p, m)
-        Part of it that no mixture of the other derivatives makes.
+        Part of it that is orthogonal to the responses of all others.
     partial_contribution_together : (p,)
         The same where all manoeuvres are made.
     """
@@ -198,6 +207,15 @@ class Experiment:
     loss: Float64
     partial_contribution: Float64
     partial_contribution_together: Float64
+
+    def to_dict(self) -> dict[str, dict[str, float]]:
+        """
+        Return the loss of each derivative in each manoeuvre, by their names.
+        """
+        manoeuvres = [each.name for each in self.manoeuvres]
+        return {
+            name: dict(zip(manoeuvres, row)) for name, row in zip(self.names, self.loss.tolist())
+        }
 
     @property
     def best(self) -> tuple[Manoeuvre, ...]:

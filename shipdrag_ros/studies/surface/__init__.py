@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Polynomial surfaces of coefficients: S5."""
 
-from shipdrag_ros.studies.study import Study
+from shipdrag_ros.studies import Study
 
 STUDY = Study(
     'surface',

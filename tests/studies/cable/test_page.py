@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from shipdrag_ros.studies.cable import words
+from shipdrag_ros.cli.output import Output
 from shipdrag_ros.studies.cable.drag import Cable, CableSurface, Tangent, tangent_range
-from shipdrag_ros.studies.cable.face import page as cable_page
 from shipdrag_ros.studies.cable.face import pictures as cable_pictures
+from shipdrag_ros.studies.cable.face import verb as words
+from shipdrag_ros.studies.face import show
 
 CABLE = Cable(50.0, 0.1, CableSurface.ROUGH)
 TANGENT = Tangent(CABLE.in_water(1025.0), 2.0)
 
 
 def test_the_page_stands_alone(tmp_path: Path, read_page: Callable[[Path], Any]) -> None:
-    cable_page.write_cable(tmp_path / 'page.html', CABLE, TANGENT, tolerance=0.25)
+    show(Output(), words.shown(CABLE, TANGENT, 0.25), tmp_path / 'page.html')
     page = read_page(tmp_path / 'page.html')
     assert page.links == []
     assert len(page.images) == 2

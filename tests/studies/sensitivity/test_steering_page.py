@@ -7,7 +7,7 @@ import pytest
 
 from shipdrag_ros.studies.manoeuvring.manoeuvre import turn, zigzag
 from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.sensitivity import steering_words as words
+from shipdrag_ros.studies.sensitivity.face import steering as words
 from shipdrag_ros.studies.sensitivity.steering import experiment, study
 
 SHIP = mariner()

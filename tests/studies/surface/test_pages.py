@@ -8,15 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipdrag_ros.cli.output import Output
 from shipdrag_ros.regression import Prediction, Surface, fit_surface
 from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual import words
-from shipdrag_ros.studies.residual.face import page as residual_page
+from shipdrag_ros.studies.face import show
+from shipdrag_ros.studies.residual.face import verb as words
 from shipdrag_ros.studies.residual.fit import ResidualFit, fit_residual
 from shipdrag_ros.studies.residual.hulls import Hulls
-from shipdrag_ros.studies.surface.face import page as surface_page
 from shipdrag_ros.studies.surface.face import pictures as fit_pictures
+from shipdrag_ros.studies.surface.face import verb as surface_words
 
 REFUSED = Prediction(1.5, float('inf'), ('x 9 is outside <0..1> of the data',))
 
@@ -61,15 +62,10 @@ def test_cells_of_predictions() -> None:
 def test_page_of_a_surface(variables: int, tmp_path: Path) -> None:
     found, values = surface(variables)
     page = tmp_path / 'page.html'
-    surface_page.write_surface(
-        page,
-        found,
-        source='forces.csv',
-        target='c<x>',
-        points=points(variables),
-        values=values,
-        predictions=[REFUSED],
+    shown = surface_words.shown(
+        found, points(variables), values, [REFUSED], target='c<x>', source='forces.csv'
     )
+    show(Output(), shown, page)
     text = page.read_text()
     # a map can be drawn over two inputs alone
     assert text.count('data:image/svg+xml') == (3 if variables == 2 else 2)
@@ -81,9 +77,8 @@ def test_page_of_a_surface(variables: int, tmp_path: Path) -> None:
 def test_page_of_a_regression(residual: tuple[ResidualFit, Float64], tmp_path: Path) -> None:
     found, values = residual
     page = tmp_path / 'page.html'
-    residual_page.write_residual(
-        page, found, source='models.csv', target='c_R', values=values, predictions=[REFUSED]
-    )
+    shown = words.shown(found, [REFUSED], values, target='c_R', source='models.csv')
+    show(Output(), shown, page)
     text = page.read_text()
     assert text.count('data:image/svg+xml') == 2
     assert 'Of 1 predictions 0 may be used' in text
@@ -99,9 +94,8 @@ def test_hulls_that_others_leave_open_have_no_picture(
     few = np.arange(len(values)) < 36
     nine = fit_residual(found.hulls.take(few), values[few], form='sirotina')
     page = tmp_path / 'page.html'
-    residual_page.write_residual(
-        page, nine, source='models.csv', target='c_R', values=values[few], predictions=[]
-    )
+    shown = words.shown(nine, [], values[few], target='c_R', source='models.csv')
+    show(Output(), shown, page)
     text = page.read_text()
     assert text.count('data:image/svg+xml') == 1
     assert 'open' in [row[2] for row in words.coefficients(nine).rows]

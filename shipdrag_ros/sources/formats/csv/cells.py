@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What may stand in a cell: a number with a point or a comma, or a coordinate."""
+"""What may stand in a cell: a number, a coordinate, a date or a count of the time."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from enum import Enum
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta, timezone, tzinfo
 from math import cos, hypot, pi, remainder, sin
+from zoneinfo import ZoneInfo
 
 import numpy as np
 
 from shipdrag_ros.display import NUMBER
-from shipdrag_ros.samples import Float64
+from shipdrag_ros.errors import ImportDataError
+from shipdrag_ros.samples import SECOND_NS, Float64
+from shipdrag_ros.sources.formats.csv.columns import Form
+from shipdrag_ros.sources.log import LIMIT_NS
+from shipdrag_ros.sources.table import Cells, texts_of
 
 _PLAIN = frozenset('0123456789+-.eE')
 _COMMA = re.compile(r'[-+]?(\d+,\d*|,\d+)([eE][-+]?\d{1,4})?')
@@ -32,43 +38,97 @@ class BadCell(Exception):
         self.cell = cell
 
 
-class Form(Enum):
-    """How the columns of an input make its value."""
-
-    PLAIN = 'plain'
-    HYPOT = 'hypot'  # a speed from two components
-    POLAR = 'polar'  # apparent wind: speed, and where it comes from, clockwise from ahead
-    COMPASS = 'compass'  # deg clockwise from north
-
-
-def number(cell: str) -> float:
+@dataclass(frozen=True)
+class CellReader:
     """
-    Read a number with a decimal point.
+    Reads the cells of a column as numbers.
 
-    Raises
-    ------
-    BadCell
-        If it is none.
+    Attributes
+    ----------
+    comma
+        Whether they have a decimal comma; one without comma and point is a number too.
+    side
+        'NS' of latitudes, 'EW' of longitudes [deg], with or without a letter; '' of others.
+    minutes
+        Whether these are degrees and minutes written as one number, ddmm.mmmm.
     """
-    if not cell:
-        raise BadCell('empty', cell)
-    if not NUMBER.fullmatch(cell):
-        raise BadCell('not a number', cell)
-    return float(cell)
+
+    comma: bool = False
+    side: str = ''
+    minutes: bool = False
+
+    def one(self, cell: str) -> float:
+        """
+        Read a cell.
+
+        Raises
+        ------
+        BadCell
+            If it holds no usable number.
+        """
+        if not cell:
+            raise BadCell('empty', cell)
+        if self.comma and not self.side and '.' in cell:
+            raise BadCell('a point where others have a decimal comma', cell)
+        text = cell.replace(',', '.', 1) if self.comma else cell
+        if self.side:
+            return _coordinate(text.strip().upper(), self.side, self.minutes, cell)
+        if not NUMBER.fullmatch(text):
+            raise BadCell('not a number', cell)
+        return float(text)
+
+    def all(self, cells: Cells, bad: dict[int, BadCell]) -> Float64:
+        """
+        Return (n,) numbers, NaN where there is none.
+
+        Parameters
+        ----------
+        cells : (n,)
+            Of a column.
+        bad
+            Filled with why, by the place of a cell that holds none.
+        """
+        if isinstance(cells, np.ndarray):
+            if not self.minutes:
+                return self._of_numbers(cells.astype(np.float64), bad)
+            cells = texts_of(cells)
+        if not (self.comma or self.side) and _PLAIN.issuperset(''.join(cells)):
+            with suppress(ValueError):  # an empty cell for instance
+                found = np.array([float(cell) for cell in cells])
+                if np.isfinite(found).all():
+                    return found
+        found = np.full(len(cells), np.nan)
+        for place, cell in enumerate(cells):
+            try:
+                found[place] = self.one(cell)
+            except BadCell as error:
+                bad.setdefault(place, error)
+        return found
+
+    def _of_numbers(self, values: Float64, bad: dict[int, BadCell]) -> Float64:
+        good = np.isfinite(values)
+        if self.side:
+            largest = 90.0 if self.side == 'NS' else 180.0
+            good &= np.abs(values) <= (largest if self.side == 'NS' else 2.0 * largest)
+            values = np.where(values > largest, values - 360.0, values)
+        why = 'no latitude and longitude' if self.side else 'not a number'
+        for place in np.flatnonzero(~good).tolist():
+            none = np.isnan(values[place])
+            cell = '' if none else str(values[place])
+            bad.setdefault(place, BadCell('empty' if none else why, cell))
+        return np.where(good, values, np.nan)
 
 
-def number_with_comma(cell: str) -> float:
-    """
-    Read a number with a decimal comma; one without either is a number too.
-
-    Raises
-    ------
-    BadCell
-        If it is none.
-    """
-    if '.' in cell:
-        raise BadCell('a point where others have a decimal comma', cell)
-    return number(cell.replace(',', '.', 1))
+def _coordinate(text: str, side: str, minutes: bool, cell: str) -> float:
+    found = _JOINED.fullmatch(text) if minutes else _PARTED.fullmatch(text)
+    if found is not None and not (minutes and found[1] and found[4]):
+        *_, whole, rest, letter = found.groups()
+        value = _checked(float(whole), float(rest), letter or side[0], side, cell)
+        return -value if minutes and found[1] == '-' else value
+    found = None if minutes else _DECIMAL.fullmatch(text)
+    if found is None or (found[2] and text[0] in '+-'):
+        raise BadCell('no latitude and longitude', cell)
+    return _checked(float(found[1]), 0.0, found[2] or side[0], side, cell)
 
 
 def has_decimal_commas(cells: Iterable[str]) -> bool:
@@ -88,48 +148,6 @@ def has_decimal_commas(cells: Iterable[str]) -> bool:
             plain += 1
     # a few that are otherwise are damaged, and rejected one by one
     return bool(commas > 1 and parted and 10 * commas >= plain and 50 * points <= commas)
-
-
-def degrees_of(side: str) -> Callable[[str], float]:
-    """
-    Return a reader of latitudes or longitudes in degrees, with or without a letter.
-
-    Parameters
-    ----------
-    side
-        'NS' or 'EW'.
-    """
-
-    def read(cell: str) -> float:
-        text = cell.strip().upper()
-        if not text:
-            raise BadCell('empty', cell)
-        if found := _PARTED.fullmatch(text):
-            return _checked(float(found[1]), float(found[2]), found[3], side, cell)
-        found = _DECIMAL.fullmatch(text)
-        if found is None or (found[2] and text[0] in '+-'):
-            raise BadCell('no latitude and longitude', cell)
-        return _checked(float(found[1]), 0.0, found[2] or side[0], side, cell)
-
-    return read
-
-
-def minutes_of(side: str) -> Callable[[str], float]:
-    """
-    Return a reader of degrees and minutes written as one number, ddmm.mmmm, and a letter.
-    """
-
-    def read(cell: str) -> float:
-        text = cell.strip().upper()
-        if not text:
-            raise BadCell('empty', cell)
-        found = _JOINED.fullmatch(text)
-        if found is None or (found[1] and found[4]):
-            raise BadCell('no latitude and longitude', cell)
-        value = _checked(float(found[2]), float(found[3]), found[4] or side[0], side, cell)
-        return -value if found[1] == '-' else value
-
-    return read
 
 
 def are_in_minutes(latitudes: Iterable[str], longitudes: Iterable[str]) -> bool:
@@ -171,35 +189,6 @@ def _checked(degrees: float, minutes: float, letter: str, side: str, cell: str) 
     return value - 360.0 if value > largest else value
 
 
-def numbers(
-    cells: Sequence[str], read: Callable[[str], float], bad: dict[int, BadCell]
-) -> Float64:
-    """
-    Return (n,) numbers of cells, NaN where there is none.
-
-    Parameters
-    ----------
-    cells
-        Of a column.
-    read
-        Reads one.
-    bad
-        Filled with why, by the place of the first column's cell that holds none.
-    """
-    if read is number and _PLAIN.issuperset(''.join(cells)):
-        with suppress(ValueError):  # an empty cell for instance
-            found = np.array([float(cell) for cell in cells])
-            if np.isfinite(found).all():
-                return found
-    found = np.full(len(cells), np.nan)
-    for place, cell in enumerate(cells):
-        try:
-            found[place] = read(cell)
-        except BadCell as error:
-            bad.setdefault(place, error)
-    return found
-
-
 def combined(form: Form, values: Sequence[Float64]) -> tuple[Float64, Float64]:
     """
     Return the two values (n,) of samples from those of their columns, in SI units.
@@ -207,8 +196,7 @@ def combined(form: Form, values: Sequence[Float64]) -> tuple[Float64, Float64]:
     first = values[0]
     nothing = np.zeros(len(first))
     if form is Form.COMPASS:
-        turns = [remainder(pi / 2.0 - each, 2.0 * pi) for each in _finite(first)]
-        return np.array(turns), nothing
+        return np.array([remainder(each, 2.0 * pi) for each in _finite(pi / 2.0 - first)]), nothing
     if form is Form.HYPOT:
         return np.array([*map(hypot, first, values[1])]), nothing
     if form is Form.POLAR:
@@ -221,3 +209,197 @@ def _finite(values: Float64) -> list[float]:
     """Return numbers that the C library takes; what is none stays none."""
     found: list[float] = np.where(np.isfinite(values), values, np.nan).tolist()
     return found
+
+
+ORDERS = ('ymd', 'dmy', 'mdy')
+"""Of year, month and day in a date."""
+
+_DAY = re.compile(r'(\d{1,4})([-/.])(\d{1,2})\2(\d{1,4})')
+_MIDNIGHT = re.compile(r'00?:00(?::00(?:[.,]0+)?)?')
+_COMPACT = re.compile(r'(\d{4})(\d\d)(\d\d)')
+_CLOCK = re.compile(
+    r'(\d{1,2}):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?(?:\s*([aApP][mM]))?\s*'
+    r'(Z|UTC|GMT|[-+]\d\d:?\d\d|[-+]\d\d)?'
+)
+_IN_TITLE = re.compile(r'(?<!\d)(20\d\d)[-_./]?(\d\d)[-_./]?(\d\d)(?!\d)')
+
+
+@dataclass(frozen=True)
+class DateForm:
+    """
+    How dates are written in a table.
+
+    Attributes
+    ----------
+    order
+        One of `ORDERS`; '' for times of day alone.
+    zone
+        Of times that state none.
+    """
+
+    order: str
+    zone: tzinfo = UTC
+
+    def read(self, text: str) -> int:
+        """
+        Return the time of a cell [ns since 1970], or [ns since midnight] of one without a date.
+
+        Raises
+        ------
+        BadCell
+            If it is none.
+        """
+        if not text:
+            raise BadCell('empty', text)
+        day, clock = parts(text)
+        clock_ns, zone = _clock_ns(clock, text)
+        if not self.order:
+            if day:
+                raise BadCell('a date where others have none', text)
+            return clock_ns
+        year, month, number = _numbers(day, self.order, text)
+        try:
+            midnight = datetime(year, month, number, tzinfo=zone or self.zone)
+            # the zone's offset at the time itself, which a change of the clocks moves
+            local = midnight + timedelta(seconds=clock_ns // SECOND_NS)
+            seconds = int(local.timestamp())
+        except (ValueError, OverflowError):
+            raise BadCell('no possible date', text) from None
+        time_ns = seconds * SECOND_NS + clock_ns % SECOND_NS
+        if not 0 <= time_ns < LIMIT_NS:
+            raise BadCell('no possible date', text)
+        return time_ns
+
+
+def parts(text: str) -> tuple[str, str]:
+    """
+    Split a cell into date and time of day; either may be empty.
+    """
+    day, blank, clock = re.sub(r'(?<=\d)T(?=\d)', ' ', text, count=1).partition(' ')
+    if _DAY.fullmatch(day) or _COMPACT.fullmatch(day):
+        midnight, _, rest = clock.strip().partition(' ')
+        if ':' in rest and _MIDNIGHT.fullmatch(midnight):  # a date of a spreadsheet, and the time
+            return day, rest.strip()
+        return day, clock.strip()
+    if blank and _DAY.fullmatch(clock.strip()):  # the time first
+        return clock.strip(), day
+    return '', text
+
+
+def is_date(text: str) -> bool:
+    """
+    Say whether a cell holds a date, a time of day, or both.
+    """
+    day, clock = parts(text)
+    if day and not _COMPACT.fullmatch(day):
+        return not clock or _CLOCK.fullmatch(clock) is not None
+    return bool(clock) and _CLOCK.fullmatch(clock) is not None
+
+
+def is_midnight(clock: str) -> bool:
+    """
+    Say whether a time of day is midnight or none.
+    """
+    return not clock or _MIDNIGHT.fullmatch(clock) is not None
+
+
+def order_of(texts: Iterable[str], hints: Sequence[str]) -> tuple[str, str]:
+    """
+    Find the order of year, month and day.
+
+    Parameters
+    ----------
+    texts
+        Cells.
+    hints
+        Titles of the table and name of the file, which may hold the date as 20170311.
+
+    Returns
+    -------
+    order, known_by
+        The order is '' where day and month are ambiguous.
+    """
+    days = [day for text in texts if (day := parts(text)[0])]
+    if not days:
+        return '', 'times of day without a date'
+    possible = [order for order in ORDERS if all(_fits(day, order) for day in days)]
+    if len(possible) == 1:
+        return possible[0], 'the dates themselves'
+    for hint in hints:
+        for found in _IN_TITLE.finditer(hint):
+            date = (int(found[1]), int(found[2]), int(found[3]))
+            fitting = [order for order in possible if _numbers(days[0], order, '') == date]
+            if len(fitting) == 1:
+                return fitting[0], f'{found[0]} in {hint.strip("- ")!r}'
+    if not possible:
+        raise ImportDataError(f'the dates, {days[0]!r} for instance, are in no order known here')
+    return '', f'{days[0]!r} is {" or ".join(possible)}'
+
+
+def zone_of(text: str) -> tzinfo:
+    """
+    Read a time zone: `UTC`, `+02:00` or `Europe/Rome`.
+
+    Raises
+    ------
+    ImportDataError
+        If it is none.
+    """
+    found = re.fullmatch(r'([-+])(\d\d):?(\d\d)?', text)
+    if found is not None and int(found[2]) < 24 and int(found[3] or 0) < 60:
+        minutes = 60 * int(found[2]) + int(found[3] or 0)
+        return timezone(timedelta(minutes=-minutes if found[1] == '-' else minutes))
+    try:
+        return ZoneInfo(text)
+    except (OSError, ValueError, KeyError):
+        raise ImportDataError(
+            f'{text!r} is no time zone; give UTC, +02:00 or Europe/Rome'
+        ) from None
+
+
+def _fits(day: str, order: str) -> bool:
+    try:
+        datetime(*_numbers(day, order, day))
+    except (BadCell, ValueError):
+        return False
+    return True
+
+
+def _numbers(day: str, order: str, text: str) -> tuple[int, int, int]:
+    """Return year, month and day of the month."""
+    if found := _COMPACT.fullmatch(day):
+        return int(found[1]), int(found[2]), int(found[3])
+    found = _DAY.fullmatch(day)
+    if found is None:
+        raise BadCell('no date', text)
+    written = dict(zip(order, (found[1], found[3], found[4]), strict=True))
+    year = written['y']
+    if len(year) not in (2, 4) or len(written['d']) > 2 or (order == 'ymd' and len(year) != 4):
+        raise BadCell('no possible date', text)
+    century = 2000 if len(year) == 2 else 0
+    return century + int(year), int(written['m']), int(written['d'])
+
+
+def _clock_ns(text: str, whole: str) -> tuple[int, tzinfo | None]:
+    """Return the time of day [ns], and its zone where it states one."""
+    if not text:
+        return 0, None
+    found = _CLOCK.fullmatch(text)
+    if found is None:
+        raise BadCell('no time of day', whole)
+    hour, minute, second = int(found[1]), int(found[2]), int(found[3] or 0)
+    if found[5]:
+        if not 1 <= hour <= 12:
+            raise BadCell('no time of day', whole)
+        hour = hour % 12 + (12 if found[5].lower() == 'pm' else 0)
+    if hour > 23 or minute > 59 or second > 59:
+        raise BadCell('no time of day', whole)
+    fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
+    zone = found[6]
+    if not zone:
+        known = None
+    elif zone[0] in '+-':
+        known = zone_of(zone)
+    else:
+        known = UTC
+    return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns, known

@@ -10,14 +10,25 @@ from typing import Any
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, Format, Head, Job, Option
-from shipdrag_ros.sources.formats.csv.columns import SPEED_UNITS, parse_input, parse_time
-from shipdrag_ros.sources.formats.csv.dates import ORDERS, zone_of
-from shipdrag_ros.sources.formats.csv.first_rows import FirstRows
-from shipdrag_ros.sources.formats.csv.guess import Guess, guess, is_table
-from shipdrag_ros.sources.formats.csv.guess_time import guessed_time, with_dates
-from shipdrag_ros.sources.formats.csv.importer import TableColumns, read_csv
-from shipdrag_ros.sources.formats.csv.names import role_and_unit
-from shipdrag_ros.sources.formats.csv.result import TableResult
+from shipdrag_ros.sources.formats.csv.cells import (
+    ORDERS,
+    zone_of,
+)
+from shipdrag_ros.sources.formats.csv.columns import (
+    SPEED_UNITS,
+    parse_input,
+    parse_time,
+    role_and_unit,
+)
+from shipdrag_ros.sources.formats.csv.guess import (
+    FirstRows,
+    Guess,
+    guess,
+    guessed_time,
+    is_table,
+    with_dates,
+)
+from shipdrag_ros.sources.formats.csv.importer import TableColumns, TableResult, read_csv
 from shipdrag_ros.sources.log import Log
 from shipdrag_ros.sources.options import RATE
 from shipdrag_ros.sources.table import LogTable

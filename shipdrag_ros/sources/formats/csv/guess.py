@@ -12,25 +12,293 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import tzinfo
 from pathlib import Path
 
 import numpy as np
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import MOTION_INPUTS, Float64
-from shipdrag_ros.sources.formats.csv.agreement import plane_speed, track_speed, unit_of
-from shipdrag_ros.sources.formats.csv.cells import are_in_minutes
+from shipdrag_ros.sources.formats.csv.cells import (
+    BadCell,
+    CellReader,
+    are_in_minutes,
+    has_decimal_commas,
+    is_date,
+    is_midnight,
+    parts,
+)
 from shipdrag_ros.sources.formats.csv.columns import (
     COMPASS,
+    NANOSECONDS,
     SPEED_UNITS,
     InputColumns,
     TimeColumn,
     columns_of,
+    role_and_unit,
 )
-from shipdrag_ros.sources.formats.csv.first_rows import FirstRows, NamedColumn, coordinates
-from shipdrag_ros.sources.formats.csv.guess_time import guessed_time, row_seconds
+from shipdrag_ros.sources.formats.csv.row_clock import RowClock
 from shipdrag_ros.sources.table import LogTable
+
+_STEP_S = 10.0  # over which the way is measured: long against the scatter of a position
+_MOVING_M_S = 0.4
+_FEWEST = 10
+_NEAR = 1.25  # two units differ by 1.7 and more; a current or a log by less than this
+_SPREAD = 1.6  # of the middle half of the ratios
+
+
+def track_speed(time_s: Float64, latitude: Float64, longitude: Float64) -> Float64:
+    """
+    Return (n,) speeds over ground [m/s] around each sample, from positions; NaN where none is.
+
+    Parameters
+    ----------
+    time_s : (n,)
+        Ascending where it can be used [s].
+    latitude, longitude : (n,)
+        [deg].
+    """
+    if not np.isfinite(latitude).any():
+        return np.full(len(time_s), np.nan)
+    radius_m = 6.371e6
+    north = np.radians(latitude) * radius_m
+    east = np.radians(longitude) * radius_m * np.cos(np.radians(np.nanmean(latitude)))
+    return plane_speed(time_s, east, north)
+
+
+def plane_speed(time_s: Float64, x: Float64, y: Float64) -> Float64:
+    """
+    Return (n,) speeds [m/s] around each sample, from (n,) positions [m].
+    """
+    speed = np.full(len(time_s), np.nan)
+    good = np.flatnonzero(np.isfinite(time_s) & np.isfinite(x) & np.isfinite(y))
+    good = (
+        good[np.r_[True, np.diff(np.maximum.accumulate(time_s[good])) > 0.0]]
+        if len(good)
+        else good
+    )
+    if len(good) < 2:
+        return speed
+    time = time_s[good]
+    ends = np.minimum(np.searchsorted(time, time + _STEP_S), len(good) - 1)
+    length_s = time[ends] - time
+    whole = (length_s >= 0.5 * _STEP_S) & (length_s <= 3.0 * _STEP_S)
+    way = np.hypot(x[good][ends] - x[good], y[good][ends] - y[good])
+    middle = good[(np.arange(len(good)) + ends)[whole] // 2]
+    speed[middle] = way[whole] / length_s[whole]
+    return speed
+
+
+def unit_of(values: Float64, track_m_s: Float64, stated: str = '') -> str:
+    """
+    Return the unit in which values agree with speeds over ground; '' where none clearly does.
+
+    Parameters
+    ----------
+    values : (n,)
+        In an unknown unit.
+    track_m_s : (n,)
+        From `track_speed`.
+    stated
+        Unit that may be another than m/s, kn and km/h, which are looked for.
+    """
+    use = np.isfinite(values) & np.isfinite(track_m_s) & (values > 0.0)
+    use &= track_m_s > _MOVING_M_S
+    if use.sum() < _FEWEST:
+        return ''
+    ratio = values[use] / track_m_s[use]
+    low, middle, high = np.quantile(ratio, [0.25, 0.5, 0.75])
+    if high > _SPREAD * low:
+        return ''
+    units = dict.fromkeys(('m/s', 'kn', 'km/h', stated or 'm/s'))
+    off = {unit: abs(np.log(middle * SPEED_UNITS[unit])) for unit in units}
+    nearest = min(off, key=lambda unit: off[unit])
+    return nearest if off[nearest] < np.log(_NEAR) else ''
+
+
+_SAMPLE_ROWS = 20_000
+
+
+@dataclass(frozen=True)
+class NamedColumn:
+    """A column with a role; `key` is its name, or its number where the name is not enough."""
+
+    key: str
+    place: int
+    unit: str
+
+    @property
+    def typed(self) -> str:
+        """As `--map` takes it."""
+        return str(self.place + 1) if set(self.key) & set(',:=') else self.key
+
+
+class FirstRows:
+    """
+    The first rows of a table that has a header.
+
+    Parameters
+    ----------
+    table
+
+    Attributes
+    ----------
+    path, header
+        Of the table.
+    roles
+        Columns by what their names say they are, in their order.
+    """
+
+    def __init__(self, table: LogTable) -> None:
+        assert table.header is not None
+        self.table = table
+        self.path = str(table.path)
+        self.header = table.header
+        self.roles: dict[str, list[NamedColumn]] = {}
+        self._rows = table.first_rows(_SAMPLE_ROWS)
+        for place, name in enumerate(table.header):
+            below = table.units[place] if table.units and place < len(table.units) else ''
+            role, unit = role_and_unit(name, below)
+            key = name if table.header.count(name) == 1 else str(place + 1)
+            if role:
+                self.roles.setdefault(role, []).append(NamedColumn(key, place, unit))
+
+    def texts(self, place: int) -> Sequence[str]:
+        """
+        Return the cells of a column; '' where a row is too short.
+        """
+        return self._rows.texts(place)
+
+    def values(self, place: int) -> Float64:
+        """
+        Return (n,) numbers of a column, NaN where a cell is none.
+        """
+        cells = self._rows.columns[place]
+        comma = not isinstance(cells, np.ndarray) and has_decimal_commas(cells)
+        return CellReader(comma=comma).all(cells, {})
+
+    def coordinates(self, places: Sequence[int]) -> list[Float64]:
+        """
+        Return latitudes and longitudes [deg], (n,) each, NaN where a cell is none.
+        """
+        minutes = are_in_minutes(*map(self.texts, places))
+        return [
+            CellReader(side=side, minutes=minutes).all(self._rows.columns[place], {})
+            for place, side in zip(places, ('NS', 'EW'), strict=True)
+        ]
+
+    def seconds(self, time: TimeColumn | None) -> Float64 | None:
+        """
+        Return (n,) times of the rows from the first one [s], NaN where there is none.
+        """
+        if time is None:
+            return None
+        places = [self.table.column(name) for name in time.names]
+        texts = self._rows.joined(places)
+        try:
+            clock = RowClock.of(time, None, 0, texts, self.table)
+        except ImportDataError:
+            return None
+        bad: dict[int, BadCell] = {}
+        times = clock.times(self._rows.columns[places[0]] if len(places) == 1 else texts, 0, bad)
+        good = np.ones(len(times), np.bool_)
+        good[list(bad)] = False
+        first = times[good.argmax()] if good.any() else 0
+        return np.where(good, (times - first) * 1e-9, np.nan)
+
+    def largest(self, place: int) -> float:
+        """
+        Return the largest size of the numbers of a column; 0 where it has none.
+        """
+        return float(np.nanmax(np.abs(self.values(place)), initial=0.0))
+
+
+_DAYS = 20_000.0  # a spreadsheet's count of days, from 1954 on
+_QUICK_S = 0.002  # of rows a day apart by that, 86400 / 500 s
+
+
+def guessed_time(rows: FirstRows, notes: list[str]) -> TimeColumn:
+    """
+    Find the column of the time; how it is known goes to the notes.
+
+    Raises
+    ------
+    ImportDataError
+        If there is none.
+    """
+    days, times = rows.roles.get('date', []), rows.roles.get('time', [])
+    dated = [each for each in (*times, *days) if _holds_date(rows, each)]
+    if dated:
+        clock = next((each for each in times if each not in dated), None)
+        clocks = [parts(text)[1] for text in rows.texts(dated[0].place)]
+        bare = not any(clocks[:5])
+        if clock is not None and not bare:  # a spreadsheet gives a date a midnight
+            bare = _holds_time_of_day(rows, clock) and all(map(is_midnight, clocks))
+        if bare and clock is not None:
+            return TimeColumn((dated[0].key, clock.key), NANOSECONDS['s'])
+        return TimeColumn((dated[0].key,), NANOSECONDS['s'])
+    if not times:
+        header = ', '.join(map(repr, rows.header))
+        raise ImportDataError(
+            f'{rows.path!r} has no column that is known as a time; it has '
+            f'{header}. Give --time COLUMN[:unit], or --rate HZ'
+        )
+    column = times[0]
+    if column.unit in NANOSECONDS:
+        return TimeColumn((column.key,), NANOSECONDS[column.unit], given=True)
+    return _counted(rows, column, notes)
+
+
+def _holds_date(rows: FirstRows, column: NamedColumn) -> bool:
+    texts = [text for text in rows.texts(column.place)[:200] if text]
+    return bool(texts) and is_date(texts[0]) and bool(parts(texts[0])[0])
+
+
+def _holds_time_of_day(rows: FirstRows, column: NamedColumn) -> bool:
+    texts = [text for text in rows.texts(column.place)[:200] if text]
+    return bool(texts) and is_date(texts[0]) and not parts(texts[0])[0]
+
+
+def _counted(rows: FirstRows, column: NamedColumn, notes: list[str]) -> TimeColumn:
+    """Return a time without a unit; whole numbers in large steps may be milliseconds."""
+    texts = [text for text in rows.texts(column.place) if text]
+    if texts and is_date(texts[0]):
+        return TimeColumn((column.key,), NANOSECONDS['s'])
+    values = rows.values(column.place)
+    values = values[np.isfinite(values)]
+    step = float(np.median(np.diff(values))) if len(values) > 1 else 0.0
+    small = len(values) > 0 and abs(values[0]) < 1e11
+    if column.unit:
+        raise ImportDataError(
+            f'{rows.path!r}: the time {column.key!r} is said to be in '
+            f'{column.unit}; counts are read in {", ".join(NANOSECONDS)}. Write it in one of '
+            'them, or give --rate HZ'
+        )
+    if small and values[0] >= _DAYS and 0.0 < step < _QUICK_S:
+        raise ImportDataError(
+            f'{rows.path!r}: the time {column.key!r} goes by {step:.3g} from '
+            f'{values[0]:.8g}, as the days of a spreadsheet do. Save it as dates; or, if they '
+            f'are seconds, give --time {shlex.quote(column.typed)}:s'
+        )
+    if small and step >= 10.0:
+        raise ImportDataError(
+            f'{rows.path!r}: the unit of the time {column.key!r} is not known; '
+            f'its steps are {step:g}. Give --time {shlex.quote(column.typed)}:ms, or :s'
+        )
+    if small:
+        notes.append(f'The time {column.key!r} states no unit and is taken as s.')
+    return TimeColumn((column.key,), NANOSECONDS['s'])
+
+
+def with_dates(time: TimeColumn | None, order: str, zone: tzinfo | None) -> TimeColumn | None:
+    """
+    Return the column of a time with what was said of its dates.
+    """
+    if time is None:
+        return None
+    return replace(time, order=order or time.order, zone=zone or time.zone)
+
 
 PLAIN_TIMES = ('time', 'time_s', 't', 't_s')
 PLAIN_COLUMNS = {
@@ -191,7 +459,7 @@ class _Guesser:
     def _position(self, time: TimeColumn | None) -> None:
         latitude, longitude = self._one('lat'), self._one('lon')
         x, y = self._one('x'), self._one('y')
-        time_s = row_seconds(self._rows, time)
+        time_s = self._rows.seconds(time)
         if latitude is not None and longitude is not None:
             for unit in (latitude.unit, longitude.unit):
                 if unit in _NO_COORDINATES:
@@ -200,13 +468,8 @@ class _Guesser:
                     )
                     return
             self._take('position', [latitude, longitude], ['deg', 'deg'])
-            texts = [self._rows.texts(each.place) for each in (latitude, longitude)]
-            minutes = are_in_minutes(*texts)
-            values = [
-                coordinates(cells, side, minutes)
-                for cells, side in zip(texts, ('NS', 'EW'), strict=True)
-            ]
             if time_s is not None:
+                values = self._rows.coordinates([latitude.place, longitude.place])
                 self._track = track_speed(time_s, *values)
         elif x is not None and y is not None:
             if x.unit == y.unit and x.unit in ('m', 'km', 'ft', 'nmi'):

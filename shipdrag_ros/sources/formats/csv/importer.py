@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A table of measurements as a bag.
+A table of measurements as samples.
 
 What cannot be read in a cell is counted by reason with its first lines; what
 can be read is written, plausible or not, for the monitor to judge.
@@ -9,44 +9,135 @@ can be read is written, plausible or not, for the monitor to judge.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice, zip_longest
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from shipdrag_ros import strict_yaml
+from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import ABSURD_SPEED_M_S, Block, Channel, Int64
 from shipdrag_ros.sources.formats.csv.cells import (
     BadCell,
+    CellReader,
     are_in_minutes,
     combined,
-    degrees_of,
     has_decimal_commas,
-    minutes_of,
-    number,
-    number_with_comma,
-    numbers,
 )
 from shipdrag_ros.sources.formats.csv.columns import InputColumns, TimeColumn
-from shipdrag_ros.sources.formats.csv.result import TableResult
 from shipdrag_ros.sources.formats.csv.row_clock import BASE_NS, RowClock
-from shipdrag_ros.sources.log import (
-    ATTACHMENT,
-    BATCH_SAMPLES,
-    Log,
-    Rejected,
-    Understood,
-)
-from shipdrag_ros.sources.table import LogRow, LogTable
+from shipdrag_ros.sources.log import ATTACHMENT, Log, Rejected, Understood
+from shipdrag_ros.sources.table import Cells, LogTable, TableRows
+
+
+@dataclass(frozen=True)
+class TableResult:
+    """
+    What became of a table.
+
+    Attributes
+    ----------
+    rows
+        Below the header.
+    left_out
+        Rows that `where` does not choose.
+    written
+        Samples by input; pitches are of `shaft`.
+    rejected
+        By input, or 'time' for a whole row, and reason.
+    start_ns, end_ns
+        First and last time written [ns].
+    base_ns
+        What was added to the times of the table [ns]; None if they are dates.
+    backward
+        Rows whose time is before that of an earlier row; a replay rejects
+        them and says so.
+    repeated
+        Rows whose time is that of the newest row before; a replay rejects them
+        too.
+    delimiter
+        That of the table.
+    header
+        Whether the table has one.
+    understood
+        What each input was taken from.
+    notes
+        What is to be known of it, a sentence each.
+    not_used
+        Columns that nothing is taken from.
+    """
+
+    rows: int
+    left_out: int
+    written: dict[str, int]
+    rejected: dict[str, dict[str, Rejected]]
+    start_ns: int
+    end_ns: int
+    base_ns: int | None
+    backward: int
+    repeated: int
+    delimiter: str
+    header: bool
+    understood: tuple[Understood, ...]
+    notes: tuple[str, ...]
+    not_used: tuple[str, ...]
+
+    def summary(self, bag: Path) -> list[str]:
+        """
+        Say how much was read, and what is to be known of it.
+        """
+        length_s = (self.end_ns - self.start_ns) * 1e-9
+        lines = [
+            f'{bag}: {sum(self.written.values())} messages of {self.rows - self.left_out} rows, '
+            f'{display.duration(length_s)}, from {display.utc(self.start_ns)}'
+        ]
+        if self.base_ns is not None:
+            lines.append(
+                f'The times count from a start; it was put at {display.utc(self.base_ns)}.'
+            )
+        lines += self.notes
+        if self.left_out:
+            lines.append(f'{self.left_out} rows were not chosen by --where.')
+        if self.backward:
+            lines.append(
+                f'In {self.backward} rows the time is before that of an earlier row; a replay '
+                'rejects those.'
+            )
+        if self.repeated:
+            lines.append(
+                f'In {self.repeated} rows the time is that of an earlier row; a replay rejects '
+                'those.'
+            )
+        return lines
+
+    def table(self) -> display.Table:
+        """
+        Return messages by input.
+        """
+        return display.Table(
+            ('input', 'messages'), tuple((name, f'{n}') for name, n in self.written.items())
+        )
+
+    def details(self) -> list[str]:
+        """
+        Say what was not used, and why.
+        """
+        lines = [
+            f'{name}: {rejected.count} cell(s) rejected, {reason}: {", ".join(rejected.first)}'
+            for name, reasons in self.rejected.items()
+            for reason, rejected in reasons.items()
+        ]
+        if self.not_used:
+            lines.append(f'Columns not used: {", ".join(map(repr, self.not_used))}')
+        return lines
+
 
 _FEW = 10
 _SAMPLE_ROWS = 2000  # by which the way of writing is known
 _SPEEDS = (Channel.SPEED_THROUGH_WATER, Channel.SPEED_OVER_GROUND)
-CellReader = Callable[[str], float]
 
 
 @dataclass(frozen=True)
@@ -122,32 +213,19 @@ def read_csv(
     columns.check()
     table = source if isinstance(source, LogTable) else LogTable(source)
     time = columns.time
-    places = [] if time is None else [table.column(name) for name in time.names]
     channels = [each for mapped in columns.inputs for each in mapped.by_channel()]
-    mapped_places = [[table.column(name) for name in each.names] for each in channels]
+    places = [[table.column(name) for name in each.names] for each in channels]
+    time_places = [] if time is None else [table.column(name) for name in time.names]
     chosen = [(table.column(name), text) for name, text in columns.where]
-    sample = list(islice(table.rows(), _SAMPLE_ROWS))
-    texts = [row_text(row, places) for row in sample]
+    sample = table.first_rows(_SAMPLE_ROWS)
+    texts = sample.joined(time_places)
     clock = RowClock.of(time, columns.rate_hz, columns.start_ns, texts, table)
-    record = _RowSamples(
-        list(zip(channels, mapped_places, _readers(channels, mapped_places, sample), strict=True)),
-        chosen,
-        clock,
-        places,
-        table.width,
-    )
+    inputs = zip(channels, places, _readers(channels, places, sample), strict=True)
+    record = _RowSamples(list(inputs), chosen, clock, time_places)
     log.attach(ATTACHMENT, _provenance(table.path, columns))
-    rows = table.rows(progress)
-    while some := list(islice(rows, BATCH_SAMPLES)):
-        log.write_samples(record.take(some))
+    for rows in table.rows(progress):
+        log.write_samples(record.take(rows))
     return record.result(table, log)
-
-
-def row_text(row: LogRow, places: Sequence[int]) -> str:
-    """
-    Return the text of one or two cells of a row, as a date and its time of day stand in them.
-    """
-    return ' '.join(_cell(row, place) for place in places)
 
 
 class _RowSamples:
@@ -159,31 +237,25 @@ class _RowSamples:
         where: Sequence[tuple[int, str]],
         clock: RowClock,
         time_places: Sequence[int],
-        width: int,
     ) -> None:
         self._inputs = inputs
-        self._width = width
         self._where = where
         self._clock = clock
         self._time_places = time_places
         self._too_fast: Counter[Channel] = Counter()
         self._used = {place for _, places, _ in inputs for place in places} | {*time_places}
-        self._rows = 0
-        self._left_out = 0
-        self._backward = 0
-        self._repeated = 0
+        self._rows = self._index = self._left_out = 0
+        self._backward = self._repeated = 0
         self._first_ns: int | None = None
         self._newest_ns = -1
         self._written: Counter[str] = Counter()
         self._rejected: dict[str, dict[str, Rejected]] = {}
-        self._index = 0
         self._seen: dict[str, None] = {}  # a set that keeps the order
 
-    def take(self, rows: Sequence[LogRow]) -> Block:
+    def take(self, rows: TableRows) -> Block:
         """Return the samples of some rows, a row after the other."""
-        rows = self._chosen(rows)
-        times, rows = self._times(rows)
-        n = len(rows)
+        times, rows = self._timed(self._chosen(rows))
+        n, m = len(rows), len(self._inputs)
         if not n:
             return Block.empty()
         if self._first_ns is None:
@@ -193,30 +265,21 @@ class _RowSamples:
         self._backward += int(np.sum(times < before[:-1]))
         self._repeated += int(np.sum(times == before[:-1]))
         self._newest_ns = int(before[-1])
-        wide = [*zip_longest(*(row.cells for row in rows), fillvalue='')]
-        texts = dict(enumerate(wide))
-        nothing = [''] * n
-        value, known = np.zeros((n, len(self._inputs), 2)), np.zeros((n, len(self._inputs)), bool)
+        value, known = np.zeros((n, m, 2)), np.ones((n, m), np.bool_)
         for k, (columns, places, readers) in enumerate(self._inputs):
             bad: dict[int, BadCell] = {}
-            values = []
-            for read, place, factor in zip(readers, places, columns.factors, strict=True):
-                found = numbers(texts.get(place, nothing), read, bad)
-                values.append(found * factor)
-            for i in sorted(bad):
-                self._reject(columns.channel.input, rows[i], bad[i])
-            good = np.ones(n, np.bool_)
-            good[list(bad)] = False
-            made = combined(columns.form, values)
-            value[:, k, 0], value[:, k, 1] = made
-            known[:, k] = good
+            values = [
+                read.all(rows.columns[place], bad) * factor
+                for read, place, factor in zip(readers, places, columns.factors, strict=True)
+            ]
+            for place in sorted(bad):
+                self._reject(columns.channel.input, rows.lines[place], bad[place])
+            known[list(bad), k] = False
+            value[:, k, 0], value[:, k, 1] = combined(columns.form, values)
             if columns.channel in _SPEEDS:
-                count = int(np.sum(np.abs(value[good, k, 0]) > ABSURD_SPEED_M_S))
-                if count:
-                    self._too_fast[columns.channel] = (
-                        self._too_fast.get(columns.channel, 0) + count
-                    )
-            self._written[columns.channel.input] += int(good.sum())
+                fast = np.abs(value[known[:, k], k, 0]) > ABSURD_SPEED_M_S
+                self._too_fast[columns.channel] += int(np.sum(fast))
+            self._written[columns.channel.input] += n - len(bad)
         row, which = np.nonzero(known)
         channel = np.array([columns.channel for columns, _, _ in self._inputs], np.uint8)
         return Block(
@@ -227,31 +290,39 @@ class _RowSamples:
             np.full((len(row), 2), np.nan),
         )
 
-    def _chosen(self, rows: Sequence[LogRow]) -> Sequence[LogRow]:
+    def _chosen(self, rows: TableRows) -> TableRows:
         """Leave out rows without the texts that were asked for."""
         self._rows += len(rows)
         for place, text in self._where:
-            kept = [row for row in rows if _cell(row, place) == text]
-            for row in rows if len(self._seen) < _FEW else ():
-                if _cell(row, place) != text and len(self._seen) < _FEW:
-                    self._seen[_cell(row, place)] = None
-            self._left_out += len(rows) - len(kept)
-            rows = kept
+            cells = np.array(rows.texts(place), object)
+            kept = cells == text
+            for cell in cells[~kept] if len(self._seen) < _FEW else ():
+                if len(self._seen) < _FEW:
+                    self._seen[cell] = None
+            self._left_out += int(np.sum(~kept))
+            rows = rows[kept]
         return rows
 
-    def _times(self, rows: Sequence[LogRow]) -> tuple[Int64, Sequence[LogRow]]:
+    def _timed(self, rows: TableRows) -> tuple[Int64, TableRows]:
         """Return the times of rows, and the rows that have one."""
-        times, kept = [], []
-        for row in rows:
-            try:
-                _check_width(row, self._width)
-                cell = row_text(row, self._time_places).strip()
-                times.append(self._clock.time_ns(self._index, cell))
-                kept.append(row)
-            except BadCell as bad:
-                self._reject('time', row, bad)
-            self._index += 1
-        return np.array(times, np.int64), kept
+        one = len(self._time_places) == 1
+        cells: Cells = [''] * len(rows)
+        if self._time_places:
+            cells = rows.columns[self._time_places[0]] if one else rows.joined(self._time_places)
+        fits = np.ones(len(rows), np.bool_)
+        if rows.beyond:
+            fits = np.array([line not in rows.beyond for line in rows.lines])
+            cells = [cell if fit else '' for cell, fit in zip(cells, fits, strict=True)]
+        bad: dict[int, BadCell] = {}
+        times = self._clock.times(cells, self._index, bad)
+        self._index += len(rows)
+        for place in np.flatnonzero(~fits).tolist():
+            text = rows.beyond[rows.lines[place]]
+            bad[place] = BadCell(f'more than {len(rows.columns)} columns', text)
+        for place in sorted(bad):
+            self._reject('time', rows.lines[place], bad[place])
+        fits[list(bad)] = False
+        return times[fits], rows[fits]
 
     def result(self, table: LogTable, log: Log) -> TableResult:
         """Sum up; ImportDataError if there is nothing."""
@@ -321,48 +392,29 @@ class _RowSamples:
             'times in seconds or in the unit given'
         )
 
-    def _reject(self, name: str, row: LogRow, bad: BadCell) -> None:
+    def _reject(self, name: str, line: int, bad: BadCell) -> None:
         by_reason = self._rejected.setdefault(name, {})
-        by_reason.setdefault(bad.reason, Rejected()).add(row.line, bad.cell)
-
-
-def _cell(row: LogRow, place: int) -> str:
-    return row.cells[place] if place < len(row.cells) else ''
-
-
-def _check_width(row: LogRow, width: int) -> None:
-    """Refuse a row that does not fit the columns, as decimal commas make it."""
-    beyond = [cell for cell in row.cells[width:] if cell]
-    if beyond:
-        raise BadCell(f'more than {width} columns', ','.join(row.cells))
+        by_reason.setdefault(bad.reason, Rejected()).add(line, bad.cell)
 
 
 def _readers(
-    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: Sequence[LogRow]
+    inputs: Sequence[InputColumns], places: Sequence[Sequence[int]], sample: TableRows
 ) -> list[list[CellReader]]:
     """Return what reads the cells of each column, as they are written in the first rows."""
-    cells = {place: [_cell(row, place) for row in sample] for each in places for place in each}
-    plain = number
-    if has_decimal_commas(cell for row in sample for cell in row.cells):
-        plain = number_with_comma
-    found: list[list[CellReader]] = []
+    written = [cells for cells in sample.columns if not isinstance(cells, np.ndarray)]
+    comma = has_decimal_commas(chain.from_iterable(written))
+    found = []
     for columns, here in zip(inputs, places, strict=True):
+        readers = [CellReader(comma=comma)] * len(here)
         if columns.channel is Channel.POSITION_GEODETIC:
-            minutes = are_in_minutes(*(cells[each] for each in here))
-            sides = zip(here, ('NS', 'EW'))
-            found.append([_coordinate(cells[each], s, minutes) for each, s in sides])
-        else:
-            found.append([plain] * len(here))
+            cells = [sample.texts(place) for place in here]
+            minutes = are_in_minutes(*cells)
+            readers = [
+                CellReader(comma=not minutes and has_decimal_commas(each), side=s, minutes=minutes)
+                for each, s in zip(cells, ('NS', 'EW'), strict=True)
+            ]
+        found.append(readers)
     return found
-
-
-def _coordinate(cells: Sequence[str], side: str, minutes: bool) -> CellReader:
-    if minutes:
-        return minutes_of(side)
-    if has_decimal_commas(cells):
-        read = degrees_of(side)
-        return lambda cell: read(cell.replace(',', '.', 1))
-    return degrees_of(side)
 
 
 def _provenance(source: Path, columns: TableColumns) -> str:

@@ -8,14 +8,25 @@ from datetime import UTC
 from decimal import Decimal
 from fractions import Fraction
 from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.samples import SECOND_NS
-from shipdrag_ros.sources.formats.csv.cells import BadCell, has_decimal_commas, number
+from shipdrag_ros.samples import SECOND_NS, Int64
+from shipdrag_ros.sources.formats.csv.cells import (
+    BadCell,
+    CellReader,
+    DateForm,
+    has_decimal_commas,
+    is_date,
+    order_of,
+    parts,
+)
 from shipdrag_ros.sources.formats.csv.columns import NANOSECONDS, TimeColumn
-from shipdrag_ros.sources.formats.csv.dates import DateForm, is_date, order_of, parts
 from shipdrag_ros.sources.log import LIMIT_NS
-from shipdrag_ros.sources.table import LogTable
+from shipdrag_ros.sources.table import Cells, LogTable, texts_of
 
 BASE_NS = 946_684_800 * SECOND_NS
 """2000-01-01, where a time that counts from the start of a test begins."""
@@ -124,7 +135,8 @@ class RowClock:
             return
         for text in texts[:1]:
             try:
-                count = abs(number(self._plain(text)))
+                plain = text.replace(',', '.', 1) if self._comma else text
+                count = abs(CellReader().one(plain))
             except BadCell:
                 continue
             unit = next((unit for unit, least in _COUNTS_FROM if count >= least), 's')
@@ -132,41 +144,77 @@ class RowClock:
                 self._unit_ns = NANOSECONDS[unit]
                 self.notes.append(f'The times are counts of {unit} since 1970, by their size.')
 
-    def _plain(self, cell: str) -> str:
-        return cell.replace(',', '.', 1) if self._comma and '.' not in cell else cell
-
-    def time_ns(self, index: int, cell: str) -> int:
+    def times(self, cells: Cells, first: int, bad: dict[int, BadCell]) -> Int64:
         """
-        Return the time of a row.
+        Return (n,) times of rows [ns].
 
-        Raises
-        ------
-        BadCell
-            If its cell holds none.
+        Parameters
+        ----------
+        cells : (n,)
+            Of the time.
+        first
+            Number of the first row, from 0.
+        bad
+            Filled with why, by the place of a cell that holds none.
         """
         if self._row_ns is not None:
-            time_ns = self._start_ns + round(index * self._row_ns)
-        elif self._dates is not None:
+            parts = range(first, first + len(cells))
+            times = [self._start_ns + round(number * self._row_ns) for number in parts]
+            return np.array(times, np.int64)
+        if self._dates is None and isinstance(cells, np.ndarray):
+            return self._counted(cells, bad)
+        found = np.zeros(len(cells), np.int64)
+        for place, cell in enumerate(texts_of(cells) if isinstance(cells, np.ndarray) else cells):
+            try:
+                found[place] = self._time_ns(cell)
+            except BadCell as error:
+                bad[place] = error
+        return found
+
+    def _time_ns(self, cell: str) -> int:
+        if self._dates is None:
+            time_ns = self._count_ns(cell)
+            self._begin(time_ns)
+            time_ns += self.base_ns or 0
+        else:
             time_ns = self._dates.read(cell)
             if not self._dates.order:
                 time_ns = self._since_midnight(time_ns)
-        else:
-            time_ns = self._counted_ns(cell)
         if not 0 <= time_ns < LIMIT_NS:
             raise BadCell('no possible date', cell)
         return time_ns
 
-    def _counted_ns(self, cell: str) -> int:
-        plain = self._plain(cell)
-        number(plain)
+    def _count_ns(self, cell: str) -> int:
+        plain = cell.replace(',', '.', 1) if self._comma and '.' not in cell else cell
+        CellReader().one(plain)
         exact = Decimal(plain) * self._unit_ns
         if exact.copy_abs() >= LIMIT_NS:
             raise BadCell('no possible date', cell)
-        time_ns = int(exact.to_integral_value())
+        return int(exact.to_integral_value())
+
+    def _begin(self, time_ns: int) -> None:
+        """Say by the first count whether they count from 1970 or from a start."""
         if not self._known:
             self.base_ns = self._start_ns if time_ns < _RELATIVE_BELOW_NS else None
             self._known = True
-        return time_ns + (self.base_ns or 0)
+
+    def _counted(self, counts: NDArray[Any], bad: dict[int, BadCell]) -> Int64:
+        """Return what `_time_ns` makes of the text of each number."""
+        times, exact = _counts_ns(counts, len(str(self._unit_ns)) - 1)
+        for place in np.flatnonzero(~exact).tolist():
+            (cell,) = texts_of(counts[place : place + 1])
+            try:
+                times[place] = self._count_ns(cell)
+            except BadCell as error:
+                bad[place] = error
+        good = np.ones(len(times), np.bool_)
+        good[list(bad)] = False
+        if good.any():
+            self._begin(int(times[good.argmax()]))
+        times += self.base_ns or 0
+        for place in np.flatnonzero(good & ((times < 0) | (times >= LIMIT_NS))).tolist():
+            bad[place] = BadCell('no possible date', str(counts[place]))
+        return times
 
     def _since_midnight(self, of_day_ns: int) -> int:
         """Add the midnights passed: a time of day that goes back by hours is of the next day."""
@@ -176,6 +224,34 @@ class RowClock:
             self._midnights -= 1  # a row from before the midnight behind one from after it
         self._last_of_day_ns = of_day_ns
         return self._start_ns + self._midnights * _DAY_NS + of_day_ns
+
+
+def _counts_ns(counts: NDArray[Any], digits: int) -> tuple[Int64, NDArray[np.bool_]]:
+    """
+    Return counts (n,) of 10^digits ns in ns, and which are exact.
+
+    A number is the one with the fewest decimals that reads back as it, as in its text.
+    """
+    size = np.abs(counts.astype(np.float64))
+    left = size < 2.0**62 / 10.0**digits  # false of NaN
+    if counts.dtype.kind != 'f':
+        return np.where(left, counts, 0).astype(np.int64) * 10**digits, left
+    size = np.where(left, size, 0.0)
+    whole = np.floor(size)
+    part, ns = size - whole, np.zeros(len(counts), np.int64)
+    exact = np.zeros(len(counts), np.bool_)
+    for k in range(digits + 1):
+        decimal = np.rint(part * 10.0**k)
+        fits = left & ~exact & (whole + decimal / 10.0**k == size)
+        ns[fits] = decimal[fits].astype(np.int64) * 10 ** (digits - k)
+        exact |= fits
+    # one of more decimals is rounded, where it is clear to which side
+    fine = part * 10.0**digits
+    near = np.abs(fine - np.rint(fine)) + np.spacing(size) * 10.0**digits < 0.5
+    fits = left & ~exact & near
+    ns[fits] = np.rint(fine[fits]).astype(np.int64)
+    whole_ns = whole.astype(np.int64) * 10**digits
+    return np.where(np.signbit(counts), -1, 1) * (whole_ns + ns), exact | fits
 
 
 def _has_zone(text: str) -> bool:

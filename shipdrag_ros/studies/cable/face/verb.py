@@ -4,19 +4,34 @@
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+from matplotlib.figure import Figure
 
 from shipdrag_ros.cli.arguments import add_json, add_report, number
 from shipdrag_ros.cli.output import Output
-from shipdrag_ros.studies.cable import words
+from shipdrag_ros.display import Section, Table
 from shipdrag_ros.studies.cable.drag import (
+    PUBLISHED_RANGE,
     Cable,
     CableSurface,
     Tangent,
     compare_errors,
+    naive_range_m_s,
+    tangent_error,
     tangent_range,
 )
-from shipdrag_ros.studies.cable.face import page as cable_page
+from shipdrag_ros.studies.cable.face.pictures import coefficient_picture, tangent_picture
+from shipdrag_ros.studies.face import Presentation, show
+
+_FORMULAS = (
+    'Formulas: Akhmedov, Naumov, Linearization of the dependence of the cable hydrodynamic drag '
+    'force from the speed. C V is the force with the same figure C and the speed in m/s, as it is '
+    'met in textbooks.'
+)
+_LINES, _COEFFICIENT = 'The drag, and a line in place of it', 'The coefficient'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -81,10 +96,7 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     cable = Cable(options.length, options.diameter, options.drag)
     tangent = Tangent(cable.in_water(options.density), options.speed)
-    _show(output, cable, tangent, options.tolerance)
-    if options.report is not None:
-        cable_page.write_cable(options.report, cable, tangent, tolerance=options.tolerance)
-        output.log(f'report in {options.report}')
+    show(output, shown(cable, tangent, options.tolerance), options.report)
     output.json(document(cable, tangent, options.tolerance))
     return 0
 
@@ -102,13 +114,128 @@ def document(cable: Cable, tangent: Tangent, tolerance: float) -> dict[str, Any]
     }
 
 
-def _show(output: Output, cable: Cable, tangent: Tangent, tolerance: float) -> None:
-    output.say(words.sentence(cable, tangent))
-    output.say(words.line(tangent, tolerance))
-    output.table(words.facts(cable, tangent, tolerance))
-    output.heading('Errors of the lines')
-    output.table(words.errors(tangent, tolerance))
-    for note in words.notes(cable):
-        output.say(note)
+def shown(cable: Cable, tangent: Tangent, tolerance: float) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+
+    Parameters
+    ----------
+    cable
+    tangent
+        Of its drag.
+    tolerance
+        Relative error that a line may have.
+    """
+
+    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+        lines = (
+            'The drag and two lines in place of it, and by how much these err; shaded: where the '
+            f'tangent errs by {100.0 * tolerance:.3g} % at most.'
+        )
+        measured = 'Drag coefficient of cylinders along the flow, where it was measured.'
+        return {
+            _LINES: [(tangent_picture(tangent, tolerance), lines)],
+            _COEFFICIENT: [(coefficient_picture(cable), measured)],
+        }
+
+    tables = (
+        ('Figures of the cable', facts(cable, tangent, tolerance)),
+        ('Errors of the lines: each over the drag, less one', errors(tangent, tolerance)),
+    )
     area = tangent.drag.drag_area_m2
-    output.say(f'On a ship: shipdrag simulate --effect towed_cable={area:.6g} ...')
+    on_a_ship = f'On a ship: shipdrag simulate --effect towed_cable={area:.6g} ...'
+    return Presentation(
+        'Drag of a towed cable, and a line in place of it',
+        f'{sentence(cable, tangent)} {line(tangent, tolerance)}',
+        [
+            Section(_LINES, tables=tables),
+            Section('Before it is used', lines=(*notes(cable), on_a_ship)),
+            Section(_COEFFICIENT),
+        ],
+        pictures,
+        foot=_FORMULAS,
+    )
+
+
+def sentence(cable: Cable, tangent: Tangent) -> str:
+    """
+    Say what the drag is.
+    """
+    kind = (
+        f'{cable.drag} cable' if isinstance(cable.drag, CableSurface) else 'cable with a stated C0'
+    )
+    return (
+        f'A {kind}, {cable.length_m:g} m by {cable.diameter_m:g} m, towed along the flow at '
+        f'{tangent.speed_m_s:g} m/s: {tangent.drag_n:.4g} N.'
+    )
+
+
+def line(tangent: Tangent, tolerance: float) -> str:
+    """
+    Say which line may replace the drag, and where.
+    """
+    low, high = tangent_range(tolerance)
+    upward = f'to {high * tangent.speed_m_s:.4g} m/s (u = V/V0 from {low:.4f} to {high:.4f})'
+    if not math.isfinite(high):
+        upward = f'on (u = V/V0 from {low:.4f}, without upper end)'
+    return (
+        f'The tangent R = {tangent.gain_n_per_m_s:.4g} N/(m/s) V - {tangent.drag_n:.4g} N is '
+        f'within {100.0 * tolerance:.3g} % of it from {low * tangent.speed_m_s:.4g} m/s {upward}; '
+        'it is never above it.'
+    )
+
+
+def facts(cable: Cable, tangent: Tangent, tolerance: float) -> Table:
+    """
+    Show the figures of a cable.
+    """
+    low, high = tangent_range(tolerance)
+    v0, percent = tangent.speed_m_s, f'{100.0 * tolerance:.3g} %'
+    return Table(
+        ('', ''),
+        (
+            ('length over diameter', f'{cable.slenderness:.5g}'),
+            ('C0, on length times diameter', f'{cable.c0:.5g}'),
+            ('drag area C0 l d', f'{tangent.drag.drag_area_m2:.5g} m²'),
+            ('density of the water', f'{tangent.drag.density_kg_m3:g} kg/m³'),
+            ('drag at V0', f'{tangent.drag_n:.5g} N'),
+            ('slope of the tangent', f'{tangent.gain_n_per_m_s:.5g} N/(m/s)'),
+            (f'tangent within {percent}, u = V/V0', _between(low, high)),
+            (f'tangent within {percent}, V', f'{_between(low * v0, high * v0)} m/s'),
+            (f'C V within {percent}, V', f'{_between(*naive_range_m_s(tolerance))} m/s'),
+        ),
+    )
+
+
+def errors(tangent: Tangent, tolerance: float) -> Table:
+    """
+    Show what the lines err at speeds about V0.
+    """
+    rows = tuple(
+        (
+            f'{u:.4f}',
+            f'{u * tangent.speed_m_s:.3f}',
+            f'{100.0 * naive:+.1f}',
+            f'{100.0 * touching:.1f}',
+        )
+        for u, naive, touching in compare_errors(tangent.speed_m_s, tolerance)
+    )
+    return Table(('u = V/V0', 'V [m/s]', 'C V: error [%]', 'tangent: error [%]'), rows)
+
+
+def notes(cable: Cable) -> tuple[str, ...]:
+    """
+    Say what has to be known before the figures are used.
+    """
+    low, high = PUBLISHED_RANGE
+    at_low, at_high = (f'{100.0 * float(tangent_error(u)):.1f} %' for u in PUBLISHED_RANGE)
+    return (
+        *(f'WARNING: {warning}' for warning in cable.warnings),
+        f'The source states 10 % for u from {low:g} to {high:g}; by its own formula the tangent '
+        f'errs by {at_low} at {low:g} and by {at_high} at {high:g}.',
+        'The drag holds along the flow at large Reynolds numbers, without waves.',
+    )
+
+
+def _between(low: float, high: float) -> str:
+    return f'{low:.5g} to {high:.5g}' if math.isfinite(high) else f'above {low:.5g}'

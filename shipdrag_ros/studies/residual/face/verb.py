@@ -4,25 +4,30 @@
 from __future__ import annotations
 
 import argparse
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
 
 from shipdrag_ros.cli.arguments import add_json, add_report, number, unused_file
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import Section, Table
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression import Prediction
 from shipdrag_ros.regression import words as fit_words
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.numbers import read_numbers
+from shipdrag_ros.studies.face import Presentation, show
 from shipdrag_ros.studies.residual.baseline import with_residual
-from shipdrag_ros.studies.residual.face.page import write_residual
-from shipdrag_ros.studies.residual.fit import AUTO, ResidualFit, fit_residual
+from shipdrag_ros.studies.residual.fit import AUTO, ResidualFit, fit_residual, leave_hulls_out
 from shipdrag_ros.studies.residual.forms import FORMS
 from shipdrag_ros.studies.residual.hulls import OPTIONAL, REQUIRED, Hulls
-from shipdrag_ros.studies.residual.words import coefficients, domain, sentence, technical
+from shipdrag_ros.studies.surface.face.pictures import left_out_picture, residual_picture
 from shipdrag_ros.studies.surface.face.verb import prediction_documents
+
+_FIT = 'The fit'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,47 +103,15 @@ def run(options: argparse.Namespace) -> int:
     values = table.column(options.target)
     found = fit_residual(hulls, values, form=options.form)
     predictions = [] if options.predict is None else _predictions(options.predict, found)
-    _show(output, found, options.target, predictions)
-    if options.report is not None:
-        write_residual(
-            options.report,
-            found,
-            source=f'{options.data.name}, {len(values)} rows',
-            target=options.target,
-            values=values,
-            predictions=predictions,
-        )
-        output.log(f'report in {options.report}')
+    source = f'{options.data.name}, {len(values)} rows'
+    seen = shown(found, predictions, values, target=options.target, source=source)
+    show(output, seen, options.report)
     if ship is not None:
         written = with_residual(ship, found, lcb=options.lcb)
         options.write.write_text(written.to_yaml(), encoding='utf-8')
         output.log(f'ship file with the fitted wave resistance in {options.write}')
-    output.json(document(found, predictions))
+    output.json({**found.to_dict(), 'predictions': prediction_documents(predictions)})
     return 0
-
-
-def document(found: ResidualFit, predictions: Sequence[Prediction]) -> dict[str, Any]:
-    """
-    Return the document of a fit and its predictions.
-    """
-
-    def named(values: Sequence[float]) -> dict[str, float]:
-        return {f'b{i}': value for i, value in enumerate(values)}
-
-    return {
-        'form': found.form.name,
-        'terms': {f'b{i}': term for i, term in enumerate(found.form.terms)},
-        'coefficients': named(found.fit.coefficients.tolist()),
-        'coefficient_sd': named(found.coefficient_sd.tolist()),
-        'F': found.criterion,
-        'left_out_rms': math.sqrt(found.left_out),
-        'rank': found.fit.rank,
-        'condition': found.fit.condition,
-        'hulls': found.count,
-        'domain': found.domain.ranges,
-        'predictions': prediction_documents(predictions),
-        'notes': found.notes,
-    }
 
 
 def _predictions(path: Path, found: ResidualFit) -> list[Prediction]:
@@ -147,17 +120,136 @@ def _predictions(path: Path, found: ResidualFit) -> list[Prediction]:
     return found.predict(Hulls.of(str(path), table.names, table.values))
 
 
-def _show(
-    output: Output, found: ResidualFit, target: str, predictions: Sequence[Prediction]
-) -> None:
-    output.say(sentence(found, target, predictions))
-    output.say(technical(found))
-    output.heading('Coefficients')
-    output.table(coefficients(found))
-    output.heading('Ranges of the data')
-    output.table(domain(found))
+def shown(
+    found: ResidualFit,
+    predictions: Sequence[Prediction],
+    values: Float64,
+    *,
+    target: str,
+    source: str,
+) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+
+    Parameters
+    ----------
+    found
+    predictions
+        May be empty.
+    values : (n,)
+        Measured.
+    target, source
+        What was measured, and where the data come from.
+    """
+
+    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+        drawn = [
+            (
+                residual_picture(values - found.fit.residuals, values, target),
+                'What the form leaves of its own data, a dot a row. Good: dots on both sides of '
+                'the line everywhere; a bow or a slope shows a term that the form lacks.',
+            )
+        ]
+        error, _, leverage = leave_hulls_out(found.form, found.hulls, values)
+        if np.any(np.isfinite(error)):
+            caption = (
+                'Each hull predicted from the others, so the error to expect of a new one. To the '
+                'right of 1 a hull is more unusual (leverage) than any of the others: there the '
+                'form goes beyond its data, and its predictions are marked as not to be used.'
+            )
+            drawn.append((left_out_picture(error, leverage, target), caption))
+        return {_FIT: drawn}
+
+    asked = [('Predictions', fit_words.predictions(predictions))] if predictions else []
+    tables = (
+        *asked,
+        ('Coefficients of the form', coefficients(found)),
+        ('Ranges of the data; outside their convex hull nothing is to be used', domain(found)),
+    )
+    return Presentation(
+        f'{target} by ratios of the hull',
+        sentence(found, target, predictions),
+        [
+            Section(text=(technical(found), what_it_is(target))),
+            Section(
+                'What these data can and cannot show' if found.notes else '', lines=found.notes
+            ),
+            Section(_FIT, tables=tables),
+        ],
+        pictures,
+        source=source,
+    )
+
+
+def sentence(found: ResidualFit, target: str, predictions: Sequence[Prediction]) -> str:
+    """
+    Say in words what was found.
+    """
+    said = (
+        f'{target} by the form of {found.form.name.capitalize()}, fitted to {found.count} hulls, '
+        f'{len(found.hulls)} rows.'
+    )
+    if np.isfinite(found.left_out):
+        said += f' A hull that is left out is missed by {np.sqrt(found.left_out):.2g} (rms).'
     if predictions:
-        output.heading('Predictions')
-        output.table(fit_words.predictions(predictions))
-    for note in found.notes:
-        output.say(f'NOTE: {note}')
+        used = sum(each.inside for each in predictions)
+        said += f' Of {len(predictions)} predictions {used} may be used.'
+    return said
+
+
+def technical(found: ResidualFit) -> str:
+    """
+    Say how well the data determine the form.
+    """
+    rank, count = found.fit.rank, len(found.fit.coefficients)
+    open_ones = '' if rank == count else f': {count - rank} combination(s) of terms stay open'
+    return (
+        f'Residual criterion F = {found.criterion:.4g}; the data determine {rank} of {count} '
+        f'terms{open_ones}; condition {found.fit.condition:.2g}.'
+    )
+
+
+def what_it_is(target: str) -> str:
+    """
+    Say what is fitted, and what the terms are made of.
+
+    Parameters
+    ----------
+    target
+        Name of what was measured.
+    """
+    return (
+        f'{target} is residual resistance, in the measure of the data: what is left when friction '
+        'is taken away, mostly waves. It is a sum of the terms in the table below, each times its '
+        'coefficient. L, B and T are length, breadth and draught, C_B is the block coefficient, '
+        'lcb the place of the centre of buoyancy, psi the slenderness L / V^(1/3), Fr the Froude '
+        'number of the length (Fr_V: of V^(1/3), V the displaced volume).'
+    )
+
+
+def coefficients(found: ResidualFit) -> Table:
+    """
+    Show the coefficients of the form, by the terms that they stand before.
+    """
+    return Table(
+        ('term', 'coefficient', 'sd'),
+        tuple(
+            (term, f'{value:.5g}', f'{sd:.2g}' if np.isfinite(sd) else 'open')
+            for term, value, sd in zip(
+                found.form.terms, found.fit.coefficients, found.coefficient_sd, strict=True
+            )
+        ),
+    )
+
+
+def domain(found: ResidualFit) -> Table:
+    """
+    Show the ranges of the data.
+    """
+    return Table(
+        ('', 'from', 'to'),
+        tuple(
+            (name, f'{low:.4g}', f'{high:.4g}')
+            for name, (low, high) in found.domain.ranges.items()
+        ),
+    )

@@ -11,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE, VERMILION
-from shipdrag_ros.studies.manoeuvring.motion import ManoeuvreMotion
+from shipdrag_ros.studies.manoeuvring.manoeuvre import ManoeuvreMotion
 from shipdrag_ros.studies.manoeuvring.ship import meaning
 from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
 from shipdrag_ros.studies.sensitivity.steering import Experiment, SteeringStudy

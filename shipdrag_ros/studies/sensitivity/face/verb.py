@@ -7,23 +7,19 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from shipdrag_ros.cli.arguments import add_json, add_report
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.ship import Ship
+from shipdrag_ros.studies.face import Presentation, show
 from shipdrag_ros.studies.manoeuvring.manoeuvre import parse
 from shipdrag_ros.studies.manoeuvring.ship import mariner
-from shipdrag_ros.studies.sensitivity import coasting_words, steering_words
 from shipdrag_ros.studies.sensitivity.coast import KIND, SPEED_FRACTION, parse_coast
-from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
-from shipdrag_ros.studies.sensitivity.face import coasting_page, steering_page
-from shipdrag_ros.studies.sensitivity.loss import Losses
-from shipdrag_ros.studies.sensitivity.steering import Experiment, SteeringStudy, experiment, study
+from shipdrag_ros.studies.sensitivity.coasting import study_coast
+from shipdrag_ros.studies.sensitivity.face import coasting, steering
+from shipdrag_ros.studies.sensitivity.steering import experiment, study
 
 _MODELS = {'mariner': mariner}
 _MODEL, _MANOEUVRE, _KEEP = 'mariner', 'zigzag:15', 24
-_COLUMNS = ('+10', '-10', '+50', '-50', '+sd', '-sd')  # of a table of losses
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,124 +65,22 @@ def run(options: argparse.Namespace) -> int:
     Analyse and show it.
     """
     output = Output(options.json)
-    if options.ship is None:
-        _steering(options, output)
-    else:
-        _coasting(options, output)
-    if options.report is not None:
-        output.log(f'report in {options.report}')
+    shown, document = (_steering if options.ship is None else _coasting)(options)
+    show(output, shown, options.report)
+    output.json(document)
     return 0
 
 
-def _steering(options: argparse.Namespace, output: Output) -> None:
+def _steering(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
     ship = _MODELS[options.model or _MODEL]()
     manoeuvre = parse(_MANOEUVRE if options.manoeuvre is None else options.manoeuvre)
     found = study(ship, manoeuvre, keep=_KEEP if options.keep is None else options.keep)
-    shown = experiment(ship)
-    words = steering_words
-    output.say(words.sentence(found))
-    for note in words.notes(found):
-        output.say(f'- {note}')
-    for heading, table in (
-        (words.LOSSES, words.loss_table(found)),
-        (words.CHECK, words.check_table(found)),
-        (words.DESIGN, words.design_table(shown)),
-        (words.MEANINGS, words.meaning_table(found)),
-    ):
-        output.heading(heading)
-        output.table(table)
-    if options.report is not None:
-        steering_page.write_steering(options.report, found, shown)
-    output.json(steering_document(found, shown))
+    sailed = experiment(ship)
+    return steering.shown(found, sailed), {**found.to_dict(), 'experiment': sailed.to_dict()}
 
 
-def _coasting(options: argparse.Namespace, output: Output) -> None:
+def _coasting(options: argparse.Namespace) -> tuple[Presentation, dict[str, Any]]:
     ship = Ship.load(options.ship)
     coast = parse_coast(ship, KIND if options.manoeuvre is None else options.manoeuvre)
     found = study_coast(ship, coast, keep=options.keep)
-    words = coasting_words
-    output.say(words.sentence(found))
-    for note in words.notes(found):
-        output.say(f'- {note}')
-    for heading, table in (
-        (words.LOSSES, words.loss_table(found)),
-        (words.MIMICS, words.mimic_table(found)),
-    ):
-        output.heading(heading)
-        output.table(table)
-    if options.report is not None:
-        coasting_page.write_coasting(options.report, found)
-    output.json(coasting_document(found))
-
-
-def steering_document(found: SteeringStudy, shown: Experiment) -> dict[str, Any]:
-    """
-    Return the document of a manoeuvring model.
-    """
-    full, reduced = np.degrees(found.check.overshoots_rad[0]), found.check.overshoots_rad[1]
-    return {
-        'manoeuvre': found.manoeuvre.name,
-        'loss': _losses(found.losses, found.losses.mean),
-        'kept': found.selection.kept,
-        'dropped': found.selection.dropped,
-        'threshold': found.selection.threshold,
-        'check': {
-            'manoeuvre': found.check.manoeuvre.name,
-            'overshoot_full_deg': full,
-            'overshoot_reduced_deg': np.degrees(reduced),
-            'rms_difference': found.check.rms_difference,
-        },
-        'mean_norm': _losses(found.mean_norms, found.mean_norms.mean),
-        'independent': found.independent,
-        'multiples': found.ship.multiples,
-        'experiment': {
-            name: dict(zip((m.name for m in shown.manoeuvres), row))
-            for name, row in zip(shown.names, shown.loss.tolist())
-        },
-    }
-
-
-def coasting_document(found: CoastStudy) -> dict[str, Any]:
-    """
-    Return the document of a ship file; no manoeuvre of hers has an overshoot.
-    """
-    check = found.check
-    return {
-        'manoeuvre': found.coast.name,
-        'loss': _losses(found.losses, found.mean),
-        'kept': found.selection.kept,
-        'dropped': found.selection.dropped,
-        'threshold': found.selection.threshold,
-        'check': {
-            'manoeuvre': check.coast.name,
-            'overshoot_full_deg': [],
-            'overshoot_reduced_deg': [],
-            'rms_difference': {'speed_m_s': check.speed_m_s, 'position_m': check.position_m},
-        },
-        'resistance': {
-            one.particular.key: {
-                'estimated': one.estimated,
-                'stated': one.stated,
-                'know_within': one.tolerable,
-            }
-            for one in found.importance
-        },
-        'mimics': [
-            {
-                'effect': mimic.effect.name,
-                'size': mimic.size,
-                'distance_sd': mimic.distance,
-                'value': mimic.particular.key,
-                'wrong_by': mimic.error,
-                'left': mimic.left,
-            }
-            for mimic in found.mimics
-        ],
-    }
-
-
-def _losses(losses: Losses, means: np.ndarray[Any, Any]) -> dict[str, dict[str, float]]:
-    return {
-        name: {**dict(zip(_COLUMNS, row)), 'mean': mean}
-        for name, row, mean in zip(losses.names, losses.table.tolist(), means.tolist())
-    }
+    return coasting.shown(found), found.to_dict()

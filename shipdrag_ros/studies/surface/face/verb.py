@@ -5,20 +5,30 @@ from __future__ import annotations
 
 import argparse
 import keyword
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from shipdrag_ros.cli.arguments import add_json, add_report, new_file
+from shipdrag_ros.cli.arguments import add_json, add_report, new_file, whole
 from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import Section
 from shipdrag_ros.errors import DataError
 from shipdrag_ros.regression import Prediction, Surface, fit_surface
 from shipdrag_ros.regression import words as fit_words
 from shipdrag_ros.regression.surface import LOWEST, MAX_DEGREE
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.sources.numbers import read_numbers
-from shipdrag_ros.studies.surface.face.page import write_surface
+from shipdrag_ros.studies.face import Presentation, show
+from shipdrag_ros.studies.surface.face.pictures import (
+    contour_picture,
+    degree_picture,
+    residual_picture,
+)
+
+_FIT = 'The fit'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--max-degree',
-        type=_degree,
+        type=whole(LOWEST),
         default=MAX_DEGREE,
         metavar='N',
         help='highest degree to try',
@@ -80,21 +90,12 @@ def run(options: argparse.Namespace) -> int:
     found = fit_surface(points, values, inputs=inputs, max_degree=options.max_degree)
     asked = None if options.predict is None else read_numbers(options.predict, inputs).values
     predictions = [] if asked is None else found.predict(asked)
-    _show(output, found, target, predictions)
+    source = f'{options.data.name}, {len(values)} rows'
+    seen = shown(found, points, values, predictions, target=target, source=source)
+    show(output, seen, options.report)
     if options.export is not None:
         options.export.write_text(found.source(target), encoding='utf-8')
         output.log(f'function in {options.export}')
-    if options.report is not None:
-        write_surface(
-            options.report,
-            found,
-            source=f'{options.data.name}, {len(values)} rows',
-            target=target,
-            points=points,
-            values=values,
-            predictions=predictions,
-        )
-        output.log(f'report in {options.report}')
     content = document(found)
     if asked is not None:
         slopes = found.polynomial.gradient(asked).tolist()
@@ -150,17 +151,63 @@ def prediction_documents(found: Sequence[Prediction]) -> list[dict[str, Any]]:
     ]
 
 
-def _show(output: Output, found: Surface, target: str, predictions: Sequence[Prediction]) -> None:
-    output.say(fit_words.sentence(found, target))
-    output.heading('Degrees tried')
-    output.table(fit_words.degrees(found))
-    output.heading('Coefficients of raw powers')
-    output.table(fit_words.coefficients(found))
-    if predictions:
-        output.heading('Predictions')
-        output.table(fit_words.predictions(predictions))
-    for note in found.notes:
-        output.say(f'NOTE: {note}')
+def shown(
+    surface: Surface,
+    points: Float64,
+    values: Float64,
+    predictions: Sequence[Prediction],
+    *,
+    target: str,
+    source: str,
+) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+
+    Parameters
+    ----------
+    surface
+    points : (n, d)
+        Data.
+    values : (n,)
+        Measured there.
+    predictions
+        May be empty.
+    target, source
+        What was measured, and where the data come from.
+    """
+
+    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+        drawn = [
+            (
+                degree_picture(surface),
+                'Residual standard deviation against the degree; the lowest degree on the plateau '
+                'is chosen.',
+            ),
+            (
+                residual_picture(surface.polynomial(points), values, target),
+                'What the surface leaves of the data.',
+            ),
+        ]
+        if len(surface.inputs) == 2:
+            drawn.append(
+                (contour_picture(surface, points, target), 'The surface; dots are the data.')
+            )
+        return {_FIT: drawn}
+
+    asked = [('Predictions', fit_words.predictions(predictions))] if predictions else []
+    tables = (
+        ('Degrees tried; F and p of the step from the degree before', fit_words.degrees(surface)),
+        ('Coefficients of raw powers', fit_words.coefficients(surface)),
+        *asked,
+    )
+    notes = 'What these data can and cannot show' if surface.notes else ''
+    return Presentation(
+        f'Surface of {target} over {", ".join(surface.inputs)}',
+        fit_words.sentence(surface, target),
+        [Section(notes, lines=surface.notes), Section(_FIT, tables=tables)],
+        pictures,
+        source=source,
+    )
 
 
 def _names(text: str) -> tuple[str, ...]:
@@ -170,12 +217,6 @@ def _names(text: str) -> tuple[str, ...]:
             f'{text!r}, expected different columns separated by commas'
         )
     return names
-
-
-def _degree(text: str) -> int:
-    if not text.isdecimal() or int(text) < LOWEST:
-        raise argparse.ArgumentTypeError(f'{text!r}, expected a whole number, {LOWEST} or more')
-    return int(text)
 
 
 def _check_names(names: Sequence[str]) -> None:

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag forecast`: the rest of each glide, foretold from what was known until then."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from shipdrag_ros.cli.arguments import add_json, add_remap, number
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
+from shipdrag_ros.forecast import words
+from shipdrag_ros.forecast.followed import Passed
+from shipdrag_ros.forecast.result import Band
+from shipdrag_ros.library.forecasts import AFTER_S, Forecasts, GlideForecast, forecast
+from shipdrag_ros.library.replaying import replay_run
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.ship import Ship
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Find the coastdowns in bags and foretell the rest of each, from what was known some '
+        'time after its stop: when she has each lower speed and how far on, with bands of 90 %, '
+        'beside what followed.'
+    )
+    parser.add_argument('bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'bag; {HELP}')
+    parser.add_argument(
+        '--ship',
+        type=Path,
+        metavar='FILE',
+        help='ship file (YAML) (default: the one attached to the bag)',
+    )
+    parser.add_argument(
+        '--parameters',
+        type=Path,
+        metavar='FILE',
+        help='parameters as `name: value` (YAML) (default: those attached to the bag)',
+    )
+    parser.add_argument(
+        '--after',
+        nargs='+',
+        type=number(0.0, unit='s', above=True),
+        default=list(AFTER_S),
+        metavar='S',
+        help='when forecasts are made, from each stop on [s]',
+    )
+    add_remap(parser)
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Foretell, and say what followed.
+    """
+    output = Output(options.json)
+    ship = None if options.ship is None else Ship.load(options.ship)
+    parameters = None if options.parameters is None else Parameters.load(options.parameters)
+    results = [
+        replay_run(each, output, ship=ship, parameters=parameters, window=own)
+        for each, own in open_windowed(options.bags, remap=dict(options.remap), output=output)
+    ]
+    found = forecast(results, options.after)
+    for line in found.summary().splitlines() if found.why_none else ():
+        output.say(line)
+    for each in found.made:
+        _show(output, each)
+    output.json(document(found))
+    return 0
+
+
+def _show(output: Output, each: GlideForecast) -> None:
+    one = Forecasts((each,))
+    output.heading(f'{each.bag}, {words.clock(each.after_s)} after the stop')
+    for line in one.summary().splitlines():
+        output.say(line)
+    if each.checked is not None:
+        output.table(words.table(each.checked.milestones, each.ship.mass_kg))
+
+
+def document(found: Forecasts) -> dict[str, Any]:
+    """
+    Return the document of the verb; a forecast that was not made says why under `not_made`.
+    """
+    return {
+        'forecasts': [
+            {
+                'bag': each.bag,
+                'stop_ns': each.stop_ns,
+                'made_ns': each.checked.forecast.made_ns,
+                'over_ground': each.checked.forecast.over_ground,
+                'speeds': [_milestone(one) for one in each.checked.milestones],
+                'inside': each.checked.inside,
+                'interval_score': each.checked.interval_score,
+                'not_compared': each.why or None,
+            }
+            for each in found.made
+            if each.checked is not None
+        ],
+        'not_made': [
+            {
+                'bag': each.bag,
+                'stop_ns': each.stop_ns,
+                'after_s': each.after_s,
+                'reason': each.why,
+            }
+            for each in found.made
+            if each.checked is None
+        ],
+    }
+
+
+def _milestone(one: Passed) -> Mapping[str, Any]:
+    def band(foretold: Band, was: float | None) -> dict[str, float | None]:
+        return {**foretold._asdict(), 'was': was}
+
+    return {
+        'speed_m_s': one.foretold.speed_m_s,
+        'time_s': band(one.foretold.time_s, one.was_s),
+        'distance_m': band(one.foretold.distance_m, one.was_m),
+    }

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is foretold of a glide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from shipdrag_ros.display import short_repr
+from shipdrag_ros.samples import Float64
+
+Z = 1.6448536269514722
+"""Standard deviations on either side of the median that hold 90 %."""
+
+
+class Band(NamedTuple):
+    """Median of a time [s] or distance [m], and the bounds that hold 90 %."""
+
+    median: float
+    low: float
+    high: float
+
+
+class Milestone(NamedTuple):
+    """When she has a speed, and how far on, from when it was foretold."""
+
+    speed_m_s: float
+    time_s: Band
+    distance_m: Band
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """
+    The rest of a glide, by speed.
+
+    Attributes
+    ----------
+    made_ns
+        Stamp of the last reading that it rests on [ns].
+    stop_m_s
+        Speed at the stop.
+    speed_m_s : (n,)
+        Descending, from the present speed on.
+    time_s, distance_m : (n, 3)
+        From `made_ns` on: median, low, high of when she has that speed and where.
+    speed_sd_m_s
+        Of the present speed.
+    current_m_s
+        Added to the speed for a way over ground.
+    drift_sd_m : (n,)
+        Standard deviation of the way that the water makes until then.
+    targets_m_s
+        Speeds that are spoken of, descending.
+    over_ground
+        Whether distances are over ground; else through water.
+    """
+
+    __repr__ = short_repr
+
+    made_ns: int
+    stop_m_s: float
+    speed_m_s: Float64
+    time_s: Float64
+    distance_m: Float64
+    speed_sd_m_s: float
+    current_m_s: float
+    drift_sd_m: Float64
+    targets_m_s: tuple[float, ...]
+    over_ground: bool
+
+    def reaches(self, speed_m_s: float) -> Milestone:
+        """
+        Return when and where she has a speed, between the present and the last one.
+        """
+        at = self.speed_m_s[::-1]
+
+        def band(values: Float64) -> Band:
+            return Band(*(float(np.interp(speed_m_s, at, each[::-1])) for each in values.T))
+
+        return Milestone(speed_m_s, band(self.time_s), band(self.distance_m))
+
+    @property
+    def milestones(self) -> tuple[Milestone, ...]:
+        """Of each of the targets."""
+        return tuple(self.reaches(each) for each in self.targets_m_s)
+
+    def in_time(self, time_s: Float64 | None = None) -> Float64:
+        """
+        Return the same by time.
+
+        Parameters
+        ----------
+        time_s : (m,)
+            From `made_ns` on, ascending from 0; None: those at which she has each speed.
+
+        Returns
+        -------
+        (m, 7)
+            Time, speed, its low and high, distance, its low and high. Where she is slower than
+            the last speed, that stands for her speed.
+
+        Notes
+        -----
+        At a time, a glide that has each speed earlier is slower; her way is the integral.
+        """
+        time = self.time_s[:, 0] if time_s is None else time_s
+        spread = np.array([0.0, -Z, Z])[:, None] * self.speed_sd_m_s
+        columns = (self.time_s[:, 0], self.time_s[:, 1], self.time_s[:, 2])
+        speed = np.stack([np.interp(time, each, self.speed_m_s) for each in columns])
+        speed[:, 0] += spread[:, 0]
+        steps = np.diff(time) * 0.5 * (speed[:, 1:] + speed[:, :-1] + 2.0 * self.current_m_s)
+        way = np.concatenate([np.zeros((3, 1)), np.cumsum(steps, axis=1)], axis=1)
+        beside = Z * np.interp(time, self.time_s[:, 0], self.drift_sd_m)
+        way[1] = way[0] - np.hypot(way[0] - way[1], beside)
+        way[2] = way[0] + np.hypot(way[2] - way[0], beside)
+        return np.column_stack([time, *speed, *way])

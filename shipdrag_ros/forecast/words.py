@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A forecast in words and as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from shipdrag_ros.display import Table, ship_speed
+from shipdrag_ros.forecast.followed import Passed
+from shipdrag_ros.forecast.result import Band, Milestone
+
+_LIGHT_KG = 1000.0
+_MILE_M = 1852.0
+_NOT_SHOWN = 'not shown'
+
+
+def clock(seconds: float) -> str:
+    """
+    Return a length of time as minutes and seconds; below a minute and a half in s.
+
+    Examples
+    --------
+    >>> clock(460.0), clock(8.31), clock(4000.0)
+    ('7:40', '8.3 s', '66:40')
+    """
+    if seconds < 90.0:
+        return f'{seconds:.1f} s'
+    minutes, rest = divmod(round(seconds), 60)
+    return f'{minutes}:{rest:02d}'
+
+
+def way(metres: float, mass_kg: float) -> str:
+    """
+    Return a distance in nautical miles, of a light craft or a short way in metres.
+    """
+    if mass_kg < _LIGHT_KG or metres < 0.1 * _MILE_M:
+        return f'{metres:.3g} m'
+    return f'{metres / _MILE_M:.2f} nm'
+
+
+def sentence(milestone: Milestone, mass_kg: float, was_s: float | None = None) -> str:
+    """
+    Say when she has a speed and how far on: `3.9 knots in 7:40 (6:50 to 8:30), 0.71 nm`.
+    """
+    time = milestone.time_s
+    text = (
+        f'{ship_speed(milestone.speed_m_s, mass_kg)} in {clock(time.median)} '
+        f'({clock(time.low)} to {clock(time.high)}), {way(milestone.distance_m.median, mass_kg)}'
+    )
+    return text if was_s is None else f'{text}; was {clock(was_s)}'
+
+
+def table(compared: Sequence[Passed], mass_kg: float) -> Table:
+    """
+    Show milestones beside what followed, a line each.
+    """
+
+    def cells(band: Band, was: float | None, time: bool) -> tuple[str, ...]:
+        def show(value: float) -> str:
+            return clock(value) if time else way(value, mass_kg)
+
+        followed = _NOT_SHOWN if was is None else show(was)
+        return show(band.median), f'{show(band.low)} to {show(band.high)}', followed
+
+    rows = tuple(
+        (
+            ship_speed(each.foretold.speed_m_s, mass_kg),
+            *cells(each.foretold.time_s, each.was_s, time=True),
+            *cells(each.foretold.distance_m, each.was_m, time=False),
+        )
+        for each in compared
+    )
+    return Table(('down to', 'in', '90 %', 'was', 'after', '90 %', 'was'), rows)

@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Forecasts of the rest of each glide of a record, beside what followed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from shipdrag_ros.coastdown.events import EndedCoastdown
+from shipdrag_ros.coastdown.running import too_vague
+from shipdrag_ros.display import Table, speed_unit, utc
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.forecast import words
+from shipdrag_ros.forecast.followed import Checked, Followed, Passed
+from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.library.shown import Shown, drawing
+from shipdrag_ros.replay.coasts import coast_windows
+from shipdrag_ros.replay.playback import ReplayResult
+from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.ship import Ship
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+AFTER_S = (60.0, 120.0, 300.0)
+"""Times after the stop at which forecasts are made by default [s]."""
+
+
+@dataclass(frozen=True)
+class GlideForecast:
+    """
+    A forecast made so long after a stop.
+
+    Attributes
+    ----------
+    bag
+        Name of the run.
+    ship
+    stop_ns
+        The stop [ns].
+    after_s
+        When it was to be made, after the stop [s].
+    checked
+        The forecast and what followed; None where none could be made: `why` says so.
+    why
+        What could not be said; '' for nothing.
+    followed
+        The readings of the glide; None where they do not show it.
+    """
+
+    bag: str
+    ship: Ship
+    stop_ns: int
+    after_s: float
+    checked: Checked | None
+    why: str = ''
+    followed: Followed | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class Forecasts(Shown):
+    """
+    Forecasts of the rest of each glide, made from what was known until then.
+
+    Attributes
+    ----------
+    made
+        In the order of the glides and of time.
+    why_none
+        Why there is no glide, where that is so.
+
+    Raises
+    ------
+    EstimationError
+        By `plot`, if no forecast could be made.
+
+    Notes
+    -----
+    Source: docs/forecast.md.
+
+    Examples
+    --------
+    >>> import shipdrag_ros as sd
+    >>> record = sd.simulate(sd.Ship.example(), duration_s=900.0, lead_in_s=400.0)
+    >>> found = sd.estimate(record).forecast(after=(300.0,))
+    >>> found
+    <Forecasts: 1 forecast of 1 glide>
+    >>> found.made[0].checked.inside
+    1.0
+    """
+
+    made: tuple[GlideForecast, ...]
+    why_none: str = ''
+
+    def _lines(self) -> Sequence[str]:
+        return [self.why_none] if self.why_none else [_line(each) for each in self.made]
+
+    def table(self) -> Table:
+        """
+        Show the milestones of each forecast, with when it was made.
+        """
+        columns: tuple[str, ...] = ()
+        rows: list[tuple[str, ...]] = []
+        for each in self.made:
+            if each.checked is not None:
+                part = words.table(each.checked.milestones, each.ship.mass_kg)
+                columns = ('made after', *part.columns)
+                rows += [(words.clock(each.after_s), *row) for row in part.rows]
+        return Table(columns, tuple(rows))
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """
+        Draw the speed foretold with its band over the one that followed.
+
+        Parameters
+        ----------
+        ax
+            To draw on; None: new axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            Of the first glide; time from the stop, speed in knots, of a model ship in m/s.
+        """
+        from shipdrag_ros.forecast.pictures import draw_forecast
+
+        shown = [each for each in self.made if each.checked is not None]
+        if not shown:
+            raise EstimationError(' '.join(self._lines()))
+        first = [each for each in shown if each.stop_ns == shown[0].stop_ns]
+        unit, name = speed_unit(shown[0].ship.mass_kg)
+        with drawing(ax) as axis:
+            for each in first:
+                assert each.checked is not None
+                draw_forecast(axis, each.checked.forecast, each.stop_ns, unit)
+            if first[0].followed is not None:
+                seen = first[0].followed
+                axis.plot(seen.time_s / 60.0, seen.speed_m_s / unit, 'k.', ms=2, label='followed')
+            axis.set_xlabel('time from the stop [min]')
+            axis.set_ylabel(f'speed [{name}]')
+            axis.legend()
+        return axis
+
+    def _title(self) -> str:
+        made = sum(each.checked is not None for each in self.made)
+        glides = len({(each.bag, each.stop_ns) for each in self.made})
+        return (
+            f'{made} forecast{"" if made == 1 else "s"} of {glides} glide'
+            f'{"" if glides == 1 else "s"}'
+        )
+
+    def _columns(self) -> Mapping[str, Any]:
+        rows = [
+            (each, one)
+            for each in self.made
+            if each.checked is not None
+            for one in each.checked.milestones
+        ]
+        found: dict[str, Any] = {
+            'bag': [each.bag for each, _ in rows],
+            'after_s': [each.after_s for each, _ in rows],
+            'speed_m_s': [one.foretold.speed_m_s for _, one in rows],
+        }
+        for name in ('time_s', 'distance_m'):
+            for part in ('median', 'low', 'high'):
+                values = [getattr(getattr(one.foretold, name), part) for _, one in rows]
+                found[f'{name.replace("_", f"_{part}_")}'] = values
+        found['time_was_s'] = [one.was_s for _, one in rows]
+        found['distance_was_m'] = [one.was_m for _, one in rows]
+        return found
+
+
+def _line(each: GlideForecast) -> str:
+    head = f'{words.clock(each.after_s)} after the stop of {utc(each.stop_ns)}'
+    if each.checked is None:
+        return f'{head}: no forecast: {each.why}.'
+    said = '; '.join(
+        words.sentence(one.foretold, each.ship.mass_kg, one.was_s)
+        for one in each.checked.milestones
+    )
+    inside = each.checked.inside
+    judged = '' if inside is None else f' {inside:.0%} of what followed lies inside the bands.'
+    beside = f' Not compared: {each.why}.' if each.why else ''
+    return f'{head}: {said}.{judged}{beside}'
+
+
+def forecast(runs: Sequence[RunResult], after_s: Sequence[float]) -> Forecasts:
+    """
+    Make forecasts of each glide of some runs.
+
+    Parameters
+    ----------
+    runs
+    after_s
+        When, from each stop on [s].
+
+    Raises
+    ------
+    EstimationError
+        If a time is not above 0, or there is none.
+    """
+    if not after_s or not all(0.0 < each < math.inf for each in after_s):
+        raise EstimationError(
+            f'forecasts after {", ".join(map(str, after_s)) or "nothing"}: give times above 0, '
+            'in s from the stop'
+        )
+    made = [
+        each
+        for run in runs
+        if run.replayed is not None
+        for each in forecast_run(run.replayed, after_s)
+    ]
+    why = '' if made else ' '.join(line for run in runs for line in run.summary())
+    return Forecasts(tuple(made), why)
+
+
+def forecast_run(result: ReplayResult, after_s: Sequence[float]) -> Iterator[GlideForecast]:
+    """
+    Yield forecasts of each glide that a replay found, each from the samples until then alone.
+
+    Parameters
+    ----------
+    result
+        From `replay`.
+    after_s
+        When, from each stop on [s].
+    """
+    for coastdown, window in coast_windows(result):
+        followed, unseen = None, ''
+        try:
+            followed = _followed(coastdown, window)
+        except EstimationError as error:
+            unseen = str(error)
+        for after in after_s:
+            yield _forecast(result, window, after, followed, unseen)
+
+
+def _followed(coastdown: EndedCoastdown, window: Window) -> Followed:
+    if coastdown.estimate is None:
+        raise EstimationError(coastdown.failure or 'the whole glide gave no estimate')
+    return Followed.of(window, coastdown.estimate)
+
+
+def _forecast(
+    result: ReplayResult, window: Window, after_s: float, followed: Followed | None, unseen: str
+) -> GlideForecast:
+    ship, parameters = result.ship, result.parameters
+    stop_ns, end_ns = window.start_ns, window.start_ns + round(after_s * SECOND_NS)
+    bag = result.run.name
+
+    def none(why: str) -> GlideForecast:
+        return GlideForecast(bag, ship, stop_ns, after_s, None, why)
+
+    if end_ns >= window.end_ns:
+        return none(f'the glide ends {(window.end_ns - stop_ns) / SECOND_NS:.0f} s after the stop')
+    try:
+        found = estimate(window.part(stop_ns, end_ns), ship, parameters)
+        if why := too_vague(found, parameters):
+            return none(why)
+        forecast = foretell(found, ship, froude_min=parameters.froude_min)
+    except EstimationError as error:
+        return none(str(error))
+    if followed is None:
+        milestones = tuple(Passed(each, None, None) for each in forecast.milestones)
+        checked = Checked(forecast, milestones, after_s, 0.0)
+        return GlideForecast(bag, ship, stop_ns, after_s, checked, unseen)
+    checked = followed.beside(forecast, stop_ns)
+    return GlideForecast(bag, ship, stop_ns, after_s, checked, followed=followed)

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The face that the studies share: one result on the terminal and on a page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import Section
+from shipdrag_ros.report.document import write_page
+from shipdrag_ros.report.drawing import picture
+
+
+@dataclass(frozen=True)
+class Presentation:
+    """
+    A result as its verb prints it and its page shows it.
+
+    Attributes
+    ----------
+    title
+        Of the page.
+    sentence
+        What was found.
+    sections
+        With their headings, without pictures.
+    pictures
+        Draws the figures of sections, by heading, each with its caption; called for a page alone.
+    source, foot
+        Of the page: where the data come from, and the formulas.
+    """
+
+    title: str
+    sentence: str
+    sections: Sequence[Section]
+    pictures: Callable[[], Mapping[str, Sequence[tuple[Figure, str]]]]
+    source: str = ''
+    foot: str = ''
+
+
+def show(output: Output, shown: Presentation, report: Path | None) -> None:
+    """
+    Print a result, and write its page where one was asked for.
+    """
+    output.say(shown.sentence)
+    for part in shown.sections:
+        for text in part.text:
+            output.say(text)
+        for caption, table in part.tables:
+            output.heading(caption)
+            output.table(table)
+        for line in part.lines:
+            output.say(f'- {line}')
+    if report is None:
+        return
+    drawn = shown.pictures()
+    sections = [
+        replace(part, pictures=[picture(*each) for each in drawn.get(part.heading, ())])
+        for part in shown.sections
+    ]
+    about = {'sentence': shown.sentence, 'source': shown.source, 'foot': shown.foot}
+    write_page(report, shown.title, sections, **about)
+    output.log(f'report in {report}')

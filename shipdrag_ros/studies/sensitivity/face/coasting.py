@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which values of a ship file must be known well, in sentences, tables and pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from matplotlib.figure import Figure
+
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.studies.face import Presentation
+from shipdrag_ros.studies.sensitivity.coast import LOG_SD_M_S, POSITION_SD_M
+from shipdrag_ros.studies.sensitivity.coasting import CoastStudy
+from shipdrag_ros.studies.sensitivity.face.pictures import mimic_picture, particulars_picture
+from shipdrag_ros.studies.sensitivity.mimics import WORST
+
+LOSSES = (
+    'Change of the record by a wrong value, in standard deviations of log and position; of r(v) '
+    'by 10 per cent; and the error that moves the record as far as all that is stated as uncertain'
+)
+MIMICS = (
+    'Effects of the library at a usual size, and the wrong value that each may be taken for; '
+    'left: what of the effect such an error does not explain'
+)
+_LOOKS_ALIKE = 0.05  # of an effect is left
+_CLOSE = 0.1  # relative error
+_LARGE = 0.5  # relative error; beyond it only that it is larger is said
+
+_KNOWN, _MISTAKEN = 'What must be known well', 'What a wrong value is taken for'
+
+
+def shown(found: CoastStudy) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+    """
+
+    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+        known = (
+            'How far the record moves when a value of the ship file is wrong by 10 per cent, and '
+            'by its stated standard deviation. The longest bars are to be measured well.'
+        )
+        mistaken = (
+            'What is left of each effect when the value beside its bar is blamed for it. A short '
+            'bar: a ship file that is so far wrong is taken for the effect, and no record '
+            'separates the two; a long bar: the effect looks like nothing else.'
+        )
+        return {
+            _KNOWN: [(particulars_picture(found), known)],
+            _MISTAKEN: [(mimic_picture(found), mistaken)],
+        }
+
+    return Presentation(
+        'Which particulars matter' + (f': {found.ship.name}' if found.ship.name else ''),
+        sentence(found),
+        [
+            Section(lines=notes(found)),
+            Section(_KNOWN, tables=((LOSSES, loss_table(found)),)),
+            Section(_MISTAKEN, tables=((MIMICS, mimic_table(found)),)),
+        ],
+        pictures,
+        source=found.ship.summary(),
+    )
+
+
+def sentence(found: CoastStudy) -> str:
+    """
+    Say what must be known well.
+    """
+    kept = found.selection.kept
+    return (
+        f'{found.ship.name or "The ship"}, {found.coast.name} m/s: the values that matter most '
+        f'are {", ".join(kept[:3])}; {len(kept)} of {len(found.importance)} have a mean loss '
+        f'above {found.selection.threshold:.3g}.'
+    )
+
+
+def notes(found: CoastStudy) -> tuple[str, ...]:
+    """
+    Say what was done and what it means.
+    """
+    scenario, check = found.coast.scenario, found.check
+    near = [mimic for mimic in found.mimics if mimic.left < _LOOKS_ALIKE]
+    alike = '; '.join(
+        f'{mimic.effect.name} like {mimic.particular.key} {mimic.error:+.0%}' for mimic in near
+    )
+    said = [
+        f'A coastdown of {scenario.duration_s:.0f} s from {scenario.speed_m_s:.2f} m/s, one '
+        f'value changed at a time; noise of a sample: log {LOG_SD_M_S:g} m/s, position '
+        f'{POSITION_SD_M:g} m.',
+        'r(v) estimated from a record takes n_r alone from the ship file, hence the added mass, '
+        'length and volume; all else matters where a record is compared with the baseline.',
+        f'With every value that is not kept wrong by 10 %, so that they add up, a coastdown from '
+        f'{check.coast.scenario.speed_m_s:.2f} m/s is off by {check.speed_m_s:.3f} m/s and '
+        f'{check.position_m:.1f} m (root mean square).',
+    ]
+    certain = [one for one in found.importance if one.tolerable < _CLOSE]
+    others = [one.tolerable for one in found.importance if one.tolerable >= _CLOSE]
+    if certain and others:
+        close = ', '.join(f'{one.particular.key} {one.tolerable:.1%}' for one in certain)
+        said.append(
+            f'To be known as well as the stated uncertainties deserve: {close}; all else may be '
+            f'wrong by {_tolerable(min(others))}.'
+        )
+    if alike:
+        said.append(
+            f'To within a twentieth of what they do, effects look like a wrong value: {alike}.'
+        )
+    if any(not math.isfinite(value) for value in found.losses.table[:, :4].flat):
+        said.append(
+            'A dash stands where so large a change leaves the table of the baseline, or where no '
+            'standard deviation is stated.'
+        )
+    return tuple(said)
+
+
+def loss_table(found: CoastStudy) -> Table:
+    """
+    Show what each value does, the most important first.
+    """
+    names = found.losses.names
+    order = [*found.selection.kept, *found.selection.dropped]
+    rows = []
+    for name in order:
+        i = names.index(name)
+        one = found.importance[i]
+        sd = one.particular.sd
+        rows.append(
+            (
+                name,
+                '-' if math.isnan(one.particular.value) else f'{one.particular.value:.4g}',
+                '-' if math.isnan(sd) else f'{sd:.1%}',
+                *(_number(value) for value in found.losses.table[i, :5]),
+                f'{one.estimated:.2%}',
+                f'{one.stated:.2%}',
+                _tolerable(one.tolerable),
+                'yes' if name in found.selection.kept else 'no',
+            )
+        )
+    heads = (
+        '',
+        'value',
+        'sd',
+        '+10 %',
+        '-10 %',
+        '+50 %',
+        '-50 %',
+        '+1 sd',
+        'estimated r',
+        'stated r',
+        'know within',
+        'kept',
+    )
+    return Table(heads, tuple(rows))
+
+
+def mimic_table(found: CoastStudy) -> Table:
+    """
+    Show which wrong value looks like which effect.
+    """
+    rows = []
+    for mimic in found.mimics:
+        quantity = mimic.effect.parameters[0]
+        # at the limit the value would have to be wrong by more than is thought of
+        bound = 'at least ' if abs(mimic.error) >= WORST else ''
+        rows.append(
+            (
+                mimic.effect.name,
+                f'{mimic.size:.3g} {quantity.unit}'.rstrip(),
+                f'{mimic.distance:.2f}',
+                mimic.particular.key,
+                f'{bound}{mimic.error:+.0%}',
+                f'{mimic.left:.1%}',
+            )
+        )
+    heads = ('effect', 'size', 'distance [sd]', 'looks like', 'wrong by', 'left')
+    return Table(heads, tuple(rows))
+
+
+def _number(value: float) -> str:
+    return f'{value:.2f}' if math.isfinite(value) else '-'
+
+
+def _tolerable(value: float) -> str:
+    if math.isnan(value):
+        return '-'
+    return f'{value:.1%}' if value < _LARGE else f'over {_LARGE:.0%}'

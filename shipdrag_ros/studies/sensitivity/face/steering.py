@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which derivatives of a steered ship matter, in sentences, tables and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.studies.face import Presentation
+from shipdrag_ros.studies.manoeuvring.ship import meaning
+from shipdrag_ros.studies.sensitivity.face.pictures import (
+    check_picture,
+    design_picture,
+    ranking_picture,
+)
+from shipdrag_ros.studies.sensitivity.steering import (
+    APPROACH_S,
+    CONTROL_S,
+    Experiment,
+    Observations,
+    ReducedModelCheck,
+    SteeringStudy,
+)
+
+LOSSES = (
+    'Loss by a derivative that is 10 or 50 per cent wrong: root mean square of the differences in '
+    'u, v and r, times 1000'
+)
+CHECK = (
+    f'The check; rudder amidships for {APPROACH_S:g} s, then first to starboard, the helmsman '
+    f'looks every {CONTROL_S:g} s; differences over the whole manoeuvre'
+)
+DESIGN = (
+    'Which manoeuvre shows which derivative: loss of 10 per cent, times 1000. Partial '
+    'contribution: the part of it that is orthogonal to the responses of all others'
+)
+
+MEANINGS = 'What the derivatives are: which force, and what it grows with'
+
+_RANKING, _CHECKED, _SAILED = (
+    'How much each matters',
+    'The model without the others',
+    'Which manoeuvre to sail',
+)
+
+
+def shown(found: SteeringStudy, sailed: Experiment) -> Presentation:
+    """
+    Return what is printed, and shown on a page.
+
+    Parameters
+    ----------
+    found
+        The losses and the reduced model.
+    sailed
+        Of several manoeuvres.
+    """
+
+    def pictures() -> Mapping[str, Sequence[tuple[Figure, str]]]:
+        ranking = (
+            'How much the motion changes when a derivative is wrong: the longer the bar, the '
+            'better it must be known. Pale bars, short of the line, may be left out of the model.'
+        )
+        checked = (
+            f'{found.check.manoeuvre.name} of the full and of the reduced models: lines that lie '
+            'on each other show that what was left out is not missed.'
+        )
+        design = (
+            'Loss of 10 per cent of each derivative in each manoeuvre: the darker, the better it '
+            'is seen. Dot: the manoeuvre that shows it best.'
+        )
+        return {
+            _RANKING: [(ranking_picture(found), ranking)],
+            _CHECKED: [(check_picture(found), checked)],
+            _SAILED: [(design_picture(sailed), design)],
+        }
+
+    return Presentation(
+        f'Which derivatives matter: {found.ship.name}',
+        sentence(found),
+        [
+            Section(lines=notes(found)),
+            Section(_RANKING, tables=((LOSSES, loss_table(found)),)),
+            Section(_CHECKED, tables=((CHECK, check_table(found)),)),
+            Section(_SAILED, tables=((DESIGN, design_table(sailed)),)),
+            Section('What the names mean', tables=((MEANINGS, meaning_table(found)),)),
+        ],
+        pictures,
+        source=found.ship.source,
+    )
+
+
+def sentence(found: SteeringStudy) -> str:
+    """
+    Say what is kept.
+    """
+    kept, dropped = found.selection.kept, found.selection.dropped
+    return (
+        f'{found.ship.name}, {found.manoeuvre.name}: of {len(kept) + len(dropped)} derivatives '
+        f'{len(kept)} have a mean loss above {found.selection.threshold:.3g} and are kept; '
+        f'{kept[0]} ({meaning(kept[0])}) matters most.'
+    )
+
+
+def notes(found: SteeringStudy) -> tuple[str, ...]:
+    """
+    Say what was done, what the losses look like, and what the number kept means.
+    """
+    root, mean = Observations.of(found.losses), Observations.of(found.mean_norms)
+    agree = 'the same' if found.norms_agree else 'not quite the same'
+    ship, kept = found.ship, found.selection.kept
+    after = sum(ship.multiples.get(name) in kept for name in found.selection.dropped)
+    return (
+        'A derivative says how much of a force or moment (X ahead, Y sideways, N turning) comes '
+        'with a motion (u change of speed, v sway, r yaw) or with the rudder (d). The loss is how '
+        'far the manoeuvre moves when it is wrong, as a part of the speed.',
+        'One derivative is changed at a time, all simulations in one call: from steady sailing, '
+        'first to starboard, the rudder reversed at the very heading, 1200 samples 0.5 s apart; '
+        f'u and v over {ship.speed_m_s:g} m/s, r over speed per length.',
+        f'+10 and -10 % differ by {root.unlike[0]:.1%} (median), +50 and -50 % by '
+        f'{root.unlike[1]:.1%}; 50 % costs {root.growth:.2f} times 10 %. Of the mean norm: '
+        f'{mean.unlike[0]:.1%}, {mean.unlike[1]:.1%}, {mean.growth:.2f}; it keeps {agree} '
+        f'{len(kept)}.',
+        f'{len(ship.multiples)} of the {len(ship.viscous)} derivatives are exact multiples of '
+        f'others, so that the model is {len(ship.groups)} measurements: the {len(kept)} kept hold '
+        f'{found.independent} of them, and {after} of the dropped ones follow from a kept one.',
+        f'Chosen by measurement, with all that follows from each, the same {found.independent} '
+        f'are {len(found.group_derivatives)} derivatives; the check shows which of the two models '
+        'is closer.',
+    )
+
+
+def loss_table(found: SteeringStudy) -> Table:
+    """
+    Show the losses, the most important derivative first.
+    """
+    names = found.losses.names
+    rows = []
+    for name in found.losses.ranking:
+        i = names.index(name)
+        values = (*found.losses.table[i], found.losses.mean[i], found.mean_norms.mean[i])
+        rows.append(
+            (
+                name,
+                *(f'{1e3 * value:.3f}' for value in values),
+                'yes' if name in found.selection.kept else 'no',
+                found.ship.multiples.get(name, '-'),
+            )
+        )
+    heads = ('', '+10 %', '-10 %', '+50 %', '-50 %', 'mean', 'by mean norm', 'kept', 'multiple of')
+    return Table(heads, tuple(rows))
+
+
+def check_table(found: SteeringStudy) -> Table:
+    """
+    Show how close the reduced models come.
+    """
+    ship, kept = found.ship, found.selection.kept
+    rows = [
+        ('full', f'{len(ship.viscous)}', f'{len(ship.groups)}', *_degrees(found.check, 0)),
+        ('kept', f'{len(kept)}', f'{found.independent}', *_degrees(found.check, 1)),
+        (
+            'kept by measurement',
+            f'{len(found.group_derivatives)}',
+            f'{found.independent}',
+            *_degrees(found.group_check, 1),
+        ),
+    ]
+    heads = (
+        found.check.manoeuvre.name,
+        'derivatives',
+        'measurements',
+        'overshoot 1 [deg]',
+        'overshoot 2 [deg]',
+        'rms u [m/s]',
+        'v [m/s]',
+        'r [deg/s]',
+        'heading [deg]',
+    )
+    return Table(heads, tuple(rows))
+
+
+def _degrees(check: ReducedModelCheck, model: int) -> tuple[str, ...]:
+    over = [f'{value:.2f}' for value in np.degrees(check.overshoots_rad[model])]
+    over += ['-'] * (2 - len(over))
+    if model == 0:
+        return (*over, '-', '-', '-', '-')
+    surge, sway, yaw, heading = check.rms_difference.values()
+    return (
+        *over,
+        f'{surge:.3f}',
+        f'{sway:.3f}',
+        f'{np.degrees(yaw):.3f}',
+        f'{np.degrees(heading):.2f}',
+    )
+
+
+def design_table(shown: Experiment) -> Table:
+    """
+    Show which manoeuvre makes which derivative visible.
+    """
+    rows = []
+    for i, name in enumerate(shown.names):
+        best = int(np.argmax(shown.loss[i]))
+        rows.append(
+            (
+                name,
+                *(f'{1e3 * value:.2f}' for value in shown.loss[i]),
+                shown.best[i].name,
+                f'{shown.partial_contribution[i, best]:.1%}',
+                f'{shown.partial_contribution_together[i]:.1%}',
+            )
+        )
+    heads = (
+        '',
+        *(manoeuvre.name for manoeuvre in shown.manoeuvres),
+        'shown most by',
+        'partial contribution there',
+        'in all together',
+    )
+    return Table(heads, tuple(rows))
+
+
+def meaning_table(found: SteeringStudy) -> Table:
+    """
+    Show what each derivative is, the most important first.
+    """
+    return Table(
+        ('derivative', 'what it is'),
+        tuple((name, meaning(name)) for name in found.losses.ranking),
+    )

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `forecast` says, in words and in JSON, and the same in Python."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import pytest
+
+import shipdrag_ros as sd
+from shipdrag_ros.cli import main
+from shipdrag_ros.cli.forecast import document
+
+mpl.use('agg')
+
+
+@pytest.fixture(scope='module')
+def found(coastdown_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    out = tmp_path_factory.mktemp('forecast') / 'forecast.json'
+    line = ['forecast', str(coastdown_bag), '--after', '300', '600', '5000', f'--json={out}']
+    assert main(line) == 0
+    result: dict[str, Any] = json.loads(out.read_text())
+    return result
+
+
+def test_the_json_has_its_keys(found: dict[str, Any], coastdown_bag: Path) -> None:
+    assert [each['bag'] for each in found['forecasts']] == [str(coastdown_bag)] * 2
+    for each, after_s in zip(found['forecasts'], (300.0, 600.0), strict=True):
+        assert {'stop_ns', 'made_ns', 'speeds', 'inside', 'interval_score'} <= set(each)
+        assert (each['made_ns'] - each['stop_ns']) * 1e-9 == pytest.approx(after_s, abs=2.0)
+        for speed in each['speeds']:
+            assert set(speed) == {'speed_m_s', 'time_s', 'distance_m'}
+            for band in (speed['time_s'], speed['distance_m']):
+                assert set(band) == {'median', 'low', 'high', 'was'}
+                assert band['low'] < band['median'] < band['high']
+        speeds = [speed['speed_m_s'] for speed in each['speeds']]
+        assert {1.0, 2.0} <= set(speeds)
+        assert speeds == sorted(speeds, reverse=True)
+
+
+def test_what_followed_stands_beside_it(found: dict[str, Any]) -> None:
+    last = found['forecasts'][-1]
+    shown = [speed['time_s'] for speed in last['speeds'] if speed['time_s']['was'] is not None]
+    assert shown
+    assert last['speeds'][-1]['speed_m_s'] == 1.0
+    assert last['speeds'][-1]['time_s']['was'] is None  # the record ends before
+    assert last['inside'] == 1.0
+    assert all(band['was'] == pytest.approx(band['median'], rel=0.3) for band in shown)
+
+
+def test_a_forecast_that_is_not_made_says_why(found: dict[str, Any]) -> None:
+    (none,) = found['not_made']
+    assert none['after_s'] == 5000.0
+    assert 'the glide ends' in none['reason']
+
+
+def test_a_script_gets_the_same(found: dict[str, Any], coastdown_bag: Path) -> None:
+    made = sd.estimate(sd.read(coastdown_bag)).forecast(after=(300.0, 600.0, 5000.0))
+    assert json.loads(json.dumps(document(made))) == found
+    assert repr(made) == '<Forecasts: 2 forecasts of 1 glide>'
+    assert '100% of what followed lies inside the bands' in made.summary()
+    axis = made.plot()
+    assert axis.get_ylabel() == 'speed [knots]'
+    assert len(axis.lines) == 3
+    frame = made.to_frame()
+    assert (frame['time_low_s'] < frame['time_high_s']).all()
+    assert len(made.table().rows) == len(frame)
+
+
+def test_no_glide_is_said(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['forecast', str(steady_bag)]) == 0
+    assert 'No coastdown found' in capsys.readouterr().out
+
+
+def test_a_time_that_is_none(coastdown_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(['forecast', str(coastdown_bag), '--after', '0'])
+    assert 'above 0' in capsys.readouterr().err
+    result = sd.estimate(sd.read(coastdown_bag), window=(300.0, 1800.0))
+    with pytest.raises(sd.ShipdragError, match='give times above 0'):
+        result.forecast(after=())

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rest of a glide, from the estimate of any estimator."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation import Window, estimate
+from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.forecast import words
+from shipdrag_ros.forecast.followed import Followed, interval_score
+from shipdrag_ros.forecast.foretell import foretell
+from shipdrag_ros.forecast.law import deceleration
+from shipdrag_ros.forecast.result import Band
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.samples import SECOND_NS
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import START_NS, Scenario, Truth, sense, simulate, standard_sensors
+
+LEAD_IN_S, DURATION_S = 600.0, 2400.0
+STOP_NS = START_NS + round(LEAD_IN_S * SECOND_NS)
+
+
+@pytest.fixture(scope='module')
+def ship() -> Ship:
+    return replace(Ship.example(), propulsion=None)
+
+
+@pytest.fixture(scope='module')
+def truth(ship: Ship) -> Truth:
+    scenario = Scenario(speed_m_s=8.0, lead_in_s=LEAD_IN_S, duration_s=DURATION_S)
+    return simulate(ship, scenario)
+
+
+@pytest.fixture(scope='module')
+def window(truth: Truth) -> Window:
+    block = sense(truth, standard_sensors(), seed=1)
+    end_ns = STOP_NS + round(DURATION_S * SECOND_NS)
+    return Window.from_block(block, STOP_NS, end_ns, before_ns=START_NS)
+
+
+def after(window: Window, seconds: float, ship: Ship, estimator: str) -> Estimate:
+    part = window.part(STOP_NS, STOP_NS + round(seconds * SECOND_NS))
+    return estimate(part, ship, Parameters(estimator=estimator))
+
+
+@pytest.fixture(scope='module')
+def early(window: Window, ship: Ship) -> Estimate:
+    return after(window, 600.0, ship, 'one')
+
+
+@pytest.mark.parametrize('estimator', ['log_time', 'ode_fit', 'one'])
+def test_it_comes_as_it_was_foretold(
+    window: Window, truth: Truth, ship: Ship, estimator: str
+) -> None:
+    found = foretell(after(window, 600.0, ship, estimator), ship, froude_min=0.05)
+    gliding = truth.time_s >= LEAD_IN_S
+    time_s = truth.time_s[gliding] - LEAD_IN_S - 600.0
+    speed = truth.speed_through_water_m_s[gliding]
+    assert found.over_ground
+    followed = [each for each in found.milestones if each.speed_m_s > speed[-1]]
+    assert len(followed) >= 2
+    for each in followed:
+        was = float(np.interp(-each.speed_m_s, -speed, time_s))
+        assert each.time_s.low < was < each.time_s.high
+        assert each.time_s.median == pytest.approx(was, rel=0.15)
+        assert each.distance_m.low < each.distance_m.median < each.distance_m.high
+
+
+def test_it_is_the_integral_of_the_law(early: Estimate, ship: Ship) -> None:
+    found = foretell(early, ship)
+    u = np.linspace(found.speed_m_s[0], found.speed_m_s[-1], 4000)
+    a = np.exp(deceleration(early, ship, u[::40]).log_m_s2)
+    per_m_s = 1.0 / np.interp(-u, -u[::40], a)
+    assert found.time_s[-1, 0] == pytest.approx(-np.trapezoid(per_m_s, u), rel=2e-3)
+    assert np.all(np.diff(found.time_s[:, 0]) > 0.0)
+    assert np.all(np.diff(found.distance_m[:, 0]) > 0.0)
+    assert np.all(np.diff(found.time_s, axis=0) >= 0.0)
+    assert np.all(np.diff(found.distance_m, axis=0) >= 0.0)
+
+
+def test_it_has_no_chance_in_it(early: Estimate, ship: Ship) -> None:
+    one, other = foretell(early, ship), foretell(early, ship)
+    assert one.time_s.tobytes() == other.time_s.tobytes()
+    assert one.distance_m.tobytes() == other.distance_m.tobytes()
+
+
+def test_a_wider_estimate_gives_a_wider_band(early: Estimate, ship: Ship) -> None:
+    curve = replace(
+        early.curve,
+        sigma_repeatable_m_s2=0.5 * early.curve.resistance_m_s2,
+        slope_sigma=early.curve.slope,
+    )
+    wide = foretell(replace(early, curve=curve), ship).milestones[0].time_s
+    narrow = foretell(early, ship).milestones[0].time_s
+    assert wide.high - wide.low > 1.2 * (narrow.high - narrow.low)
+
+
+def test_the_law_is_less_known_where_nothing_was_seen(early: Estimate, ship: Ship) -> None:
+    u = early.last_speed_m_s * np.array([1.0, 0.7, 0.4])
+    sd = np.sqrt(np.diag(deceleration(early, ship, u).covariance))
+    assert sd[0] < sd[1] < sd[2]
+
+
+def test_the_targets(early: Estimate, ship: Ship) -> None:
+    stop = early.curve.speed_m_s[-1]
+    found = foretell(early, ship, froude_min=0.05, speeds_m_s=(3.0, 2.9, 100.0))
+    expected = {0.25 * stop, 3.0, 2.9, float(ship.speed(0.05))}
+    assert found.targets_m_s == tuple(sorted(expected, reverse=True))
+    assert found.speed_m_s[0] == pytest.approx(early.last_speed_m_s)
+    assert found.speed_m_s[-1] == found.targets_m_s[-1]
+
+
+def test_nothing_left_to_foretell_is_said(early: Estimate, ship: Ship) -> None:
+    slow = replace(early, last_speed_m_s=0.5)
+    with pytest.raises(EstimationError, match=r'nothing is left to foretell: at 0\.5 m/s'):
+        foretell(slow, ship)
+
+
+def test_the_speed_in_time_has_its_band(early: Estimate, ship: Ship) -> None:
+    found = foretell(early, ship)
+    table = found.in_time()
+    time_s, speed, low, high, way, way_low, way_high = table.T
+    assert time_s[0] == 0.0
+    assert np.all(np.diff(time_s) > 0.0)
+    assert np.all(low <= speed)
+    assert np.all(speed <= high)
+    assert np.all(way_low <= way)
+    assert np.all(way <= way_high)
+    # where the band of the time says that she has a speed early, that of the speed says slow
+    milestone = found.milestones[0]
+    at_low = np.interp(milestone.time_s.low, time_s, low)
+    assert at_low == pytest.approx(milestone.speed_m_s, rel=0.02)
+
+
+def test_a_current_carries_her_over_ground_alone(early: Estimate, ship: Ship) -> None:
+    still = foretell(replace(early, current_m_s=0.0), ship).milestones[0]
+    carried = foretell(replace(early, current_m_s=0.5), ship).milestones[0]
+    assert carried.time_s == still.time_s
+    more = carried.distance_m.median - still.distance_m.median
+    assert more == pytest.approx(0.5 * still.time_s.median, rel=1e-9)
+
+
+def test_it_takes_less_than_five_milliseconds(early: Estimate, ship: Ship) -> None:
+    foretell(early, ship)
+    spent = []
+    for _ in range(20):
+        start = time.process_time()
+        foretell(early, ship)
+        spent.append(time.process_time() - start)
+    assert np.median(spent) < 5e-3
+
+
+def test_what_followed_is_read_from_the_instruments(
+    window: Window, truth: Truth, early: Estimate, ship: Ship
+) -> None:
+    whole = estimate(window, ship, Parameters(estimator='one'))
+    checked = Followed.of(window, whole).beside(foretell(early, ship), STOP_NS)
+    gliding = truth.time_s >= LEAD_IN_S
+    speed = truth.speed_through_water_m_s[gliding]
+    shown = [each for each in checked.milestones if each.was_s is not None]
+    assert shown
+    for each in shown:
+        was = float(np.interp(-each.foretold.speed_m_s, -speed, truth.time_s[gliding]))
+        assert each.was_s == pytest.approx(was - LEAD_IN_S - 600.0, abs=25.0)
+    unseen = [each for each in checked.milestones if each.foretold.speed_m_s < speed[-1] - 0.05]
+    assert all(each.was_s is None and each.was_m is None for each in unseen)
+    assert checked.inside is not None
+
+
+def test_a_spike_is_not_what_followed(window: Window, ship: Ship, early: Estimate) -> None:
+    whole = estimate(window, ship, Parameters(estimator='one'))
+    sound = Followed.of(window, whole).beside(foretell(early, ship), STOP_NS)
+    log = window.speed_through_water
+    value = log.value.copy()
+    value[800::97] += 4.0
+    spoilt = replace(window, speed_through_water=replace(log, value=value))
+    other = Followed.of(spoilt, whole).beside(foretell(early, ship), STOP_NS)
+    for one, two in zip(sound.milestones, other.milestones, strict=True):
+        if one.was_s is not None:
+            assert two.was_s == pytest.approx(one.was_s, abs=5.0)
+
+
+def test_the_interval_score() -> None:
+    band = Band(1.0, 0.5, 2.0)
+    assert interval_score(band, 1.0, 0.0) == pytest.approx(np.log(4.0))
+    assert interval_score(band, 4.0, 0.0) == pytest.approx(np.log(4.0) + 20.0 * np.log(2.0))
+    assert interval_score(band, 4.0, 4.0) == pytest.approx(np.log(6 / 4.5) + 20 * np.log(8 / 6))
+
+
+def test_words(early: Estimate, ship: Ship) -> None:
+    first = foretell(early, ship).milestones[0]
+    text = words.sentence(first, ship.mass_kg, 451.0)
+    assert text.endswith(' nm; was 7:31')
+    assert words.clock(first.time_s.median) in text
+    assert words.way(100.0, ship.mass_kg) == '100 m'
