@@ -270,7 +270,7 @@ class ShipRuns:
         """
         Return unknowns with all that is not a matter of where a run began as it is stated.
         """
-        found, _ = self._base()
+        found, _ = self._base(priors.NOTHING, 0)
         k = self.coefficients
         for place in self.places:
             kept = place[[k + i for i in (motion.SPEED, motion.PLACE, _PORT, _HEADING)]]
@@ -300,9 +300,9 @@ class ShipRuns:
             if way.components:
                 components.append([place + i for i in way.components])
             place += len(way.unknowns)
-        base_mean, base_precision = self._base()
         means, precisions, chances = [], [], []
-        for hull in hulls:
+        for number, hull in enumerate(hulls):
+            base_mean, base_precision = self._base(name, number)
             for amount in sizes:
                 for which in range(2 ** len(components)):
                     mean, precision = np.zeros(width), np.ones(width)
@@ -320,12 +320,13 @@ class ShipRuns:
                     chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
         return PriorFamilies(np.array(means) - now, np.array(precisions), np.log(chances))
 
-    def _base(self) -> tuple[Float64, Float64]:
-        """Return mean and precision of the unknowns that are no coefficients."""
+    def _base(self, name: str, number: int) -> tuple[Float64, Float64]:
+        """Return mean and precision of the unknowns that are no coefficients, in a family."""
         mean, precision = np.zeros(self.size), np.ones(self.size)
         k = self.coefficients
         for run, place in zip(self.runs, self.places):
-            family = run.model.families[0]
+            alike = [each for each in run.model.families if each.name == name]
+            family = alike[number % len(alike)]  # a run without a log has fewer
             mean[place[k:-4]], precision[place[k:-4]] = family.mean[k:], family.precision[k:]
             mean[place[k + _FREE]] = priors.FREE_SHAFT.mean
             precision[place[k + _FREE]] = priors.FREE_SHAFT.sd**-2.0

@@ -201,6 +201,8 @@ TABLE: tuple[Declared, ...] = (
     LOG_LAG,
     GROUND_LAG,
     CURRENT,
+    CALM_CURRENT,
+    FREE_SHAFT,
     WRONG,
 )
 """What docs/model.md prints, in its order."""
