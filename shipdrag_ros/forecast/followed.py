@@ -170,7 +170,7 @@ class Followed:
                 raise EstimationError(f'{name}: {len(series)} readings do not show what followed')
             time_s = _since(window, series.time_ns)
             sd = np.full(len(series), max(whole.noise_sd.get(name, 0.0), 1e-6))
-            sure = right(series.value, sd, priors.WRONG.mean)
+            sure = right(time_s, series.value, sd, priors.WRONG.mean)
             speed = _monotone(-series.value, sure)
             speed = _as_estimated(-speed, name, whole)
         else:
