@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import difflib
 import reprlib
+from array import array
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from os import PathLike
@@ -159,7 +160,7 @@ def numbers(
     expectation = f'a list of {minimum} or more {order}numbers, {one.expectation}'
 
     def read(value: object, path: str, problems: Problems) -> tuple[float, ...] | _Invalid:
-        if not isinstance(value, list) or len(value) < minimum:
+        if not isinstance(value, list | tuple | array) or len(value) < minimum:
             problems.append(f'{path}: {show(value)}, expected {expectation}')
             return INVALID
         row = [one.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]

@@ -22,6 +22,7 @@ from shipdrag_ros.fields import (
     declare,
     keys_of,
     number,
+    numbers,
     parse,
     read_keys,
     show,
@@ -41,6 +42,7 @@ ESTIMATORS = (
     ),
 )
 """Values of the parameter `estimator`."""
+SPEEDS_M_S = (2.0, 1.0)
 
 
 def _parameter(
@@ -178,6 +180,12 @@ class Parameters:
         'and is worth less',
         low=0.01,
         high=10.0,
+    )
+    forecast_speeds: tuple[float, ...] = declare(
+        numbers(0.01, 40.0, 'm/s', minimum=1),
+        'speeds of which the forecast of a glide speaks, besides 90, 75, 50 and 25 % of that at '
+        'the stop; lower: it reaches further, where less is known',
+        default=SPEEDS_M_S,
     )
     heading_convention: str = _parameter(
         'rep103',
@@ -328,6 +336,7 @@ class Parameters:
         Return the text that `from_yaml` reads back.
         """
         values = {item.name: getattr(self, item.name) for item in fields(self)}
+        values['forecast_speeds'] = list(self.forecast_speeds)
         return strict_yaml.dump(values)
 
 

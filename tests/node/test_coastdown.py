@@ -30,6 +30,7 @@ PARAMETERS = {
     'slope_window_s': 30.0,
     'confirm_s': 60.0,
     'window_s': 600.0,
+    'forecast_speeds': [3.0, 1.5],
 }
 SPEED = 100.0  # times as fast as life
 TYPES = {
