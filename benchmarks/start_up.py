@@ -27,7 +27,10 @@ def cpu_s(tree: Path, *line: str) -> float:
     """Return the CPU time of a program on a tree [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     environment = {**os.environ, 'PYTHONPATH': str(tree)}
-    subprocess.run([sys.executable, *line], check=True, env=environment, capture_output=True)
+    # in its folder too, which Python looks into first
+    subprocess.run(
+        [sys.executable, *line], check=True, env=environment, cwd=tree, stdout=subprocess.DEVNULL
+    )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -35,6 +38,7 @@ def cpu_s(tree: Path, *line: str) -> float:
 def main() -> None:
     """Print a line a verb."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('verbs', nargs='*', help='all by default')
     parser.add_argument('--tree', type=Path, action='append', default=[])
     parser.add_argument('--times', type=int, default=5)
     options = parser.parse_args()
@@ -42,7 +46,7 @@ def main() -> None:
     asked = subprocess.run(
         [sys.executable, '-c', VERBS], check=True, capture_output=True, text=True
     )
-    for verb in asked.stdout.split():
+    for verb in options.verbs or asked.stdout.split():
         line = ('-m', 'shipdrag_ros.cli', verb, '--help')
         taken = [[cpu_s(tree, *line) for tree in trees] for _ in range(options.times)]
         least = [min(each) for each in zip(*taken, strict=True)]

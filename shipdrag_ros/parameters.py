@@ -32,7 +32,7 @@ from shipdrag_ros.fields import (
 
 _SECTION = 'ros__parameters'
 FORMER_ESTIMATORS = {'warped': 'log_time', 'motion': 'ode_fit'}
-"""Names that an estimator had before, still accepted, and what they are now."""
+"""Names that an estimator had before, and what they are now; a file may not use them."""
 # every module of that folder is one; listed without importing it
 ESTIMATORS = (
     'auto',
@@ -55,7 +55,7 @@ def _parameter(
     choices: tuple[str, ...] = (),
 ) -> Any:
     if isinstance(default, str):
-        kind = choice(*choices, former=FORMER_ESTIMATORS if choices is ESTIMATORS else ())
+        kind = choice(*choices, former=FORMER_ESTIMATORS if choices is ESTIMATORS else {})
     elif isinstance(default, int):
         kind = whole_number(int(low), int(high), unit)
     else:

@@ -199,7 +199,7 @@ def _as_on_board(
 ) -> ReplayResult:
     # what nothing is compared with is left out: an estimate depends on its window alone
     monitor = Monitor(ship, parameters, estimate=estimate if own else None)
-    comparison = Comparison(run.outputs() if own else iter(()))
+    comparison = Comparison(run.outputs() if own else iter(()), by=run.software)
     coastdowns: list[EndedCoastdown] = []
     kept: list[Event] = []
 
@@ -266,7 +266,7 @@ def _in_window(
         (coastdown,),
         (coastdown, *coastdown.cuts),
         _counts(run, samples.inputs, used, rejected),
-        Recorded(0, 0, None),
+        Recorded(0, 0, None, by=run.software),
     )
 
 
