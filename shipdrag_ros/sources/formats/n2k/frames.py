@@ -9,7 +9,7 @@ from datetime import UTC
 from typing import NamedTuple
 
 from shipdrag_ros.samples import SECOND_NS
-from shipdrag_ros.sources.times import iso_ns
+from shipdrag_ros.sources.log import iso_ns
 
 MINUTE_NS = 60 * SECOND_NS
 DAY_NS = 1440 * MINUTE_NS
