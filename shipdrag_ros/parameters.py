@@ -183,7 +183,7 @@ class Parameters:
     )
     forecast_speeds: tuple[float, ...] = declare(
         numbers(0.01, 40.0, 'm/s', minimum=1),
-        'speeds of which the forecast of a glide speaks, besides 90, 75, 50 and 25 % of that at '
+        'speeds of which the forecast of a glide speaks, and of 90, 75, 50 and 25 % of that at '
         'the stop; lower: it reaches further, where less is known',
         default=SPEEDS_M_S,
     )
