@@ -27,6 +27,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -44,6 +45,8 @@ from hidden_b import plans as plans_b
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
+from shipdrag_ros.diagnosis import diagnose as diagnose_coastdowns
+from shipdrag_ros.library import diagnosing as library
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 OUT = Path(__file__).parent / 'out'
@@ -141,6 +144,9 @@ def diagnosis(
     if by == 'oracle':
         oracle = import_module('hidden.oracle' if world == 'a' else 'hidden_b.oracle')
         return lambda seen: _timed(oracle.diagnose, seen, WORLDS[world].known(number))
+    if by == 'one':
+        library.diagnose = partial(diagnose_coastdowns, engine='one')
+        by = 'command'
     if by == 'command':
         more: list[str] = []
         if with_facts:
@@ -247,7 +253,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Ask, keep, reveal, and print.
     """
     parser = argparse.ArgumentParser(description=(__doc__ or '').strip().splitlines()[0])
-    parser.add_argument('--by', default='command', help='oracle, command or MODULE:FUNCTION')
+    parser.add_argument(
+        '--by',
+        default='command',
+        help='oracle, command, one (the posterior of docs/model.md) or MODULE:FUNCTION',
+    )
     parser.add_argument('--as', dest='form', choices=('blocks', 'bags'), default='blocks')
     parser.add_argument('--first', type=int, default=0, help='number of the first case')
     parser.add_argument('--count', type=int, help='how many cases; all of them by default')

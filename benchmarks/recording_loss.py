@@ -36,10 +36,10 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.bags.compaction import compact
 from shipdrag_ros.bags.durable import SYNC_S, PartLimits
 from shipdrag_ros.bags.live import LiveFile
 from shipdrag_ros.bags.records import MAGIC, walk
+from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage, encode
 from shipdrag_ros.node.recorder import Recorder

@@ -101,6 +101,8 @@ def parameters() -> str:
         kind = key.kind
         if kind.choices:
             allowed = ', '.join(f'`{choice}`' for choice in kind.choices)
+        elif kind.low is None:
+            allowed = kind.expectation
         else:
             allowed = f'{kind.low:g} .. {kind.high:g}'
         default = f'`{key.default}` {kind.unit}'.strip()

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import difflib
 import reprlib
+from array import array
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from os import PathLike
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -158,7 +160,7 @@ def numbers(
     expectation = f'a list of {minimum} or more {order}numbers, {one.expectation}'
 
     def read(value: object, path: str, problems: Problems) -> tuple[float, ...] | _Invalid:
-        if not isinstance(value, list) or len(value) < minimum:
+        if not isinstance(value, list | tuple | array) or len(value) < minimum:
             problems.append(f'{path}: {show(value)}, expected {expectation}')
             return INVALID
         row = [one.read(item, f'{path}[{i}]', problems) for i, item in enumerate(value)]
@@ -189,16 +191,18 @@ def text() -> Kind:
     return Kind(read, 'text')
 
 
-def choice(*values: str, former: Collection[str] = ()) -> Kind:
+def choice(*values: str, former: Mapping[str, str] = MappingProxyType({})) -> Kind:
     """
-    Expect one of some words; those that they had before are accepted, and listed nowhere.
+    Expect one of some words; the error of a former one names its successor.
     """
     expectation = f'one of {", ".join(value for value in values if value)}'
 
     def read(value: object, path: str, problems: Problems) -> str | _Invalid:
-        if isinstance(value, str) and (value in values or value in former):
+        if isinstance(value, str) and value in values:
             return value
-        problems.append(f'{path}: {show(value)}, expected {expectation}')
+        known = former.get(value) if isinstance(value, str) else None
+        now = '' if known is None else f'which is {known!r} now; '
+        problems.append(f'{path}: {show(value)}, {now}expected {expectation}')
         return INVALID
 
     return Kind(read, expectation, choices=values)

@@ -135,6 +135,26 @@ class Prior:
             case _:
                 return a + b * z
 
+    def inverse(self, value: float) -> float:
+        """
+        Return z of a value, of its own sign where either is alike.
+
+        Raises
+        ------
+        ValueError
+            If the prior is a choice or uniform.
+        """
+        a, b = self.first, self.second
+        match self.shape:
+            case Shape.HALF_NORMAL:
+                return value / b
+            case Shape.LOG_NORMAL | Shape.EITHER_SIGN:
+                return math.log(max(value / a, 1e-300)) / b
+            case Shape.CHOICE | Shape.UNIFORM:
+                raise ValueError(f'a prior that is {self} has no z of a value')
+            case _:
+                return (value - a) / b
+
     def slope(self, z: float) -> float:
         """
         Return the derivative of the value by z.

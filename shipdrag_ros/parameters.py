@@ -22,6 +22,7 @@ from shipdrag_ros.fields import (
     declare,
     keys_of,
     number,
+    numbers,
     parse,
     read_keys,
     show,
@@ -31,7 +32,7 @@ from shipdrag_ros.fields import (
 
 _SECTION = 'ros__parameters'
 FORMER_ESTIMATORS = {'warped': 'log_time', 'motion': 'ode_fit'}
-"""Names that an estimator had before, still accepted, and what they are now."""
+"""Names that an estimator had before, and what they are now; a file may not use them."""
 # every module of that folder is one; listed without importing it
 ESTIMATORS = (
     'auto',
@@ -41,6 +42,7 @@ ESTIMATORS = (
     ),
 )
 """Values of the parameter `estimator`."""
+SPEEDS_M_S = (2.0, 1.0)
 
 
 def _parameter(
@@ -53,7 +55,7 @@ def _parameter(
     choices: tuple[str, ...] = (),
 ) -> Any:
     if isinstance(default, str):
-        kind = choice(*choices, former=FORMER_ESTIMATORS if choices is ESTIMATORS else ())
+        kind = choice(*choices, former=FORMER_ESTIMATORS if choices is ESTIMATORS else {})
     elif isinstance(default, int):
         kind = whole_number(int(low), int(high), unit)
     else:
@@ -178,6 +180,12 @@ class Parameters:
         'and is worth less',
         low=0.01,
         high=10.0,
+    )
+    forecast_speeds: tuple[float, ...] = declare(
+        numbers(0.01, 40.0, 'm/s', minimum=1),
+        'speeds of which the forecast of a glide speaks, and of 90, 75, 50 and 25 % of that at '
+        'the stop; lower: it reaches further, where less is known',
+        default=SPEEDS_M_S,
     )
     heading_convention: str = _parameter(
         'rep103',
@@ -328,6 +336,7 @@ class Parameters:
         Return the text that `from_yaml` reads back.
         """
         values = {item.name: getattr(self, item.name) for item in fields(self)}
+        values['forecast_speeds'] = list(self.forecast_speeds)
         return strict_yaml.dump(values)
 
 

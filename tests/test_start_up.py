@@ -55,6 +55,12 @@ def test_a_verb_that_estimates_nothing_imports_no_estimator(verb: str) -> None:
     assert not {'scipy.stats', 'matplotlib', 'shipdrag_ros.diagnosis'} & found
 
 
+@pytest.mark.parametrize('verb', ['simulate', 'watch', 'demo', 'trend'])
+def test_splines_are_imported_with_the_first_of_them(verb: str) -> None:
+    found = after(f'from shipdrag_ros.cli import parser; parser({verb!r})')
+    assert not {'scipy.interpolate', 'scipy.optimize', 'scipy.special'} & found
+
+
 def test_what_is_imported_is_compiled_when_it_is_called() -> None:
     code = (
         'from shipdrag_ros import compiled; import shipdrag_ros.coastdown as room; '

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """MCAP files in and out; nothing that estimates."""
 
-from shipdrag_ros.bags.reader import open_runs
+from shipdrag_ros.bags.reader import BagInfo, info, open_runs
 from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, SilenceMark, TopicInfo
-from shipdrag_ros.bags.summary import BagInfo, info
 from shipdrag_ros.bags.writer import BagWriter, Compression
 
 __all__ = [

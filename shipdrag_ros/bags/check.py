@@ -27,7 +27,6 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
 from shipdrag_ros.bags.locate import locate
 from shipdrag_ros.bags.mcap_file import not_mcap
 from shipdrag_ros.bags.message_index import EVERY_CHANNEL, index_messages
@@ -37,6 +36,9 @@ from shipdrag_ros.bags.records import (
     MAGIC,
     MESSAGE_HEAD,
     Buffer,
+    Damage,
+    DamageKind,
+    DamageList,
     Place,
     attachment_agrees,
     checksum,

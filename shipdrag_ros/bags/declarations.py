@@ -17,6 +17,8 @@ from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import OUTPUT_TOPICS, types
 
 PROFILE = 'ros2'
+METADATA = 'shipdrag_ros'
+"""Name of the metadata record that says which recording a file is part of."""
 LIBRARY = f'shipdrag_ros {__version__}'
 
 # as rosbag2 writes it; a player needs it to latch the topic again

@@ -18,8 +18,8 @@ from pathlib import Path
 from time import monotonic
 from uuid import uuid4
 
-from shipdrag_ros.bags.compaction import compact
 from shipdrag_ros.bags.live import LiveFile, NameTakenError
+from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 

@@ -29,9 +29,9 @@ from mcap.records import (
 )
 
 from shipdrag_ros.bags import declarations
-from shipdrag_ros.bags.declarations import LIBRARY, PROFILE, as_bytes
+from shipdrag_ros.bags.declarations import LIBRARY, METADATA, PROFILE, as_bytes
 from shipdrag_ros.bags.records import MAGIC
-from shipdrag_ros.bags.writer import METADATA, private_opener
+from shipdrag_ros.bags.writer import private_opener
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage
 

@@ -24,12 +24,12 @@ import zstandard
 from mcap.opcode import Opcode
 
 from shipdrag_ros.bags.contents import FileSegment, contents_of, damaged_chunk
-from shipdrag_ros.bags.damage import DamageKind
 from shipdrag_ros.bags.message_index import CHANNELS, Messages, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
     HEAD,
     MAGIC,
+    DamageKind,
     Place,
     Unpacked,
     release,

@@ -4,30 +4,31 @@ Salvage of a damaged bag: every whole message into a sound one.
 
 Messages of a chunk that is cut off or has a wrong checksum, messages whose bounds are
 inferred, and those of topics that are not known, go into a bag of their own, so that
-nothing doubtful is taken for data.
+nothing doubtful is taken for data. Sound chunks are copied as they are. A finished part
+is made compact in the same way: its name holds a whole file at every moment.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
+import numpy as np
 import zstandard
 from isal.isal_zlib import crc32
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
-from shipdrag_ros.bags.damage import Damage, DamageKind, DamageList
 from shipdrag_ros.bags.declarations import as_bytes
 from shipdrag_ros.bags.live import sync_directory
 from shipdrag_ros.bags.locate import BagFiles, locate
 from shipdrag_ros.bags.mcap_file import unpack_file
-from shipdrag_ros.bags.message_index import EVERY_CHANNEL, index_messages
+from shipdrag_ros.bags.message_index import EVERY_CHANNEL, Indexed, index_messages
 from shipdrag_ros.bags.records import (
     CHUNK_LIMIT_BYTES,
     GARBAGE,
@@ -37,6 +38,9 @@ from shipdrag_ros.bags.records import (
     MESSAGE_HEAD,
     TIME_LIMIT_NS,
     Buffer,
+    Damage,
+    DamageKind,
+    DamageList,
     Place,
     attachment_agrees,
     read,
@@ -44,13 +48,13 @@ from shipdrag_ros.bags.records import (
     unpack_zstd,
     walk,
 )
-from shipdrag_ros.bags.writer import RecordWriter
+from shipdrag_ros.bags.writer import CHUNK_RANGE, RecordWriter
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.progress import PartDone
 
 _FOOTER_BYTES = HEAD.size + 20
 _STATED = ((20, 8), (4, 4))  # before the last magic: start and checksum of the summary
-SUFFIX = '.part'
+_PART = '.part'
 
 
 @dataclass(frozen=True)
@@ -237,7 +241,7 @@ class _Salvaged:
         self._writer: RecordWriter | None = None
         self.numbers: dict[int, int] = {}
         self._written: set[bytes] = set()
-        self._part = path.with_name(f'.{path.name}{SUFFIX}')
+        self._part = path.with_name(f'.{path.name}{_PART}')
         if path.exists():
             raise BagError(f'{str(path)!r} exists; choose another name or remove it')
 
@@ -359,12 +363,15 @@ class _Salvage:
         if damage not in (None, chunk.damage):
             self.damages.add(chunk.offset, 'chunk', damage)
         sound = verified or (damage is None and chunk.damage is None)
-        messages, others, notes = index_messages([records], [0], EVERY_CHANNEL)
+        indexed = index_messages([records], [0], EVERY_CHANNEL)
+        messages, others, notes = indexed
         if sound and not notes:
             for at in others.tolist():
-                start = at + HEAD.size
-                place = Place(records[at], at, start, start + HEAD.unpack_from(records, at)[1])
+                place = _place_at(records, at)
                 self._record(records, place, chunk.offset, sound=True, verified=verified)
+            as_it_is = verified and damage is None and not self._bag.message_compression
+            if as_it_is and self._copy(data, chunk, records, indexed):
+                return
             starts = (messages.start - MESSAGE_HEAD.size).tolist()
             for start, end in zip(starts, messages.end.tolist(), strict=True):
                 self._message(records[start:end], chunk.offset, self._sound)
@@ -380,6 +387,30 @@ class _Salvage:
                 self._record(records, place, chunk.offset, sound=believed, verified=verified)
         packed = chunk.end - chunk.start
         self.bytes_lost += packed * (len(records) - used) // len(records) if records else packed
+
+    def _copy(self, data: Buffer, chunk: Place, records: bytes, indexed: Indexed) -> bool:
+        """Write a chunk as it is, if it needs no other numbers and is worth it; say whether."""
+        messages, others, _ = indexed
+        record, declared = read(data, chunk), self._declared.channels
+        numbers = np.unique(messages.channel).tolist()
+        small = not record.compression and len(record.data) < CHUNK_RANGE[0]
+        if small or not numbers or not declared.keys() >= set(numbers):
+            return False
+        inside = [read(records, _place_at(records, at)) for at in others.tolist()]
+        for number in {*numbers, *(it.id for it in inside if isinstance(it, Channel))}:
+            if self._sound.number(number, self._declared) != number:
+                return False
+        if not all(self._sound.writer.says(it) for it in inside):
+            return False
+        offsets = messages.start - (HEAD.size + MESSAGE_HEAD.size)
+        entries = np.column_stack((messages.log_ns, offsets)).astype('<u8')
+        first, last = int(messages.log_ns.min()), int(messages.log_ns.max())
+        self._sound.writer.add_chunk(
+            replace(record, message_start_time=first, message_end_time=last),
+            {number: entries[messages.channel == number].ravel() for number in numbers},
+        )
+        self._sound.messages += len(messages)
+        return True
 
     def _record(
         self, data: Buffer, place: Place, offset: int, *, sound: bool, verified: bool = False
@@ -428,3 +459,49 @@ class _Salvage:
         number = bag.numbers.get(channel) or bag.number(channel, self._declared)
         bag.writer.add_content(number, content, log_ns=log_ns)
         bag.messages += 1
+
+
+def _place_at(records: bytes, at: int) -> Place:
+    """Return the place of a whole record in an unpacked chunk."""
+    start = at + HEAD.size
+    return Place(records[at], at, start, start + HEAD.unpack_from(records, at)[1])
+
+
+SUFFIX = '.compacting'
+
+
+def compact(path: Path, *, messages: int) -> None:
+    """
+    Rewrite a file that is no longer written into compressed chunks with an index.
+
+    Parameters
+    ----------
+    path
+        From `LiveFile`; afterwards the same messages.
+    messages
+        How many there are.
+
+    Raises
+    ------
+    BagError
+        If that is impossible; the file is then as it was.
+    """
+    compacted = path.with_name(path.name + SUFFIX)
+    made = [compacted]
+    try:
+        compacted.unlink(missing_ok=True)  # from an attempt that failed
+        written = recover(path, compacted)
+        made += [written.quarantine] if written.quarantine else []
+        if written.messages_recovered != messages or written.quarantine:
+            raise BagError(
+                f'{str(path)!r} cannot be compacted: it holds {written.messages_recovered} sound '
+                f'messages, {messages} were written'
+            )
+        compacted.replace(path)
+        sync_directory(path.parent)
+    except OSError as error:
+        raise BagError(f'{str(path)!r} cannot be compacted: {error}') from error
+    finally:
+        for each in made:
+            with suppress(OSError):
+                each.unlink()

@@ -16,6 +16,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from shipdrag_ros.bags.contents import FileChannel
+from shipdrag_ros.bags.declarations import METADATA
 from shipdrag_ros.bags.locate import BagFiles
 from shipdrag_ros.bags.mcap_file import McapFile
 from shipdrag_ros.bags.message_index import CHANNELS, Messages
@@ -141,6 +142,11 @@ class Run:
         if not spans:
             return None
         return min(start for start, _ in spans), max(end for _, end in spans)
+
+    @property
+    def software(self) -> str | None:
+        """Version of this package that recorded it; None if it was another tool."""
+        return self.parts[0].contents.metadata.get(METADATA, {}).get('version')
 
     @property
     def warnings(self) -> tuple[str, ...]:

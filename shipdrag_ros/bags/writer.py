@@ -40,9 +40,11 @@ from mcap.records import (
     Schema,
     Statistics,
 )
+from numpy.typing import NDArray
 
 from shipdrag_ros.bags.declarations import (
     LIBRARY,
+    METADATA,
     PROFILE,
     as_bytes,
     attachment,
@@ -50,6 +52,7 @@ from shipdrag_ros.bags.declarations import (
     metadata,
     schema,
 )
+from shipdrag_ros.bags.message_index import CHANNELS
 from shipdrag_ros.bags.records import HEAD, MAGIC, MESSAGE_HEAD
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
@@ -58,8 +61,6 @@ from shipdrag_ros.samples import Block
 _NUMBERED = struct.Struct('<BQH')  # opcode, length, channel
 CHUNK_RANGE = 1 << 14, 1 << 20
 """Least and most bytes of a chunk before it is packed."""
-METADATA = 'shipdrag_ros'
-"""Name of the metadata record that says which recording a file is part of."""
 
 
 def private_opener(path: str, flags: int) -> int:
@@ -148,16 +149,25 @@ class RecordWriter:
         Parameters
         ----------
         channel, schema
-            Their own numbers do not count.
+            Their own numbers are kept where they are free; 0 is none.
         """
-        number = 0 if schema is None else self._number(replace(schema, id=0))
-        return self._number(replace(channel, id=0, schema_id=number))
+        number = 0 if schema is None else self._number(schema)
+        return self._number(replace(channel, schema_id=number))
+
+    def says(self, record: Schema | Channel) -> bool:
+        """
+        Say whether exactly this was declared, with its number.
+        """
+        return self._declared.get(as_bytes(replace(record, id=0))) == record
 
     def _number(self, record: Schema | Channel) -> int:
-        key = as_bytes(record)
+        """Keep the number of a record where it is free, and give it another where not."""
+        key = as_bytes(replace(record, id=0))
         if key not in self._declared:
-            same = [it for it in self._declared.values() if type(it) is type(record)]
-            self._declared[key] = replace(record, id=len(same) + 1)
+            taken = {it.id for it in self._declared.values() if type(it) is type(record)}
+            if record.id in {0, *taken}:
+                record = replace(record, id=next(n for n in range(1, CHANNELS) if n not in taken))
+            self._declared[key] = record
             # outside of chunks: any chunk may be damaged and the others sound
             self._write(as_bytes(self._declared[key]))
         return int(self._declared[key].id)
@@ -255,46 +265,58 @@ class RecordWriter:
         if not self._chunk:
             return
         records = bytes(self._chunk)
-        at = self._at
         name, pack = _PACKERS[self._compression]
         first, last = self._times
-        packed = pack(records)
-        chunk = as_bytes(
-            Chunk(
-                compression=name,
-                data=packed,
-                message_end_time=last,
-                message_start_time=first,
-                uncompressed_crc=crc32(records),
-                uncompressed_size=len(records),
-            )
+        chunk = Chunk(
+            compression=name,
+            data=pack(records),
+            message_end_time=last,
+            message_start_time=first,
+            uncompressed_crc=crc32(records),
+            uncompressed_size=len(records),
         )
-        self._write(chunk)
-        offsets = {}
-        for number, entries in self._entries.items():
-            offsets[number] = self._at
-            listed = np.array(entries, '<u8').tobytes()
-            head = HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(listed))
-            self._write(head + struct.pack('<HI', number, len(listed)) + listed)
-            self._counts[number] += len(entries) // 2
-        self._indexes.append(
-            ChunkIndex(
-                chunk_length=len(chunk),
-                chunk_start_offset=at,
-                compression=name,
-                compressed_size=len(packed),
-                message_end_time=last,
-                message_index_length=self._at - at - len(chunk),
-                message_index_offsets=offsets,
-                message_start_time=first,
-                uncompressed_size=len(records),
-            )
-        )
-        self._unpacked += len(records)
-        least, most = CHUNK_RANGE
-        self._room = self._chunk_bytes or min(max(self._unpacked >> 6, least), most)
+        entries = {number: np.array(each, '<u8') for number, each in self._entries.items()}
         self._chunk.clear()
         self._entries.clear()
+        self.add_chunk(chunk, entries)
+
+    def add_chunk(self, chunk: Chunk, entries: Mapping[int, NDArray[np.uint64]]) -> None:
+        """
+        Write a chunk as it is, behind what was added before.
+
+        Parameters
+        ----------
+        chunk
+            Of messages whose channels were declared by the numbers that they have in it.
+        entries
+            Log time [ns] and offset of each message in it, in turn, by channel.
+        """
+        self._end_chunk()
+        at, record = self._at, as_bytes(chunk)
+        self._write(record)
+        offsets = {}
+        for number, each in entries.items():
+            offsets[number] = self._at
+            listed = each.tobytes()
+            head = HEAD.pack(Opcode.MESSAGE_INDEX, 6 + len(listed))
+            self._write(head + struct.pack('<HI', number, len(listed)) + listed)
+            self._counts[number] += each.size // 2
+        self._indexes.append(
+            ChunkIndex(
+                chunk_length=len(record),
+                chunk_start_offset=at,
+                compression=chunk.compression,
+                compressed_size=len(chunk.data),
+                message_end_time=chunk.message_end_time,
+                message_index_length=self._at - at - len(record),
+                message_index_offsets=offsets,
+                message_start_time=chunk.message_start_time,
+                uncompressed_size=chunk.uncompressed_size,
+            )
+        )
+        self._unpacked += chunk.uncompressed_size
+        least, most = CHUNK_RANGE
+        self._room = self._chunk_bytes or min(max(self._unpacked >> 6, least), most)
 
     def _statistics(self) -> Statistics:
         kinds = Counter(map(type, chain(self._declared.values(), self._indexes)))

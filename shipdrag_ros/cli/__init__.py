@@ -55,6 +55,7 @@ _OWN = (
     Verb('forecast', '.forecast', 'the rest of each glide foretold, beside what followed'),
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
     Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
+    Verb('poster', '.poster', 'stopping without engine: time and way from speed to speed'),
     Verb('import', '.import_', 'logs and tables of other programs -> bag'),
     Verb('completion', '.completion', 'completion of the command line in a shell'),
     Verb('doctor', '.doctor', 'what of the installation works, and what to do about the rest'),

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from shipdrag_ros.bags.check import FileCheck, check
-from shipdrag_ros.bags.damage import Damage
+from shipdrag_ros.bags.records import Damage
 from shipdrag_ros.cli.arguments import add_json, bag
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table

@@ -49,6 +49,10 @@ EXAMPLES = {
         'shipdrag trend store --json trend.json',
         "shipdrag trend store --sql 'select ship, count(*) from coastdowns group by ship'",
     ),
+    'poster': (
+        'shipdrag poster store --report poster.html',
+        'shipdrag poster store --json poster.json',
+    ),
     'import': (
         'shipdrag import LOG.nmea.gz -o log.mcap --ship ship.yaml',
         'shipdrag import log.csv -o plane.mcap --time t:ms --map speed_through_water=u:kn '

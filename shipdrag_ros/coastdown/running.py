@@ -100,7 +100,12 @@ class RunningCoastdown:
 
     def _with_forecast(self, stamp_ns: int, found: Estimate, window: Window) -> Update:
         try:
-            forecast = foretell(found, self._ship, froude_min=self._parameters.froude_min)
+            forecast = foretell(
+                found,
+                self._ship,
+                froude_min=self._parameters.froude_min,
+                speeds_m_s=self._parameters.forecast_speeds,
+            )
         except EstimationError:  # nothing is left to foretell
             return Update(stamp_ns, found)
         return Update(stamp_ns, found, forecast, PathAhead.of(window, forecast))

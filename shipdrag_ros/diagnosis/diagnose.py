@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Literal
 
 from shipdrag_ros.diagnosis.advice import advice
 from shipdrag_ros.diagnosis.carried import carried
@@ -17,6 +18,7 @@ from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.limits import limits_of
 from shipdrag_ros.diagnosis.nameless import with_nameless
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.one import diagnose_one
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
@@ -51,6 +53,7 @@ def diagnose(
     earlier: Sequence[EarlierDiagnosis] = (),
     advise: bool = True,
     progress: Progress = silent,
+    engine: Literal['fits', 'one'] = 'fits',
 ) -> DiagnosisResult:
     """
     Name the effect that is missing in a ship's model.
@@ -71,6 +74,8 @@ def diagnose(
         Whether to work out what would decide, which takes as long as all the rest.
     progress
         Called with each stage, how much of it is done, and of how much.
+    engine
+        'one': the posterior of docs/model.md, without advice, traces and earlier diagnoses.
 
     Returns
     -------
@@ -127,6 +132,19 @@ def diagnose(
             coastdowns_used=len(seen),
             runs=_seen_runs(seen),
         )
+    if engine == 'one':
+        if earlier:
+            notes = (*notes, 'earlier diagnoses do not count in the one posterior yet')
+
+        def observe(
+            moved_s: Mapping[str, float],
+        ) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
+            if not any(moved_s.values()):
+                return seen, notes
+            return _observed(runs, ship, parameters, moved_s, progress)
+
+        found_one = diagnose_one(observe, ship, lambda these: _stated(runs, these, ship, facts))
+        return replace(found_one, runs=_seen_runs(seen))
     model, found, stated, notes = _searched(
         (seen, notes), runs, ship, parameters, facts, earlier, progress
     )

@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.result import WeighedFact
-from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.inference.decision import UNKNOWN
+from shipdrag_ros.posterior.compare import ComparedHypotheses
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
 from shipdrag_ros.simulation.effect import Effect
@@ -28,6 +28,13 @@ _SHAFT: Mapping[str, Mapping[str, float]] = {
     'free': {'free': 1.0 - _DRIVEN, 'driven': _DRIVEN},
     'locked': {'locked': 1.0},
 }
+
+
+class Missing(Protocol):
+    """What may be missing, as facts see it."""
+
+    def effects_in(self, run: int | None) -> list[Effect]:
+        """Return the effects that are missing in a run; None: in any."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,7 @@ class Facts:
     ship: Ship
     stated: tuple[StatedFact, ...] = ()
 
-    def log_likelihood(self, hypothesis: Hypothesis) -> float:
+    def log_likelihood(self, hypothesis: Missing) -> float:
         """
         Return the logarithm of the probability that these facts are stated.
 
@@ -82,7 +89,9 @@ class Facts:
             math.log(_likelihood(*self._so(each, hypothesis))) for each in self.stated
         )
 
-    def weighed(self, posterior: Posterior, runs: Sequence[str]) -> tuple[WeighedFact, ...]:
+    def weighed(
+        self, posterior: Posterior | ComparedHypotheses, runs: Sequence[str]
+    ) -> tuple[WeighedFact, ...]:
         """
         Return how probable it is that each fact is wrong.
 
@@ -153,15 +162,10 @@ class Facts:
             found[name] = math.fsum(_decided(posterior, each, decides) for each in so)
         return found
 
-    def _so(self, stated: StatedFact, hypothesis: Hypothesis) -> tuple[float, Fact]:
+    def _so(self, stated: StatedFact, hypothesis: Missing) -> tuple[float, Fact]:
         """Return how probable it is that a fact is so under a hypothesis, and the fact."""
         name = stated.fact.name
-        effects = [
-            term.effect
-            for term in hypothesis.terms
-            if isinstance(term, EffectTerm) and not term.stated and name in term.effect.facts
-            if stated.run is None or term.acts_in(stated.run)
-        ]
+        effects = [effect for effect in hypothesis.effects_in(stated.run) if name in effect.facts]
         if effects:
             return min(_goes_with(effect, stated) for effect in effects), stated.fact
         return self._usual(stated.fact), stated.fact

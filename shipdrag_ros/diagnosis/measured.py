@@ -31,6 +31,8 @@ class Measured:
         Places of the rows in the times of the observation.
     rows
         `POSITION` rows are distances along the direction [m].
+    variance : (n,)
+        Of the white noise of each.
     whitener : (n, n)
         Inverse Cholesky factor of the noise covariance.
     water_m_s
@@ -40,6 +42,7 @@ class Measured:
 
     at: Int64
     rows: Rows
+    variance: Float64
     whitener: Float64
     water_m_s: float
 
@@ -124,6 +127,7 @@ class SteadyNoise:
         return Measured(
             np.searchsorted(times, time),
             rows,
+            variance,
             np.ascontiguousarray(whitener.T),
             # without a log it is not separated from a gust
             noise.slow.water_m_s if (rows.kind[steady] == LOG).any() else 0.0,

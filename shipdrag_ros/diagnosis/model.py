@@ -106,6 +106,16 @@ class Hypothesis:
             log_odds=self.log_odds + log_odds,
         )
 
+    def effects_in(self, run: int | None) -> list[Effect]:
+        """Return the effects that are missing in a run; None: in any."""
+        return [
+            term.effect
+            for term in self.terms
+            if getattr(term, 'effect', None) is not None
+            and not term.stated
+            and (run is None or term.acts_in(run))
+        ]
+
     @cached_property
     def parts(self) -> tuple[tuple[Any, int], ...]:
         """Each `Part`, with the place of its first unknown."""

@@ -401,6 +401,12 @@ def _known(hypothesis: Hypothesis) -> list[int]:
     ]
 
 
+def rows_of(seen: Observation, columns: Columns) -> tuple[Float64, Float64, Float64]:
+    """Return rows along and across (k, n), and the distance ahead (k, m), of each column."""
+    found = _predicted(seen, columns)
+    return found.along, found.across, found.distance
+
+
 def _predicted(seen: Observation, columns: Columns) -> _Predictions:
     """Return what each column predicts of the rows."""
     cos, sin = math.cos(seen.heading_rad), math.sin(seen.heading_rad)

@@ -18,13 +18,12 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast.law import deceleration
 from shipdrag_ros.forecast.result import Forecast, Z
+from shipdrag_ros.parameters import SPEEDS_M_S
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 FRACTIONS = (0.9, 0.75, 0.5, 0.25)
 """Of the speed at the stop, that are always spoken of."""
-SPEEDS_M_S = (2.0, 1.0)
-"""Further ones by default."""
 # sizes of what disturbs a glide, as the priors of the noise have them (`inference/learning.py`)
 GUST = 0.04
 """Standard deviation of a gust, of the deceleration at the stop."""
@@ -37,6 +36,7 @@ CURRENT_M_S = 0.4
 READING, READING_WHITE = 1e-3, 0.3
 """Slow error of the instrument: of the speed at the stop, or of its white noise."""
 _NODES = 64  # of the glide, evenly in ln u
+_BEYOND = 0.5  # of the lowest speed that is spoken of, until which is foretold
 _WIDEST = 10.0  # of the logarithm of a figure, on either side
 
 
@@ -86,8 +86,7 @@ def foretell(
             f'{FRACTIONS[-1]:.0%} of {stop:.3g} m/s and than {", ".join(map(str, speeds_m_s))} '
             'm/s: give a lower speed in forecast_speeds'
         )
-    u = np.exp(np.linspace(math.log(now), math.log(targets[-1]), _NODES))
-    u[-1] = targets[-1]
+    u = np.exp(np.linspace(math.log(now), math.log(_BEYOND * targets[-1]), _NODES))
     found = deceleration(estimate, ship, np.append(u, stop))
     a = np.exp(found.log_m_s2)
     weights = _weights(u, a[:-1])

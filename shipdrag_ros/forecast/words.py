@@ -5,11 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shipdrag_ros.display import Table, ship_speed
+from shipdrag_ros.display import LIGHT_KG, Table, ship_speed
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band, Milestone
 
-_LIGHT_KG = 1000.0
 _MILE_M = 1852.0
 _NOT_SHOWN = 'not shown'
 
@@ -33,7 +32,7 @@ def way(metres: float, mass_kg: float) -> str:
     """
     Return a distance in nautical miles, of a light craft or a short way in metres.
     """
-    if mass_kg < _LIGHT_KG or metres < 0.1 * _MILE_M:
+    if mass_kg < LIGHT_KG or metres < 0.1 * _MILE_M:
         return f'{metres:.3g} m'
     return f'{metres / _MILE_M:.2f} nm'
 

@@ -261,7 +261,12 @@ def _forecast(
         found = estimate(window.part(stop_ns, end_ns), ship, parameters)
         if why := too_vague(found, parameters):
             return none(why)
-        forecast = foretell(found, ship, froude_min=parameters.froude_min)
+        forecast = foretell(
+            found,
+            ship,
+            froude_min=parameters.froude_min,
+            speeds_m_s=parameters.forecast_speeds,
+        )
     except EstimationError as error:
         return none(str(error))
     if followed is None:

@@ -18,7 +18,6 @@ from shipdrag_ros.library.shown import Shown, drawing, time_column, writing
 from shipdrag_ros.library.wording import says_it_in_python
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.trend import ShipTrend, fleet_trends, words
-from shipdrag_ros.trend.document import document
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,7 +81,10 @@ class Trends(Shown):
         """
         Return the JSON document of `shipdrag trend`; arrays are numpy's.
         """
-        return document(self.ships, self.skipped)
+        return {
+            'ships': [trend.to_dict() for trend in self.ships],
+            'skipped': [{'bag': bag, 'reason': reason} for bag, reason in self.skipped],
+        }
 
     def _lines(self) -> Sequence[str]:
         lines = [

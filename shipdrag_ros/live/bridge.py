@@ -20,13 +20,23 @@ from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.figures import (
     PagePart,
     at_usual_speed,
+    checked_part,
     curve_part,
+    forecast_part,
     past_part,
     ship_part,
     to_go_s,
 )
 from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
-from shipdrag_ros.live.outputs import Curve, Figure, read_curve, read_resistance, read_speed
+from shipdrag_ros.live.outputs import (
+    ComingGlide,
+    Curve,
+    Figure,
+    read_curve,
+    read_forecast,
+    read_resistance,
+    read_speed,
+)
 from shipdrag_ros.live.trace import Trace
 from shipdrag_ros.live.verdicts import verdict_part
 from shipdrag_ros.messages import EventKind, MalformedMessage, read_event, types
@@ -93,6 +103,8 @@ class Bridge:
         self._speed: Figure | None = None
         self._resistance: Figure | None = None
         self._curve: Curve | None = None
+        self._coming: list[ComingGlide] = []
+        self._foretold: PagePart | None = None
         self._verdict: PagePart = {'state': '', 'sentence': ''}  # as the health says it
         self._found: PagePart | None = None  # the last diagnosis
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
@@ -238,10 +250,22 @@ class Bridge:
                 if self._coast_ns is not None and curve.stamp_ns > self._coast_ns:
                     age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
                     self._bands.append((age_s, curve.band(self._ship)))
+        elif name == 'forecast':
+            self._take_forecast(read_forecast(payload))
         elif name == 'events':
             self._take_event(payload)
         elif name == 'diagnosis':
             self.take_diagnosis(json.loads(types.deserialize(types.STRING, payload).data))
+
+    def _take_forecast(self, coming: ComingGlide | None) -> None:
+        if coming is not None:
+            self._coming.append(coming)
+            self._foretold = forecast_part(coming, self._ship)
+            return
+        self._foretold = None
+        if self._coming and self._speed is not None and self._coast_ns is not None:
+            self._foretold = checked_part(self._coming, self._speed, self._coast_ns)
+        self._coming = []
 
     def _take_event(self, payload: bytes) -> None:
         note = read_event(payload)
@@ -262,7 +286,8 @@ class Bridge:
 
     def _begin(self, start_ns: int) -> None:
         self._coast_ns, self._bands = start_ns, []
-        self._curve = self._resistance = self._speed = None
+        self._curve = self._resistance = self._speed = self._foretold = None
+        self._coming = []
         before = [course for second, course in self._courses if second * 10**9 <= start_ns]
         self._course_at_stop = before[-1] if before else self._recent.direction(self._now_s)
 
@@ -292,6 +317,7 @@ class Bridge:
             'ship': ship_part(self._ship),
             'figures': self._figures(now_s),
             'curve': curve_part(self._curve),
+            'forecast': self._foretold,
             'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now, now_s),
             'verdict': self._found if self._done else self._verdict,

@@ -13,14 +13,16 @@ from typing import Any
 
 import numpy as np
 
+from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.outputs import Curve
+from shipdrag_ros.live.outputs import ComingGlide, Curve, Figure
 from shipdrag_ros.ship import Ship
 
 _CLEAN_POINTS = 60
 _CURVE_POINTS = 60
 _PAST_POINTS = 24
+_SPOKEN_OF_M_S = 2.0 * M_S_PER_KNOT
 
 PagePart = dict[str, Any]
 LONGEST_S = 3600.0  # a time to go beyond it is not shown
@@ -97,6 +99,42 @@ def curve_part(curve: Curve | None, *, points: int = _CURVE_POINTS) -> PagePart 
         'speed_m_s': _rounded(speed),
         'r': _rounded(np.interp(speed, curve.speed_m_s, curve.resistance_m_s2)),
         'r_sigma': _rounded(np.interp(speed, curve.speed_m_s, curve.sigma_m_s2)),
+    }
+
+
+def forecast_part(coming: ComingGlide, ship: Ship | None) -> PagePart:
+    """
+    Return the rest of the glide: one speed in figures, and the curve to come.
+
+    The speed is 2 knots; of a model ship, or where the end of its band is beyond what is foretold,
+    half of the present one.
+    """
+    speed = coming.points[:, 1]
+    light = ship is not None and ship.mass_kg < LIGHT_KG
+    wanted = 0.5 * float(speed[0]) if light else _SPOKEN_OF_M_S
+    if not wanted < speed[0] or coming.time_s(wanted)[2] is None:
+        wanted = max(0.5 * float(speed[0]), float(speed[-1]))
+    time_s, low_s, high_s = coming.time_s(wanted)
+    return {
+        'made_s': coming.stamp_ns // 1_000_000_000,
+        'speed_m_s': wanted,
+        'time_s': [time_s, low_s, high_s],
+        'way_m': None if time_s is None else coming.way_m(time_s),
+        'rows': [_rounded(row[:4]) for row in coming.points],
+    }
+
+
+def checked_part(made: Sequence[ComingGlide], last: Figure, start_ns: int) -> PagePart:
+    """
+    Return what was foretold half-way, beside what was: when she had her last speed.
+    """
+    half_ns = (start_ns + last.stamp_ns) // 2
+    then = next((each for each in made if each.stamp_ns >= half_ns), made[-1])
+    foretold_s, low_s, high_s = then.time_s(last.value)
+    return {
+        'speed_m_s': last.value,
+        'foretold_s': [foretold_s, low_s, high_s],
+        'was_s': (last.stamp_ns - then.stamp_ns) * 1e-9,
     }
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from shipdrag_ros.estimation.force import usual_within
 from shipdrag_ros.messages import MalformedMessage, types
-from shipdrag_ros.messages.reporting import CURVE_FIELDS
-from shipdrag_ros.messages.topics import RESISTANCE, RESISTANCE_CURVE, SPEED
+from shipdrag_ros.messages.reporting import CURVE_FIELDS, FORECAST_FIELDS
+from shipdrag_ros.messages.topics import FORECAST, RESISTANCE, RESISTANCE_CURVE, SPEED, OutputTopic
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
@@ -100,18 +100,72 @@ def read_curve(payload: bytes) -> Curve | None:
     MalformedMessage
         If it is none.
     """
-    message = types.deserialize(RESISTANCE_CURVE.type, payload)
-    names = tuple(field.name for field in message.fields)
-    if names != CURVE_FIELDS or message.is_bigendian:
-        raise MalformedMessage(f'fields {", ".join(names)}, expected {", ".join(CURVE_FIELDS)}')
-    try:
-        points = np.frombuffer(message.data.tobytes(), '<f8').reshape(-1, len(CURVE_FIELDS))
-    except ValueError as error:
-        raise MalformedMessage(f'not whole points: {error}') from error
-    points = points[np.isfinite(points).all(axis=1)]
+    stamp_ns, points = _points(RESISTANCE_CURVE, CURVE_FIELDS, payload)
     if len(points) < 2:
         return None
-    return Curve(types.stamp_ns(message), points[:, 0], points[:, 1], points[:, 2])
+    return Curve(stamp_ns, points[:, 0], points[:, 1], points[:, 2])
+
+
+@dataclass(frozen=True)
+class ComingGlide:
+    """
+    The rest of the glide.
+
+    Attributes
+    ----------
+    stamp_ns
+    points : (n, 7)
+        Time, speed, its low and high, distance, its low and high; times ascending from 0.
+    """
+
+    stamp_ns: int
+    points: Float64
+
+    def time_s(self, speed_m_s: float) -> tuple[float | None, float | None, float | None]:
+        """
+        Return when she has a speed, and the earliest and latest of that; None where not said.
+        """
+
+        def passed(column: int) -> float | None:
+            below = np.flatnonzero(self.points[:, column] <= speed_m_s)
+            if not len(below):
+                return None
+            i = max(int(below[0]), 1)
+            part = slice(i - 1, i + 1)
+            return float(np.interp(-speed_m_s, -self.points[part, column], self.points[part, 0]))
+
+        return passed(1), passed(2), passed(3)
+
+    def way_m(self, time_s: float) -> float:
+        """
+        Return how far on she is then.
+        """
+        return float(np.interp(time_s, self.points[:, 0], self.points[:, 4]))
+
+
+def read_forecast(payload: bytes) -> ComingGlide | None:
+    """
+    Read `~/forecast`; None where it is withdrawn.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    stamp_ns, points = _points(FORECAST, FORECAST_FIELDS, payload)
+    return ComingGlide(stamp_ns, points) if len(points) >= 2 else None
+
+
+def _points(topic: OutputTopic, names: tuple[str, ...], payload: bytes) -> tuple[int, Float64]:
+    message = types.deserialize(topic.type, payload)
+    given = tuple(field.name for field in message.fields)
+    if given != names or message.is_bigendian:
+        raise MalformedMessage(f'fields {", ".join(given)}, expected {", ".join(names)}')
+    try:
+        points = np.frombuffer(message.data.tobytes(), '<f8').reshape(-1, len(names))
+    except ValueError as error:
+        raise MalformedMessage(f'not whole points: {error}') from error
+    return types.stamp_ns(message), points[np.isfinite(points).all(axis=1)]
 
 
 def _figure(message: object, value: float, variance: float) -> Figure:

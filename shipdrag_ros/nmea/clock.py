@@ -10,15 +10,12 @@ since is measured instead, on its clock.
 
 from __future__ import annotations
 
-import re
-from contextlib import suppress
 from datetime import date
 
-from shipdrag_ros.nmea.framing import Sentence
-from shipdrag_ros.nmea.sentences import TIMED, Fields, NoValue, has_fix
+from shipdrag_ros.nmea.reading import DAY_NS, Sentence, SentenceTime, days_of
+from shipdrag_ros.nmea.sentences import NoValue
 from shipdrag_ros.samples import SECOND_NS
 
-DAY_NS = 86_400 * SECOND_NS
 GAP_NS = 10 * SECOND_NS
 """A longer step of the time is a gap; what was measured inside it has no time."""
 
@@ -26,88 +23,7 @@ BEHIND_NS = SECOND_NS
 """A line that comes later than others by more waited somewhere: it is of a backlog."""
 
 _MEMORY_NS = 60 * SECOND_NS  # of the least delay; a clock that was set is known after it
-_LIMIT_NS = 2**31 * SECOND_NS  # of the stamp of a message
-
-_TIME = re.compile(r'(\d\d)(\d\d)(\d\d)(?:\.(\d+))?')
-_DATE = re.compile(r'(\d\d)(\d\d)(\d\d)')
-_CENTURY_TURNS = 80  # 80 to 99 are years of the 20th century
 ROLLOVER_DAYS = 1024 * 7  # a week number of GPS has ten bits
-
-
-class SentenceTime:
-    """
-    The time in a sentence.
-
-    Parameters
-    ----------
-    fields
-        Of RMC, GGA, GLL or ZDA.
-
-    Attributes
-    ----------
-    of_day_ns
-        Since midnight [ns]; a leap second is that of the midnight after it.
-    day
-        Days since 1970; None if the sentence has no date.
-    trusted
-        Whether the source calls its fix valid; ZDA always.
-
-    Raises
-    ------
-    NoValue
-        If there is no time, or no possible date.
-    """
-
-    def __init__(self, fields: Fields) -> None:
-        self.of_day_ns = _of_day_ns(fields['time'])
-        self.day = _day(fields)
-        self.trusted = fields.kind == 'ZDA' or has_fix(fields)
-
-
-def _of_day_ns(text: str) -> int:
-    if not text:
-        raise NoValue('empty')
-    found = _TIME.fullmatch(text)
-    if found is None:
-        raise NoValue('no time of day', text)
-    hour, minute, second = int(found[1]), int(found[2]), int(found[3])
-    leap = (hour, minute, second) == (23, 59, 60)
-    if hour > 23 or minute > 59 or (second > 59 and not leap):
-        raise NoValue('no time of day', text)
-    fraction_ns = int((found[4] or '')[:9].ljust(9, '0'))
-    return (3600 * hour + 60 * minute + second) * SECOND_NS + fraction_ns
-
-
-def _day(fields: Fields) -> int | None:
-    if fields.kind == 'ZDA':
-        texts = [fields[name] for name in ('year', 'month', 'day')]
-        if not all(texts):
-            return None
-        if not all(text.isdecimal() and text.isascii() for text in texts):
-            raise NoValue('no possible date', ','.join(texts))
-        year, month, day = (int(text) for text in texts)
-    elif fields.kind == 'RMC' and fields['date']:
-        found = _DATE.fullmatch(fields['date'])
-        if found is None:
-            raise NoValue('no possible date', fields['date'])
-        day, month, year = (int(text) for text in found.groups())
-        year += 1900 if year >= _CENTURY_TURNS else 2000
-    else:
-        return None
-    try:
-        days = days_of(date(year, month, day))
-    except (ValueError, OverflowError):
-        raise NoValue('no possible date', f'{year}-{month}-{day}') from None
-    if not 0 <= days * DAY_NS < _LIMIT_NS - DAY_NS:
-        raise NoValue('no possible date', f'{year}-{month}-{day}')
-    return days
-
-
-def days_of(day: date) -> int:
-    """
-    Return the days since 1970.
-    """
-    return (day - date(1970, 1, 1)).days
 
 
 def rollover_days(day: int, true: date) -> int | None:
@@ -140,13 +56,12 @@ class SentenceClock:
     dates_put_right
         Number of times whose date was a day off at midnight.
     now_ns
-        Last time stated [ns since the epoch]; None before the first.
+        The present time [ns since the epoch]; None before the first.
     """
 
-    def __init__(self, near_ns: int | None, *, shift_days: int = 0) -> None:
+    def __init__(self, near_ns: int | None, shift_days: int = 0) -> None:
         self._near_ns = near_ns
         self.shift_days = shift_days
-        self._received_ns: int | None = None
         self.dates_put_right = 0
         self.now_ns: int | None = None
 
@@ -186,25 +101,6 @@ class SentenceClock:
         day = round((near_ns - of_day_ns) / DAY_NS)
         return day * DAY_NS + of_day_ns
 
-    def set(self, time_ns: int, receive_ns: int | None) -> None:
-        """
-        Take a time as the present one.
-        """
-        self.now_ns = time_ns
-        self._received_ns = receive_ns
-
-    def since(self, receive_ns: int | None) -> int | None:
-        """
-        Return the time of a line by its receipt [ns], None if that is not known.
-        """
-        if receive_ns is None:
-            return None
-        if self.now_ns is None:
-            return receive_ns
-        if self._received_ns is None:
-            return None
-        return self.now_ns + receive_ns - self._received_ns
-
 
 class WireClock:
     """
@@ -232,12 +128,10 @@ class WireClock:
         read_ns
             When its line was read [ns since the epoch].
         """
-        if sentence.kind in TIMED:
-            with suppress(NoValue):
-                moment = SentenceTime(Fields(sentence.kind, sentence.fields))
-                if moment.trusted:
-                    receiver = self._receivers.setdefault(sentence.talker, _Receiver())
-                    self._behind_ns = receiver.behind_ns(moment.of_day_ns, read_ns)
+        moment = sentence.time
+        if isinstance(moment, SentenceTime) and moment.trusted:
+            receiver = self._receivers.setdefault(sentence.talker, _Receiver())
+            self._behind_ns = receiver.behind_ns(moment.of_day_ns, read_ns)
         # a backlog ends where its lines have caught up
         self._waited = self._behind_ns > (BEHIND_NS // 10 if self._waited else BEHIND_NS)
         return read_ns - self._behind_ns if self._waited else read_ns

@@ -17,9 +17,8 @@ from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros.messages import EncodedMessage, encode, types
 from shipdrag_ros.nmea.clock import WireClock
-from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
-from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting, NoValue
-from shipdrag_ros.nmea.values import SentenceSource, best, read_values
+from shipdrag_ros.nmea.reading import START, Sentence, SentenceReader, SentenceSource, best
+from shipdrag_ros.nmea.sentences import READERS, TIMED, Mounting
 from shipdrag_ros.samples import Block, Channel
 
 TOPIC = 'nmea'
@@ -115,7 +114,7 @@ class Interpreter:
         self.behind: Counter[str] = Counter()
         self.used: Counter[str] = Counter()
         self.not_taken: Counter[str] = Counter()
-        self._mounting = mounting or Mounting()
+        self._reader = SentenceReader(mounting)
         self._clocks: dict[str, WireClock] = {}
         self._choices: dict[Channel, _Choice] = {}
 
@@ -138,10 +137,9 @@ class Interpreter:
             self.rejected['no sentence'] += 1
         found = []
         for each in texts:
-            try:
-                sentence = parse(each.strip(), Checksum.REQUIRED)
-            except ValueError as error:
-                self.rejected[str(error)] += 1
+            sentence = self._reader.read(each.strip())
+            if isinstance(sentence, str):
+                self.rejected[sentence] += 1
             else:
                 found += self._of_sentence(sentence, address, read_ns)
         return found
@@ -167,20 +165,17 @@ class Interpreter:
             return []
         if sentence.talker not in NMEA_TALKERS:
             _count(self.unknown, f'talker {sentence.talker}')
-        messages: list[EncodedMessage] = []
-        for channel, source, value in read_values(sentence, self._mounting):
-            if isinstance(value, NoValue):
-                _count(self.no_value, f'{channel.input} {sentence.kind}: {value.reason}')
+        for channel, reason in sentence.refused:
+            _count(self.no_value, f'{channel.input} {sentence.kind}: {reason}')
+        samples = []
+        for value in sentence.values:
+            choice = self._choices.setdefault(value.channel, _Choice(read_ns))
+            if not choice.takes((value.source, address), read_ns):
+                self.not_taken[value.channel.input] += 1
                 continue
-            assert source is not None
-            choice = self._choices.setdefault(channel, _Choice(read_ns))
-            if not choice.takes((source, address), read_ns):
-                self.not_taken[channel.input] += 1
-                continue
-            self.used[channel.input] += 1
-            sample = (int(channel), stamp_ns, read_ns, value.a, value.b)
-            messages += encode(Block.of_samples([sample]))
-        return messages
+            self.used[value.channel.input] += 1
+            samples.append((int(value.channel), stamp_ns, read_ns, value.a, value.b))
+        return list(encode(Block.of_samples(samples)))
 
 
 def _count(counter: Counter[str], key: str) -> None:

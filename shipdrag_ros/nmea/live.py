@@ -1,15 +1,303 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several sources of NMEA 0183 heard at once, their lines in order of arrival."""
+"""
+Sources of NMEA 0183 received at once, each in a thread of its own until it is closed.
+
+A line that drops is opened again and again, and said. What comes in is bounded:
+bytes of a line, lines a second, lines that wait. Nobody outside can fill the memory.
+"""
 
 from __future__ import annotations
 
+import os
+import re
+import socket
+import stat
+import struct
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from time import monotonic
 from typing import NamedTuple
 
-from shipdrag_ros.nmea.address import Address
-from shipdrag_ros.nmea.listener import LineListener, SourceCounts
+import serial
+
+from shipdrag_ros.nmea.address import Address, Way
+
+LINES_A_SECOND = 1000.0  # a serial line of 38400 baud brings about 60
+BURST_LINES = 2000.0
+SILENT_S = 60.0  # a TCP peer that vanished without a word is found so
+_WAKE_S = 0.25  # how often a wait looks whether it shall end
+_CONNECT_S = 5.0
+_RETRY_S = (0.5, 1.0, 2.0, 5.0)
+_READ_BYTES = 4096
+_IEC_61162_450 = b'UdPbC\0'  # stands before the sentences of a datagram
+_SO_RXQ_OVFL = 40  # Linux: the kernel says how many datagrams it dropped
+
+# lines that arrived together
+Deliver = Callable[[Address, list[str]], None]
+Read = Callable[[], bytes | None]
+LINE_BYTES = 512
+"""A sentence has 82 characters; one with a TAG block, or of a careless maker, has more."""
+
+_ENDS = re.compile(rb'[\r\n]+')
+_PLAIN = re.compile(rb'[\x20-\x7e]+')
+
+
+class LineSplitter:
+    """
+    Cuts a stream of bytes into lines.
+
+    Attributes
+    ----------
+    too_long
+        Lines longer than `LINE_BYTES`; all of such a line is dropped.
+    binary
+        Lines with anything but printable ASCII.
+    """
+
+    def __init__(self) -> None:
+        self.too_long = 0
+        self.binary = 0
+        self._open = b''
+        self._skipping = False
+
+    def feed(self, data: bytes) -> list[str]:
+        """
+        Return the lines that have ended, without their ends; blank ones are left out.
+        """
+        *ended, rest = _ENDS.split(data)
+        lines = []
+        for piece in ended:
+            line, self._open = self._open + piece, b''
+            skipping, self._skipping = self._skipping, False
+            if not skipping:
+                lines += self._line(line)
+        if not self._skipping:
+            self._open += rest
+            if len(self._open) > LINE_BYTES:
+                self.too_long += 1
+                self._open, self._skipping = b'', True
+        return lines
+
+    def end(self) -> list[str]:
+        """
+        Take what is open as a line: the datagram, or the connection, has ended.
+        """
+        line, self._open = self._open, b''
+        skipping, self._skipping = self._skipping, False
+        return [] if skipping else self._line(line)
+
+    def _line(self, line: bytes) -> list[str]:
+        if len(line) > LINE_BYTES:
+            self.too_long += 1
+        elif line and not _PLAIN.fullmatch(line):
+            self.binary += 1
+        elif text := line.decode('ascii').strip():
+            return [text]
+        return []
+
+
+@dataclass
+class SourceCounts:
+    """
+    What became of one source so far.
+
+    Attributes
+    ----------
+    problem
+        Why nothing can be heard now; '' if the line is open.
+    opened
+        Times that it was opened.
+    lines
+        Handed on.
+    too_long, binary
+        See `LineSplitter`.
+    flooded
+        Waits because more came than `LINES_A_SECOND`.
+    dropped
+        Datagrams that the kernel dropped meanwhile.
+    """
+
+    problem: str = 'not opened yet'
+    opened: int = 0
+    lines: int = 0
+    too_long: int = 0
+    binary: int = 0
+    flooded: int = 0
+    dropped: int = 0
+    last_s: float | None = None
+
+    @property
+    def age_s(self) -> float | None:
+        """Time since the last line [s], None before the first."""
+        return None if self.last_s is None else monotonic() - self.last_s
+
+
+class LineListener:
+    """
+    Hears one source from `start` to `close`.
+
+    Parameters
+    ----------
+    address
+        Where.
+    deliver
+        Called in the thread with lines that arrived together.
+
+    Attributes
+    ----------
+    counts
+        What became of it.
+    """
+
+    def __init__(self, address: Address, deliver: Deliver) -> None:
+        self.address = address
+        self.counts = SourceCounts()
+        self._deliver = deliver
+        self._closing = threading.Event()
+        self._budget = BURST_LINES
+        self._budget_s = monotonic()
+        self._thread = threading.Thread(target=self._run, name=f'nmea {address}', daemon=True)
+
+    def start(self) -> None:
+        """
+        Begin to hear; returns at once.
+        """
+        self._thread.start()
+
+    def stop(self) -> None:
+        """
+        Ask for the end.
+        """
+        self._closing.set()
+
+    def close(self) -> None:
+        """
+        End, and wait for it a second at most.
+        """
+        self.stop()
+        self._thread.join(1.0)
+
+    def _run(self) -> None:
+        failures = 0
+        while not self._closing.is_set():
+            opened = self.counts.opened
+            try:
+                with _OPENERS[self.address.way](self.address, self.counts) as read:
+                    self.counts.opened += 1
+                    self.counts.problem = ''
+                    self._hear(read)
+                why = 'the other side closed the connection'
+            except (OSError, serial.SerialException) as error:
+                why = getattr(error, 'strerror', None) or str(error)
+            failures = 0 if self.counts.opened > opened else failures + 1
+            self.counts.problem = f'{why}; opened again and again until it works'
+            self._closing.wait(_RETRY_S[min(failures, len(_RETRY_S) - 1)])
+
+    def _hear(self, read: Read) -> None:
+        """Read until the other side ends it."""
+        splitter = LineSplitter()
+        heard_s = monotonic()
+        before = (self.counts.too_long, self.counts.binary)
+        while not self._closing.is_set():
+            data = read()
+            if data is None:
+                if self.address.way is Way.TCP and monotonic() - heard_s > SILENT_S:
+                    raise OSError(0, f'nothing came for {SILENT_S:.0f} s')
+                continue
+            heard_s = monotonic()
+            lines = splitter.feed(data)
+            if self.address.way is Way.UDP:  # a datagram is whole
+                lines += splitter.end()
+            self.counts.too_long = before[0] + splitter.too_long
+            self.counts.binary = before[1] + splitter.binary
+            if lines:
+                self.counts.lines += len(lines)
+                self.counts.last_s = heard_s
+                self._deliver(self.address, lines)
+            if not data and self.address.way is not Way.UDP:
+                return
+            self._slow_down(max(len(lines), len(data) / 80.0))
+
+    def _slow_down(self, lines: float) -> None:
+        """Read no faster than any ship's instruments talk, so that a flood takes no core."""
+        now_s = monotonic()
+        refilled = self._budget + (now_s - self._budget_s) * LINES_A_SECOND
+        self._budget = min(refilled, BURST_LINES) - lines
+        self._budget_s = now_s
+        if self._budget < 0.0:
+            self.counts.flooded += 1
+            self._closing.wait(-self._budget / LINES_A_SECOND)
+
+
+@contextmanager
+def _udp(address: Address, counts: SourceCounts) -> Iterator[Read]:
+    family, _, _, _, where = socket.getaddrinfo(
+        address.place, address.number, type=socket.SOCK_DGRAM, flags=socket.AI_PASSIVE
+    )[0]
+    dropped_before = counts.dropped
+    with socket.socket(family, socket.SOCK_DGRAM) as heard:
+        heard.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
+        if address.is_multicast:
+            heard.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # others may hear it too
+        heard.bind(where)
+        if address.is_multicast:
+            _join(heard, address)
+        heard.settimeout(_WAKE_S)
+
+        def read() -> bytes | None:
+            try:
+                data, extra, _, _ = heard.recvmsg(65536, 64)
+            except TimeoutError:
+                return None
+            for level, kind, value in extra:
+                if level == socket.SOL_SOCKET and kind == _SO_RXQ_OVFL:
+                    counts.dropped = dropped_before + struct.unpack('=I', value[:4])[0]
+            return data.removeprefix(_IEC_61162_450)
+
+        yield read
+
+
+def _join(heard: socket.socket, address: Address) -> None:
+    interface = address.interface or '0.0.0.0'
+    group = socket.inet_aton(address.place) + socket.inet_aton(interface)
+    try:
+        heard.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
+    except OSError as error:
+        raise OSError(
+            error.errno,
+            f'the group cannot be joined on interface {interface} ({error.strerror}); name one '
+            f'by its address, {address.text.partition("@")[0]}@ADDRESS',
+        ) from error
+
+
+@contextmanager
+def _tcp(address: Address, counts: SourceCounts) -> Iterator[Read]:
+    where = (address.place, address.number)
+    with socket.create_connection(where, timeout=_CONNECT_S) as line:
+        line.settimeout(_WAKE_S)
+
+        def read() -> bytes | None:
+            try:
+                return line.recv(_READ_BYTES)
+            except TimeoutError:
+                return None
+
+        yield read
+
+
+@contextmanager
+def _serial(address: Address, counts: SourceCounts) -> Iterator[Read]:
+    if not stat.S_ISCHR(os.stat(address.place).st_mode):
+        raise OSError(0, f'{address.place!r} is no serial device')
+    with serial.Serial(address.place, address.number, timeout=_WAKE_S, exclusive=True) as line:
+        yield lambda: line.read(min(line.in_waiting or 1, _READ_BYTES)) or None
+
+
+_OPENERS = {Way.UDP: _udp, Way.TCP: _tcp, Way.SERIAL: _serial}
+
 
 WAITING_LINES = 8000
 """That wait to be taken; what finds no room is counted."""

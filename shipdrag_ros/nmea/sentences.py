@@ -64,16 +64,24 @@ class MeasuredValue(NamedTuple):
     channel: Channel | None = None
 
 
-@dataclass(frozen=True)
-class Fields:
-    """The fields of a sentence by pynmeagps' names; one that is not there is empty."""
+class Fields(dict[str, str]):
+    """
+    The fields of a sentence by pynmeagps' names; one that is not there is empty.
 
-    kind: str
-    texts: Sequence[str]
+    Parameters
+    ----------
+    kind
+        Of the sentence.
+    texts
+        What follows its address.
+    """
 
-    def __getitem__(self, name: str) -> str:
-        place = _PLACES[self.kind][name]
-        return self.texts[place].strip() if place < len(self.texts) else ''
+    def __init__(self, kind: str, texts: Sequence[str]) -> None:
+        super().__init__(zip(_NAMES.get(kind, ()), map(str.strip, texts)))
+        self.kind = kind
+
+    def __missing__(self, name: str) -> str:
+        return ''
 
     def number(self, name: str) -> float:
         """
@@ -302,7 +310,7 @@ def _check_fix(fields: Fields) -> None:
             raise NoValue(f'quality {quality}: {_NO_FIX[quality]}', quality)
         return
     if not fields['status']:
-        if fields.kind == 'GLL' and len(fields.texts) <= _GLL_OF_OLD:
+        if fields.kind == 'GLL' and len(fields) <= _GLL_OF_OLD:
             return  # before NMEA 0183 2.0 it had neither time nor status
         raise NoValue('status empty')
     fields.check('status', allowed='AD')
@@ -352,8 +360,6 @@ READERS: Mapping[str, tuple[tuple[Channel, FieldsReader], ...]] = {
 TIMED = ('RMC', 'GGA', 'GLL', 'ZDA')
 """Sentences that hold the time."""
 
-_PLACES = {
-    kind: {name: place for place, name in enumerate(NMEA_PAYLOADS_GET[kind])}
-    for kind in (*READERS, 'ZDA')
-    if kind in NMEA_PAYLOADS_GET
-} | {'PUHAW': {'kind': 0, 'east': 1, 'north': 2, 'heading': 3}}
+_NAMES = {
+    kind: tuple(NMEA_PAYLOADS_GET[kind]) for kind in (*READERS, 'ZDA') if kind in NMEA_PAYLOADS_GET
+} | {'PUHAW': ('kind', 'east', 'north', 'heading')}

@@ -26,8 +26,7 @@ from shipdrag_ros.messages import Source, decode
 from shipdrag_ros.messages.heard import ERROR, OK, STALE, WARN, Status
 from shipdrag_ros.nmea.address import Address, parse_addresses
 from shipdrag_ros.nmea.interpreter import TOPIC, Interpreter, raw_message
-from shipdrag_ros.nmea.listener import SourceCounts
-from shipdrag_ros.nmea.live import LiveNmea
+from shipdrag_ros.nmea.live import LiveNmea, SourceCounts
 from shipdrag_ros.nmea.sentences import NOT_STATED, READERS, Mounting
 from shipdrag_ros.node.inputs import InputTopic, message_class
 from shipdrag_ros.node.judging import SILENT_S

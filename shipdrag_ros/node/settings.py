@@ -32,7 +32,7 @@ from shipdrag_ros.nmea.address import FORMS as NMEA_FORMS
 from shipdrag_ros.nmea.address import parse_addresses
 from shipdrag_ros.parameters import Parameters
 
-ParameterValue = bool | int | float | str
+ParameterValue = bool | int | float | str | list[float]
 
 
 @dataclass(frozen=True)
@@ -169,6 +169,7 @@ class NodeSettings:
             **{name: getattr(self, name) for name in keys_of(type(self))},
             **{f'{name}.type': self.types.get(name, '') for name in TOPICS},
             **{name: getattr(self.parameters, name) for name in keys_of(Parameters)},
+            'forecast_speeds': list(self.parameters.forecast_speeds),
         }
 
 
@@ -221,6 +222,8 @@ def parameters_file() -> str:
             said += f'; one of {", ".join(filter(None, key.kind.choices))}'
         lines += textwrap.wrap(said, 99, initial_indent='    # ', subsequent_indent='    # ')
         value = str(key.default).lower() if isinstance(key.default, bool) else repr(key.default)
+        if isinstance(key.default, tuple):
+            value = repr(list(key.default))
         lines.append(f'    {name}: {value}')
     return '\n'.join(lines) + '\n'
 

@@ -151,6 +151,22 @@ WRONG = Declared(
     '',
     _REALITY,
 )
+CALM_CURRENT = Declared(
+    'c', 'the same where none is missing', normal(0.05), 'm/s', 'still water is seldom still'
+)
+FREE_SHAFT = Declared(
+    '-',
+    'shaft speed of a propeller that the water turns, over that under power',
+    normal(0.15, mean=0.5),
+    '',
+    'four-quadrant open-water data of B4-70',
+)
+UNNAMED_ODDS = 0.015
+"""Prior odds of something smooth without a name, in each place where it may be."""
+SMOOTH_SIZES = (0.015, 0.05, 0.15)
+"""Points of its size in time, relative to r or to the speed, all alike."""
+SMALL_COMPONENTS = 0.25
+"""Size of the components of a weak current or wind, which is as probable as a usual one."""
 # what a hull may differ by: probabilities, and points of what a size is averaged over
 NOTHING, FRICTION_ALONE, SMOOTH = 'nothing', 'friction', 'smooth in u'
 CHANCES = {NOTHING: 0.4, FRICTION_ALONE: 0.3, SMOOTH: 0.3}
@@ -185,6 +201,8 @@ TABLE: tuple[Declared, ...] = (
     LOG_LAG,
     GROUND_LAG,
     CURRENT,
+    CALM_CURRENT,
+    FREE_SHAFT,
     WRONG,
 )
 """What docs/model.md prints, in its order."""

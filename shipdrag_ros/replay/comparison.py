@@ -43,12 +43,19 @@ class Recorded:
     largest_difference
         Of a figure, in parts of the larger of the two; infinite where a
         message is missing or of another shape, 0 if all are identical.
+    largest_difference_sigma
+        Of an estimate, in the larger of its two standard deviations; of messages that both
+        have, and points of the curve at the same speed.
+    by
+        Version of this package that recorded the bag; None if that is not known.
     """
 
     compared: int
     identical: int
     first_difference: str | None
     largest_difference: float = 0.0
+    largest_difference_sigma: float = 0.0
+    by: str | None = None
 
 
 class Comparison:
@@ -59,6 +66,8 @@ class Comparison:
     ----------
     recorded
         Outputs as recorded, in order of arrival.
+    by
+        Version that recorded them.
 
     Notes
     -----
@@ -68,14 +77,15 @@ class Comparison:
     topic is therefore no difference.
     """
 
-    def __init__(self, recorded: Iterator[OutputMessage]) -> None:
+    def __init__(self, recorded: Iterator[OutputMessage], *, by: str | None = None) -> None:
         self._recorded = recorded
+        self._by = by
         self._queues: dict[str, deque[OutputMessage]] = {topic.name: deque() for topic in COMPARED}
         self._begun: set[str] = set()
         self._compared = 0
         self._identical = 0
         self._first_difference: str | None = None
-        self._largest_difference = 0.0
+        self._largest_difference = self._largest_sigma = 0.0
 
     def add(self, replayed: OutputMessage) -> None:
         """
@@ -110,7 +120,12 @@ class Comparison:
                 self._differ(message, None)
             queue.clear()
         return Recorded(
-            self._compared, self._identical, self._first_difference, self._largest_difference
+            self._compared,
+            self._identical,
+            self._first_difference,
+            self._largest_difference,
+            self._largest_sigma,
+            self._by,
         )
 
     def _read_one(self) -> bool:
@@ -134,6 +149,7 @@ class Comparison:
         self._largest_difference = max(
             self._largest_difference, _relative_difference(recorded, replayed)
         )
+        self._largest_sigma = max(self._largest_sigma, _sigmas(recorded, replayed))
         message = recorded or replayed
         if self._first_difference is None and message is not None:
             self._first_difference = (
@@ -174,6 +190,25 @@ def _figures(message: OutputMessage | None) -> Float64:
             return np.array([axis for place in places for axis in (place.x, place.y)])
         case _:
             return np.frombuffer(content.data.tobytes(), '<f8')
+
+
+def _sigmas(one: OutputMessage | None, other: OutputMessage | None) -> float:
+    """Return the largest difference of two estimates in the larger standard deviation."""
+    first, second = _estimates(one), _estimates(other)
+    same = sorted(first.keys() & second.keys())
+    pairs = np.array([(*first[key], *second[key]) for key in same]).reshape(-1, 4)
+    apart, sigma = np.abs(pairs[:, 0] - pairs[:, 2]), np.fmax(pairs[:, 1], pairs[:, 3])
+    known = (apart > 0.0) & (sigma > 0.0)
+    return float(np.max(apart[known] / sigma[known], initial=0.0))
+
+
+def _estimates(message: OutputMessage | None) -> dict[float, tuple[float, float]]:
+    """Return value and standard deviation of an output; of a curve, by speed."""
+    figures = _figures(message)
+    if message is not None and message.type == RESISTANCE_CURVE.type:
+        table = figures[: len(figures) // 4 * 4].reshape(-1, 4).tolist()
+        return {speed: (value, sigma) for speed, value, sigma, _ in table}
+    return {0.0: (figures[0], math.sqrt(max(figures[1], 0.0)))} if len(figures) == 2 else {}
 
 
 def _content(message: OutputMessage | None) -> str:

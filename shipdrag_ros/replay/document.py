@@ -158,5 +158,9 @@ def _recorded(runs: Sequence[RunResult]) -> dict[str, Any]:
         identical=sum(run.recorded.identical for run in runs),
         first_difference=differences[0] if differences else None,
         largest_difference=max((run.recorded.largest_difference for run in runs), default=0.0),
+        largest_difference_sigma=max(
+            (run.recorded.largest_difference_sigma for run in runs), default=0.0
+        ),
+        by=', '.join(sorted({run.recorded.by for run in runs if run.recorded.by})) or None,
     )
     return vars(total)

@@ -213,7 +213,7 @@ def _as_on_board(
 ) -> ReplayResult:
     # what nothing is compared with is left out: an estimate depends on its window alone
     monitor = Monitor(ship, parameters, estimate=estimate if own else None)
-    comparison = Comparison(run.outputs() if own else iter(()))
+    comparison = Comparison(run.outputs() if own else iter(()), by=_by(run))
     coastdowns: list[EndedCoastdown] = []
     kept: list[Event] = []
 
@@ -284,7 +284,7 @@ def _in_window(
         (coastdown,),
         (coastdown, *coastdown.cuts),
         _counts(run, samples.inputs, used, rejected),
-        Recorded(0, 0, None),
+        Recorded(0, 0, None, by=_by(run)),
     )
 
 
@@ -329,6 +329,11 @@ def recorded_parameters(run: Run) -> Parameters:
     parameters, dropped = Parameters.of_bag(text, subject=PARAMETERS_FILE)
     run.note(dropped)
     return parameters
+
+
+def _by(run: Run) -> str | None:
+    """Return the version whose node recorded the bag; None of a bag that no node recorded."""
+    return run.software if run.node is not None else None
 
 
 def _is_own(run: Run, ship: Ship, parameters: Parameters) -> bool:

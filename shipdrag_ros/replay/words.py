@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from shipdrag_ros import __version__
 from shipdrag_ros.coastdown.events import EndedBy, EndedCoastdown
 from shipdrag_ros.display import duration, plus_minus
 from shipdrag_ros.estimation.reciprocal import Combined
@@ -40,6 +41,11 @@ def recorded_sentence(recorded: Recorded) -> str:
         )
     else:
         size = f'first difference: {recorded.first_difference}'
+    if recorded.by not in (None, __version__):
+        size = (
+            f'version {recorded.by} recorded it and this is {__version__}: the estimates differ '
+            f'by {recorded.largest_difference_sigma:.2g} standard deviations at most. The {size}'
+        )
     return (
         f'{recorded.identical} of {recorded.compared} outputs in the bag are identical to the '
         f'replayed ones; {size}.'

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicHermiteSpline
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
@@ -98,6 +97,8 @@ class Truth:
         time_s : (m,)
             Ascending or not [s].
         """
+        from scipy.interpolate import CubicHermiteSpline  # takes long to import
+
         path = CubicHermiteSpline(self.time_s, self.position_m, self.velocity_over_ground_m_s)
         speed = np.interp(time_s, self.time_s, self.speed_through_water_m_s)
         velocity = [np.interp(time_s, self.time_s, v) for v in self.velocity_over_ground_m_s.T]

@@ -9,7 +9,6 @@ from functools import lru_cache
 from math import hypot
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
@@ -40,6 +39,8 @@ def law_of(ship: Ship, speed_m_s: float) -> SurgeLaw:
             f'{low:.4g}..{high:.4g} m/s; choose a speed inside or extend the baseline'
         )
     speeds = np.linspace(low, min(high, _RANGE * speed_m_s), _CELLS + 1)
+    from scipy.interpolate import CubicSpline  # takes long to import
+
     table = CubicSpline(speeds, ship.resistance_n(speeds) / ship.mass_kg)
     span = float(speeds[-1] - low)
     return SurgeLaw(

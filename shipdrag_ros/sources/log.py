@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every format shares: what is read of a file, and what is left out of it."""
+"""What every format shares: what is read of a file, what is left out, and how that is said."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import datetime, tzinfo
 from pathlib import Path
 
 import numpy as np
 
 from shipdrag_ros.bags.writer import BagWriter
+from shipdrag_ros.display import Table
 from shipdrag_ros.messages import EncodedMessage, input_type
 from shipdrag_ros.samples import SECOND_NS, Block, Channel
 
@@ -203,3 +206,81 @@ def new_bag(out: Path, attachments: Mapping[str, str]) -> Iterator[BagWriter]:
     except BaseException:
         out.unlink(missing_ok=True)
         raise
+
+
+_ISO = re.compile(
+    r'(\d{4}-\d\d-\d\d)[T ](\d\d:\d\d:\d\d)(?:[.,](\d{1,12}))?\s*(Z|[+-]\d\d:?\d\d)?'
+)
+
+
+def iso_ns(text: str, zone: tzinfo) -> int | None:
+    """
+    Return the time of ISO 8601 [ns since 1970], exactly; None where it is none.
+
+    Parameters
+    ----------
+    text
+    zone
+        Of a time that states none.
+    """
+    found = _ISO.fullmatch(text)
+    if found is None:
+        return None
+    try:
+        moment = datetime.fromisoformat(f'{found[1]}T{found[2]}{found[4] or ""}')
+        if moment.tzinfo is None:
+            moment = moment.replace(tzinfo=zone)
+        seconds = int(moment.timestamp())
+    except (ValueError, OverflowError):
+        return None
+    time_ns = seconds * SECOND_NS + int((found[3] or '')[:9].ljust(9, '0'))
+    return time_ns if 0 <= time_ns < LIMIT_NS else None
+
+
+def backward_and_repeated(backward: int, repeated: int) -> list[str]:
+    """
+    Say how many samples a replay will reject for their stamps.
+    """
+    lines = []
+    if backward:
+        lines.append(
+            f'{backward} messages are stamped before an earlier one of their input; a replay '
+            'rejects those.'
+        )
+    if repeated:
+        lines.append(
+            f'{repeated} messages have the stamp of an earlier one of their input; a replay '
+            'rejects those.'
+        )
+    return lines
+
+
+def table_of_messages(written: Mapping[str, int], sources: Mapping[str, str]) -> Table:
+    """
+    Return messages by input, and what each was taken from.
+    """
+    return Table(
+        ('input', 'from', 'messages'),
+        tuple((name, sources[name], f'{n}') for name, n in written.items()),
+    )
+
+
+def not_taken_words(not_taken: Mapping[str, Mapping[str, int]]) -> list[str]:
+    """
+    Say which other sources held an input.
+    """
+    return [
+        f'{name}: not taken from {", ".join(f"{source} {n}" for source, n in counts.items())}'
+        for name, counts in not_taken.items()
+    ]
+
+
+def rejected_words(rejected: Mapping[str, Mapping[str, Rejected]]) -> list[str]:
+    """
+    Say what was rejected, and why.
+    """
+    return [
+        f'{name}: {each.count} rejected, {reason}: {each.first[0]}'
+        for name, reasons in rejected.items()
+        for reason, each in reasons.items()
+    ]

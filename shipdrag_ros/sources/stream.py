@@ -27,8 +27,6 @@ from shipdrag_ros.sources.log import (
     Log,
     Rejected,
     Understood,
-)
-from shipdrag_ros.sources.words import (
     backward_and_repeated,
     not_taken_words,
     rejected_words,

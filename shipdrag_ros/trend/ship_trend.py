@@ -6,9 +6,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
+from shipdrag_ros.display import day
 from shipdrag_ros.fleet.events import HullEvent
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.samples import Float64, Int64
@@ -138,6 +140,42 @@ class ShipTrend:
                 point = replace(point, reason=text)
             found.append(point)
         return tuple(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """
+        Return what `shipdrag trend --json` has of the ship.
+        """
+        now, cleaning_ns = _figure(self.now), self.cleaning_from_ns
+        if now is not None:
+            now['power_kw'] = _figure(self.power_kw)
+        of_point = ('time_ns', 'bag', 'value', 'sd', 'used', 'reason')
+        of_event = ('time_ns', 'kind', 'known', 'probability')
+        return {
+            'name': self.series.name,
+            'coastdowns': len(self.series.points),
+            'reference_speed_m_s': self.series.reference_speed_m_s,
+            'clean_hull': self.series.clean,
+            'added_resistance': [
+                {name: getattr(point, name) for name in of_point} for point in self.points
+            ],
+            'growth_per_year': _figure(self.growth_per_year),
+            'now': now,
+            'events': [
+                {name: getattr(event, name) for name in of_event}
+                | {'change': _figure(event.change)}
+                for event in self.events
+            ],
+            'costs': self.costs
+            and {name: _figure(figure) for name, figure in vars(self.costs).items()},
+            'cleaning_pays_from': None if cleaning_ns is None else day(cleaning_ns),
+            'scatter': self.scatter,
+            'rank': self.rank,
+            'notes': list(self.notes),
+        }
+
+
+def _figure(found: Parameter | None) -> dict[str, Any] | None:
+    return None if found is None else {'value': found.value, 'sd': found.sd}
 
 
 def fleet_trends(

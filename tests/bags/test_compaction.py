@@ -13,9 +13,9 @@ from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
 
 from shipdrag_ros import __version__
-from shipdrag_ros.bags import compaction
-from shipdrag_ros.bags.compaction import SUFFIX, compact
+from shipdrag_ros.bags import recover
 from shipdrag_ros.bags.live import LiveFile
+from shipdrag_ros.bags.recover import SUFFIX, compact
 from shipdrag_ros.bags.writer import RecordWriter
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
@@ -113,11 +113,12 @@ def test_what_an_interrupted_attempt_left_is_no_obstacle(tmp_path: Path, block: 
 
 
 @pytest.mark.parametrize(
-    ('owner', 'step', 'whole'),
+    ('owner', 'step', 'call', 'whole'),
     [
-        (RecordWriter, 'close', 'before'),
-        (Path, 'replace', 'before'),
-        (compaction, 'sync_directory', 'after'),
+        (RecordWriter, 'close', 1, 'before'),
+        (recover, 'sync_directory', 1, 'before'),
+        (Path, 'replace', 1, 'before'),
+        (recover, 'sync_directory', 2, 'after'),
     ],
 )
 def test_killed_at_any_step_it_leaves_one_whole_file(
@@ -126,13 +127,20 @@ def test_killed_at_any_step_it_leaves_one_whole_file(
     monkeypatch: pytest.MonkeyPatch,
     owner: Any,
     step: str,
+    call: int,
     whole: str,
 ) -> None:
     file = grown(tmp_path / 'a.mcap', block)
     before = file.path.read_bytes()
 
-    def die(*_: object, **__: object) -> None:
-        os.kill(os.getpid(), signal.SIGKILL)
+    calls = []
+    done = getattr(owner, step)
+
+    def die(*given: Any, **named: Any) -> Any:
+        calls.append(given)
+        if len(calls) == call:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return done(*given, **named)
 
     child = os.fork()
     if child == 0:

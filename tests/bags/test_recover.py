@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import lz4.frame
+import numpy as np
 import pytest
 import zstandard
 from mcap.opcode import Opcode
@@ -25,11 +26,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from shipdrag_ros.bags import BagWriter, Run, info, open_runs
 from shipdrag_ros.bags.check import check
-from shipdrag_ros.bags.records import HEAD, MAGIC
+from shipdrag_ros.bags.records import HEAD, MAGIC, walk
 from shipdrag_ros.bags.recover import recover
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import encode
-from shipdrag_ros.samples import Block, concatenate
+from shipdrag_ros.samples import Block, Channel, concatenate
 
 ReadSamples = Callable[[Run], Block]
 AssertSame = Callable[[Block, Block], None]
@@ -360,3 +361,43 @@ def test_topics_that_have_other_numbers_in_each_file_are_joined(
         }
         assert saved == written
         assert reader.get_summary().statistics.channel_count == 3
+
+
+START_NS = 1_700_000_000 * 10**9
+
+
+def test_sound_chunks_are_copied_as_they_are(tmp_path: Path) -> None:
+    """A flipped bit in one chunk; the packed bytes of the others stand in the output."""
+    block = Block.of(Channel.DEPTH, range(START_NS, START_NS + 4000), np.arange(4000) % 97)
+    with BagWriter(tmp_path / 'a.mcap', chunk_bytes=1 << 14) as bag:
+        bag.write_samples(block)
+    data = bytearray((tmp_path / 'a.mcap').read_bytes())
+    chunks = [each for each in walk(bytes(data), 8, len(data)) if each.opcode == Opcode.CHUNK]
+    assert len(chunks) > 10
+    data[chunks[3].end - 9] ^= 4
+    (tmp_path / 'b.mcap').write_bytes(data)
+    found = recover(tmp_path / 'b.mcap', tmp_path / 'c.mcap')
+    saved = (tmp_path / 'c.mcap').read_bytes()
+    kept = [bytes(data[each.start + 28 : each.end]) in saved for each in chunks]
+    assert kept == [place != 3 for place in range(len(chunks))]
+    assert check([tmp_path / 'c.mcap'])[0].sound
+    assert found.messages_recovered + found.messages_crc_suspect <= 4000
+    (run,) = open_runs([tmp_path / 'c.mcap'])
+    assert sum(len(part) for part in run.inputs() if isinstance(part, Block)) > 3000
+
+
+def test_chunks_of_two_files_whose_numbers_meet_keep_their_topics(tmp_path: Path) -> None:
+    """Both files call their one topic number 1; in one bag they cannot."""
+    folder = tmp_path / 'run'
+    folder.mkdir()
+    for place, channel in enumerate((Channel.DEPTH, Channel.SPEED_THROUGH_WATER)):
+        with BagWriter(folder / f'run_{place}.mcap') as bag:
+            stamps = range(START_NS + place * 10**6, START_NS + place * 10**6 + 2000)
+            bag.write_samples(Block.of(channel, stamps, np.full(2000, 5.0 + place)))
+    recover(folder, tmp_path / 'c.mcap')
+    assert check([tmp_path / 'c.mcap'])[0].sound
+    (run,) = open_runs([tmp_path / 'c.mcap'])
+    block = concatenate([part for part in run.inputs() if isinstance(part, Block)])
+    for place, channel in enumerate((Channel.DEPTH, Channel.SPEED_THROUGH_WATER)):
+        assert np.all(block.value[block.channel == channel, 0] == 5.0 + place)
+        assert np.sum(block.channel == channel) == 2000

@@ -58,14 +58,20 @@ def test_a_missing_package_is_told_with_what_does_not_work(
     assert main(['doctor', '--out', str(tmp_path)]) == 1
 
 
+@pytest.fixture
+def own_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """What a run sets is put back; it leaves its files in a folder of the test."""
+    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
+        monkeypatch.setenv(name, os.environ[name])
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path / 'ros'))
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+
+
+@pytest.mark.usefixtures('own_environment')
 def test_a_ship_sails_past_the_node_and_live_is_replay(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip('rclpy')
-    monkeypatch.setenv('TMPDIR', str(tmp_path))
-    monkeypatch.setattr(tempfile, 'tempdir', None)
-    for name in ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
-        monkeypatch.setenv(name, os.environ.get(name, '0'))  # put back, as the run sets them
     assert main(['doctor', '--run', '--out', str(tmp_path)]) == 0
     said = capsys.readouterr().out
     assert said.splitlines()[-1] == 'PASS'
@@ -74,13 +80,12 @@ def test_a_ship_sails_past_the_node_and_live_is_replay(
     assert list(tmp_path.glob('shipdrag-doctor-*')) == []
 
 
+@pytest.mark.usefixtures('own_environment')
 def test_a_node_that_fails_is_told_with_its_log(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip('rclpy')
     monkeypatch.setattr(doctor_run, '_NODE', ('steady_s:=nonsense',))
-    for name in ('ROS_DOMAIN_ID', 'ROS_LOG_DIR', 'ROS_AUTOMATIC_DISCOVERY_RANGE'):
-        monkeypatch.setenv(name, os.environ.get(name, '0'))
     assert main(['doctor', '--run', '--out', str(tmp_path), '--json']) == 1
     found = json.loads(capsys.readouterr().out)
     assert found['works'] is False
@@ -89,3 +94,4 @@ def test_a_node_that_fails_is_told_with_its_log(
     assert 'steady_s' in failed['found']
     folder = Path(failed['found'].rpartition('files in ')[2])
     assert (folder / 'node.log').is_file()
+    assert folder.parent == tmp_path

@@ -47,6 +47,8 @@ def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
         'identical': 0,
         'first_difference': None,
         'largest_difference': 0.0,
+        'largest_difference_sigma': 0.0,
+        'by': None,
     }
     assert found['inputs']['position'] == {'messages': 1801, 'used': 1801, 'rejected': {}}
     (coastdown,) = found['coastdowns']

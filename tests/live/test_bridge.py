@@ -186,6 +186,29 @@ def test_an_estimate_that_still_waits_is_one_line_of_the_log(bags: list[Path]) -
     assert sum('first figure waits' in text for text in texts) <= 1
 
 
+def test_the_rest_of_the_glide_is_shown_and_then_compared(bags: list[Path]) -> None:
+    (run,) = open_runs(bags[:1])
+    timeline = Timeline(run, Ship.load(SHIP), Parameters())
+    timeline.read()
+    bridge = Bridge(Ship.load(SHIP))
+    play(timeline, timeline.start_ns + 300 * 10**9, bridge)
+    assert bridge.parts(0.0)['forecast'] is None
+    bridge = Bridge(Ship.load(SHIP))
+    play(timeline, timeline.end_ns - 30 * 10**9, bridge)
+    coming = bridge.parts(0.0)['forecast']
+    time_s, low_s, high_s = coming['time_s']
+    assert 0.0 < low_s < time_s < (high_s or math.inf)
+    assert coming['rows'][0][0] == 0.0
+    assert coming['way_m'] < time_s * coming['rows'][0][1]
+    bridge = Bridge(Ship.load(SHIP))
+    play(timeline, timeline.end_ns, bridge)
+    checked = bridge.parts(0.0)['forecast']
+    foretold_s, low_s, high_s = checked['foretold_s']
+    assert low_s < checked['was_s'] < high_s
+    assert 100.0 < checked['was_s'] < 300.0
+    assert low_s < foretold_s < high_s
+
+
 def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
     bridge = Bridge(Ship.load(SHIP))
     before = bridge.parts(0.0)

@@ -139,9 +139,9 @@ def test_who_never_asks_holds_no_place(
         opened = [socket.create_connection(address) for _ in range(20)]
         for each in opened:
             each.sendall(beginning)
-        assert get(f'{url}login', timeout=5.0).status_code == 200
+        assert get(f'{url}login').status_code == 200
         # those that still have a place lose it, though they go on
-        end_s = time.monotonic() + 1.5 + 5.0
+        end_s = time.monotonic() + 100.0  # of a busy machine; without a limit they stay for ever
         while opened and time.monotonic() < end_s:
             opened = [each for each in opened if not closed(each, drips=drips)]
             time.sleep(0.1)
@@ -172,7 +172,7 @@ def test_more_viewers_than_places_are_told(serving: Any, monkeypatch: pytest.Mon
         with socket.create_connection(address) as one_more:
             assert one_more.recv(1000).startswith(b'HTTP/1.1 503')
         viewers.pop().close()
-        end_s = time.monotonic() + 20.0
+        end_s = time.monotonic() + 100.0
         while get(url).status_code != 200:
             assert time.monotonic() < end_s
         for each in viewers:

@@ -83,7 +83,7 @@ def test_what_instruments_say_by_nmea_is_what_a_mate_reads(
     node.wait_for('ready to estimate')
 
     talker.sentences = GROUND
-    viewer.wait_for('#figure-speed', '10.2 kn', within_s=25.0)
+    viewer.wait_for('#figure-speed', '10.2 kn')
     assert viewer.text('#note-speed') == 'over ground'
     talker.sentences = (*GROUND, *LOG, *CONTEXT)
     viewer.wait_for('#figure-speed', '10.0 kn')

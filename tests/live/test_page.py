@@ -201,7 +201,7 @@ def test_time_passes(view: Any, serving: Any) -> None:
         viewer = view(url)
         viewer.wait_for('#headline', 'NO NODE HEARD')
         first = viewer.text('#utc-time')
-        end_s = time.monotonic() + 20.0
+        end_s = time.monotonic() + 100.0
         while viewer.text('#utc-time') == first:
             assert time.monotonic() < end_s
             viewer.page.wait_for_timeout(100)

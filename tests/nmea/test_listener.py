@@ -6,7 +6,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shipdrag_ros.nmea.listener import LINE_BYTES, LineSplitter
+from shipdrag_ros.nmea.live import LINE_BYTES, LineSplitter
 
 
 def test_lines_by_any_end() -> None:

@@ -15,10 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.nmea import listener, live
+from shipdrag_ros.nmea import live
 from shipdrag_ros.nmea.address import parse_addresses
-from shipdrag_ros.nmea.listener import SourceCounts
-from shipdrag_ros.nmea.live import LiveNmea
+from shipdrag_ros.nmea.live import LiveNmea, SourceCounts
 
 WITHIN_S = 120.0
 TEXT = '$HEHDT,90.0,T*18'
@@ -111,7 +110,7 @@ def test_a_flood_is_slowed_and_what_finds_no_room_is_counted(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(live, 'WAITING_LINES', 40)
-    monkeypatch.setattr(listener, 'BURST_LINES', 50.0)
+    monkeypatch.setattr(live, 'BURST_LINES', 50.0)
     port = free_port(socket.SOCK_DGRAM)
     with hearing(f'udp://127.0.0.1:{port}') as heard, to_udp(heard, port) as send:
         sent = 0
@@ -126,7 +125,7 @@ def test_a_flood_is_slowed_and_what_finds_no_room_is_counted(
 
 
 def test_tcp_is_opened_again_when_it_drops(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(listener, '_RETRY_S', (0.05,))
+    monkeypatch.setattr(live, '_RETRY_S', (0.05,))
     port = free_port(socket.SOCK_STREAM)
     with hearing(f'tcp://127.0.0.1:{port}') as heard:
         until(lambda: 'refused' in counts(heard).problem)
@@ -145,7 +144,7 @@ def test_tcp_is_opened_again_when_it_drops(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_tcp_peer_that_vanished_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(listener, 'SILENT_S', 0.3)
+    monkeypatch.setattr(live, 'SILENT_S', 0.3)
     with socket.create_server(('127.0.0.1', 0)) as server:
         port = server.getsockname()[1]
         with hearing(f'tcp://127.0.0.1:{port}') as heard:
@@ -153,7 +152,7 @@ def test_a_tcp_peer_that_vanished_is_noticed(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_serial_line_and_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(listener, '_RETRY_S', (0.05,))
+    monkeypatch.setattr(live, '_RETRY_S', (0.05,))
     ours, theirs = pty.openpty()
     tty.setraw(theirs)
     device = os.ttyname(theirs)

@@ -30,6 +30,7 @@ PARAMETERS = {
     'slope_window_s': 30.0,
     'confirm_s': 60.0,
     'window_s': 600.0,
+    'forecast_speeds': [3.0, 1.5],
 }
 SPEED = 100.0  # times as fast as life
 TYPES = {
@@ -109,10 +110,13 @@ def test_live_figures_are_recorded_and_replayed(
     )
     peer.spin_until(lambda: late)
     assert node.stop() == 0
-    peer.spin_for(0.5)
 
     (bag,) = (tmp_path / 'bags').glob('*.mcap')
-    for name in ('speed', 'resistance', 'resistance_curve', 'forecast', 'forecast_path'):
+    names = ('speed', 'resistance', 'resistance_curve', 'forecast', 'forecast_path')
+    sent = {name: len(list(recorded(bag, f'/coastdown_node/{name}'))) for name in names}
+    peer.spin_until(lambda: all(len(heard[name]) >= sent[name] for name in names))
+    peer.spin_until(lambda: read_event(heard['events'][-1]).kind is EventKind.COASTDOWN)
+    for name in names:
         assert len(heard[name]) > 20
         assert heard[name] == [
             on_the_wire(payload) for payload in recorded(bag, f'/coastdown_node/{name}')

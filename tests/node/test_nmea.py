@@ -45,7 +45,7 @@ class Instruments:
 
     def until(self, condition: Any, peer: Any, *contents: str) -> None:
         """Repeat sentences, their number at the end of a field of no meaning, until it is so."""
-        end = time.monotonic() + 60.0
+        end = time.monotonic() + 200.0
         while not condition():
             assert time.monotonic() < end
             self.say(*(sentence(content) for content in contents))

@@ -103,11 +103,12 @@ def test_the_launch_file_parses_and_sets_known_parameters() -> None:
     assert {'ship_file', 'output_directory', 'autostart'} <= names
 
 
-def test_a_former_name_is_accepted_and_listed_nowhere() -> None:
+def test_the_error_of_a_former_name_says_the_new_one() -> None:
     estimator = KEYS['estimator'].kind
     assert 'warped' not in estimator.choices
     problems: list[str] = []
-    assert estimator.read('warped', 'estimator', problems) == 'warped'
+    estimator.read('warped', 'estimator', problems)
+    assert "which is 'log_time' now" in problems.pop()
     assert problems == []
     estimator.read('kalman', 'estimator', problems)
     assert 'log_time' in problems[0]

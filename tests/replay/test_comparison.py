@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipdrag_ros import __version__
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.coastdown.events import Event, Update
 from shipdrag_ros.messages import OutputMessage, outputs
 from shipdrag_ros.replay import Recorded
 from shipdrag_ros.replay.comparison import Comparison
+from shipdrag_ros.replay.words import recorded_sentence
 
 
 def message(stamp_ns: int, payload: bytes = b'', name: str = 'speed') -> OutputMessage:
@@ -102,3 +104,20 @@ def test_how_much_figures_differ_is_told(recording: tuple[Path, list[Event]]) ->
         for each in outputs(replace(updates[3], estimate=changed)):
             comparison.add(each)
         assert comparison.finish().largest_difference == pytest.approx(difference, rel=0.01)
+
+
+def test_a_difference_is_told_in_standard_deviations(
+    recording: tuple[Path, list[Event]],
+) -> None:
+    (update, *_) = [event for event in recording[1] if isinstance(event, Update)]
+    was = update.estimate
+    apart = replace(was, last_resistance_m_s2=was.last_resistance_m_s2 + 3.0 * was.last_sigma_m_s2)
+    comparison = Comparison(iter(outputs(update)), by='0.1.0')
+    for each in outputs(replace(update, estimate=apart)):
+        comparison.add(each)
+    found = comparison.finish()
+    assert found.largest_difference_sigma == pytest.approx(3.0)
+    assert found.by == '0.1.0'
+    assert 'version 0.1.0 recorded it' in recorded_sentence(found)
+    assert 'differ by 3 standard deviations' in recorded_sentence(found)
+    assert 'version' not in recorded_sentence(replace(found, by=__version__))

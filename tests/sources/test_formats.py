@@ -160,6 +160,31 @@ def test_lines_of_a_serial_adapter_may_end_with_a_carriage_return(
     assert np.array_equal(block_of(path).value, block_of(files['slcan']).value)
 
 
+def test_a_serial_adapter_need_not_give_milliseconds(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    path, plain = tmp_path / 'plain.log', files['slcan']
+    path.write_text('\n'.join(line[:-4] for line in plain.read_text().splitlines()))
+    found, whole = block_of(path, rate=10.0), block_of(plain)
+    assert np.array_equal(found.channel, whole.channel)
+    assert np.array_equal(found.value, whole.value)
+
+
+@pytest.mark.parametrize('length', '01234567')
+def test_a_damaged_length_of_a_frame_makes_no_value_of_its_milliseconds(
+    files: dict[str, Path], tmp_path: Path, length: str
+) -> None:
+    """Each line of 8 bytes in turn says that it has fewer; its clock is no byte, nor bytes it."""
+    lines = files['slcan'].read_text().splitlines()
+    whole = {tuple(row) for row in block_of(files['slcan']).value.tolist()}
+    path = tmp_path / 'damaged.log'
+    for place in range(20, 30):
+        damaged = [*lines]
+        damaged[place] = damaged[place][:9] + length + damaged[place][10:]
+        path.write_text('\n'.join(damaged))
+        assert {tuple(row) for row in block_of(path).value.tolist()} <= whole
+
+
 def test_a_coordinate_may_have_thirty_decimals(tmp_path: Path) -> None:
     path = tmp_path / 'track.gpx'
     points = (

@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.bags import open_runs
 from shipdrag_ros.errors import BagError, ImportDataError
-from shipdrag_ros.nmea.framing import Checksum
+from shipdrag_ros.nmea.reading import Checksum
 from shipdrag_ros.samples import PITCHES, SHAFTS, Block, Channel, concatenate
 from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
@@ -360,8 +360,12 @@ def test_in_a_gap_only_the_first_has_a_time() -> None:
     assert count(result, 'speed_through_water') == {'in a gap of the time': 3}
 
 
-def test_a_long_gap_takes_no_memory() -> None:
-    result, _ = run(lines(rmc(0), *[vhw(1)] * 20_000, rmc(7)))
+def test_many_samples_of_a_step_are_spread_and_those_of_a_gap_are_not() -> None:
+    result, block = run(lines(rmc(0), *[vhw(1)] * 20_000, rmc(7)))
+    assert result.written['speed_through_water'] == 20_000
+    steps = np.diff(seconds(block, Channel.SPEED_THROUGH_WATER))
+    assert steps == pytest.approx(7 / 20_000, abs=1e-9)
+    result, _ = run(lines(rmc(0), *[vhw(1)] * 20_000, rmc(70)))
     assert result.written['speed_through_water'] == 1
     assert count(result, 'speed_through_water') == {'in a gap of the time': 19_999}
 

@@ -150,19 +150,27 @@ function timeAxis(offset) {
 }
 
 /** Speeds over time; rows are [second, log, ground, estimate, shaft]. */
-export function drawSpeeds(chart, rows, span, units, offset) {
+export function drawSpeeds(chart, rows, span, units, offset, forecast) {
   const cut = since(rows, span);
-  const speed = column => cut.map(row => (row[column] == null ? null : units.toSpeed(row[column])));
+  const newest = cut.length ? cut[cut.length - 1][0] : 0;
+  // what is to come, not more of it than half of what was
+  const coming = (forecast?.rows ?? []).map(([t, ...rest]) => [forecast.made_s + t, ...rest]).filter(([t]) => t > newest && t < newest + span / 2);
+  const speed = column => [...cut.map(row => (row[column] == null ? null : units.toSpeed(row[column]))), ...coming.map(() => null)];
+  const ahead = column => [...cut.map(() => null), ...coming.map(row => units.toSpeed(row[column]))];
   chart.draw(`${units.name} ${offset}`, () => ({
     scales: { x: { time: true }, y: { range: (_, min, max) => (min == null ? [0, 1] : pad(min, max)) } },
     axes: [timeAxis(offset), axis(`speed [${units.speed}]`, 58)],
+    bands: [{ series: [6, 5], fill: ink('--band') }],
     series: [
       { label: 'time', value: (_, v) => (v == null ? '–' : new Date((v + offset * 3600) * 1000).toISOString().slice(11, 19)) },
       { label: 'log', stroke: ink('--accent'), width: 2, points: { show: false } },
       { label: 'over ground', stroke: ink('--second'), width: 1.5, dash: [6, 4], points: { show: false } },
       { label: 'estimate', stroke: ink('--third'), width: 3, dash: [2, 3], spanGaps: true, points: { show: false } },
+      { label: 'foretold (shaded: 90 %)', stroke: ink('--third'), width: 1.5, points: { show: false } },
+      { label: 'low', stroke: ink('--third'), width: 0.5, legend: false, points: { show: false } },
+      { label: 'high', stroke: ink('--third'), width: 0.5, legend: false, points: { show: false } },
     ].map(each => (each.stroke ? { ...each, value: (_, v) => (v == null ? '–' : v.toFixed(2)) } : each)),
-  }), [cut.map(row => row[0]), speed(1), speed(2), speed(3)]);
+  }), [[...cut, ...coming].map(row => row[0]), speed(1), speed(2), speed(3), ahead(1), ahead(2), ahead(3)]);
 }
 
 export function drawShafts(chart, rows, span, offset) {

@@ -94,6 +94,7 @@ function thin() {
 const SHOWN = {
   headline: showHeadline,
   figures: showFigures,
+  forecast: showForecast,
   checks: showChecks,
   inputs: showInputs,
   verdict: showVerdict,
@@ -166,6 +167,26 @@ function showFigures(part) {
     setFigure('figure-over', percent(usual.over_clean), '', ` ± ${(200 * usual.over_clean_sd).toFixed(0)} %`);
     text('note-over', where);
   }
+}
+
+/** A time as minutes and seconds. */
+function minutes(s) { return s == null ? '…' : `${Math.floor(Math.round(s) / 60)}:${String(Math.round(s) % 60).padStart(2, '0')}`; }
+
+function showForecast(part) {
+  if (!part) { setFigure('figure-glide', '–', '', ''); text('note-glide', 'foretold while she coasts'); return; }
+  const speed = `${units.toSpeed(part.speed_m_s).toFixed(units === SI ? 2 : 1)} ${units.speed}`;
+  const span = (low, high) => (high == null ? `${minutes(low)} or later` : `${minutes(low)} to ${minutes(high)}`);
+  if (part.was_s != null) {
+    const [foretold, low, high] = part.foretold_s;
+    setFigure('figure-glide', minutes(part.was_s), 'min', '');
+    text('note-glide', `to ${speed}; foretold half-way ${minutes(foretold)} (${span(low, high)})`);
+    return;
+  }
+  const [time, low, high] = part.time_s;
+  const mass = picture.ship?.mass_kg;
+  const far = part.way_m == null ? '' : `, ${units === SI || mass < 1e4 ? `${part.way_m.toFixed(0)} m` : `${(part.way_m / 1852).toFixed(2)} nm`}`;
+  setFigure('figure-glide', minutes(time), 'min', '');
+  text('note-glide', `${speed} in ${minutes(time)} (${span(low, high)})${far}`);
 }
 
 function signed(list, rows) {
@@ -264,7 +285,7 @@ function showTraces() {
   const { rows } = picture;
   const span = Number(el('span').value);
   if (!rows.length) { charts.speeds.clear(); charts.shafts.clear(); return; }
-  drawSpeeds(charts.speeds, rows, span, units, zone);
+  drawSpeeds(charts.speeds, rows, span, units, zone, picture.forecast);
   const last = rows[rows.length - 1];
   const said = [['log', 1], ['over ground', 2], ['estimate', 3]].filter(([, i]) => last[i] != null).map(([name, i]) => `${name} ${units.toSpeed(last[i]).toFixed(1)}`);
   text('trace-say', said.length ? `${silent('speed through water', 'speed over ground') ? 'Last' : 'Now'}: ${said.join(', ')} ${units.speed}.` : 'Nothing was read in the last second.');

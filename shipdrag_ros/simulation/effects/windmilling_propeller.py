@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-from scipy.special import expit
-
 from shipdrag_ros.parameter import Parameter, log_normal
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.simulation.action import Action
@@ -19,6 +17,8 @@ def _act(frame: Frame, drag_coefficient: float, stall_speed_m_s: float) -> Actio
     disc = disc_area_m2(frame.ship)
 
     def resistance(speed: Float64) -> Float64:
+        from scipy.special import expit  # takes long to import
+
         stalled = expit((stall_speed_m_s - speed) / (_WIDTH * stall_speed_m_s))
         area = disc * (drag_coefficient + (_LOCKED - drag_coefficient) * stalled)
         force: Float64 = drag_n(frame.ship, 1.0, speed) * area

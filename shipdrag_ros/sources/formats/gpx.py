@@ -16,10 +16,9 @@ from xml.parsers import expat
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Format, Head, Job
-from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.log import Log, iso_ns
 from shipdrag_ros.sources.opened import check_unpacked, opened
 from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
-from shipdrag_ros.sources.times import iso_ns
 
 _CHUNK = 1 << 16
 _DEEPEST = 32

@@ -27,8 +27,14 @@ from shipdrag_ros.errors import BagError, ImportDataError
 from shipdrag_ros.messages import EncodedMessage, MalformedMessage, match_inputs, types
 from shipdrag_ros.messages.topics import TOPICS
 from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job
-from shipdrag_ros.sources.log import ATTACHMENT, LIMIT_NS, Log, Rejected, Understood
-from shipdrag_ros.sources.words import rejected_words
+from shipdrag_ros.sources.log import (
+    ATTACHMENT,
+    LIMIT_NS,
+    Log,
+    Rejected,
+    Understood,
+    rejected_words,
+)
 
 _ROS1, _SQLITE = b'#ROSBAG V', b'SQLite format 3\0'
 _CHUNK_BYTES = 256 << 20

@@ -13,11 +13,10 @@ from typing import Any, TypeGuard
 
 from shipdrag_ros.samples import SHAFTS, Channel
 from shipdrag_ros.sources.format import CERTAIN, NO, POSSIBLE, Format, Head, Job
-from shipdrag_ros.sources.log import Log
+from shipdrag_ros.sources.log import Log, iso_ns
 from shipdrag_ros.sources.opened import Lines
 from shipdrag_ros.sources.options import GEAR
 from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
-from shipdrag_ros.sources.times import iso_ns
 
 _SELF = 'vessels.self'
 _CONTEXT = re.compile(r'"context"\s*:\s*"([^"]{1,200})"')

@@ -267,7 +267,6 @@ def test_every_parameter_changes_something(coast: Any, ship: Ship) -> None:
 def test_auto_is_this_estimator(coast: Any, ship: Ship) -> None:
     cut = window(coast.block(100))
     assert estimate(cut, ship, Parameters()).estimator == 'log_time'
-    assert estimate(cut, ship, Parameters(estimator='warped')).estimator == 'log_time'
     assert estimate(cut, ship, Parameters(estimator='s1_joint')).estimator == 's1_joint'
 
 

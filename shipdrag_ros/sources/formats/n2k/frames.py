@@ -9,7 +9,7 @@ from datetime import UTC
 from typing import NamedTuple
 
 from shipdrag_ros.samples import SECOND_NS
-from shipdrag_ros.sources.times import iso_ns
+from shipdrag_ros.sources.log import iso_ns
 
 MINUTE_NS = 60 * SECOND_NS
 DAY_NS = 1440 * MINUTE_NS
@@ -37,7 +37,7 @@ _YACHT_DEVICES = re.compile(
     rf'(\d\d):(\d\d):(\d\d)\.(\d{{1,6}})\s+[RT]\s+({_HEX}{{8}})((?:\s+{_HEX}{{2}})+)'
 )
 # SLCAN: identifier, length, bytes, and with some adapters milliseconds of a minute
-_SLCAN = re.compile(rf'T({_HEX}{{8}})([0-8])((?:{_HEX}{{2}})*?)({_HEX}{{4}})?')
+_SLCAN = re.compile(rf'T({_HEX}{{8}})([0-8])({_HEX}*)')
 # what loggers write before a line: the date and time
 _LED = re.compile(
     r'[\[(]?(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:[.,]\d{1,12})?\s?(?:Z|[+-]\d\d:?\d\d)?)[\])]?'
@@ -139,12 +139,16 @@ def _canboat(line: str) -> N2kFrame | None:
 
 def _slcan(line: str) -> N2kFrame | None:
     found = _SLCAN.fullmatch(line)
-    if found is None or len(found[3]) != 2 * int(found[2]):
+    if found is None:
         return None
-    time_ns = None if found[4] is None else int(found[4], 16) * 1_000_000
+    length = 2 * int(found[2])
+    data, clock = found[3][:length], found[3][length:]
+    if len(data) < length or len(clock) not in (0, 4):
+        return None
+    time_ns = int(clock, 16) * 1_000_000 if clock else None
     if time_ns is not None and time_ns >= MINUTE_NS:
         return None
-    return _of_can_id(time_ns, MINUTE_NS, found[1], bytes.fromhex(found[3]))
+    return _of_can_id(time_ns, MINUTE_NS, found[1], bytes.fromhex(data))
 
 
 _READERS: tuple[Callable[[str], N2kFrame | None], ...] = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 
-from shipdrag_ros.nmea.framing import Checksum
+from shipdrag_ros.nmea.reading import Checksum
 from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Format, Head, Job, Option, head_of
 from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log

@@ -10,31 +10,29 @@ is attached, if it is not too long, so that nothing is lost.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import date
 from pathlib import Path
 
+import numpy as np
 from pynmeagps.nmeatypes_core import NMEA_TALKERS
 
 from shipdrag_ros import display, strict_yaml
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.nmea.clock import DAY_NS
-from shipdrag_ros.nmea.framing import Checksum
+from shipdrag_ros.nmea.clock import ROLLOVER_DAYS, SentenceClock, rollover_days
+from shipdrag_ros.nmea.reading import DAY_NS, Checksum, SentenceReader, days_of
 from shipdrag_ros.nmea.sentences import MAGNETIC, READERS, TIMED, Mounting
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.samples import INPUTS, Channel
+from shipdrag_ros.samples import INPUTS, Block, Channel
 from shipdrag_ros.sources.formats.nmea.log import NmeaLog
-from shipdrag_ros.sources.formats.nmea.record import SentenceConverter
-from shipdrag_ros.sources.formats.nmea.survey import Survey
+from shipdrag_ros.sources.formats.nmea.record import TakenSentences
 from shipdrag_ros.sources.log import (
     ATTACHMENT,
     BATCH_SAMPLES,
     Log,
     Rejected,
     Understood,
-)
-from shipdrag_ros.sources.words import (
     backward_and_repeated,
     not_taken_words,
     rejected_words,
@@ -210,125 +208,157 @@ def read_nmea(
 
     Notes
     -----
-    The log is read twice: first to see who sends what. Each input is taken
-    from one talker and sentence, the first in `READERS` of those that have at
+    Each input is taken from one talker and sentence, the first in `READERS` of those that have at
     least half as many values as the most frequent; two instruments of
     different place or scale are never mixed.
     """
-    text = NmeaLog(source, checksum=checksum)
-    mounting = Mounting(transducer_m)
-    survey = Survey(mounting)
-    for sentence in text.sentences(_part(progress, 0)):
-        survey.take(sentence)
-    clock = survey.clock(text, day)
-    record = SentenceConverter(survey.chosen(), clock, mounting)
+    text = NmeaLog(source)
+    reader = SentenceReader(Mounting(transducer_m), checksum)
+    taken = TakenSentences()
+    for place, (line, each, receive_ns) in enumerate(text.texts(progress)):
+        sentence = reader.read(each)
+        if isinstance(sentence, str):
+            text.reject(sentence, line, each)
+        else:
+            taken.take(place, line, each, sentence, receive_ns)
+    clock = _clock(text, taken, day)
     whole = text.text(LOG_LIMIT_BYTES)
     if whole is not None:
         log.attach(LOG_ATTACHMENT, whole)
-    for sentence in text.sentences(_part(progress, 1)):
-        record.take(sentence)
-        if len(record) >= BATCH_SAMPLES:
-            log.write_samples(record.pop())
-    record.finish()
-    log.write_samples(record.pop())
-    understood = _understood(log, record)
-    result = _result(text, survey, record, understood, attached=whole is not None)
+    block = taken.samples(clock)
+    for first in range(0, len(block), BATCH_SAMPLES):
+        log.write_samples(block[first : first + BATCH_SAMPLES])
+    result = _result(text, taken, clock, block, log)
+    result = replace(
+        result, log_attached=whole is not None, checksums=checksum is Checksum.REQUIRED
+    )
     about = {'source': source.name, 'date': day, 'transducer_m': transducer_m}
     about |= {'checksum': checksum.value, **asdict(result)}
     log.attach(ATTACHMENT, strict_yaml.dump(about))
     return result
 
 
-def _part(progress: PartDone | None, part: int) -> PartDone | None:
-    """Return the progress of one of two readings."""
-    if progress is None:
-        return None
-    return lambda done, total: progress(part * total + done, 2 * total)
+def _clock(log: NmeaLog, taken: TakenSentences, day: date | None) -> SentenceClock:
+    """Return the clock at the start of the log; ImportDataError where nothing states it."""
+    name, first = repr(str(log.path)), taken.first
+    if not taken.count:
+        reasons = ', '.join(
+            f'{reason} {rejected.count} times, {rejected.first[0]}'
+            for reason, rejected in log.rejected.items()
+        )
+        bare = 'without checksum' in log.rejected
+        hint = '; for sentences without give --no-checksum' if bare else ''
+        raise ImportDataError(
+            f'{name} holds no sentence of NMEA 0183 in {log.lines} line(s): '
+            f'{reasons or "all are blank"}{hint}; for a table give --map and --time'
+        )
+    if first is not None and first.day is not None:
+        shift_days = 0 if day is None else rollover_days(first.day, day)
+        if shift_days is None:
+            own = date.fromordinal(date(1970, 1, 1).toordinal() + first.day)
+            raise ImportDataError(
+                f'--date {day}: {name} begins on {own}, which is no whole number of '
+                '1024 weeks away; leave --date out'
+            )
+        return SentenceClock((first.day + shift_days) * DAY_NS + first.of_day_ns, shift_days)
+    if day is not None:
+        return SentenceClock(days_of(day) * DAY_NS + DAY_NS // 2 - 1)  # noon: of the whole day
+    if taken.received:
+        return SentenceClock(None)
+    if taken.timed:
+        raise ImportDataError(
+            f'{name} has times of day, but no date (no RMC or ZDA with a fix and a date); '
+            'give --date YYYY-MM-DD of its first time, in UTC'
+        )
+    raise ImportDataError(
+        f'{name} states no time: it has none of {", ".join(TIMED)} with a time, and no time '
+        'of receipt before its lines'
+    )
+
+
+def _days_early(taken: TakenSentences) -> int:
+    """Return the days that the receiver is before the receipt where these are whole cycles."""
+    first, received_ns = taken.first, taken.first_received_ns
+    if first is None or first.day is None or received_ns is None:
+        return 0
+    days = round(received_ns / DAY_NS) - first.day
+    cycles = round(days / ROLLOVER_DAYS)
+    return cycles * ROLLOVER_DAYS if abs(days - cycles * ROLLOVER_DAYS) <= 2 else 0
 
 
 def _result(
-    log: NmeaLog,
-    survey: Survey,
-    record: SentenceConverter,
-    understood: tuple[Understood, ...],
-    *,
-    attached: bool,
+    log: NmeaLog, taken: TakenSentences, clock: SentenceClock, block: Block, into: Log
 ) -> NmeaResult:
     """Sum up; ImportDataError if there is nothing."""
-    rejected = {
-        name: record.rejected[name] for name in (*INPUTS, 'time') if name in record.rejected
-    }
+    rejected = taken.rejected(log.lines_of)
     if log.rejected:
         rejected['line'] = log.rejected
-    if record.start_ns is None:
+    if not len(block):
         reasons = [
             f'{name}: {reason} {each.count} times, {each.first[0]}'
             for name, by_reason in rejected.items()
             for reason, each in by_reason.items()
         ]
         raise ImportDataError(
-            f'{str(log.path)!r} gave no sample from {record.sentences} sentence(s); '
+            f'{str(log.path)!r} gave no sample from {taken.count} sentence(s); '
             f'{"; ".join(reasons) or "give a log with any of " + ", ".join(READERS)}'
         )
     not_used: Counter[str] = Counter()
     unknown: Counter[str] = Counter()
-    for (talker, kind), count in survey.addresses.items():
+    for (talker, kind), count in taken.addresses.items():
         if kind not in READERS and kind not in TIMED and talker not in READERS:
             not_used[talker + kind] += count
         if kind and talker not in NMEA_TALKERS:
             unknown[talker] += count
-    heading = record.chosen.get(Channel.HEADING)
+    chosen = taken.chosen()
+    sources: dict[str, dict[str, None]] = {}
+    not_taken: dict[str, Counter[str]] = {}
+    for channel, counts in sorted(taken.values().items()):
+        sources.setdefault(channel.input, {})[str(chosen[channel])] = None
+        others = {str(s): n for s, n in counts.items() if s != chosen[channel]}
+        if others:
+            not_taken.setdefault(channel.input, Counter()).update(others)
+    backward, repeated = _out_of_order(block)
+    written = Counter(Channel(code).input for code in block.channel.tolist())
     return NmeaResult(
         lines=log.lines,
-        sentences=record.sentences,
-        written={name: record.written[name] for name in INPUTS if record.written[name]},
-        sources=_sources(record),
-        not_taken=_not_taken(survey, record),
+        sentences=taken.count,
+        written={name: written[name] for name in INPUTS if written[name]},
+        sources={name: ', '.join(each) for name, each in sources.items()},
+        not_taken={name: dict(counts) for name, counts in not_taken.items()},
         not_used=dict(not_used.most_common()),
         unknown_talkers=dict(unknown),
         rejected=rejected,
-        start_ns=record.start_ns,
-        end_ns=record.newest_ns,
-        backward=record.backward,
-        repeated=record.repeated,
-        dates_put_right=record.clock.dates_put_right,
-        magnetic_heading=heading is not None and heading.detail == MAGNETIC,
-        shift_days=record.clock.shift_days,
-        days_early=survey.days_early,
-        log_attached=attached,
+        start_ns=int(block.stamp_ns[0]),
+        end_ns=int(block.receive_ns[-1]),
+        backward=backward,
+        repeated=repeated,
+        dates_put_right=clock.dates_put_right,
+        magnetic_heading=Channel.HEADING in chosen and chosen[Channel.HEADING].detail == MAGNETIC,
+        shift_days=clock.shift_days,
+        days_early=_days_early(taken),
+        log_attached=False,
         damage=log.damage,
-        checksums=log.checksum is Checksum.REQUIRED,
-        understood=understood,
+        checksums=True,
+        understood=tuple(
+            Understood(
+                channel.input,
+                str(chosen[channel]),
+                '',
+                first,
+                geodetic=channel is Channel.POSITION_GEODETIC,
+            )
+            for channel, first in sorted(into.first.items())
+        ),
     )
 
 
-def _understood(log: Log, record: SentenceConverter) -> tuple[Understood, ...]:
-    return tuple(
-        Understood(
-            channel.input,
-            str(record.chosen[channel]),
-            '',
-            first,
-            geodetic=channel is Channel.POSITION_GEODETIC,
-        )
-        for channel, first in sorted(log.first.items())
-    )
-
-
-def _sources(record: SentenceConverter) -> dict[str, str]:
-    """Say what each input is taken from; of several shafts and pitches, each once."""
-    by_input: dict[str, dict[str, None]] = {}
-    for channel, source in sorted(record.chosen.items()):
-        by_input.setdefault(channel.input, {})[str(source)] = None
-    return {name: ', '.join(sources) for name, sources in by_input.items()}
-
-
-def _not_taken(survey: Survey, record: SentenceConverter) -> dict[str, dict[str, int]]:
-    """Count by input the values of the sources that nothing is taken from."""
-    counts: dict[str, dict[str, int]] = {}
-    for channel, of_channel in sorted(survey.values.items()):
-        for source, count in of_channel.items():
-            if source != record.chosen[channel]:
-                others = counts.setdefault(channel.input, {})
-                others[str(source)] = others.get(str(source), 0) + count
-    return counts
+def _out_of_order(block: Block) -> tuple[int, int]:
+    """Return how many samples are stamped before, and how many as, an earlier one."""
+    backward = repeated = 0
+    for code in np.unique(block.channel):
+        stamps = block.stamp_ns[block.channel == code]
+        newest = np.maximum.accumulate(stamps)[:-1]
+        backward += int(np.sum(stamps[1:] < newest))
+        repeated += int(np.sum(stamps[1:] == newest))
+    return backward, repeated

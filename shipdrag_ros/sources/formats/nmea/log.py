@@ -7,17 +7,15 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from datetime import datetime
 from fractions import Fraction
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
 from typing import IO, cast
 
-from pynmeagps.nmeahelpers import calc_checksum
-
 from shipdrag_ros.errors import ImportDataError
-from shipdrag_ros.nmea.framing import START, Checksum, Sentence, parse
+from shipdrag_ros.nmea.reading import START, checksum_of
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.sources.log import LIMIT_NS, Rejected
@@ -49,18 +47,15 @@ class NmeaLog:
         File with a sentence a line. Before a sentence may stand a TAG block,
         or the time of its receipt: seconds or milliseconds since 1970, or ISO
         8601, taken as UTC without a zone.
-    checksum
-        Of the sentences.
 
     Attributes
     ----------
-    checksum
     rejected
-        Lines without a sentence by reason, of the last reading.
+        Lines without a sentence by reason.
     lines
-        Number of lines of the last reading.
+        Number of lines.
     damage
-        Why the last reading ended early, empty if it did not.
+        Why the reading ended early, empty if it did not.
 
     Raises
     ------
@@ -68,9 +63,8 @@ class NmeaLog:
         If the file cannot be read, is empty or in UTF-16.
     """
 
-    def __init__(self, path: Path, *, checksum: Checksum = Checksum.REQUIRED) -> None:
+    def __init__(self, path: Path) -> None:
         self.path = path
-        self.checksum = checksum
         self.rejected: dict[str, Rejected] = {}
         self.lines = 0
         self.damage = ''
@@ -98,23 +92,38 @@ class NmeaLog:
             except (EOFError, OSError, zlib.error, UnicodeDecodeError):
                 return None
 
-    def sentences(self, progress: PartDone | None = None) -> Iterator[Sentence]:
+    def texts(self, progress: PartDone | None = None) -> Iterator[tuple[int, str, int | None]]:
         """
-        Yield the sentences in the order of the log.
+        Yield line, text and time of receipt [ns] of what may be sentences, in their order.
 
         Parameters
         ----------
         progress
             Called with how many bytes are read, and of how many.
         """
-        self.rejected = {}
-        self.damage = ''
         total = self.path.stat().st_size
         with opened(self.path) as (raw, file):
             for line in self._lines(raw, file):
                 if progress is not None and self.lines % 1000 == 0:
                     progress(raw.tell(), total)
-                yield from self._of_line(self.lines, line)
+                if line[:1] == '$' and line.rfind('$') == 0 and '!' not in line:
+                    yield self.lines, line[1:].strip(), None
+                else:
+                    yield from self._of_line(self.lines, line)
+
+    def lines_of(self, places: Collection[int]) -> dict[int, tuple[int, str]]:
+        """
+        Return line and text of what stands at some places among the texts.
+        """
+        left, found = set(places), {}
+        texts = NmeaLog(self.path).texts() if left else iter(())
+        for place, (line, text, _) in enumerate(texts):
+            if place in left:
+                found[place] = line, text
+                left.remove(place)
+                if not left:
+                    break
+        return found
 
     def _lines(self, raw: IO[bytes], file: IO[bytes]) -> Iterator[str]:
         """Yield lines ended by LF, CR or both; of a long one only its beginning."""
@@ -135,36 +144,36 @@ class NmeaLog:
                     check_unpacked(self.path, size, raw.tell())
                 if self.lines == 1:
                     line = line.removeprefix(_UTF_8_MARK)
-                yield line.strip()
+                if len(line) >= _LINE - 1:
+                    self.reject(f'longer than {_LINE} characters', self.lines, line)
+                else:
+                    yield line.strip()
         except (EOFError, OSError, zlib.error) as error:
             self.damage = f'after line {self.lines}: {error}'
         finally:
             text.detach()  # whoever opened the file closes it
 
-    def _of_line(self, number: int, line: str) -> Iterator[Sentence]:
-        if len(line) >= _LINE - 1:
-            self._reject(f'longer than {_LINE} characters', number, line)
-            return
+    def _of_line(self, number: int, line: str) -> Iterator[tuple[int, str, int | None]]:
         if not line:
             return
         # a lost line end leaves two sentences in a line
         prefix, *texts = START.split(line)
         if not texts:
-            self._reject('no sentence', number, line)
+            self.reject('no sentence', number, line)
             return
         prefix = prefix.strip()
         try:
             receive_ns = _receive_ns(prefix) if prefix else None
         except ValueError as error:
-            self._reject(str(error), number, prefix)
+            self.reject(str(error), number, prefix)
             receive_ns = None
         for text in texts:
-            try:
-                yield parse(text.strip(), self.checksum, line=number, receive_ns=receive_ns)
-            except ValueError as error:
-                self._reject(str(error), number, text)
+            yield number, text.strip(), receive_ns
 
-    def _reject(self, reason: str, number: int, text: str) -> None:
+    def reject(self, reason: str, number: int, text: str) -> None:
+        """
+        Count what is no sentence.
+        """
         self.rejected.setdefault(reason, Rejected()).add(number, text)
 
 
@@ -172,7 +181,7 @@ def _receive_ns(prefix: str) -> int | None:
     """Return the time before a sentence [ns]; ValueError says why there is none."""
     if _TAGS.fullmatch(prefix):
         tags = _TAG.findall(prefix)
-        if any(calc_checksum(content) != checksum.upper() for content, checksum in tags):
+        if any(checksum_of(content) != checksum.upper() for content, checksum in tags):
             raise ValueError('wrong checksum of a TAG block')
         times = [found for content, _ in tags if (found := _TAG_TIME.search(content))]
         if not times:

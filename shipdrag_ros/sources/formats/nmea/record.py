@@ -2,179 +2,308 @@
 """
 Sentences of NMEA 0183 to samples with a time, in their order.
 
-A sample whose sentence states no time waits until the next time is stated.
+One pass takes what the sentences hold; then it is known who sends what, and on which
+day. A sample whose sentence states no time has that of the last one that did; where an
+input speaks several times before the next, its samples are spread evenly until then.
 """
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Mapping
+from typing import NamedTuple
 
-from shipdrag_ros.nmea.clock import GAP_NS, SentenceClock, SentenceTime
-from shipdrag_ros.nmea.framing import Sentence
-from shipdrag_ros.nmea.sentences import (
-    TIMED,
-    Fields,
-    MeasuredValue,
-    Mounting,
-    NoValue,
-)
-from shipdrag_ros.nmea.values import SentenceSource, read_values
-from shipdrag_ros.samples import Block, Channel
+import numpy as np
+from numpy.typing import NDArray
+
+from shipdrag_ros.nmea.clock import GAP_NS, SentenceClock
+from shipdrag_ros.nmea.reading import Sentence, SentenceSource, SentenceTime, best
+from shipdrag_ros.nmea.sentences import NoValue
+from shipdrag_ros.samples import INPUTS, Block, Channel, Int64, UInt8
 from shipdrag_ros.sources.log import Rejected
 
-_WAITING_SAMPLES = 16384  # in GAP_NS, of all inputs
-_GAP = 'in a gap of the time'
+Refused = dict[str, dict[str, Rejected]]
+TextsAt = Callable[[Collection[int]], Mapping[int, tuple[int, str]]]
+
+_NONE = -1  # no time of receipt, no date
+_GAP, _BEFORE = 'in a gap of the time', 'before the first time'
+_SHOWN = 3  # rejected sentences of a reason whose text is shown
 
 
-@dataclass
-class _Waiting:
-    """A sample; its time is None until the next time is stated."""
+class _Times(NamedTuple):
+    """Of each sentence that states a time, or should."""
 
-    channel: Channel
-    value: MeasuredValue
-    line: int
-    text: str
-    stamp_ns: int | None
+    place: array[int]
+    receive_ns: array[int]
+    of_day_ns: array[int]
+    day: array[int]
+    trusted: array[int]
+    address: array[int]
 
 
-@dataclass
-class SentenceConverter:
+class _Samples(NamedTuple):
+    """Of each value: the place of its sentence, its source by number, and when it was received."""
+
+    place: array[int]
+    source: array[int]
+    receive_ns: array[int]
+    a: array[float]
+    b: array[float]
+
+
+class TakenSentences:
     """
-    Turns sentences into samples and counts what becomes of them.
+    What the sentences of a log hold.
 
     Attributes
     ----------
-    chosen
-        Source of each channel.
-    clock
-        At the start of the log.
-    mounting
-        See there.
-    written
-        Samples by input.
-    rejected
-        By input or 'time', and reason.
-    sentences
-        Number taken.
-    backward, repeated
-        Samples stamped before, or as, an earlier one of their channel.
-    start_ns, newest_ns
-        First and largest stamp [ns].
+    addresses
+        Number of sentences by talker and kind.
+    received
+        Whether any has a time of receipt.
+    timed
+        Whether any states a time.
+    first, first_received_ns
+        The first time with a date that its source calls valid, and when it was received.
     """
 
-    chosen: Mapping[Channel, SentenceSource]
-    clock: SentenceClock
-    mounting: Mounting
-    written: Counter[str] = field(default_factory=Counter)
-    rejected: dict[str, dict[str, Rejected]] = field(default_factory=dict)
-    sentences: int = 0
-    backward: int = 0
-    repeated: int = 0
-    start_ns: int | None = None
-    newest_ns: int = -1
+    def __init__(self) -> None:
+        self.addresses: Counter[tuple[str, str]] = Counter()
+        self.received = False
+        self.timed = False
+        self.first: SentenceTime | None = None
+        self.first_received_ns: int | None = None
+        self._sources: dict[tuple[Channel, SentenceSource], int] = {}
+        self._reasons: dict[tuple[str, str], int] = {}
+        self._samples = _Samples(array('q'), array('i'), array('q'), array('d'), array('d'))
+        self._times = _Times(*(array('q') for _ in _Times._fields))
+        self._rejected = array('q'), array('i')  # places and reasons by number
+        self._without_time = array('q')
+        self._texts: dict[int, tuple[int, str]] = {}
+        self._addresses: dict[str, int] = {}
 
-    def __post_init__(self) -> None:
-        self._waiting: list[_Waiting] = []
-        self._step_ns: int | None = None
-        self._lost = False
-        self._newest: dict[Channel, int] = {}
-        self._samples: list[tuple[int, int, int, float, float]] = []
-
-    def __len__(self) -> int:
-        return len(self._samples)
-
-    def take(self, sentence: Sentence) -> None:
+    def take(
+        self, place: int, line: int, text: str, sentence: Sentence, receive_ns: int | None
+    ) -> None:
         """
-        Take the samples of one sentence.
+        Take one sentence.
+
+        Parameters
+        ----------
+        place
+            Of its text among those of the log.
+        line, text
+            Where it stands.
+        sentence, receive_ns
         """
-        self.sentences += 1
-        try:
-            stamp_ns = self._time(sentence)
-        except NoValue as reason:
-            self._reject('time', sentence, reason)
+        before = len(self._rejected[0])
+        talker, kind, moment, values, refused = sentence
+        self.addresses[talker, kind] += 1
+        received = _NONE
+        if receive_ns is not None:
+            received, self.received = receive_ns, True
+        if moment is not None:
+            self._take_time(place, sentence, received)
+        for channel, reason in refused:
+            self._reject(channel.input, f'{talker}{kind}: {reason}', place)
+        places, sources, receipts, first, second = self._samples
+        for channel, source, a, b in values:
+            places.append(place)
+            sources.append(self._sources.setdefault((channel, source), len(self._sources)))
+            receipts.append(received)
+            first.append(a)
+            second.append(b)
+        if len(self._rejected[0]) > before and len(self._texts) < _SHOWN * len(self._reasons):
+            self._texts[place] = line, text
+
+    def _take_time(self, place: int, sentence: Sentence, received: int) -> None:
+        moment = sentence.time
+        if isinstance(moment, NoValue):
+            self._without_time.append(place)
+            self._reject('time', f'{sentence.talker}{sentence.kind}: {moment.reason}', place)
             return
-        for channel, source, value in read_values(sentence, self.mounting):
-            if isinstance(value, NoValue):
-                self._reject(channel.input, sentence, value)
-            elif source == self.chosen[channel]:
-                self._wait(_Waiting(channel, value, sentence.line, sentence.text, stamp_ns))
+        assert moment is not None
+        self.timed = True
+        if self.first is None and moment.trusted and moment.day is not None:
+            self.first, self.first_received_ns = moment, None if received == _NONE else received
+        known, address = self._addresses, sentence.talker + sentence.kind
+        times, day = self._times, _NONE if moment.day is None else moment.day
+        times.place.append(place)
+        times.receive_ns.append(received)
+        times.of_day_ns.append(moment.of_day_ns)
+        times.day.append(day)
+        times.trusted.append(moment.trusted)
+        times.address.append(known.setdefault(address, len(known)))
 
-    def finish(self) -> None:
+    def _reject(self, name: str, reason: str, place: int) -> None:
+        places, reasons = self._rejected
+        places.append(place)
+        reasons.append(self._reasons.setdefault((name, reason), len(self._reasons)))
+
+    @property
+    def count(self) -> int:
+        """Number of sentences."""
+        return self.addresses.total()
+
+    def values(self) -> dict[Channel, Counter[SentenceSource]]:
         """
-        Take what still waits, as if the last step of the time came once more.
+        Return the number of values by source, of each channel.
         """
-        self._settle(self._step_ns)
+        found: dict[Channel, Counter[SentenceSource]] = {}
+        counts = np.bincount(self._samples.source, minlength=len(self._sources)).tolist()
+        for (channel, source), number in zip(self._sources, counts, strict=True):
+            found.setdefault(channel, Counter())[source] = number
+        return found
 
-    def pop(self) -> Block:
+    def chosen(self) -> dict[Channel, SentenceSource]:
         """
-        Return the samples taken since the last time.
+        Return the one source of each channel.
         """
-        samples, self._samples = self._samples, []
-        return Block.of_samples(samples)
+        return {channel: best(each) for channel, each in self.values().items()}
 
-    def _time(self, sentence: Sentence) -> int | None:
-        """Return the time of a sentence, None if only the next one states it; NoValue if none."""
-        fields = Fields(sentence.kind, sentence.fields) if sentence.kind in TIMED else None
-        if fields is None or not fields['time']:
-            return self.clock.since(sentence.receive_ns)
-        time_ns = self.clock.resolve(SentenceTime(fields), sentence.receive_ns)
-        now_ns = self.clock.now_ns
-        # a little earlier: sentences of one fix, or of two receivers, out of order
-        if now_ns is None or time_ns > now_ns or time_ns < now_ns - GAP_NS:
-            self._settle(None if now_ns is None else time_ns - now_ns)
-            self.clock.set(time_ns, sentence.receive_ns)
-            self._lost = False
-        return time_ns
+    def samples(self, clock: SentenceClock) -> Block:
+        """
+        Return the samples of the chosen sources, in the order of their sentences.
 
-    def _wait(self, sample: _Waiting) -> None:
-        if sample.stamp_ns is None and (self._lost or self.clock.now_ns is None):
-            self._no_time(sample, _GAP if self._lost else 'before the first time')
-            return
-        self._waiting.append(sample)
-        if len(self._waiting) > _WAITING_SAMPLES:
-            self._settle(None)
-            self._lost = True
-
-    def _settle(self, step_ns: int | None) -> None:
-        """Give times to what waits, now that the step to the next time is known."""
-        within = step_ns is not None and 0 < step_ns <= GAP_NS
-        self._step_ns = step_ns if within else None
-        share = Counter(each.channel for each in self._waiting if each.stamp_ns is None)
-        place: Counter[Channel] = Counter()
-        for sample in self._waiting:
-            stamp_ns = sample.stamp_ns
-            if stamp_ns is None:
-                assert self.clock.now_ns is not None
-                k = place[sample.channel]
-                place[sample.channel] += 1
-                if k > 0 and self._step_ns is None:
-                    self._no_time(sample, _GAP)
-                    continue
-                stamp_ns = self.clock.now_ns + k * (self._step_ns or 0) // share[sample.channel]
-            self._append(sample, stamp_ns)
-        self._waiting = []
-
-    def _append(self, sample: _Waiting, stamp_ns: int) -> None:
-        newest_ns = self._newest.get(sample.channel, -1)
-        self.backward += stamp_ns < newest_ns
-        self.repeated += stamp_ns == newest_ns
-        self._newest[sample.channel] = max(newest_ns, stamp_ns)
-        if self.start_ns is None:
-            self.start_ns = stamp_ns
+        Parameters
+        ----------
+        clock
+            At the start of the log. What it cannot tell the time of is rejected.
+        """
+        moments = self._resolve(clock)
+        place, source, received, a, b = (np.array(each) for each in self._samples)
+        chosen = self.chosen()
+        use = np.array([chosen[c] == each for c, each in self._sources], np.bool_)[source]
+        use &= ~np.isin(place, self._without_time)
+        place, source, received = place[use], source[use], received[use]
+        code = np.array([channel for channel, _ in self._sources], np.uint8)[source]
+        stamps, reason = moments.stamps(place, code, received)
+        for why in (_BEFORE, _GAP):
+            for where, number in zip(place[reason == why], code[reason == why], strict=True):
+                self._reject(Channel(number).input, why, int(where))
+        good = reason == ''
+        value = np.column_stack((a[use], b[use]))[good]
         # arrival never goes back, so that a replay sees the sentences in their order
-        self.newest_ns = max(self.newest_ns, stamp_ns)
-        self._samples.append(
-            (sample.channel, stamp_ns, self.newest_ns, sample.value.a, sample.value.b)
+        arrived = np.maximum.accumulate(stamps[good]) if good.any() else stamps[good]
+        return Block(code[good], stamps[good], arrived, value, np.full(value.shape, np.nan))
+
+    def _resolve(self, clock: SentenceClock) -> _Moments:
+        """Follow the clock through the sentences that state a time."""
+        stated, steps = [array('q') for _ in range(2)], [array('q') for _ in range(3)]
+        addresses = list(self._addresses)
+        for place, received, of_day_ns, day, trusted, address in zip(*self._times, strict=True):
+            moment = SentenceTime(of_day_ns, None if day == _NONE else day, bool(trusted))
+            receive_ns = None if received == _NONE else received
+            try:
+                time_ns = clock.resolve(moment, receive_ns)
+            except NoValue as reason:
+                self._without_time.append(place)
+                self._reject('time', f'{addresses[address]}: {reason.reason}', place)
+                continue
+            now_ns = clock.now_ns
+            # a little earlier: sentences of one fix, or of two receivers, out of order
+            if now_ns is None or time_ns > now_ns or time_ns < now_ns - GAP_NS:
+                clock.now_ns = time_ns
+                for column, value in zip(steps, (place, time_ns, received), strict=True):
+                    column.append(value)
+            for column, value in zip(stated, (place, time_ns), strict=True):
+                column.append(value)
+        return _Moments(*(np.array(each, np.int64) for each in (*stated, *steps)))
+
+    def rejected(self, texts: TextsAt) -> Refused:
+        """
+        Return what was rejected, by input or 'time', and reason.
+
+        Parameters
+        ----------
+        texts
+            Gives line and text of the sentences at some places.
+        """
+        places, reasons = (np.array(each) for each in self._rejected)
+        lost = np.isin(places, self._without_time)  # of these their time alone is said
+        shown: dict[tuple[str, str], list[int]] = {}
+        counts: dict[tuple[str, str], int] = {}
+        for key, number in self._reasons.items():
+            of_reason = places[(reasons == number) & ((key[0] == 'time') | ~lost)]
+            if len(of_reason):
+                counts[key] = len(of_reason)
+                shown[key] = np.sort(of_reason)[:_SHOWN].tolist()
+        wanted = {place for some in shown.values() for place in some}
+        found = {**self._texts, **texts(wanted - self._texts.keys())}
+        made: Refused = {}
+        for name in (*INPUTS, 'time'):
+            for (of, reason), first in shown.items():
+                if of == name:
+                    rejected = made.setdefault(name, {}).setdefault(reason, Rejected())
+                    for place in first:
+                        rejected.add(*found[place])
+                    rejected.count = counts[of, reason]
+        return made
+
+
+class _Moments(NamedTuple):
+    """
+    Times of sentences [ns].
+
+    Attributes
+    ----------
+    place, time_ns
+        Of those that state one.
+    set_place, set_ns, set_received_ns
+        Of these, those that moved the clock, and when they were received.
+    """
+
+    place: Int64
+    time_ns: Int64
+    set_place: Int64
+    set_ns: Int64
+    set_received_ns: Int64
+
+    def stamps(self, place: Int64, code: UInt8, received: Int64) -> tuple[Int64, NDArray[np.str_]]:
+        """
+        Return the times (n,) of samples, and why one has none.
+
+        Parameters
+        ----------
+        place, code, received : (n,)
+            Of their sentences, channels and times of receipt.
+        """
+        stamps = received.copy()  # before the first time
+        reason = np.where(received == _NONE, _BEFORE, '').astype('U32')
+        if len(self.set_place):
+            self._since(place, code, received, stamps, reason)
+        if len(self.place):
+            at = np.searchsorted(self.place, place).clip(max=len(self.place) - 1)
+            own = self.place[at] == place
+            stamps[own], reason[own] = self.time_ns[at[own]], ''
+        return stamps, reason
+
+    def _since(
+        self,
+        place: Int64,
+        code: UInt8,
+        received: Int64,
+        stamps: Int64,
+        reason: NDArray[np.str_],
+    ) -> None:
+        """Fill in what the last time before each sample gives."""
+        last = np.searchsorted(self.set_place, place, 'right') - 1
+        own = np.isin(place, self.place)
+        begun = last >= 0
+        noted = begun & (received != _NONE) & (self.set_received_ns[last] != _NONE)
+        stamps[noted] = (self.set_ns[last] + received - self.set_received_ns[last])[noted]
+        spread = np.flatnonzero(begun & ~noted & ~own)
+        last = last[spread]
+        step_ns = np.diff(self.set_ns)
+        step_ns = np.where((step_ns > 0) & (step_ns <= GAP_NS), step_ns, 0)
+        step_ns = np.append(step_ns, step_ns[-1:] if len(step_ns) else 0)  # as if it came again
+        _, group, share = np.unique(
+            last * len(Channel) + code[spread], return_inverse=True, return_counts=True
         )
-        self.written[sample.channel.input] += 1
-
-    def _no_time(self, sample: _Waiting, reason: str) -> None:
-        by_reason = self.rejected.setdefault(sample.channel.input, {})
-        by_reason.setdefault(reason, Rejected()).add(sample.line, sample.text)
-
-    def _reject(self, name: str, sentence: Sentence, value: NoValue) -> None:
-        by_reason = self.rejected.setdefault(name, {})
-        reason = f'{sentence.talker}{sentence.kind}: {value.reason}'
-        by_reason.setdefault(reason, Rejected()).add(sentence.line, sentence.text)
+        order = np.argsort(group, kind='stable')
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order)) - np.repeat(np.cumsum(share) - share, share)
+        stamps[spread] = self.set_ns[last] + rank * step_ns[last] // share[group]
+        reason[spread] = np.where((rank > 0) & (step_ns[last] == 0), _GAP, '')
+        reason[noted] = ''

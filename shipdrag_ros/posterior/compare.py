@@ -1,0 +1,777 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Hypotheses compared by their evidence: fitted under usual noise, weighed over all of it.
+
+Every hypothesis sees the same rows and the same settings of the noise, learnt with the likeliest
+of them at hand, so that no effect is taken for noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import log_ndtr
+
+from shipdrag_ros.compiled import compiled
+from shipdrag_ros.inference import decision
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, WeighedHypothesis
+from shipdrag_ros.inference.gaussian import products_of, substitute
+from shipdrag_ros.inference.learning import learn
+from shipdrag_ros.inference.learning import prior as prior_of
+from shipdrag_ros.inference.limits import Sensitivity, SizePosterior, named_from
+from shipdrag_ros.inference.noise import Noise, whiten
+from shipdrag_ros.inference.rows import LOG, Rows
+from shipdrag_ros.inference.sampling import Seen
+from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
+from shipdrag_ros.parameter import Shape
+from shipdrag_ros.posterior.effects import EffectWay, stated_way, ways_of
+from shipdrag_ros.posterior.hypotheses import (
+    IN_GROUND,
+    IN_LOG,
+    IN_SPEED,
+    IN_TIME,
+    Explanation,
+    PriorFamilies,
+    RunTable,
+    ShipRuns,
+    half,
+)
+from shipdrag_ros.posterior.laplace import of_family
+from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect
+
+_ITERATIONS = 8  # of Gauss and Newton
+_CLOSE = 0.1  # of -2 ln posterior
+_LONGEST = 1.5  # of a step in z
+_HOPELESS, _TRIED = 25.0, 3  # nats behind the best, from where none is fitted on, and not before
+_STARTS = 2  # of each way that are fitted
+_TAUGHT = 6  # likeliest effects with which the noise is learnt
+_PAIRED, _PAIRS = 4, 10
+_PAIR_NATS = 7.0  # behind the best, by the linear score, from where a pair is not fitted
+_LIKELY = 0.03  # probability of names that may leave something smooth
+_TYPICAL_SMOOTH = 0.05  # size of something smooth, with which the noise is learnt
+_RUN_DOWNS, _FEWEST = 8.0, 5  # after the stop no thrust is left; rows of a curve
+_AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
+_EXACT = 1e16  # precision of what does not act
+
+
+@compiled
+def _products(
+    along: Float64, rest: Float64, rows: Rows, white: Noise, steady: int, settings: Settings
+) -> tuple[Float64, Float64]:
+    """Return products of whitened lines, (s, l, l), and log determinants (s,)."""
+    s, lines = len(settings.weight), len(along)
+    found, log_det = np.empty((s, lines, lines)), np.empty(s)
+    for k in range(s):
+        table = along.copy()
+        log_det[k] = whiten(rows, table, noise_of(settings, k, rows, white, steady))
+        found[k] = products_of(table) + rest
+    return found, log_det
+
+
+@compiled
+def _solve(
+    products: Float64, mean: Float64, precision: Float64, first: int, count: int
+) -> tuple[Float64, Float64, Float64]:
+    """
+    Return log evidence (s, f) and step (s, f, p) of linear models.
+
+    With the variance (s, f, count) of some unknowns.
+    """
+    s, f, p = len(products), len(mean), len(products[0]) - 1
+    logs = np.full((s, f), -np.inf)
+    steps, variances = np.zeros((s, f, p)), np.zeros((s, f, count))
+    unit = np.zeros((p, count))
+    for a in range(count):
+        unit[first + a, a] = 1.0
+    for k in range(s):
+        for q in range(f):
+            solved, log, step, lower, scale = of_family(products[k], mean[q], precision[q])
+            if not solved or not np.isfinite(log):
+                continue
+            logs[k, q], steps[k, q] = log, step
+            if count == 0:
+                continue
+            covariance = substitute(lower, scale, unit)
+            for a in range(count):
+                variances[k, q, a] = covariance[first + a, a]
+    return logs, steps, variances
+
+
+@dataclass
+class Fitted:
+    """
+    A hypothesis on its way to its best, and then its evidence.
+
+    Attributes
+    ----------
+    hypothesis
+    at : (p,)
+    tables
+        One a run; linear about `at`.
+    cost
+        -2 ln of the posterior under usual noise.
+    log_evidence
+        Without the prior odds.
+    z, sd : (q,)
+        Mean and standard deviation of the unknowns of the effects, over noise and families.
+    """
+
+    hypothesis: Explanation
+    at: Float64
+    tables: list[RunTable] | None = None
+    cost: float = math.inf
+    log_evidence: float = -math.inf
+    z: Float64 | None = None
+    sd: Float64 | None = None
+
+    @property
+    def names(self) -> Names:
+        """As the decision takes them."""
+        return UNKNOWN if self.hypothesis.smooth else self.hypothesis.names
+
+    @property
+    def log_weight(self) -> float:
+        """Logarithm of evidence times prior odds."""
+        return self.log_evidence + self.hypothesis.log_odds
+
+
+class _RunNoise(NamedTuple):
+    """Noise of a run: settings, weights of their prior (logarithm), and the usual setting."""
+
+    settings: Settings
+    log_prior: Float64
+    typical: Settings
+    learnt: bool
+
+
+class RunResidual(NamedTuple):
+    """
+    What a hypothesis leaves of a run.
+
+    Attributes
+    ----------
+    along : (n,)
+        Of the rows of the motion.
+    rest : (q,)
+        Of what is measured besides.
+    whitened : (n + q,)
+        Under usual noise.
+    """
+
+    along: Float64
+    rest: Float64
+    whitened: Float64
+
+
+@dataclass(frozen=True)
+class ComparedHypotheses:
+    """
+    All hypotheses with their evidence.
+
+    Attributes
+    ----------
+    runs, effects
+    fitted
+        The best of each.
+    """
+
+    runs: ShipRuns
+    effects: tuple[Effect, ...]
+    fitted: tuple[Fitted, ...]
+
+    @cached_property
+    def probability(self) -> dict[Names, float]:
+        """Of each set of names, most probable first."""
+        return decision.probabilities(
+            WeighedHypothesis(each.names, each.log_evidence, each.hypothesis.log_odds)
+            for each in self.fitted
+        )
+
+    @cached_property
+    def best(self) -> dict[Names, Fitted]:
+        """The likeliest way of each set of names."""
+        found: dict[Names, Fitted] = {}
+        for each in self.fitted:
+            old = found.get(each.names)
+            if old is None or each.log_weight > old.log_weight:
+                found[each.names] = each
+        return found
+
+    def sizes(self, name: str) -> list[SizePosterior]:
+        """
+        Return the size of an effect under each hypothesis that holds it.
+        """
+        found = []
+        for names, fit in self.best.items():
+            place = 0
+            for way in fit.hypothesis.ways:
+                mine = way.effect.name == name and not way.stated and names != UNKNOWN
+                if mine and fit.z is not None and fit.sd is not None:
+                    weight, prior = self.probability[names], way.unknowns[0].prior
+                    z, sd = float(fit.z[place]), float(fit.sd[place])
+                    found.append(SizePosterior(weight, z, sd, prior))
+                place += len(way.unknowns)
+        # given that it is there: how improbable that is does not matter
+        total = sum(each.weight for each in found)
+        return found if total > 0.0 else [each._replace(weight=1.0) for each in found]
+
+
+class Comparing:
+    """
+    The comparison of hypotheses about some runs of a ship.
+
+    Parameters
+    ----------
+    runs
+    ship
+    effects
+        That may be missing.
+    log_facts
+        Logarithm of how probable it is that all facts are stated, under a hypothesis.
+    """
+
+    def __init__(
+        self,
+        runs: ShipRuns,
+        ship: Ship,
+        effects: Sequence[Effect],
+        log_facts: Callable[[Explanation], float] = lambda hypothesis: 0.0,
+    ) -> None:
+        self.runs, self.effects, self.log_facts = runs, tuple(effects), log_facts
+        self.stated = tuple(stated_way(each, ship) for each in ship.effects)
+        self.base = Explanation(self.stated)
+        self.noise: list[_RunNoise] = []
+        kinds = {int(k) for run in runs.runs for k in np.unique(run.model.rows.kind)}
+        both = LOG in kinds and len(kinds) > 1
+        self.smooth = (IN_SPEED, IN_TIME, IN_LOG, IN_GROUND) if both else (IN_SPEED, IN_TIME)
+        longest = max(float(run.model.rows.time_s[-1]) for run in runs.runs)
+        self.ways: dict[str, list[EffectWay]] = {
+            effect.name: list(ways_of(effect, ship, longest, len(runs.runs)))
+            for effect in self.effects
+        }
+
+    def compare(self) -> ComparedHypotheses:
+        """
+        Fit and weigh nothing, each effect, pairs where they may count, and something smooth.
+        """
+        self.noise = [self._usual(j) for j in range(len(self.runs.runs))]
+        start = np.zeros(self.runs.width(self.base))
+        start[: self.runs.size] = self.runs.start
+        nothing = Fitted(self.base, start)
+        self._climb([nothing])
+        self.nothing = nothing
+        ways = [way for each in self.ways.values() for way in each]
+        scores, amounts, responses = self._score(nothing, ways)
+        self._learn(nothing, ways, scores, responses)
+        singles = self._likeliest(nothing, ways, scores, amounts, responses)
+        smooth = [
+            Fitted(smooth, self._widened(nothing, smooth))
+            for where in self.smooth
+            for smooth in (replace(self.base, smooth=where),)
+        ]
+        nothing.cost = math.inf
+        every = [nothing, *smooth, *singles]
+        self._climb(every)
+        every = self._weigh(every)
+        pairs = self._pairs(every)
+        if pairs:
+            self._climb(pairs)
+            every += self._weigh(pairs)
+        every += self._weigh(self._beside(every))
+        return ComparedHypotheses(self.runs, self.effects, tuple(every))
+
+    @property
+    def as_stated(self) -> Fitted:
+        """The ship as her file states her, and how the runs began."""
+        fit = Fitted(replace(self.base, frozen=True), self.nothing.at.copy())
+        fit.at[: self.runs.coefficients] = 0.0
+        self._climb([fit])
+        return fit
+
+    def residuals(self, fit: Fitted) -> list[RunResidual]:
+        """
+        Return what a hypothesis leaves of each run, at its best.
+        """
+        assert fit.tables is not None
+        found = []
+        for j, table in enumerate(fit.tables):
+            model = self.runs.runs[j].model
+            noise = noise_of(self.noise[j].typical, 0, model.rows, table.white, model.steady)
+            line = table.along[:1].copy()
+            whiten(model.rows, line, noise)
+            whitened = np.concatenate([line[0], table.rest[0]])
+            found.append(RunResidual(table.along[0], table.residual, whitened))
+        return found
+
+    def named_from(self, inseparable: Sequence[frozenset[str]]) -> dict[str, float]:
+        """
+        Return the size from which each effect is named; without those that never are.
+
+        Parameters
+        ----------
+        inseparable
+            Effects that no record separates: never named.
+        """
+        ways = []
+        for each in self.ways.values():  # one that shows neither best nor least
+            ways.append(each[len(each) // 2])
+        hypotheses = [Explanation((*self.stated, way)) for way in ways]
+        responses = [self._traces(j, self.nothing, hypotheses) for j in range(len(self.runs.runs))]
+        _, information = self._given_way(self.nothing, responses)
+        amounts = np.array([_amount(way) for way in ways])
+        log_odds = np.array([math.log(way.effect.odds) for way in ways])
+        known = Sensitivity(information, amounts[:, 0], amounts[:, 1], log_odds)
+        never = {name for group in inseparable for name in group}
+        found = {}
+        for way, amount in zip(ways, named_from(known).tolist(), strict=True):
+            if math.isfinite(amount) and way.effect.name not in never:
+                tried = abs(way.unknowns[0].prior.at(way.tried()[0]))
+                found[way.effect.name] = tried * amount ** (1.0 / way.effect.size_power)
+        return found
+
+    def percent_of_r(self, name: str, bound: float) -> float:
+        """
+        Return by how much an effect of some size changes the deceleration that is shown.
+
+        Parameters
+        ----------
+        name
+            Of the effect.
+        bound
+            Its size.
+
+        Returns
+        -------
+        float
+            Rms over the coastdown after the run-down, percent.
+        """
+        way = self.ways[name][0]
+        prior = way.unknowns[0].prior
+        z = list(way.start)
+        run = self.runs.runs[0]
+        still, speed = self.runs.still(0, self.nothing.at)
+        sign = -1.0 if prior.first < 0.0 else 1.0
+        z[0] = prior.inverse(sign * bound)
+        shown = run.simulate([still, still + way.action(run.frame, z)], np.full(2, speed)).along
+        rows, model = run.model.rows, run.model
+        by_log = rows.kind == LOG if (rows.kind == LOG).any() else rows.kind == rows.kind[-1]
+        late = by_log & (rows.time_s > _RUN_DOWNS * max(model.forces.tau_s, 1.0))
+        time, lines = rows.time_s[late], shown[:, late]
+        if len(time) < _FEWEST or not np.isfinite(lines).all():
+            return math.nan
+        loss = np.gradient(lines, time, axis=1)
+        apart = np.interp(-lines[0], -lines[1], loss[1]) / np.minimum(loss[0], -1e-9) - 1.0
+        inside = (lines[0] >= lines[1].min()) & (lines[0] <= lines[1].max())
+        return 100.0 * float(np.sqrt(np.mean(apart[inside] ** 2))) if inside.any() else math.nan
+
+    def _usual(self, j: int) -> _RunNoise:
+        """Return usual noise, before anything is learnt."""
+        run = self.runs.runs[j]
+        tables = self.runs.linearise([Explanation()], [self.runs.start])[0]
+        assert tables is not None
+        table = tables[j]
+        none = np.zeros((1, len(table.along) - 1))
+        seen = Seen(run.model.rows, table.along, none, none, table.white, run.model.steady)
+        return _noise(prior_of(seen, run.model.speed_m_s), np.zeros(0))
+
+    def _climb(self, fits: Sequence[Fitted]) -> None:
+        """Fit hypotheses, all in step, under the usual noise of each run."""
+        for fit in fits:
+            fit.tables, fit.cost = None, math.inf
+        trials = [fit.at for fit in fits]
+        steps = [np.zeros(0)] * len(fits)
+        active = list(range(len(fits)))
+        for number in range(_ITERATIONS):
+            if not active:
+                break
+            tables = self.runs.linearise(
+                [fits[i].hypothesis for i in active], [trials[i] for i in active]
+            )
+            going = []
+            for i, table in zip(active, tables, strict=True):
+                fit = fits[i]
+                if table is None:
+                    if fit.tables is None:
+                        continue
+                    cost, step = math.inf, steps[i]
+                else:
+                    cost, step = self._step(fit.hypothesis, table, trials[i])
+                if cost < fit.cost:
+                    gained = fit.cost - cost
+                    fit.tables, fit.cost, fit.at, steps[i] = table, cost, trials[i], step
+                    if gained < _CLOSE:
+                        continue
+                else:
+                    steps[i] = 0.3 * steps[i]
+                    if np.max(np.abs(steps[i]), initial=0.0) == 0.0:
+                        continue
+                trials[i] = fit.at + steps[i]
+                going.append(i)
+            least = min(fit.cost - 2.0 * fit.hypothesis.log_odds for fit in fits)
+            active = [
+                i
+                for i in going
+                if number < _TRIED
+                or fits[i].cost - 2.0 * fits[i].hypothesis.log_odds < least + 2.0 * _HOPELESS
+            ]
+
+    def _step(
+        self, hypothesis: Explanation, tables: list[RunTable], at: Float64
+    ) -> tuple[float, Float64]:
+        """Return -2 ln of the posterior here, and the step to the mean of the linear model."""
+        total = np.zeros((len(at) + 1, len(at) + 1))
+        for j, table in enumerate(tables):
+            products, _ = self._of_run(j, table, self.noise[j].typical)
+            _put(total, products[0], table.place)
+        mean, precision, log_chance = self.runs.priors(hypothesis, at)
+        density = (
+            log_chance
+            + 0.5 * np.log(precision).sum(axis=1)
+            - 0.5 * (precision * mean**2).sum(axis=1)
+        )
+        cost = float(total[0, 0] - 2.0 * np.logaddexp.reduce(density))
+        logs, steps, _ = _solve(total[None], mean, precision, 0, 0)
+        if not np.isfinite(logs).any():
+            return math.inf, np.zeros(len(at))
+        weight = np.exp(logs[0] + log_chance - (logs[0] + log_chance).max())
+        step = (weight / weight.sum()) @ steps[0]
+        first, q = self.runs.size, len(hypothesis.unknowns)
+        own = step[first : first + q]
+        longest = float(np.max(np.abs(own), initial=0.0))
+        step *= min(1.0, _LONGEST / max(longest, 1e-12))
+        for i in half(hypothesis, first):
+            step[i] = max(step[i], -at[i])
+        return cost, step
+
+    def _of_run(self, j: int, table: RunTable, settings: Settings) -> tuple[Float64, Float64]:
+        model = self.runs.runs[j].model
+        rest = products_of(np.ascontiguousarray(table.rest))
+        return _products(table.along, rest, model.rows, table.white, model.steady, settings)
+
+    def _score(
+        self, nothing: Fitted, ways: Sequence[EffectWay]
+    ) -> tuple[Float64, Float64, list[Float64]]:
+        """
+        Return the log evidence that each start will about reach, in which amount.
+
+        And its trace in each run.
+        """
+        assert nothing.tables is not None
+        hypotheses = [Explanation((*self.stated, way)) for way in ways]
+        responses = [self._traces(j, nothing, hypotheses) for j in range(len(self.runs.runs))]
+        return *self._gains(nothing, hypotheses, responses), responses
+
+    def _traces(self, j: int, base: Fitted, hypotheses: Sequence[Explanation]) -> Float64:
+        """Return what the last effect of each hypothesis adds to a run's rows, (h, n + q)."""
+        run, size = self.runs.runs[j], self.runs.size
+        z = base.at[size : size + len(base.hypothesis.unknowns)]
+        still, steady_m_s = self.runs.still(j, base.at)
+        whole = sum(base.hypothesis.actions(run.frame, j, z), still)
+        actions = [whole]
+        for each in hypotheses:
+            way = each.ways[-1]
+            more = way.action(run.frame, way.tried()) if way.acts_in(j) else Action()
+            actions.append(whole + more)
+        shown = run.simulate(actions, np.full(len(actions), steady_m_s))
+        change = np.hstack([shown.along, shown.rest])
+        change = change[1:] - change[0]
+        change[~np.isfinite(change).all(axis=1)] = 0.0
+        n = len(run.model.rows.time_s)
+        change[:, n:] = change[:, n:] @ run.whitener.T
+        result: Float64 = change
+        return result
+
+    def _gains(
+        self, base: Fitted, hypotheses: Sequence[Explanation], responses: Sequence[Float64]
+    ) -> tuple[Float64, Float64]:
+        """
+        Return log evidence over that of the base, by the linear response to one effect.
+
+        And how much of what is tried there is.
+        """
+        score, information = self._given_way(base, responses)
+        own = np.maximum(np.diag(information), 0.0)
+        amounts = np.array([_amount(each.ways[-1]) for each in hypotheses])
+        prior, held = amounts[:, 0], amounts[:, 1]
+        slope = score + held * prior
+        found: Float64 = 0.5 * (slope**2 / (own + held) - held * prior**2)
+        found -= 0.5 * np.log((own + held) / held)
+        found += np.array([each.ways[-1].log_odds for each in hypotheses])
+        return found, slope / (own + held)
+
+    def _given_way(self, base: Fitted, responses: Sequence[Float64]) -> tuple[Float64, Float64]:
+        """Return scores (h,) and information (h, h) of traces, less what the base takes up."""
+        assert base.tables is not None
+        p, h = len(base.at), len(responses[0])
+        total = np.zeros((1 + p + h, 1 + p + h))
+        for j, table in enumerate(base.tables):
+            n = table.along.shape[1]
+            joined = replace_table(table, responses[j][:, :n], responses[j][:, n:], p)
+            products, _ = self._of_run(j, joined, self.noise[j].typical)
+            _put(total, products[0], joined.place)
+        mean, precision, _ = self.runs.priors(base.hypothesis, base.at)
+        widest = int(np.argmin(precision[:, : self.runs.coefficients].sum(axis=1)))
+        matrix = total[1 : 1 + p, 1 : 1 + p] + np.diag(precision[widest])
+        right = total[1 : 1 + p, 0] + precision[widest] * mean[widest]
+        scale = 1.0 / np.sqrt(np.diag(matrix))
+        scaled = matrix * np.outer(scale, scale)
+        both = np.column_stack([right, total[1 : 1 + p, 1 + p :]]) * scale[:, None]
+        solved = np.linalg.solve(scaled, both) * scale[:, None]
+        cross = total[1 + p :, 1 : 1 + p]
+        score: Float64 = total[1 + p :, 0] - cross @ solved[:, 0]
+        return score, total[1 + p :, 1 + p :] - cross @ solved[:, 1:]
+
+    def _learn(
+        self,
+        nothing: Fitted,
+        ways: Sequence[EffectWay],
+        scores: Float64,
+        responses: Sequence[Float64],
+    ) -> None:
+        """Learn the noise of each run with the likeliest effects at hand."""
+        assert nothing.tables is not None
+        chosen: dict[str, int] = {}
+        for i in np.argsort(-scores).tolist():
+            chosen.setdefault(ways[i].effect.name, i)
+        taught = list(chosen.values())[:_TAUGHT]
+        noise = []
+        for j, table in enumerate(nothing.tables):
+            run = self.runs.runs[j]
+            n, p = table.along.shape[1], len(table.along) - 1
+            smooth = [self.runs.smooth(j, where, nothing.at) for where in self.smooth[1:]]
+            lines = np.vstack([table.along, responses[j][taught][:, :n], *smooth])
+            q = len(lines) - 1 - p
+            means, precisions = [], []
+            for where in ('', IN_SPEED):
+                prior = self.runs.priors(replace(self.base, smooth=where), nothing.at)
+                for mean, precision in zip(prior.mean, prior.precision):
+                    means.append(np.concatenate([mean[table.place], np.zeros(q)]))
+                    precisions.append(np.concatenate([precision[table.place], np.full(q, _EXACT)]))
+            for i, which in enumerate(taught):
+                amount, held = _amount(ways[which])
+                mean, precision = means[0].copy(), precisions[0].copy()
+                mean[p + i], precision[p + i] = amount, held
+                means.append(mean)
+                precisions.append(precision)
+            for i in range(len(smooth)):
+                mean, precision = means[0].copy(), precisions[0].copy()
+                first = p + len(taught) + i * len(smooth[0])
+                precision[first : first + len(smooth[0])] = _TYPICAL_SMOOTH**-2.0
+                means.append(mean)
+                precisions.append(precision)
+            seen = Seen(
+                run.model.rows,
+                lines,
+                np.array(means),
+                np.array(precisions),
+                table.white,
+                run.model.steady,
+            )
+            learnt = learn(seen, run.model.speed_m_s)
+            rest = np.zeros((len(lines), len(lines)))
+            products, log_det = _products(
+                lines, rest, run.model.rows, table.white, run.model.steady, learnt.settings
+            )
+            logs, _, _ = _solve(products, seen.mean, seen.precision, 0, 0)
+            alike = np.logaddexp.reduce(logs, axis=1) - 0.5 * log_det - math.log(len(means))
+            noise.append(_noise(learnt, alike))
+        self.noise = noise
+
+    def _likeliest(
+        self,
+        nothing: Fitted,
+        ways: Sequence[EffectWay],
+        scores: Float64,
+        amounts: Float64,
+        responses: Sequence[Float64],
+    ) -> list[Fitted]:
+        """Return the most promising starts of each way."""
+        kept: dict[tuple[object, ...], int] = {}
+        found = []
+        shown = sum((np.abs(each).max(axis=1) for each in responses), np.zeros(len(ways)))
+        for i in np.lexsort((-scores, shown == 0.0)).tolist():  # no fit leaves where nothing shows
+            way = ways[i]
+            kept[way.mode] = kept.get(way.mode, 0) + 1
+            if kept[way.mode] > _STARTS:
+                continue
+            hypothesis = Explanation((*self.stated, way))
+            at = self._widened(nothing, hypothesis)
+            # at the best of nothing, nuisances stand for the effect as far as they can
+            at[: self.runs.size] = self.runs.as_stated(nothing.at)
+            first = self.runs.size + len(self.base.unknowns)
+            at[first : first + len(way.start)] = way.start
+            at[first] = way.resized(float(amounts[i]))
+            found.append(Fitted(hypothesis, at))
+        return found
+
+    def _widened(self, base: Fitted, hypothesis: Explanation) -> Float64:
+        """Return where a fit of a larger hypothesis begins."""
+        at = np.zeros(self.runs.width(hypothesis))
+        size = self.runs.size
+        at[:size] = base.at[:size]
+        q = len(base.hypothesis.unknowns)
+        own = base.at[size : size + q]
+        at[size : size + q] = own
+        return at
+
+    def _weigh(self, fits: Sequence[Fitted]) -> list[Fitted]:
+        """Give the best fit of each hypothesis its evidence, averaged over the noise."""
+        best: dict[tuple[object, ...], Fitted] = {}
+        for fit in fits:
+            if fit.tables is None:
+                continue
+            key = (fit.hypothesis.smooth, *(way.mode for way in fit.hypothesis.ways))
+            if key not in best or fit.cost < best[key].cost:
+                best[key] = fit
+        for fit in best.values():
+            self._weigh_one(fit)
+        return list(best.values())
+
+    def _weigh_one(self, fit: Fitted) -> None:
+        assert fit.tables is not None
+        p = len(fit.at)
+        families = self.runs.priors(fit.hypothesis, fit.at)
+        usual = np.zeros((1 + p, 1 + p))
+        typical = []
+        for j, table in enumerate(fit.tables):
+            products, log_det = self._of_run(j, table, self.noise[j].typical)
+            typical.append((products[0], float(log_det[0])))
+            _put(usual, products[0], table.place)
+        several = len(fit.tables) > 1
+        at_usual = self._evidence(fit, usual[None], families)[0][0] if several else 0.0
+        log_evidence, weights, moments = 0.0, [], []
+        for j, table in enumerate(fit.tables):
+            noise = self.noise[j]
+            products, log_det = self._of_run(j, table, noise.settings)
+            whole = np.repeat(usual[None], len(products), axis=0)
+            for k in range(len(products)):
+                _put(whole[k], products[k] - typical[j][0], table.place)
+            logs, z, variance = self._evidence(fit, whole, families)
+            logs = logs + noise.log_prior - 0.5 * log_det
+            total = float(np.logaddexp.reduce(logs))
+            log_evidence += total - (at_usual if several and j else 0.0)
+            weights.append(np.exp(logs - total))
+            moments.append((z, variance))
+        log_evidence += self.log_facts(fit.hypothesis)
+        fit.log_evidence = log_evidence if math.isfinite(log_evidence) else -math.inf
+        first = self.runs.size
+        q = len(fit.hypothesis.unknowns)
+        weight = np.concatenate(weights) / len(weights)
+        z = np.concatenate([each for each, _ in moments])
+        variance = np.concatenate([each for _, each in moments])
+        mean = weight @ z
+        fit.z = fit.at[first : first + q] + mean
+        fit.sd = np.sqrt(np.maximum(weight @ (variance + z**2) - mean**2, 0.0))
+
+    def _evidence(
+        self, fit: Fitted, products: Float64, families: PriorFamilies
+    ) -> tuple[Float64, Float64, Float64]:
+        """Return log evidence (s,), and mean and variance of the effects' unknowns (s, q)."""
+        first, q = self.runs.size, len(fit.hypothesis.unknowns)
+        logs, steps, variances = _solve(products, families.mean, families.precision, first, q)
+        logs = logs + families.log_chance
+        own = steps[..., first : first + q]
+        for i in half(fit.hypothesis, 0):
+            sd = np.sqrt(np.maximum(variances[..., i], 1e-300))
+            logs = logs + math.log(2.0) + log_ndtr((fit.at[first + i] + own[..., i]) / sd)
+        total = np.logaddexp.reduce(logs, axis=1)
+        weight = np.exp(logs - np.where(np.isfinite(total), total, 0.0)[:, None])
+        mean = np.einsum('sf,sfq->sq', weight, own)
+        square = np.einsum('sf,sfq->sq', weight, variances + own**2)
+        return total, mean, square - mean**2
+
+    def _pairs(self, fits: Sequence[Fitted]) -> list[Fitted]:
+        """Return pairs of the likeliest names with all others, that the linear score allows."""
+        found = ComparedHypotheses(self.runs, self.effects, tuple(fits))
+        top = max(fit.log_weight for fit in fits)
+        names = [each for each in found.probability if each not in (NONE, UNKNOWN)][:_PAIRED]
+        # as each was found alone, and as it is looked for at first
+        first = self.runs.size + len(self.base.unknowns)
+        starts = [
+            replace(way, start=tuple(fit.at[first : first + len(way.start)].tolist()))
+            for fit in fits
+            if len(fit.hypothesis.names) == 1 and not fit.hypothesis.smooth
+            for way in fit.hypothesis.ways[-1:]
+        ]
+        starts += [each[0] for each in self.ways.values()]
+        tried: list[tuple[float, Fitted]] = []
+        for name in names:
+            base = found.best[name]
+            if base.tables is None or not math.isfinite(base.log_evidence):
+                continue
+            mine = base.hypothesis.ways[-1].effect
+            ways = [way for way in starts if way.effect.goes_with(mine)]
+            hypotheses = [Explanation((*base.hypothesis.ways, way)) for way in ways]
+            responses = [self._traces(j, base, hypotheses) for j in range(len(self.runs.runs))]
+            gains, amounts = self._gains(base, hypotheses, responses)
+            for gain, amount, hypothesis in zip(gains + base.log_weight, amounts, hypotheses):
+                if gain < top - _PAIR_NATS:
+                    continue
+                way = hypothesis.ways[-1]
+                at = self._widened(base, hypothesis)
+                to = self.runs.size + len(base.hypothesis.unknowns)
+                at[to : to + len(way.start)] = way.start
+                at[to] = way.resized(float(amount))
+                tried.append((float(gain), Fitted(hypothesis, at)))
+        kept: dict[Names, Fitted] = {}
+        for _, fit in sorted(tried, key=lambda each: -each[0]):
+            kept.setdefault(fit.hypothesis.names, fit)
+        return list(kept.values())[:_PAIRS]
+
+    def _beside(self, fits: Sequence[Fitted]) -> list[Fitted]:
+        """Return likely names with something smooth besides, linear where the names are best."""
+        found = ComparedHypotheses(self.runs, self.effects, tuple(fits))
+        tried = []
+        for names, probability in found.probability.items():
+            if names in (NONE, UNKNOWN) or probability < _LIKELY:
+                continue
+            base = found.best[names]
+            for where in self.smooth:
+                hypothesis = Explanation(base.hypothesis.ways, where)
+                at = np.zeros(self.runs.width(hypothesis))
+                at[: len(base.at)] = base.at
+                tried.append(Fitted(hypothesis, at))
+        if tried:
+            tables = self.runs.linearise([t.hypothesis for t in tried], [t.at for t in tried])
+            for fit, table in zip(tried, tables, strict=True):
+                fit.tables, fit.cost = table, 0.0
+        return tried
+
+
+def replace_table(table: RunTable, along: Float64, rest: Float64, p: int) -> RunTable:
+    """Return the rows of a run with lines more, whose places are behind all."""
+    return table._replace(
+        along=np.vstack([table.along, along]),
+        rest=np.vstack([table.rest, rest]),
+        place=np.concatenate([table.place, p + np.arange(len(along))]),
+    )
+
+
+def _noise(learnt: NoisePosterior, alike: Float64) -> _RunNoise:
+    """Return settings with the logarithms of their weights before any evidence."""
+    weight = np.log(np.maximum(learnt.settings.weight, 1e-300))
+    log_prior = weight - alike if len(alike) else weight
+    return _RunNoise(learnt.settings, log_prior, learnt.typical, learnt.learnt)
+
+
+def _put(total: Float64, products: Float64, place: Int64) -> None:
+    """Add the products of a run to those of all."""
+    at = np.concatenate([[0], 1 + place])
+    total[np.ix_(at, at)] += products
+
+
+def _amount(way: EffectWay) -> tuple[float, float]:
+    """Return mean and precision of the size, in parts of that which is tried."""
+    shape = way.unknowns[0].prior.shape
+    tried = way.tried()[0]
+    if shape is Shape.HALF_NORMAL or way.start[0] == 0.0:
+        return 0.0, tried**2
+    return 1.0, 1.0 / _AMOUNT_SD**2

@@ -1,0 +1,557 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+Hypotheses about runs of one ship: what may be missing, and all rows linear in its unknowns.
+
+The motion and the instruments are those of `motion.predict`. What an effect adds to rows is the
+difference of two simulations at its parameters; the derivatives by all else are those of the
+motion under its force.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from shipdrag_ros.inference.noise import Noise
+from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.parameter import Parameter, Shape
+from shipdrag_ros.posterior import motion, priors
+from shipdrag_ros.posterior.effects import EffectWay, retardation_of
+from shipdrag_ros.posterior.motion import EXTRAS
+from shipdrag_ros.posterior.problem import RunModel
+from shipdrag_ros.samples import Float64, Int64
+from shipdrag_ros.simulation.action import Action
+from shipdrag_ros.simulation.effect import Effect, Frame
+
+IN_SPEED, IN_TIME, IN_LOG, IN_GROUND = 'u', 't', 'log', 'ground'
+"""Where something smooth without a name may be."""
+_FORMS, _SMOOTH = 4, 6  # splines over a run: of the error of a formula, of something smooth
+_FROZEN = 1e16  # precision of what is as it is stated
+_STEP_Z = 0.02  # of differences
+_OWN = (motion.SPEED, motion.TAU, motion.STOP, motion.PLACE, motion.CURRENT)  # of a run
+_PORT, _HEADING = EXTRAS, EXTRAS + 1  # behind the extras: place to port, and first heading
+_FREE = EXTRAS + 2  # shaft speed of a propeller that the water turns
+_SCATTER = EXTRAS + 3  # of the resistance from run to run
+_LOCAL = EXTRAS + 4
+_NOTHING = Action()
+
+
+class SimulatedRows(NamedTuple):
+    """
+    What columns of a simulation show of a run.
+
+    Attributes
+    ----------
+    along : (m, n)
+        The rows of the motion.
+    rest : (m, q)
+        Places to port, then wind, depth, shaft and heading.
+    distance : (m, a)
+        Ahead, at the times of the places to port.
+    """
+
+    along: Float64
+    rest: Float64
+    distance: Float64
+
+
+@dataclass(frozen=True)
+class RunSight:
+    """
+    One run as hypotheses see it.
+
+    Attributes
+    ----------
+    model
+        Rows of the motion, their noise and the prior of the stop.
+    frame
+    rest, whitener : (q,), (q, q)
+        What is measured besides, places to port first.
+    across
+        How many places to port.
+    heading_sd_rad
+    stated_run_down_s
+        Of the thrust, as the ship file states it; 0 without.
+    scatter
+        Of the resistance from run to run, relative.
+    stop_s
+        Where the stop was taken for at first.
+    simulate
+        From actions and steady speeds (m,).
+    """
+
+    model: RunModel
+    frame: Frame
+    rest: Float64
+    whitener: Float64
+    across: int
+    heading_sd_rad: float
+    stated_run_down_s: float
+    scatter: float
+    stop_s: float
+    simulate: Callable[[Sequence[Action], Float64], SimulatedRows]
+
+    @cached_property
+    def over_run(self) -> Float64:
+        """Part of the coastdown at each row, 0 .. 1."""
+        time_s = self.model.rows.time_s
+        result: Float64 = np.clip(time_s / time_s[-1], 0.0, 1.0)
+        return result
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """
+    What may be missing, in one way.
+
+    Attributes
+    ----------
+    ways
+        Of the effects, by name.
+    smooth
+        Where something smooth without a name is besides; '' without.
+    frozen
+        Whether the hull is as stated to the digit: no hypothesis, but what a gap is seen by.
+    """
+
+    ways: tuple[EffectWay, ...] = ()
+    smooth: str = ''
+    frozen: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the effects, sorted; without those that the ship file states."""
+        return tuple(sorted(way.effect.name for way in self.ways if not way.stated))
+
+    def effects_in(self, run: int | None) -> list[Effect]:
+        """Return the effects that are missing in a run; None: in any."""
+        return [
+            way.effect for way in self.ways if not way.stated and (run is None or way.acts_in(run))
+        ]
+
+    @property
+    def log_odds(self) -> float:
+        """Prior log odds over nothing."""
+        unnamed = math.log(priors.UNNAMED_ODDS) if self.smooth else 0.0
+        return sum(way.log_odds for way in self.ways) + unnamed
+
+    @cached_property
+    def unknowns(self) -> tuple[Parameter, ...]:
+        """Of the effects, and of what they leave open."""
+        return tuple(q for way in self.ways for q in way.unknowns)
+
+    def actions(self, frame: Frame, run: int, z: Float64) -> list[Action]:
+        """Return what each effect does in a run."""
+        found, place = [], 0
+        for way in self.ways:
+            own = z[place : place + len(way.unknowns)].tolist()
+            place += len(way.unknowns)
+            found.append(way.action(frame, own) if way.acts_in(run) else _NOTHING)
+        return found
+
+    @property
+    def forms(self) -> list[int]:
+        """Places among the effects of those whose formula may be off."""
+        return [
+            i for i, way in enumerate(self.ways) if way.effect.formula_sd > 0.0 and not way.stated
+        ]
+
+
+@dataclass
+class _Asked:
+    """Columns of one simulation; each is there once."""
+
+    numbers: dict[tuple[Action, float], int] = field(default_factory=dict)
+
+    def add(self, action: Action, speed_m_s: float) -> int:
+        return self.numbers.setdefault((action, speed_m_s), len(self.numbers))
+
+    def simulate(self, run: RunSight) -> SimulatedRows:
+        actions = [action for action, _ in self.numbers]
+        return run.simulate(actions, np.array([speed for _, speed in self.numbers]))
+
+
+class PriorFamilies(NamedTuple):
+    """
+    Families of one hypothesis, (f, p) and (f,).
+    """
+
+    mean: Float64
+    precision: Float64
+    log_chance: Float64
+
+
+class RunTable(NamedTuple):
+    """
+    Rows of one run, linear about some unknowns.
+
+    Attributes
+    ----------
+    along : (1 + l, n)
+        RunResidual, then derivatives of the prediction; not whitened.
+    rest : (1 + l, q)
+        The same of what is measured besides, whitened.
+    place : (l,)
+        Of each line among all unknowns.
+    white
+        Noise of the rows, and how the hull damps there.
+    residual : (q,)
+        Of `rest`, not whitened.
+    """
+
+    along: Float64
+    rest: Float64
+    place: Int64
+    white: Noise
+    residual: Float64
+
+
+@dataclass(frozen=True)
+class ShipRuns:
+    """
+    Runs of one ship, with the unknowns that they share.
+
+    Attributes
+    ----------
+    runs
+        With one law.
+    """
+
+    runs: tuple[RunSight, ...]
+
+    @property
+    def coefficients(self) -> int:
+        """How many coefficients of forces there are."""
+        return self.runs[0].model.coefficients
+
+    @cached_property
+    def places(self) -> tuple[Int64, ...]:
+        """Of each run's own unknowns among those of all."""
+        k, own = self.coefficients, [*_OWN, _PORT, _HEADING, _SCATTER]
+        shared = [i for i in range(_LOCAL) if i not in own]
+        found = []
+        for j in range(len(self.runs)):
+            place = np.empty(k + _LOCAL, np.int64)
+            place[:k] = np.arange(k)
+            place[[k + i for i in shared]] = k + np.arange(len(shared))
+            first = k + len(shared) + j * len(own)
+            place[[k + i for i in own]] = first + np.arange(len(own))
+            found.append(place)
+        return tuple(found)
+
+    @cached_property
+    def size(self) -> int:
+        """Number of unknowns that every hypothesis has."""
+        return 1 + max(int(place.max()) for place in self.places)
+
+    @cached_property
+    def start(self) -> Float64:
+        """Where a search begins: the baseline as it is stated."""
+        found = np.zeros(self.size)
+        for run, place in zip(self.runs, self.places):
+            found[place[:-4]] = run.model.start
+            found[place[self.coefficients + _FREE]] = priors.FREE_SHAFT.mean
+        found[: self.coefficients] = 0.0
+        return found
+
+    def stop_s(self, at: Float64) -> list[float]:
+        """
+        Return the stop of each run at some unknowns.
+        """
+        return [float(at[place[self.coefficients + motion.STOP]]) for place in self.places]
+
+    def as_stated(self, at: Float64) -> Float64:
+        """
+        Return unknowns with all that is not a matter of where a run began as it is stated.
+        """
+        found, _ = self._base(priors.NOTHING, 0)
+        k = self.coefficients
+        for place in self.places:
+            kept = place[[k + i for i in (motion.SPEED, motion.PLACE, _PORT, _HEADING)]]
+            found[kept] = at[kept]
+        return found
+
+    def width(self, hypothesis: Explanation) -> int:
+        """Return the number of unknowns of a hypothesis."""
+        found = self.size + len(hypothesis.unknowns) + _FORMS * len(hypothesis.forms)
+        if hypothesis.smooth not in ('', IN_SPEED):
+            found += _SMOOTH * len(self.runs)
+        return found
+
+    def priors(self, hypothesis: Explanation, now: Float64) -> PriorFamilies:
+        """
+        Return the families of a hypothesis; means count from some unknowns (p,).
+        """
+        width, size = self.width(hypothesis), self.size
+        q = len(hypothesis.unknowns)
+        name = priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING
+        hulls = [each for each in self.runs[0].model.families if each.name == name]
+        total = math.fsum(each.chance for each in hulls)
+        sizes = priors.SMOOTH_SIZES if width > size + q + _FORMS * len(hypothesis.forms) else (1,)
+        components = []
+        place = size
+        for way in hypothesis.ways:
+            if way.components:
+                components.append([place + i for i in way.components])
+            place += len(way.unknowns)
+        means, precisions, chances = [], [], []
+        for number, hull in enumerate(hulls):
+            base_mean, base_precision = self._base(name, number)
+            for amount in sizes:
+                for which in range(2 ** len(components)):
+                    mean, precision = np.zeros(width), np.ones(width)
+                    mean[:size], precision[:size] = base_mean, base_precision
+                    k = self.coefficients
+                    mean[:k], precision[:k] = hull.mean[:k], hull.precision[:k]
+                    if hypothesis.frozen:
+                        precision[:k] = _FROZEN
+                    precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
+                    for i, each in enumerate(components):
+                        if which >> i & 1:
+                            precision[each] = priors.SMALL_COMPONENTS**-2.0
+                    means.append(mean)
+                    precisions.append(precision)
+                    chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
+        return PriorFamilies(np.array(means) - now, np.array(precisions), np.log(chances))
+
+    def _base(self, name: str, number: int) -> tuple[Float64, Float64]:
+        """Return mean and precision of the unknowns that are no coefficients, in a family."""
+        mean, precision = np.zeros(self.size), np.ones(self.size)
+        k = self.coefficients
+        for run, place in zip(self.runs, self.places):
+            alike = [each for each in run.model.families if each.name == name]
+            family = alike[number % len(alike)]  # a run without a log has fewer
+            mean[place[k:-4]], precision[place[k:-4]] = family.mean[k:], family.precision[k:]
+            mean[place[k + _FREE]] = priors.FREE_SHAFT.mean
+            precision[place[k + _FREE]] = priors.FREE_SHAFT.sd**-2.0
+            mean[place[k + motion.STOP]] = run.stop_s
+            precision[place[k + _PORT]] = 1e-6  # of where she was, nothing is known
+            precision[place[k + _HEADING]] = max(run.heading_sd_rad, 1e-8) ** -2.0
+            precision[place[k + _SCATTER]] = max(run.scatter, 1e-8) ** -2.0
+            at = place[k + motion.CURRENT]
+            if precision[at] < 1e10:
+                precision[at] = priors.CALM_CURRENT.sd**-2.0
+        return mean, precision
+
+    def linearise(
+        self, hypotheses: Sequence[Explanation], at: Sequence[Float64]
+    ) -> list[list[RunTable] | None]:
+        """
+        Return the rows of each run under each hypothesis, linear about its unknowns.
+
+        None where a hypothesis cannot be simulated.
+        """
+        found: list[list[RunTable] | None] = [[] for _ in hypotheses]
+        for j in range(len(self.runs)):
+            for i, table in enumerate(self._run(j, hypotheses, at)):
+                mine = found[i]
+                if mine is not None and table is not None:
+                    mine.append(table)
+                else:
+                    found[i] = None
+        return found
+
+    def _run(
+        self, j: int, hypotheses: Sequence[Explanation], at: Sequence[Float64]
+    ) -> list[RunTable | None]:
+        run, batch = self.runs[j], _Asked()
+        plans = [self._plan(j, h, x, batch) for h, x in zip(hypotheses, at, strict=True)]
+        shown = batch.simulate(run)
+        return [self._table(j, h, x, plan, shown) for h, x, plan in zip(hypotheses, at, plans)]
+
+    def _plan(self, j: int, hypothesis: Explanation, at: Float64, batch: _Asked) -> _Places:
+        run = self.runs[j]
+        still, speed = self.still(j, at)
+        z = at[self.size : self.size + len(hypothesis.unknowns)]
+        actions = hypothesis.actions(run.frame, j, z)
+        whole = sum(actions, still)
+        steps = []
+        for i in range(len(z)):
+            stepped = z.copy()
+            stepped[i] += _STEP_Z
+            more = sum(hypothesis.actions(run.frame, j, stepped), still)
+            steps.append(batch.add(more, speed))
+        without = [
+            batch.add(sum((a for i, a in enumerate(actions) if i != form), still), speed)
+            for form in hypothesis.forms
+        ]
+        base, acting = batch.add(still, speed), batch.add(whole, speed)
+        turned = batch.add(whole + Action(free_shaft=_STEP_Z), speed)
+        return _Places(base, acting, steps, without, turned, sum(actions, _NOTHING))
+
+    def still(self, j: int, at: Float64) -> tuple[Action, float]:
+        """Return what acts in a run without effects, and her steady speed."""
+        run, place, k = self.runs[j], self.places[j], self.coefficients
+        tau_s = run.model.forces.tau_s * math.exp(float(at[place[k + motion.TAU]]))
+        free = float(at[place[k + _FREE]])
+        still = Action(run_down_change_s=tau_s - run.stated_run_down_s, free_shaft=free)
+        return still, float(at[place[k + motion.SPEED]])
+
+    def _table(
+        self, j: int, hypothesis: Explanation, at: Float64, plan: _Places, shown: SimulatedRows
+    ) -> RunTable | None:
+        run, model, place, k = self.runs[j], self.runs[j].model, self.places[j], self.coefficients
+        own, q = at[place[:-4]], len(hypothesis.unknowns)
+        rows, n = model.rows, len(model.rows.time_s)
+        residual, speed = motion.predict(model.forces, own, model.grid_s, rows)
+        forces = model.forces
+        if hypothesis.ways:
+            forces = _with(forces, plan.action, run.frame, self.runs[j])
+            table, speed = motion.predict(forces, own, model.grid_s, rows)
+        else:
+            table = residual
+        extra = len(hypothesis.forms) * _FORMS
+        smooth = self._smooth(j, hypothesis.smooth, forces, own)
+        lines = 1 + k + _LOCAL + q + extra + len(smooth)
+        along, rest = np.zeros((lines, n)), np.zeros((lines, len(run.rest)))
+        along[0] = residual[0] - (shown.along[plan.acting] - shown.along[plan.base])
+        along[1 : 1 + k + EXTRAS] = table[1:]
+        along[1 + k + _SCATTER] = table[1] + table[2]  # both parts of the law
+        along[0] -= at[place[k + _SCATTER]] * along[1 + k + _SCATTER]
+        rest[0] = run.rest - shown.rest[plan.acting]
+        a, first = run.across, 1 + k + _LOCAL
+        if a:
+            port, heading = place[k + _PORT], place[k + _HEADING]
+            distance = shown.distance[plan.acting]
+            rest[0, :a] -= at[port] + at[heading] * distance
+            rest[1 + k + _PORT, :a], rest[1 + k + _HEADING, :a] = 1.0, distance
+        for i, column in enumerate(plan.steps):
+            along[first + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_Z
+            rest[first + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
+        rest[1 + k + _FREE] = (shown.rest[plan.turned] - shown.rest[plan.acting]) / _STEP_Z
+        bumps = bsplines(run.over_run, _FORMS)
+        for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
+            sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
+            trace = sd * (shown.along[plan.acting] - shown.along[column])
+            along[to : to + _FORMS] = bumps * trace
+            if a:
+                trace = sd * (shown.rest[plan.acting, :a] - shown.rest[column, :a])
+                even = bsplines(np.linspace(0.0, 1.0, a), _FORMS)
+                rest[to : to + _FORMS, :a] = even * trace
+        along[first + q + extra :] = smooth
+        # forms and what is smooth stand at some unknowns too
+        beyond = at[self.size + q :]
+        mine = self._beyond(j, hypothesis)
+        along[0] -= beyond[mine] @ along[first + q :]
+        rest[0] -= beyond[mine] @ rest[first + q :]
+        if not (np.isfinite(along).all() and np.isfinite(rest).all()):
+            return None
+        damping, inertia = motion.damping_of(forces, own[:k], np.maximum(speed, 0.0))
+        white = model.white._replace(damping_1_s=damping, inertia=inertia)
+        places = np.concatenate([place, self.size + np.arange(q), self.size + q + mine])
+        return RunTable(along, rest @ run.whitener.T, places, white, rest[0].copy())
+
+    def _beyond(self, j: int, hypothesis: Explanation) -> Int64:
+        """Return places, behind the effects' unknowns, of those that a run has."""
+        forms = _FORMS * len(hypothesis.forms)
+        if hypothesis.smooth in ('', IN_SPEED):
+            return np.arange(forms)
+        return np.concatenate([np.arange(forms), forms + _SMOOTH * j + np.arange(_SMOOTH)])
+
+    def smooth(self, j: int, where: str, at: Float64) -> Float64:
+        """
+        Return columns (6, n) of something smooth in a run, of unit relative size.
+        """
+        return self._smooth(j, where, self.runs[j].model.forces, at[self.places[j][:-4]])
+
+    def _smooth(self, j: int, where: str, forces: motion.Forces, own: Float64) -> Float64:
+        run = self.runs[j]
+        rows, u_0 = run.model.rows, run.model.speed_m_s
+        if where in ('', IN_SPEED):
+            return np.zeros((0, len(rows.time_s)))
+        if where == IN_TIME:
+            return _force_in_time(run, forces, own)
+        found = np.zeros((_SMOOTH, len(rows.time_s)))
+        if where == IN_LOG:
+            by_log = rows.kind == LOG
+            found[:, by_log] = u_0 * bsplines(run.over_run, _SMOOTH)[:, by_log]
+            return found
+        ground, position = rows.kind == OVER_GROUND, rows.kind == POSITION
+        found[:, ground] = u_0 * bsplines(run.over_run, _SMOOTH)[:, ground]
+        time = np.linspace(rows.time_s[0], rows.time_s[-1], 400)
+        bumps = bsplines(np.clip(time / rows.time_s[-1], 0.0, 1.0), _SMOOTH)
+        way = np.cumsum(bumps, axis=1) * (time[1] - time[0])
+        for i in range(_SMOOTH):
+            found[i, position] = u_0 * np.interp(rows.time_s[position], time, way[i])
+        return found
+
+
+class _Places(NamedTuple):
+    """Columns that a hypothesis needs of a run."""
+
+    base: int
+    acting: int
+    steps: list[int]
+    without: list[int]
+    turned: int
+    action: Action
+
+
+def _with(forces: motion.Forces, action: Action, frame: Frame, run: RunSight) -> motion.Forces:
+    """Return forces with what an action adds."""
+    grid = run.model.law.speed_m_s
+    # a table of the ship file may end below the highest speed that a fit may try
+    low, high = frame.ship.baseline_range_m_s
+    r, inertia = retardation_of(action, frame, np.clip(grid, low, high))
+    if not r.any() and inertia == 0.0:
+        return forces
+    slope = np.gradient(r, forces.step_m_s, edge_order=2)
+    more = forces.inertia.copy()
+    more[0] += inertia
+    return forces._replace(known=forces.known + np.stack([r, slope]), inertia=more)
+
+
+def _force_in_time(run: RunSight, forces: motion.Forces, own: Float64) -> Float64:
+    """Return what forces of unit size, over r(u_0), do to the rows; one for each time."""
+    rows = run.model.rows
+    end = float(rows.time_s[-1])
+    time = np.linspace(0.0, end, 240)
+    step = time[1]
+    probe = Rows(time, np.full(len(time), LOG, np.int64), np.zeros(len(time)))
+    plain = own.copy()
+    plain[-EXTRAS + motion.SCALE :] = 0.0
+    plain[-EXTRAS + motion.STOP] = 0.0
+    table, _ = motion.predict(forces, plain, run.model.grid_s, probe)
+    k = run.model.coefficients
+    u = np.maximum(-table[0], 0.0)
+    damping, inertia = motion.damping_of(forces, own[:k], u)
+    known, columns = motion.shapes_at(forces, u[:1])
+    r_0 = float(known[0, 0] + own[:k] @ columns[0, :, 0])
+    left = np.exp(-damping * step)
+    force = -r_0 * bsplines(time / end, _SMOOTH) / inertia
+    speed = np.zeros_like(force)
+    for i in range(1, len(time)):
+        speed[:, i] = left[i] * speed[:, i - 1] + 0.5 * step * (
+            force[:, i] + left[i] * force[:, i - 1]
+        )
+    way = np.cumsum(speed, axis=1) * step
+    found = np.zeros((_SMOOTH, len(rows.time_s)))
+    after, position = rows.time_s > 0.0, rows.kind == POSITION
+    for i in range(_SMOOTH):
+        moved = np.where(
+            position, np.interp(rows.time_s, time, way[i]), np.interp(rows.time_s, time, speed[i])
+        )
+        found[i] = np.where(after, moved, 0.0)
+    return found
+
+
+def bsplines(x: Float64, count: int) -> Float64:
+    """
+    Return cubic B-splines on even knots over 0 .. 1, (count, n); they add up to 1.
+    """
+    inner = np.linspace(0.0, 1.0, count - 2)
+    knots = np.concatenate([np.zeros(3), inner, np.ones(3)])
+    table = BSpline.design_matrix(np.clip(x, 0.0, 1.0), knots, 3).toarray()
+    return np.ascontiguousarray(table.T)
+
+
+def half(hypothesis: Explanation, size: int) -> list[int]:
+    """Return places of unknowns that have one side only."""
+    unknowns = hypothesis.unknowns
+    return [size + i for i, q in enumerate(unknowns) if q.prior.shape is Shape.HALF_NORMAL]

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Effects as unknowns of the model: their forces, their ways, and one that is new."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipdrag_ros.parameter import Shape, log_normal
+from shipdrag_ros.posterior.effects import retardation_of as found_retardation
+from shipdrag_ros.posterior.effects import ways_of
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Action, Scenario, simulate_columns
+from shipdrag_ros.simulation.effect import Frame
+from shipdrag_ros.simulation.effects import LIBRARY, action_of, parse
+
+TEXTS = ('fouling=0.4', 'wind=8', 'wind=-5,cross_m_s=6', 'waves=20000', 'shallow_water=20')
+
+
+@pytest.mark.parametrize('text', TEXTS)
+def test_the_force_of_an_effect_is_that_of_its_simulation(text: str) -> None:
+    ship = Ship.example()
+    scenario = Scenario(speed_m_s=7.0, lead_in_s=60.0, duration_s=400.0, heading_rad=0.4)
+    frame = Frame(ship, scenario, 0.4)
+    action = action_of(frame, [parse(text)])
+    time = np.arange(62.0, 440.0, 2.0)
+    both = simulate_columns(ship, scenario, [Action(), action], time)
+    speed = both.speed_through_water_m_s
+    slower = -np.gradient(speed[1], time)
+    u, n_r = speed[1], ship.n_r(speed[1])
+    r, inertia = found_retardation(action, frame, u)
+    late = time > 60.0 + 12.0 * (ship.propulsion.run_down_s if ship.propulsion else 0.0)
+    late[-2:] = False  # one-sided differences
+    shown = (ship.resistance_n(u) / ship.mass_kg + r) / (1.0 + n_r + inertia)
+    np.testing.assert_allclose(slower[late], shown[late], rtol=2e-3)
+
+
+def test_every_effect_of_the_library_has_ways_that_act() -> None:
+    ship = Ship.example()
+    frame = Frame(ship, Scenario(speed_m_s=7.0, duration_s=600.0), 0.0)
+    for effect in LIBRARY.values():
+        if effect.missing(ship):
+            continue
+        ways = list(ways_of(effect, ship, 600.0, 2))
+        odds = {way.mode: np.exp(way.log_odds) for way in ways}
+        assert np.isclose(sum(odds.values()), effect.odds), effect.name
+        for way in ways:
+            assert way.action(frame, way.tried()) != Action(), effect.name
+            assert len(way.start) == len(way.unknowns)
+
+
+def test_a_size_goes_there_and_back() -> None:
+    for prior in (log_normal(0.2, 0.5), log_normal(-3.0, 0.7)):
+        assert prior.shape is Shape.LOG_NORMAL
+        for z in (-1.3, 0.0, 2.0):
+            assert prior.inverse(prior.at(z)) == pytest.approx(z, abs=1e-12)
+    with pytest.raises(ValueError, match='no z of a value'):
+        replace(log_normal(1.0, 1.0), shape=Shape.CHOICE).inverse(1.0)
