@@ -18,7 +18,7 @@ from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.replay.run_result import RunResult
-from shipdrag_ros.replay.told_stop import Stop
+from shipdrag_ros.replay.told_stop import StopTime
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
@@ -135,7 +135,7 @@ def replay_run(
     ship: Ship | None = None,
     parameters: Parameters | None = None,
     window: WindowSpan | None = None,
-    stop: Stop | None = None,
+    stop: StopTime | None = None,
 ) -> RunResult:
     """
     Replay one run; its progress is shown.

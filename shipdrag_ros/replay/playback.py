@@ -29,7 +29,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
-from shipdrag_ros.replay.told_stop import Stop, ToldStop, told_ns, with_stop
+from shipdrag_ros.replay.told_stop import StopTime, ToldStop, told_ns, with_stop
 from shipdrag_ros.samples import Block, Channel, Reason
 from shipdrag_ros.ship import Ship
 
@@ -121,7 +121,7 @@ def replay(
     ship: Ship | None = None,
     parameters: Parameters | None = None,
     window: tuple[float, float] | None = None,
-    stop: Stop | None = None,
+    stop: StopTime | None = None,
     compare: bool = True,
     progress: PartDone | None = None,
 ) -> ReplayResult:

@@ -12,11 +12,11 @@ from shipdrag_ros.bags.run import Mark, Run
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import SECOND_NS, Block
 
-Stop = float | datetime
+StopTime = float | datetime
 """In s from the start of the bag, or as a time of day with its zone."""
 
 
-def told_ns(run: Run, stop: Stop) -> int:
+def told_ns(run: Run, stop: StopTime) -> int:
     """
     Return when a stop was told [ns, time of arrival].
 
