@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 
 from shipdrag_ros.imports import need
@@ -42,6 +43,28 @@ def add_json(parser: argparse.ArgumentParser) -> None:
         help='write the result as JSON, NaN as null, to FILE; without FILE: JSON alone on '
         'stdout and the readable result on stderr',
     )
+
+
+def stop_time(text: str) -> float | datetime:
+    """
+    Read a time: s from the start of the bag, or ISO 8601 with its zone.
+    """
+    try:
+        at_s = float(text)
+    except ValueError:
+        at_s = math.nan
+    if math.isfinite(at_s) and at_s >= 0.0:
+        return at_s
+    try:
+        at = datetime.fromisoformat(text)
+    except ValueError:
+        at = None
+    if at is None or at.tzinfo is None:
+        raise argparse.ArgumentTypeError(
+            f'{text!r}, expected s from the start of the bag, or a time of day with its zone, as '
+            '2026-06-01T08:05:00Z'
+        )
+    return at
 
 
 def number(

@@ -85,6 +85,19 @@ def _is_primary(bins: Bins, tuning: Tuning, source: int, number: int) -> bool:
 
 
 @compiled(inline=True, uncounted=True)
+def _wakes(
+    bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
+) -> bool:
+    """Say whether a source beside the primary one falls faster than chance explains."""
+    update_limits(steadiness, tuning.slopes, bins, source, number)
+    falls = False
+    for scale in range(SCALES):
+        slope, level, _ = line(bins, source, number, tuning.slopes.width << scale)
+        falls = falls or (slope < -steadiness.limit[source, scale] and level > tuning.speed_min)
+    return falls and watch.armed[0] != 0
+
+
+@compiled(inline=True, uncounted=True)
 def _look_at_speed(
     bins: Bins, steadiness: Steadiness, watch: Watch, tuning: Tuning, source: int, number: int
 ) -> int:
@@ -92,7 +105,11 @@ def _look_at_speed(
     watched = watch.source[0]
     if watched == NEVER:
         if not _is_primary(bins, tuning, source, number):
-            return 0
+            return (
+                _SLOPE
+                if tuning.all_wake and _wakes(bins, steadiness, watch, tuning, source, number)
+                else 0
+            )
     elif watched != source:
         update_limits(
             steadiness, tuning.slopes, bins, source, number
@@ -156,7 +173,7 @@ def _look_at_shaft(bins: Bins, watch: Watch, tuning: Tuning, channel: int, numbe
 _SLOPES = Slopes(1, 1, 1, 1, np.zeros((SCALES, 1)), 0.0)  # its types are all that counts
 _SIGNATURE: Signature = types.UniTuple(types.int64, 2)(
     typeof(Memory.fresh(_SLOPES, seconds=1, tally=InputTally.fresh())),
-    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0)),
+    typeof(Tuning(Limits(0, 0), _SLOPES, 0, 0.0, False)),
     CHANNEL_CODES,
     STAMPS,
     STAMPS,

@@ -142,9 +142,12 @@ class Tuning(NamedTuple):
         Silence that stops a source [ns].
     speed_min
         Speed below which nothing starts [m/s].
+    all_wake
+        Whether any speed source may propose a coastdown, or the best of them alone.
     """
 
     limits: Limits
     slopes: Slopes
     data_stop_ns: int
     speed_min: float
+    all_wake: bool

@@ -109,6 +109,7 @@ class Monitor:
             slopes,
             round(parameters.data_stop_s * SECOND_NS),
             float(ship.speed(parameters.froude_min)),
+            parameters.regimes == 'filter',
         )
         self._seconds = (
             round(parameters.steady_s + 4 * parameters.confirm_s) + 16 * slopes.width + 64
@@ -212,9 +213,12 @@ class Monitor:
                 if not self._fall_back(int(stamp_ns[at])):
                     events += self._stop_at_last_sample(EndedBy.DATA_STOP)
             elif stop == WalkEvent.SLOPE:
-                self._propose(int(self._memory.watch.seen[0]), noticed=True)
+                source = int(channel[at])
+                self._propose(source, int(self._memory.bins.closed[source]), noticed=True)
             elif stop == WalkEvent.SHAFT:
-                self._propose(int(self._memory.bins.filling[channel[at]]), noticed=False)
+                source = int(self._memory.watch.seen_source[0])
+                number = int(self._memory.bins.filling[channel[at]])
+                self._propose(source, number, noticed=False)
             else:
                 arrival, guard = int(receive_ns[at]), self._memory.guard
                 why = clock_set(guard, stop, int(channel[at]), int(stamp_ns[at]), arrival)
@@ -233,8 +237,28 @@ class Monitor:
         """
         events = self._stop_at_last_sample(EndedBy.RESET)
         events += self._dismissals.flush()
-        self._memory = self._fresh(self._memory.tally)
+        self._memory, self._reported_s = self._fresh(self._memory.tally), -np.inf
         return [*events, Reset(receive_ns, reason)]
+
+    def engine_stopped(self, stamp_ns: int) -> bool:
+        """
+        Take it from a person that the engine was stopped at a stamp [ns], within some seconds.
+
+        It is evidence like the rest, and wakes the regimes.
+
+        Returns
+        -------
+        bool
+            False where it is of no use: no speed was read yet, or the rules judge.
+        """
+        source = int(self._memory.watch.seen_source[0])
+        if self._parameters.regimes != 'filter' or source == NEVER:
+            return False
+        if self._regimes is None:
+            self._propose(source, int(self._memory.watch.seen[0]), noticed=True)
+        assert self._regimes is not None
+        self._regimes.tell(stamp_ns / SECOND_NS)
+        return True
 
     def fall_silent(self) -> list[Event]:
         """
@@ -274,9 +298,8 @@ class Monitor:
         )
         self._memory = self._memory._replace(store=store)
 
-    def _propose(self, number: int, *, noticed: bool) -> None:
+    def _propose(self, source: int, number: int, *, noticed: bool) -> None:
         watch, bins = self._memory.watch, self._memory.bins
-        source = int(watch.seen_source[0])
         watch.source[0] = source
         seen = OnsetCandidate(source, number, Drive(), noticed).knowing(self._memory.steadiness)
         if self._parameters.regimes == 'filter':
@@ -285,7 +308,7 @@ class Monitor:
 
             width = RegimeFilter.width(self._parameters.slope_window_s)
             self._regimes = RegimeFilter(bins, self._ship, width, number)
-            self._candidate, self._reported_s = seen, -np.inf
+            self._candidate = seen
             return
         self._candidate = propose(bins, self._tuning, seen, number)
 
@@ -380,8 +403,8 @@ class Monitor:
             end_ns = round(one.end_s * SECOND_NS)
             cause = regimes.ended_by(one.after) if one.after >= 0 else EndedBy.SPEED
             events += self._running.end(cause, end_ns, None, self._final_estimator, _chosen(one))
-            self._running = None
-        if not dated and self._reported_s < 0.0 and regimes.doubted:
+            self._running, self._reported_s = None, one.end_s
+        if not dated and self._reported_s < self._candidate.start and regimes.doubted:
             reason, text = regimes.dismissal()
             start_ns, end_ns = self._candidate.start * SECOND_NS, (number + 1) * SECOND_NS
             events += self._dismissals.take(NotCoastdown(start_ns, end_ns, reason, text))

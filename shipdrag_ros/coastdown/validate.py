@@ -10,7 +10,8 @@ The tests, in this order; the first that fails names the reason:
 
 1. arrival more than 10 s before the arrival of the sample before: clock set
 2. stamp more than 2 s after its arrival: `FUTURE`
-3. stamp more than 10 s before the last accepted one of the channel: clock set
+3. stamp more than 10 s before the last accepted one of the channel: `LATE`; clock set where
+   the `AGREED` of the channel in a row are, and ascend
 4. equal to it: `DUPLICATE`; before it: `OUT_OF_ORDER`
 5. more than `late_s` before the newest accepted stamp of any input: `LATE`
 6. value: `NAN`, `INFINITE`, `ABSURD`, `FROZEN`, `OUTLIER`
@@ -58,6 +59,7 @@ from shipdrag_ros.samples import (
 
 CHANNELS = len(Channel)
 NEVER = -(2**62)  # a stamp before all stamps that leaves room for subtraction
+AGREED = 3  # stamps in a row that make a clock that was set: two may be a slip
 
 # not reasons of a sample: the clock was set, everything starts afresh
 STAMP_JUMPED_BACK = -1
@@ -106,6 +108,8 @@ class CheckMemory(NamedTuple):
         Newest accepted stamp of any channel [ns].
     arrival_ns : (1,) int64
         Arrival of the sample before, used or not [ns].
+    back_ns, back : (channels,) int64
+        Stamp of the last sample that was far behind, and how many were in a row [ns].
     held : (channels, 2)
         Value of the last accepted sample.
     held_since_ns : (channels,) int64
@@ -117,6 +121,8 @@ class CheckMemory(NamedTuple):
     last_ns: Int64
     newest_ns: Int64
     arrival_ns: Int64
+    back_ns: Int64
+    back: Int64
     held: Float64
     held_since_ns: Int64
     past: Past
@@ -130,6 +136,8 @@ class CheckMemory(NamedTuple):
             np.full(CHANNELS, NEVER),
             np.full(1, NEVER),
             np.full(1, NEVER),
+            np.full(CHANNELS, NEVER),
+            np.zeros(CHANNELS, np.int64),
             np.full((CHANNELS, 2), np.nan),
             np.full(CHANNELS, NEVER),
             Past.fresh(),
@@ -177,7 +185,8 @@ def examine(
     last = guard.last_ns[channel]
     if stamp <= last:
         if stamp < last - BACKWARD_JUMP_NS:
-            return STAMP_JUMPED_BACK
+            agree = guard.back[channel] >= AGREED - 1 and stamp > guard.back_ns[channel]
+            return STAMP_JUMPED_BACK if agree else _LATE
         if stamp == last:
             return _DUPLICATE
         return _OUT_OF_ORDER
@@ -226,6 +235,7 @@ def remember(
     """
     if channel <= _MOTION:
         take(guard.past, channel, stamp, a, b, variance_a, variance_b)
+    guard.back[channel] = 0
     guard.last_ns[channel] = stamp
     guard.newest_ns[0] = max(guard.newest_ns[0], stamp)
     same = a == guard.held[channel, 0] and (
@@ -251,6 +261,10 @@ def reject(
     """
     Take a sample that was rejected into the memory of the tests.
     """
+    if code == _LATE and stamp < guard.last_ns[channel] - BACKWARD_JUMP_NS:
+        ascends = stamp > guard.back_ns[channel]
+        guard.back[channel] = guard.back[channel] + 1 if ascends else 1
+        guard.back_ns[channel] = stamp
     if code >= _FROZEN:
         refuse(guard.past, channel, stamp, a, b, variance_a, variance_b)
 
@@ -275,6 +289,8 @@ def forget(guard: CheckMemory) -> None:
     guard.last_ns[:] = NEVER
     guard.newest_ns[:] = NEVER
     guard.arrival_ns[:] = NEVER
+    guard.back_ns[:] = NEVER
+    guard.back[:] = 0
     guard.held[:] = np.nan
     guard.held_since_ns[:] = NEVER
     forget_past(guard.past)

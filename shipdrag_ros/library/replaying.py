@@ -18,6 +18,7 @@ from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay import accepted_samples, replay
 from shipdrag_ros.replay.playback import SHIP_FILE
 from shipdrag_ros.replay.run_result import RunResult
+from shipdrag_ros.replay.told_stop import StopTime
 from shipdrag_ros.samples import Channel
 from shipdrag_ros.ship import Ship
 
@@ -134,6 +135,7 @@ def replay_run(
     ship: Ship | None = None,
     parameters: Parameters | None = None,
     window: WindowSpan | None = None,
+    stop: StopTime | None = None,
 ) -> RunResult:
     """
     Replay one run; its progress is shown.
@@ -145,7 +147,9 @@ def replay_run(
     """
     with listener.progress(f'replaying {each.name}') as progress:
         result = RunResult.of(
-            replay(each, ship=ship, parameters=parameters, window=window, progress=progress)
+            replay(
+                each, ship=ship, parameters=parameters, window=window, stop=stop, progress=progress
+            )
         )
     if not result.coastdowns:
         astern = _astern(each)

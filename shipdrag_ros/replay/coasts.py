@@ -14,6 +14,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.replay.given_window import parts_of_one_clock
 from shipdrag_ros.replay.playback import InputCounts, ReplayResult, feed
 from shipdrag_ros.samples import MOTION_INPUTS, SECOND_NS, Block, Reason, concatenate
 from shipdrag_ros.ship import Ship
@@ -134,5 +135,13 @@ def window_between(
     block = concatenate([item for item in inputs if isinstance(item, Block)])
     reasons = validate(_arrived_later(block) if apart else block, parameters)
     accepted = block[np.flatnonzero(reasons == Reason.ACCEPTED)]
+    # a clock that was set tells some times twice
+    shown = [
+        (int(np.count_nonzero((start_ns <= stamps) & (stamps <= end_ns))), part)
+        for part in parts_of_one_clock(accepted)
+        if len(stamps := accepted.stamp_ns[part])
+    ]
+    if shown:
+        accepted = accepted[max(shown, key=lambda each: each[0])[1]]
     before = start_ns - before_ns if steady else None
     return Window.from_block(accepted, start_ns, end_ns, before_ns=before)

@@ -95,7 +95,9 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
     reasons = validate(block, parameters)
     accepted = np.flatnonzero(reasons == Reason.ACCEPTED)
     if len(accepted):
-        clock_ns = int(block.stamp_ns[accepted[0]] - block.receive_ns[accepted[0]])
+        within = accepted[inside[accepted]]
+        first = int((within if len(within) else accepted)[0])  # the clock of before may be another
+        clock_ns = int(block.stamp_ns[first] - block.receive_ns[first])
         start_ns, end_ns = start_ns + clock_ns, end_ns + clock_ns
     return WindowSamples(inputs, block, reasons, inside, start_ns, end_ns)
 
@@ -108,15 +110,17 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
     before is not known to be steady sailing; it helps to examine, and teaches the
     estimate nothing.
     """
-    accepted = samples.block[samples.reasons == Reason.ACCEPTED]
+    used = samples.reasons == Reason.ACCEPTED
+    accepted, inside = samples.block[used], samples.inside[used]
     start_ns, end_ns = samples.start_ns, samples.end_ns
-    before_ns = int(accepted.stamp_ns.min()) if len(accepted) else None
-    try:
-        window = Window.from_block(accepted, start_ns, end_ns, before_ns=before_ns)
-    except ValueError:  # accepted stamps ascend but for this
+    parts = [part for part in parts_of_one_clock(accepted) if inside[part].any()]
+    if len(parts) > 1:
         failure = 'a clock was set in the window; choose one before or after'
-        found = Examined(start_ns, end_ns, (), None, failure, refused=False, stretch=())
+        found = Examined(start_ns, end_ns, (), None, failure, refused=True, stretch=())
     else:
+        accepted = accepted[parts[0]] if parts else accepted[:0]
+        before_ns = int(accepted.stamp_ns.min()) if len(accepted) else None
+        window = Window.from_block(accepted, start_ns, end_ns, before_ns=before_ns)
         found = estimate_examined(window, ship, parameters, estimate_final, steady=False)
     heading = _heading(accepted, found.start_ns)
     return EndedCoastdown(
@@ -131,6 +135,28 @@ def estimate_window(samples: WindowSamples, ship: Ship, parameters: Parameters) 
         cuts=found.cuts,
         stretch=found.stretch,
     )
+
+
+def parts_of_one_clock(accepted: Block) -> list[slice]:
+    """
+    Return the parts of a record between which a clock was set.
+
+    Parameters
+    ----------
+    accepted
+        What was accepted, in the order of its arrival.
+    """
+    parts, first, count = [], 0, len(accepted)
+    while first < count:
+        last = count
+        for channel in np.unique(accepted.channel[first:]):
+            rows = first + np.flatnonzero(accepted.channel[first:] == channel)
+            back = np.flatnonzero(np.diff(accepted.stamp_ns[rows]) <= 0)
+            if len(back):
+                last = min(last, int(rows[back[0] + 1]))
+        parts.append(slice(first, last))
+        first = last
+    return parts
 
 
 def _heading(accepted: Block, start_ns: int) -> float | None:

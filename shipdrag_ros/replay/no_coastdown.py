@@ -55,7 +55,10 @@ def why_no_coastdown(result: ReplayResult) -> str:
 
 
 def _why(result: ReplayResult) -> str:
-    """Say why by what was dismissed, or else by what the speed did."""
+    """Say why by what was given or dismissed, or else by what the speed did."""
+    for one in result.coastdowns:
+        if one.failure and not one.cuts:
+            return one.failure
     if result.not_coastdowns:
         return _dismissed(result)
     block, _ = accepted_samples(result.run)

@@ -7,6 +7,7 @@ Also one window of it, given by hand, through the same estimator.
 
 from __future__ import annotations
 
+import dataclasses
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
+from shipdrag_ros.replay.told_stop import StopTime, ToldStop, told_ns, with_stop
 from shipdrag_ros.samples import Block, Channel, Reason
 from shipdrag_ros.ship import Ship
 
@@ -119,6 +121,7 @@ def replay(
     ship: Ship | None = None,
     parameters: Parameters | None = None,
     window: tuple[float, float] | None = None,
+    stop: StopTime | None = None,
     compare: bool = True,
     progress: PartDone | None = None,
 ) -> ReplayResult:
@@ -135,6 +138,9 @@ def replay(
     window
         Begin and end [s from the start of the bag], instead of finding
         coastdowns; outputs are then not compared.
+    stop
+        When the engine was stopped, as a person tells it within some seconds: evidence that
+        the regimes weigh with the rest; outputs are then not compared.
     compare
         Whether outputs in the bag are compared; the estimates while a coastdown runs are
         made for that alone.
@@ -145,15 +151,18 @@ def replay(
     ------
     BagError
         If the bag has no input, no ship file where none is given, or the
-        window lies outside of it.
+        window or the stop lies outside of it.
     ShipFileError, ParameterError
         If those attached to the bag cannot be used.
     """
     used_ship, used_parameters = settings_of(run, ship, parameters)
     if window is not None:
         return _in_window(run, used_ship, used_parameters, window)
+    told = None if stop is None else told_ns(run, stop)
+    if told is not None:  # the rules read no such thing
+        compare, used_parameters = False, dataclasses.replace(used_parameters, regimes='filter')
     own = compare and _is_own(run, used_ship, used_parameters)
-    return _as_on_board(run, used_ship, used_parameters, own, progress)
+    return _as_on_board(run, used_ship, used_parameters, own, progress, told)
 
 
 def settings_of(
@@ -195,7 +204,12 @@ def _no_input(run: Run) -> str:
 
 
 def _as_on_board(
-    run: Run, ship: Ship, parameters: Parameters, own: bool, progress: PartDone | None
+    run: Run,
+    ship: Ship,
+    parameters: Parameters,
+    own: bool,
+    progress: PartDone | None,
+    told: int | None = None,
 ) -> ReplayResult:
     # what nothing is compared with is left out: an estimate depends on its window alone
     monitor = Monitor(ship, parameters, estimate=estimate if own else None)
@@ -215,7 +229,11 @@ def _as_on_board(
 
     inputs = run.inputs()
     total = sum(topic.messages for topic in run.topics if topic.input)
-    for item in inputs:
+    for item in with_stop(inputs, told):
+        if isinstance(item, ToldStop):
+            if not monitor.engine_stopped(item):
+                raise BagError(f'{run.name!r}: no speed was read before the stop that is given')
+            continue
         take(feed(monitor, item))
         if progress is not None:
             progress(inputs.messages.total(), total)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ def window_only(window, ship, parameters):
 
 
 def events_of(ship, block: Block, places=()) -> list:
-    monitor = Monitor(ship, FILTER, estimate=window_only, final=window_only)
+    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
     events = []
     for first, last in zip([0, *places], [*places, len(block)], strict=True):
         events += monitor.update(block[first:last])
@@ -77,6 +78,17 @@ def test_an_engine_that_is_engaged_ends_it(ship, record) -> None:
     assert abs(ended.end_ns - START_NS - 1300 * S) < 30 * S
 
 
+def test_positions_are_believed_beside_a_log_that_says_nothing_true(ship, record) -> None:
+    block = record(sensors=(LOG, TRACK), seed=3)
+    is_log = block.channel == Channel.SPEED_THROUGH_WATER
+    value = block.value.copy()
+    value[is_log, 0] = np.random.default_rng(1).uniform(0.5, 6.0, int(is_log.sum()))
+    events = events_of(ship, replace(block, value=value))
+    (ended,) = [each for each in of(EndedCoastdown, events) if not each.withdrawn]
+    assert abs(ended.start_ns - START_NS - 900 * S) < 30 * S
+    assert ended.end_ns > START_NS + 1500 * S
+
+
 @given(seed=st.integers(0, 2**16))
 @settings(max_examples=5, deadline=None)
 def test_how_a_record_is_cut_changes_no_bit(ship, record, bits, seed) -> None:
@@ -91,3 +103,36 @@ def test_the_docs_print_the_numbers_of_the_code() -> None:
     page = (Path(__file__).resolve().parents[2] / 'docs' / 'regimes.md').read_text()
     assert table() in page
     assert all(each.unit and each.source for each in NUMBERS)
+
+
+def test_a_stop_that_is_told_dates_a_glide_that_a_noisy_log_shows_late(ship, record) -> None:
+    noisy = Sensor(channel=Channel.SPEED_THROUGH_WATER, sd=0.1, coloured=GaussMarkov(0.07, 60.0))
+    block = record(sensors=(noisy,), seed=2)
+    at = int(np.searchsorted(block.stamp_ns, START_NS + 900 * S))
+    starts = []
+    for told in (False, True):
+        monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
+        events = monitor.update(block[:at])
+        if told:
+            monitor.engine_stopped(START_NS + 900 * S)
+        events += [*monitor.update(block[at:]), *monitor.finish()]
+        starts.append(
+            [
+                (each.onset_detected_ns, each.start_ns)
+                for each in of(EndedCoastdown, events)
+                if not each.withdrawn
+            ]
+        )
+    (late, _), (soon, start_ns) = starts[0][0], starts[1][0]
+    assert abs(start_ns - START_NS - 900 * S) < 15 * S
+    assert soon < late
+
+
+def test_a_stop_that_is_told_and_is_none_is_no_coastdown(ship, record) -> None:
+    block = record(sensors=(LOG,), seed=2, orders=(), duration_s=900.0)
+    at = int(np.searchsorted(block.stamp_ns, START_NS + 900 * S))
+    monitor = Monitor(ship, FILTER, estimate=None, final=window_only)
+    events = monitor.update(block[:at])
+    monitor.engine_stopped(START_NS + 900 * S)
+    events += [*monitor.update(block[at:]), *monitor.finish()]
+    assert not [each for each in of(EndedCoastdown, events) if not each.withdrawn]

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.coastdown.validate import validate
+from shipdrag_ros.coastdown.validate import AGREED, validate
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Reason, concatenate
 
@@ -83,11 +83,25 @@ def test_a_rejected_sample_leaves_no_trace() -> None:
     assert reasons(sample(LOG, 100.0, 8.0), ahead, after) == ['accepted', 'future', 'accepted']
 
 
-def test_a_stamp_far_back_starts_afresh() -> None:
+def test_stamps_far_back_that_agree_start_afresh() -> None:
     old = [sample(LOG, 100.0, 8.0), sample(GROUND, 100.0, 8.0)]
-    back = sample(LOG, 89.9, 8.0, receive_s=101.0)
-    after = [sample(GROUND, 90.5, 8.0, receive_s=101.5), sample(LOG, 91.0, 8.0, receive_s=102.0)]
-    assert reasons(*old, back, *after) == ['accepted'] * 5
+    back = [sample(LOG, 80.0 + i, 8.0, receive_s=101.0 + i) for i in range(AGREED)]
+    after = [sample(GROUND, 83.5, 8.0, receive_s=104.5), sample(LOG, 84.0, 8.0, receive_s=105.0)]
+    late = ['late'] * (AGREED - 1)
+    assert reasons(*old, *back, *after) == ['accepted'] * 2 + late + ['accepted'] * 3
+
+
+@pytest.mark.parametrize('slips', [1, 2, 40])
+def test_a_few_stamps_far_back_are_late_and_no_clock_that_was_set(slips: int) -> None:
+    log = [sample(LOG, 100.0 + i, 8.0 + 0.01 * (i % 7)) for i in range(200)]
+    expected = ['accepted'] * 200
+    for slip in range(slips):
+        at = 20 + 4 * slip
+        log.insert(
+            at, sample(LOG, 50.0 + slip, 8.0, receive_s=(int(log[at].stamp_ns[0]) - NOW) / S)
+        )
+        expected.insert(at, 'late')
+    assert reasons(*log) == expected
 
 
 def test_an_arrival_far_back_starts_afresh() -> None:

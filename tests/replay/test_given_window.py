@@ -15,7 +15,8 @@ from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, Event
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.replay import Recorded, replay
+from shipdrag_ros.replay import Recorded, coast_windows, replay
+from shipdrag_ros.replay.no_coastdown import why_no_coastdown
 from shipdrag_ros.samples import Block, Channel, concatenate, in_arrival_order
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 
@@ -141,3 +142,38 @@ def test_a_clock_set_in_a_window_is_no_estimate(
     (coastdown,) = replay(run, window=(410.0, 2000.0)).coastdowns
     assert coastdown.failure is not None
     assert 'a clock was set in the window' in coastdown.failure
+
+
+def test_a_window_behind_a_clock_that_was_set_is_estimated_from_the_record_after_it(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+) -> None:
+    block = voyage()
+    span_ns = int(block.receive_ns[-1] - block.receive_ns[0])
+    # the clock is set back by all that was recorded, and the same voyage comes once more
+    second = replace(block, receive_ns=block.receive_ns + span_ns + 10**9)
+    path = write_run(tmp_path / 'a.mcap', concatenate([block, second]), ship)
+    later_s = 1.0 + span_ns * 1e-9
+    (run,) = open_runs([path])
+    result = replay(run, window=(later_s + 410.0, later_s + 1000.0))
+    (coastdown,) = result.coastdowns
+    assert coastdown.estimate is not None, coastdown.failure
+    ((_, window),) = coast_windows(result)
+    assert len(window.speed_through_water) == 591
+    assert window.end_ns == coastdown.end_ns
+    (alone,) = open_runs([write_run(tmp_path / 'b.mcap', block, ship)])
+    (expected,) = replay(alone, window=(410.0, 1000.0)).coastdowns
+    assert expected.estimate is not None
+    np.testing.assert_array_equal(
+        coastdown.estimate.curve.resistance_m_s2, expected.estimate.curve.resistance_m_s2
+    )
+
+
+def test_a_window_over_a_clock_that_was_set_is_diagnosed_with_words(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
+) -> None:
+    block = voyage()
+    second = replace(block, receive_ns=block.receive_ns + 1200 * 10**9)
+    (run,) = open_runs([write_run(tmp_path / 'a.mcap', concatenate([block, second]), ship)])
+    result = replay(run, window=(410.0, 2000.0))
+    assert coast_windows(result) == []
+    assert 'a clock was set in the window' in why_no_coastdown(result)

@@ -54,6 +54,7 @@ _LOST = 16.0  # and one that is dropped
 _ALIKE_S, _OLD_S = 8.0, 240.0  # switches so near each other, so long ago, are one
 _THIN_EVERY = 6  # bins
 _LOG_S = math.log(float(n.NO_THRUST))
+_ROOT = math.sqrt(2.0 * math.pi)
 
 
 @compiled(uncounted=True)
@@ -121,17 +122,16 @@ def _born(
 def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the thrust run down."""
     under_way = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
-    for k in range(len(n.RUN_DOWN_S)):
-        for unseen in range(2 if setting.shafts > 0 else 1):
-            ramp_s = n.RUN_DOWN_S[k] * setting.pace
-            share = n.RUN_DOWN_SHARE[k]
+    drags = len(n.DRAGGED) if under_way else 1
+    for k in range(len(n.RUN_DOWN_S) if under_way else 1):
+        ramp_s = n.RUN_DOWN_S[k] * setting.pace
+        share = chance * (n.RUN_DOWN_SHARE[k] if under_way else 1.0)
+        for m in range(drags * (2 if setting.shafts > 0 else 1)):
+            unseen, drag = m // drags, m % drags
+            part = share * (n.DRAGGED_SHARE[drag] if under_way else 1.0)
             if setting.shafts > 0:
-                share *= n.PITCH_UNSEEN if unseen else 1.0 - n.PITCH_UNSEEN
-            if not under_way and k > 0:
-                continue
-            j = _born(
-                bank, i, setting.hull, now_s, chance * (share if under_way else 1.0), GLIDE, ramp_s
-            )
+                part *= n.PITCH_UNSEEN if unseen else 1.0 - n.PITCH_UNSEEN
+            j = _born(bank, i, setting.hull, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
             x, p = bank.mean[j], bank.spread[j]
@@ -139,11 +139,12 @@ def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
             if under_way:
                 if bank.whole[i, REGIME] == LEVEL:
                     p[LN_A, LN_A] += n.KEPT_SD**2
-                x[LN_A] += n.DRAGGED[0]
-                p[LN_A, LN_A] += n.DRAGGED[1] ** 2
+                x[LN_A] += n.DRAGGED[drag]
+                p[LN_A, LN_A] += n.DRAGGED_SD[drag] ** 2
+                p[POWER, POWER] += n.DRAGGED_EXPONENT_SD**2
                 bank.number[j, BEFORE] = x[OPEN]
             bank.number[j, FIRST_A] = math.exp(hull_law(setting.hull, x[LN_U])[0] + x[LN_A])
-            _free(bank, j, OPEN, 0.0, 0.0)
+            _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
             bank.whole[j, GLIDED] = 1
 
 
@@ -153,13 +154,15 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
     f = bank.number[i]
     engaged = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
     base = bank.mean[i, OPEN] if engaged else f[BEFORE]
+    ramps = len(n.LEVEL_RAMP_S) if engaged else 1
     for k in range(len(n.LEVELS)):
-        for m in range(len(n.LEVEL_RAMP_S) if engaged else 1):
-            share = chance * n.LEVELS_SHARE[k] / (len(n.LEVEL_RAMP_S) if engaged else 1)
-            ramp_s = (n.LEVEL_RAMP_S[m] if engaged else n.ENGAGE_S) * setting.pace
+        for m in range(2 * ramps):
+            share = chance * n.LEVELS_SHARE[k] / (2 * ramps)
+            ramp_s = (n.LEVEL_RAMP_S[m // 2] if engaged else n.ENGAGE_S) * setting.pace
             j = _born(bank, i, setting.hull, now_s, share, LEVEL, ramp_s)
             if j < 0:
                 continue
+            bank.whole[j, UNSEEN] = m % 2
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
             _free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
 
@@ -227,6 +230,7 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             w[REGIME] = regime = DRIVEN
             f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
             f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
+        left = 0.0  # hazard of all that it may switch to
         if regime in (DRIVEN, LEVEL):
             if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
                 continue
@@ -238,13 +242,19 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
                 stop = n.MANOEUVRE * stops
                 level = n.MANOEUVRE * n.OF_MANOEUVRES[1] * rest
                 turn = n.MANOEUVRE * n.OF_MANOEUVRES[2] * rest
+            if not np.isnan(setting.told_s):
+                off = (now_s - setting.told_s) / n.TOLD[1]
+                stop += n.TOLD[0] * 3600.0 * math.exp(-0.5 * off * off) / (_ROOT * n.TOLD[1])
             _glides(bank, i, setting, now_s, stop * hours)
             _levels(bank, i, setting, now_s, level * hours)
             _turns(bank, i, setting, now_s, turn * hours, TURN)
+            left = stop + level + turn
         elif regime == GLIDE:
             _levels(bank, i, setting, now_s, n.GLIDE_LEVEL * hours)
+            left = n.GLIDE_LEVEL + n.GLIDE_BRAKE
             if steered:
                 _turns(bank, i, setting, now_s, n.GLIDE_TURN * hours, GLIDE_TURN)
+                left += n.GLIDE_TURN
             for k in range(len(n.BRAKES)):
                 share = n.GLIDE_BRAKE * hours / len(n.BRAKES)
                 j = _born(bank, i, setting.hull, now_s, share, BRAKE, 1.0)
@@ -253,10 +263,14 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
         elif regime == BRAKE:
             _glides(bank, i, setting, now_s, n.BRAKE_GLIDE * hours)
             _levels(bank, i, setting, now_s, n.BRAKE_LEVEL * hours)
-        elif regime == TURN:
-            _back(bank, i, setting, now_s, n.TURN_OUT * hours)
+            left = n.BRAKE_GLIDE + n.BRAKE_LEVEL
         else:
-            _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+            if regime == TURN:
+                _back(bank, i, setting, now_s, n.TURN_OUT * hours)
+            else:
+                _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
+            left = float(n.TURN_OUT)
+        f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
 
 
 @compiled(uncounted=True)

@@ -78,8 +78,23 @@ def hull_law(hull: HullPrior, log_u: float) -> tuple[float, float]:
 
 
 @compiled(inline=True, uncounted=True)
+def _advance(part: float, torque: bool) -> tuple[float, float]:
+    """
+    Return revs over speed, as of steady sailing, and their derivative by ln of `part`.
+
+    `part` is the speed that balances over that of now. A governor holds the revs; where the
+    torque is held, they go up with the water.
+    """
+    if not torque:
+        return part, part
+    free = float(n.WINDMILL[0])
+    root = math.sqrt(free * free + 4.0 * part * part * (1.0 - free))
+    return 0.5 * (free + root), 2.0 * part * part * (1.0 - free) / root
+
+
+@compiled(inline=True, uncounted=True)
 def _force(
-    regime: int, x: Float64, f: Float64, now_s: float, law: float, slope: float
+    regime: int, torque: bool, x: Float64, f: Float64, now_s: float, law: float, slope: float
 ) -> tuple[float, float, float, float, float]:
     """Return net force per mass, its derivatives by ln u, ln a and the open one, and a."""
     a = math.exp(min(max(law + x[LN_A], -20.0), 5.0))
@@ -91,26 +106,22 @@ def _force(
         elif regime == LEVEL:
             share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
             target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
-        rho = math.exp(min(target - x[LN_U], 1.0))
+        rho, by_target = _advance(math.exp(min(target - x[LN_U], 1.0)), torque)
         thrust = (_S * rho * rho - rho) / (_S - 1.0)
-        steep = rho * (2.0 * _S * rho - 1.0) / (_S - 1.0)
-        left, by_u, by_open = 1.0 - thrust, steep, -steep * share
+        steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
+        left, by_u, by_open = 1.0 - thrust, steep, a * steep * share
     elif regime == GLIDE:
         left = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
     if regime in (TURN, GLIDE_TURN):
         drag = math.exp(min(x[OPEN], 3.0))
-        left, by_open = left + drag, drag
-    net = -a * left + x[GUST]
+        left, by_open = left + drag, -a * drag
     more = 0.0
     if regime == BRAKE:
-        more = -math.exp(min(x[OPEN], 3.0)) * f[FIRST_A]
-    return (
-        net + more,
-        -a * left * slope - a * by_u,
-        -a * left,
-        -a * by_open + more,
-        a,
-    )
+        more = by_open = -math.exp(min(x[OPEN], 3.0)) * f[FIRST_A]
+    elif regime == GLIDE:
+        more, by_open = -x[OPEN] * f[FIRST_A], -f[FIRST_A]
+    net = -a * left + x[GUST] + more
+    return net, -a * left * slope - a * by_u, -a * left, by_open, a
 
 
 @compiled(inline=True, uncounted=True)
@@ -133,6 +144,7 @@ def predict(
     """
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime = bank.whole[i, REGIME]
+    torque = regime == LEVEL and bank.whole[i, UNSEEN] == 1
     dt = setting.step_s / _PARTS
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
@@ -143,7 +155,7 @@ def predict(
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])
-        net, by_u, by_a, by_open, a = _force(regime, x, f, now_s, law, slope)
+        net, by_u, by_a, by_open, a = _force(regime, torque, x, f, now_s, law, slope)
         u = math.exp(x[LN_U])
         change = min(max(dt * net / u, -0.5), 0.5)
         for j in range(STATES):
@@ -184,7 +196,8 @@ def predict(
             p[OPEN, OPEN] += n.TURNS_SD**2 * dt / (60.0 * pace)
         elif regime in (DRIVEN, LEVEL):
             p[OPEN, OPEN] += n.POWER_DRIFT**2 * dt / (600.0 * pace)
-        p[GUST, GUST] += (1.0 - keep_g * keep_g) * (noise[N_GUST] * a) ** 2
+        # the wind that she meets falls less than her own way
+        p[GUST, GUST] += (1.0 - keep_g * keep_g) * noise[N_GUST] ** 2 * a * max(a, f[FIRST_A])
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
@@ -202,7 +215,14 @@ def predict(
 
 @compiled(inline=True, uncounted=True)
 def _take(
-    x: Float64, p: Float64, h: Float64, work: Float64, off: float, variance: float, bad: float
+    x: Float64,
+    p: Float64,
+    h: Float64,
+    work: Float64,
+    off: float,
+    variance: float,
+    bad: float,
+    least: float,
 ) -> float:
     """Update by one reading, good or bad; return its log density."""
     total = variance
@@ -224,12 +244,63 @@ def _take(
             for k in range(j + 1):
                 p[j, k] += (around - share) * gain * work[0, k]
                 p[k, j] = p[j, k]
+        x[LN_U] = max(x[LN_U], least)
     return math.log(density)
 
 
 @compiled(inline=True, uncounted=True)
 def _normal(off: float, sd: float) -> float:
     return math.exp(-0.5 * (off / sd) ** 2) / (_ROOT * sd)
+
+
+@compiled(inline=True, uncounted=True)
+def _as_usual(
+    f: Float64, nu: float, expected: float, wide: float, rises: float, falls: float
+) -> float:
+    """
+    Return the density of revs that are a ratio times those expected, and learn the ratio.
+
+    The error of an expectation stays as it is: it is paid for once, by the first reading, and
+    then held. `rises` is how fast the ratio may grow with each bin; it falls by a fifth.
+    """
+    ratio, now = f[REVS], nu / max(expected, 0.05)
+    if np.isnan(ratio):
+        f[REVS] = min(max(now, 0.7), 1.3)
+        return _normal(nu - expected, wide)
+    density = _normal(nu - ratio * expected, n.SHAFT_SD)
+    f[REVS] = ratio + (rises if now > ratio else falls) * min(max(now - ratio, -0.2), 0.2)
+    return density
+
+
+@compiled(uncounted=True)
+def _driving(
+    bank: Histories,
+    i: int,
+    nu: float,
+    log_first: float,
+    u_part: float,
+    now_s: float,
+    several: bool,
+) -> float:
+    """Return the density of the revs of a screw that drives."""
+    f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
+    target, settled = x[OPEN], True
+    if regime == TURN:
+        target = f[BEFORE]
+    elif regime == LEVEL:
+        share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
+        target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
+        settled = share == 1.0
+    at = math.exp(min(target - log_first, 1.0))
+    if regime == TURN or (regime == LEVEL and bank.whole[i, UNSEEN] == 1):
+        at = _advance(math.exp(min(target - x[LN_U], 1.0)), True)[0] * u_part
+    if not settled:
+        density = _normal(nu - at, 2.0 * n.SHAFT_SD)
+        return 0.5 * (density + (1.0 if nu < 1.1 else 0.0)) if several else density
+    if several and regime == LEVEL and np.isnan(f[REVS]):  # one of them may turn as before
+        f[REVS] = nu / at
+        return 0.5 * (_normal(nu - at, 2.0 * n.SHAFT_SD) + (1.0 if nu < 1.1 else 0.0))
+    return _as_usual(f, nu, at, 2.0 * n.SHAFT_SD, 0.03, 0.03)
 
 
 @compiled(uncounted=True)
@@ -239,39 +310,31 @@ def _shaft(
     """Return the log density of what the shafts do, by the regime."""
     f, regime, x = bank.number[i], bank.whole[i, REGIME], bank.mean[i]
     nu, low = said[HIGH], said[LOW]
-    sd = float(n.SHAFT_SD)
     u_part = math.exp(min(x[LN_U] - log_first, 1.0))
     if low < -0.05:
         return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
-    if regime in (DRIVEN, LEVEL):
-        target = x[OPEN]
-        if regime == LEVEL:
-            share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
-            target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
-        at = math.exp(min(target - log_first, 1.0))
-        held, f[REVS] = f[REVS], nu if np.isnan(f[REVS]) else 0.7 * f[REVS] + 0.3 * nu
-        density = 0.5 * _normal(nu - at, sd)
-        if abs(at - nu) < 0.35:  # a governor, or the sea, holds them near it
-            density += 0.5 * (1.0 if np.isnan(held) else _normal(nu - held, sd))
-        if several and regime == LEVEL:
-            density = 0.5 * density + (0.5 if at - sd < nu < 1.0 + sd else 0.0)
-    elif regime == TURN:
-        density = 3.0 if 0.75 < nu < 1.05 else 0.0
-    elif bank.whole[i, UNSEEN] == 1:
-        held, f[REVS] = f[REVS], nu if np.isnan(f[REVS]) else 0.7 * f[REVS] + 0.3 * nu
-        density = 1.0 if np.isnan(held) else _normal(nu - held, sd)
+    if regime in (DRIVEN, LEVEL, TURN):
+        density = _driving(bank, i, nu, log_first, u_part, now_s, several)
+    elif bank.whole[i, UNSEEN] == 1:  # no pitch is read: the shaft turns on as it likes
+        density = 1.0 if np.isnan(f[REVS]) else _normal(nu - f[REVS], n.SHAFT_SD)
+        f[REVS] = nu if np.isnan(f[REVS]) else 0.97 * f[REVS] + 0.03 * nu
     else:
-        risen = nu > f[REVS] + 3.0 * sd
-        f[REVS] = nu if np.isnan(f[REVS]) else min(f[REVS], nu)
-        running = regime == GLIDE and now_s - f[SINCE] < f[RAMP_S] + 10.0
-        at, wide = n.WINDMILL[0] * u_part, math.sqrt(sd * sd + (n.WINDMILL[1] * u_part) ** 2)
-        density = 0.3 * _normal(nu, 0.5 * sd)
-        if nu < n.WINDMILL[2] * u_part + sd:
-            density += 0.7 * _normal(nu - at, wide)
-        if running and nu < 1.05:
-            density = 0.5 * density + 0.5
-        if risen:
-            density = 0.0
+        left = 0.0
+        if regime == GLIDE:
+            left = 1.0 - (now_s - f[SINCE]) / (f[RAMP_S] + 10.0)
+        stands = 0.3 * _normal(nu, 0.5 * n.SHAFT_SD)
+        at, wide = n.WINDMILL[0] * u_part, math.hypot(n.SHAFT_SD, n.WINDMILL[1] * u_part)
+        if left > 0.0:
+            falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
+            density = 0.4 * (stands + 0.7 * _normal(nu - at, wide)) + (0.3 if nu < 1.05 else 0.0)
+            density += 0.3 * _normal(nu - falls, 1.5 * n.SHAFT_SD)
+        elif not np.isnan(f[REVS]):  # it may turn slower later, by its friction, but not faster
+            density = _as_usual(f, nu, u_part, wide, 0.01, 0.2)
+        else:
+            density = stands
+            if nu < n.WINDMILL[2] * u_part + n.SHAFT_SD:
+                density += 0.7 * _normal(nu - at, wide)
+            f[REVS] = min(nu / u_part, n.WINDMILL[2])
     return math.log(density + n.SHAFT_LIES)
 
 
@@ -290,6 +353,7 @@ def weigh(
     pace = setting.pace
     gained = 0.0
     bad = float(n.BAD_DENSITY)
+    least = setting.hull.first - 1.0  # at rest
     now_s = (bank.clock[0] - 0.5) * setting.step_s
     for which in (LOG, GROUND):
         if np.isnan(said[which]):
@@ -311,7 +375,7 @@ def weigh(
             h[CURRENT] = 1.0
             expected += x[CURRENT]
             sd = noise[N_GROUND]
-        gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad)
+        gained += _take(x, p, h, work, said[which] - expected, sd * sd, bad, least)
     if not np.isnan(said[ADVANCE]):
         if liar == THE_TRACK:
             gained += math.log(bad)
@@ -321,7 +385,7 @@ def weigh(
                 h[j] = 0.0
             h[WAY], h[LN_U], h[CURRENT] = 1.0, -half * u, -half
             expected = x[WAY] - half * (u + x[CURRENT])
-            gained += _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad)
+            gained += _take(x, p, h, work, -expected, noise[N_FIX] ** 2, bad, least)
     if not np.isnan(said[RATE]):
         u = math.exp(x[LN_U])
         wide = n.TURN_RATE * u / setting.hull.length_m + noise[N_RATE]

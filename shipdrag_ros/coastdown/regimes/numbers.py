@@ -64,7 +64,11 @@ RESISTANCE = _grid(
 RESISTANCE_FILE = _grid(
     'RESISTANCE_FILE', (0.15, 0.20), 'ln', 'over the baseline of the ship file: mean, sd'
 )
-DRAGGED = _grid('DRAGGED', (0.15, 0.20), 'ln', 'more in a glide: a propeller that is dragged')
+DRAGGED = _grid('DRAGGED', (0.1, 0.8), 'ln', 'more in a glide: a propeller windmills, or stands')
+DRAGGED_SHARE = _grid('DRAGGED_SHARE', (0.7, 0.3), '1', 'of these')
+DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.35), 'ln', 'of each')
+DRAGGED_EXPONENT_SD = _number('DRAGGED_EXPONENT_SD', 0.2, '1', 'a propeller drags by another law')
+WIND_SD = _number('WIND_SD', 0.06, 'of the first resistance', 'a force that stays as she slows')
 KEPT_SD = _number('KEPT_SD', 0.15, 'ln', 'of a resistance learnt under power, taken to a glide')
 EXPONENT = _grid('EXPONENT', (0.45, 0.6), '1', 'over that of friction: mean, sd; waves have 4')
 EXPONENT_FILE = _grid('EXPONENT_FILE', (0.1, 0.3), '1', 'over that of the baseline: mean, sd')
@@ -91,6 +95,7 @@ LIES_FIRST = _number('LIES_FIRST', 0.01, '1', 'it has never said anything true')
 
 # switches, each an hour
 STOP = _number('STOP', 0.5, '1/h', 'driven to gliding')
+TOLD = _grid('TOLD', (0.9, 5.0), '1, s', 'a stop that a person tells is one: chance, and error')
 LEVEL = _number('LEVEL', 0.5, '1/h', 'driven to another level')
 TURN = _number('TURN', 1.0, '1/h', 'driven to turning')
 MANOEUVRE = _number('MANOEUVRE', 6.0, '1/h', 'all three within `MANOEUVRING_S` of a switch')
@@ -98,7 +103,7 @@ MANOEUVRING_S = _number('MANOEUVRING_S', 1800.0, 's', 'manoeuvres come in groups
 OF_MANOEUVRES = _grid('OF_MANOEUVRES', (0.3, 0.5, 0.2), '1', 'stop, level, turn')
 AFTER_KICK = _number('AFTER_KICK', 0.6, '1', 'of switches after one from a glide: stops')
 GLIDE_LEVEL = _number('GLIDE_LEVEL', 4.0, '1/h', 'gliding to a level')
-GLIDE_BRAKE = _number('GLIDE_BRAKE', 1.0, '1/h', 'gliding to braked')
+GLIDE_BRAKE = _number('GLIDE_BRAKE', 0.5, '1/h', 'gliding to braked')
 GLIDE_TURN = _number('GLIDE_TURN', 0.5, '1/h', 'gliding to turning without thrust')
 BRAKE_GLIDE = _number('BRAKE_GLIDE', 6.0, '1/h', 'braked to gliding')
 BRAKE_LEVEL = _number('BRAKE_LEVEL', 2.0, '1/h', 'braked to a level')
@@ -115,7 +120,7 @@ LEVELS_SHARE = _grid('LEVELS_SHARE', (0.1, 0.3, 0.25, 0.2, 0.1, 0.05), '1', 'of 
 LEVELS_SD = _number('LEVELS_SD', 0.12, 'ln', 'of each')
 LEVEL_RAMP_S = _grid('LEVEL_RAMP_S', (15.0, 60.0), 's', 'from level to level')
 ENGAGE_S = _number('ENGAGE_S', 10.0, 's', 'from no thrust to a level')
-BRAKES = _grid('BRAKES', (0.3, 1.0), 'of the first resistance', 'astern power')
+BRAKES = _grid('BRAKES', (0.4, 1.0), 'of the first resistance', 'astern power')
 BRAKES_SD = _number('BRAKES_SD', 0.47, 'ln', 'a factor of 1.6 either way')
 TURNS = _grid('TURNS', (0.35, 1.1), 'of the resistance', 'helm')
 TURNS_SD = _number('TURNS_SD', 0.3, 'ln', 'of each, and its drift in a minute')
@@ -130,7 +135,7 @@ PITCH_UNSEEN = _number('PITCH_UNSEEN', 0.1, '1', 'share of glides with the shaft
 SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 
 # what is made of it: the only loss
-ANNOUNCE = _grid('ANNOUNCE', (0.7, 0.3), '1', 'P(gliding) above, and again below')
+ANNOUNCE = _grid('ANNOUNCE', (0.7, 0.03), '1', 'P(gliding) above, and again below')
 HOLD = _grid('HOLD', (0.35, 0.4), '1', 'smoothed P(gliding) in a coastdown, and its peak')
 SHORTEST_S = _number('SHORTEST_S', 30.0, 's', 'of a coastdown')
 EVEN = _grid('EVEN', (0.98, 120.0), '1, s', 'a ship that keeps so much so long glides no more')

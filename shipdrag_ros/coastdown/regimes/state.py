@@ -106,6 +106,8 @@ class BankSetting(NamedTuple):
         How many are read.
     glides
         Probability that the record begins in a glide.
+    told_s
+        When a person says that the engine was stopped [s since the start]; NaN where nobody does.
     """
 
     hull: HullPrior
@@ -113,6 +115,7 @@ class BankSetting(NamedTuple):
     pace: float
     shafts: int
     glides: float
+    told_s: float
 
     @classmethod
     def of(
@@ -121,4 +124,4 @@ class BankSetting(NamedTuple):
         """
         Return the setting of a bank with bins of `step_s`.
         """
-        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides)
+        return cls(hull, step_s, step_s / n.BIN_S, shafts, glides, np.nan)

@@ -113,6 +113,12 @@ class RegimeFilter:
         self._astern = not math.isnan(low) and low < -0.05
         return True
 
+    def tell(self, stop_s: float) -> None:
+        """
+        Take it from a person that the engine was stopped [s since the epoch].
+        """
+        self._setting = self._setting._replace(told_s=stop_s - self._first * self._width)
+
     @property
     def gliding(self) -> float:
         """P(gliding) now, the run-down with it."""

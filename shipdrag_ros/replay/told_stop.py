@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A stop of the engine that a person tells, put into the run where it was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from datetime import datetime
+
+import numpy as np
+
+from shipdrag_ros.bags.run import Mark, Run
+from shipdrag_ros.errors import BagError
+from shipdrag_ros.samples import SECOND_NS, Block
+
+StopTime = float | datetime
+"""In s from the start of the bag, or as a time of day with its zone."""
+
+
+def told_ns(run: Run, stop: StopTime) -> int:
+    """
+    Return when a stop was told [ns, time of arrival].
+
+    Raises
+    ------
+    BagError
+        If it lies outside of the bag.
+    """
+    span = run.span_ns
+    start_ns, end_ns = (0, -1) if span is None else span
+    if isinstance(stop, datetime):
+        at_ns = round(stop.timestamp() * SECOND_NS)
+    else:
+        at_ns = start_ns + round(stop * SECOND_NS)
+    if not start_ns <= at_ns <= end_ns:
+        at_s, length_s = (at_ns - start_ns) / SECOND_NS, max(end_ns - start_ns, 0) / SECOND_NS
+        raise BagError(
+            f'stop at {at_s:.3f} s: expected inside of {run.name!r}, '
+            f'which is {length_s:.3f} s long'
+        )
+    return at_ns
+
+
+class ToldStop(int):
+    """The stamp of a stop that was told [ns]."""
+
+
+def with_stop(
+    items: Iterable[Block | Mark], at_ns: int | None
+) -> Iterator[Block | Mark | ToldStop]:
+    """
+    Put a stop between the samples of a run.
+
+    Parameters
+    ----------
+    items
+        In the order of arrival.
+    at_ns
+        Its time of arrival [ns]; the stamps of the samples may be of another clock.
+    """
+    for item in items:
+        if at_ns is None or not isinstance(item, Block) or not len(item):
+            yield item
+            continue
+        first = int(np.argmax(item.receive_ns >= at_ns)) if item.receive_ns[-1] >= at_ns else -1
+        if first < 0:
+            yield item
+            continue
+        near = max(first - 1, 0)
+        yield item[:first]
+        yield ToldStop(at_ns + int(item.stamp_ns[near] - item.receive_ns[near]))
+        yield item[first:]
+        at_ns = None
