@@ -135,24 +135,11 @@ def diagnose(
     if engine == 'one':
         if earlier:
             notes = (*notes, 'earlier diagnoses do not count in the one posterior yet')
-
-        def observe(
-            moved_s: Mapping[str, float],
-        ) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
-            if not any(moved_s.values()):
-                return seen, notes
-            return _observed(runs, ship, parameters, moved_s, progress)
-
-        found_one = diagnose_one(observe, ship, lambda these: _stated(runs, these, ship, facts))
-        return replace(found_one, runs=_seen_runs(seen))
+        return _by_one((seen, notes), runs, ship, parameters, facts, progress)
     model, found, stated, notes = _searched(
         (seen, notes), runs, ship, parameters, facts, earlier, progress
     )
     seen = model.seen
-    found = with_swinging(found, model)
-    found = with_pairs(with_differing(found, model), progress=progress)
-    found = with_nameless(found, model)
-    found = with_unnamed(found)
     best, judged = found.best, judge(found)
     would_decide: tuple[Advice, ...] = ()
     if advise and judged.verdict is Verdict.ONE_OF:
@@ -221,7 +208,31 @@ def _searched(
         if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
             break
         moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
-    return model, found, stated, notes
+    found = with_swinging(found, model)
+    found = with_pairs(with_differing(found, model), progress=progress)
+    found = with_nameless(found, model)
+    return model, with_unnamed(found), stated, notes
+
+
+def _by_one(
+    first: tuple[tuple[Observation, ...], tuple[str, ...]],
+    runs: Sequence[CoastRun],
+    ship: Ship,
+    parameters: Parameters,
+    facts: Sequence[Fact],
+    progress: Progress,
+) -> DiagnosisResult:
+    """Diagnose by the one posterior, which observes the runs again where it moves their stops."""
+
+    def observe(
+        moved_s: Mapping[str, float],
+    ) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
+        if not any(moved_s.values()):
+            return first
+        return _observed(runs, ship, parameters, moved_s, progress)
+
+    answer = diagnose_one(observe, ship, lambda these: _stated(runs, these, ship, facts))
+    return replace(answer, runs=_seen_runs(first[0]))
 
 
 def _stated(

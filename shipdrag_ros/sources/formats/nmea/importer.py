@@ -303,13 +303,7 @@ def _result(
             f'{str(log.path)!r} gave no sample from {taken.count} sentence(s); '
             f'{"; ".join(reasons) or "give a log with any of " + ", ".join(READERS)}'
         )
-    not_used: Counter[str] = Counter()
-    unknown: Counter[str] = Counter()
-    for (talker, kind), count in taken.addresses.items():
-        if kind not in READERS and kind not in TIMED and talker not in READERS:
-            not_used[talker + kind] += count
-        if kind and talker not in NMEA_TALKERS:
-            unknown[talker] += count
+    not_used, unknown = _of_no_use(taken)
     chosen = taken.chosen()
     sources: dict[str, dict[str, None]] = {}
     not_taken: dict[str, Counter[str]] = {}
@@ -351,6 +345,18 @@ def _result(
             for channel, first in sorted(into.first.items())
         ),
     )
+
+
+def _of_no_use(taken: TakenSentences) -> tuple[Counter[str], Counter[str]]:
+    """Return how many sentences are of kinds without a reader, and of unknown talkers."""
+    not_used: Counter[str] = Counter()
+    unknown: Counter[str] = Counter()
+    for (talker, kind), count in taken.addresses.items():
+        if kind not in READERS and kind not in TIMED and talker not in READERS:
+            not_used[talker + kind] += count
+        if kind and talker not in NMEA_TALKERS:
+            unknown[talker] += count
+    return not_used, unknown
 
 
 def _out_of_order(block: Block) -> tuple[int, int]:
