@@ -95,7 +95,7 @@ CASES = (
         'nine hulls, of which others cannot be predicted',
         _residual(*_HULLS[: 1 + 9 * 8]),
         0,
-        'NOTE: 9 hulls determine 14 of 15 coefficients',
+        '9 hulls determine 14 of 15 coefficients',
     ),
     _case(
         'a ship that is outside the data',
