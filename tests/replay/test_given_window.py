@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.coastdown.events import Dismissal, EndedBy, EndedCoastdown, Event
 from shipdrag_ros.errors import BagError
@@ -82,7 +83,7 @@ def test_a_window_is_estimated_without_an_onset(recording: tuple[Path, list[Even
     assert coastdown.estimate is not None
     assert coastdown.heading_rad == pytest.approx(0.7, abs=0.005)
     assert coastdown.estimate.samples['speed_through_water'] == 571
-    assert result.recorded == Recorded(0, 0, None)
+    assert result.recorded == Recorded(0, 0, None, by=__version__)
     shorter = replay(run, window=(430.0, 700.0)).coastdowns[0].estimate
     assert shorter is not None
     assert shorter.curve.speed_m_s[0] > coastdown.estimate.curve.speed_m_s[0]
