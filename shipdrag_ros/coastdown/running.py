@@ -24,8 +24,10 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.forecast.foretell import foretell
 from shipdrag_ros.forecast.path import PathAhead
+from shipdrag_ros.forecast.result import Forecast
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
 from shipdrag_ros.ship import Ship
@@ -100,15 +102,9 @@ class RunningCoastdown:
 
     def _with_forecast(self, stamp_ns: int, found: Estimate, window: Window) -> Update:
         try:
-            forecast = foretell(
-                found,
-                self._ship,
-                froude_min=self._parameters.froude_min,
-                speeds_m_s=self._parameters.forecast_speeds,
-            )
+            return Update(stamp_ns, found, *_ahead(found, window, self._ship, self._parameters))
         except EstimationError:  # nothing is left to foretell
             return Update(stamp_ns, found)
-        return Update(stamp_ns, found, forecast, PathAhead.of(window, forecast))
 
     def end(
         self,
@@ -175,6 +171,22 @@ class RunningCoastdown:
         before_ns = round(self._parameters.steady_s * SECOND_NS)
         first_ns = start_ns - before_ns if start_ns == self.onset.start_ns else start_ns
         return self._cut(start_ns, end_ns, first_ns)
+
+
+def _rest_of_the_glide(
+    found: Estimate, window: Window, ship: Ship, parameters: Parameters
+) -> tuple[Forecast, PathAhead | None]:
+    """Foretell times, distances and places."""
+    forecast = foretell(
+        found,
+        ship,
+        froude_min=parameters.froude_min,
+        speeds_m_s=parameters.forecast_speeds,
+    )
+    return forecast, PathAhead.of(window, forecast)
+
+
+_ahead = shielded(_rest_of_the_glide, 'forecast', '')
 
 
 def too_vague(found: Estimate, parameters: Parameters) -> str:

@@ -1,37 +1,43 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever goes wrong in an estimator is a failure with words, and ends nothing else."""
+"""A defect in an estimate or a forecast is a failure with words, and ends nothing else."""
 
 from __future__ import annotations
 
 import logging
 import traceback
+from collections.abc import Callable
 from functools import wraps
+from typing import ParamSpec, TypeVar
 
 from shipdrag_ros.errors import EstimationError, ShipdragError
-from shipdrag_ros.estimation.estimator import WindowEstimator
-from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.ship import Ship
+
+_P = ParamSpec('_P')
+_R = TypeVar('_R')
 
 _log = logging.getLogger(__name__)
 _logged: set[tuple[str, int]] = set()  # file and line of defects whose trace is in the log
 
 
-def shielded(estimator: WindowEstimator) -> WindowEstimator:
+def shielded(
+    call: Callable[_P, _R],
+    what: str = 'estimator',
+    remedy: str = ', or set `estimator` to another',
+) -> Callable[_P, _R]:
     """
-    Return an estimator whose every error is an `EstimationError`.
+    Return a function whose every error is an `EstimationError`.
 
     Parameters
     ----------
-    estimator
+    call
         Any; a defect in it is logged once, with its trace.
+    what, remedy
+        What failed, and what the user can do besides a report of the defect.
     """
 
-    @wraps(estimator)
-    def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
+    @wraps(call)
+    def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         try:
-            return estimator(window, ship, parameters)
+            return call(*args, **kwargs)
         except EstimationError:
             raise
         except ShipdragError as error:
@@ -41,10 +47,10 @@ def shielded(estimator: WindowEstimator) -> WindowEstimator:
             place = (last.filename, last.lineno or 0)
             if place not in _logged:
                 _logged.add(place)
-                _log.exception('an estimator failed; this is a defect of the program')
+                _log.exception('the %s failed; this is a defect of the program', what)
             raise EstimationError(
-                f'the estimator failed ({type(error).__name__}: {error}), which is a defect of '
-                'the program: report it with the trace in the log, or set `estimator` to another'
+                f'the {what} failed ({type(error).__name__}: {error}), which is a defect of '
+                f'the program: report it with the trace in the log{remedy}'
             ) from error
 
-    return estimate
+    return guarded

@@ -153,11 +153,13 @@ def test_a_clock_that_was_set_resets_and_says_so(ship, record, jumps: str) -> No
     (coastdown,), (reset,) = of(EndedCoastdown, events), of(Reset, events)
     assert coastdown.ended_by is EndedBy.RESET
     assert coastdown.end_ns == int(block.stamp_ns[half - 1])
-    assert reset.receive_ns == int(later.receive_ns[0])
-    assert '3599.000 s' in reset.reason
+    # a stamp or two far back are late; three that ascend are a clock that was set
+    late = 2 if jumps == 'stamp' else 0
+    assert reset.receive_ns == int(later.receive_ns[late])
+    assert f'{3599 - late}.000 s' in reset.reason
     assert ('speed_through_water' in reset.reason) == (jumps == 'stamp')
     rejected = watched.health()['speed_through_water'].rejected
-    assert rejected == {}
+    assert rejected == ({'late': late} if late else {})
 
 
 def test_silence_of_the_log_ends_a_coastdown_though_others_go_on(ship, record, sensors) -> None:

@@ -9,7 +9,7 @@ from importlib.resources import files
 import pytest
 
 from shipdrag_ros.coastdown import Monitor
-from shipdrag_ros.coastdown.events import EndedCoastdown, NoEstimate
+from shipdrag_ros.coastdown.events import EndedCoastdown, NoEstimate, Update
 from shipdrag_ros.errors import EstimationError, ShipFileError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.estimation.shield import shielded
@@ -47,3 +47,21 @@ def test_errors_with_words_keep_them() -> None:
 
     with pytest.raises(EstimationError, match='length_m: missing'):
         shielded(refuses)(None, SHIP, Parameters())  # type: ignore[arg-type]
+
+
+def test_a_forecast_that_fails_costs_the_forecast_alone(caplog: pytest.LogCaptureFixture) -> None:
+    block = sense(
+        simulate(SHIP, Scenario(speed_m_s=6.0, duration_s=900.0)), standard_sensors(), seed=1
+    )
+
+    def vague(window: Window, ship: Ship, parameters: Parameters) -> Window:
+        return window
+
+    monitor = Monitor(SHIP, Parameters(), estimate=vague, final=vague)  # type: ignore[arg-type]
+    with caplog.at_level(logging.ERROR):
+        events = monitor.update(block)
+    updates = [event for event in events if isinstance(event, Update)]
+    assert len(updates) > 10
+    assert all(update.forecast is None for update in updates)
+    assert 'the forecast failed' in caplog.text
+    assert len(caplog.records) <= 1  # its trace once

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from shipdrag_ros import __version__
 from shipdrag_ros.bags import BagWriter, open_runs
 from shipdrag_ros.coastdown.events import (
     EndedBy,
@@ -43,8 +44,9 @@ def test_replay_gives_the_live_figures_bit_for_bit(
     result = replayed(path)
     updates = [event for event in events if isinstance(event, Update)]
     assert len(updates) > 10
-    # speed, resistance and curve of each, and the curve once more at the end
-    assert result.recorded == Recorded(3 * len(updates) + 1, 3 * len(updates) + 1, None)
+    # speed, resistance, curve, forecast and path of each; the last three once more at the end
+    count = 5 * len(updates) + 3
+    assert result.recorded == Recorded(count, count, None, by=__version__)
     assert result.parameters == parameters
     assert result.ship == ship
     (coastdown,) = result.coastdowns
@@ -65,7 +67,7 @@ def test_what_is_not_compared_is_left_out_and_the_final_figure_is_the_same(
     path, events = recording
     (run,) = open_runs([path])
     result = replay(run, compare=False)
-    assert result.recorded == Recorded(0, 0, None)
+    assert result.recorded == Recorded(0, 0, None, by=__version__)
     (found,) = result.coastdowns
     (live,) = (event for event in events if isinstance(event, EndedCoastdown))
     assert (found.start_ns, found.end_ns) == (live.start_ns, live.end_ns)
@@ -93,7 +95,7 @@ def test_also_when_recording_starts_in_mid_run(
     session.stop(int(block.receive_ns[-1]))
     result = replayed(tmp_path / 'a.mcap')
     after = sum(isinstance(event, Update) for event in session.events) - before
-    assert result.recorded == Recorded(3 * after + 1, 3 * after + 1, None)
+    assert result.recorded == Recorded(5 * after + 3, 5 * after + 3, None, by=__version__)
 
 
 def test_also_when_recording_stops_before_the_node(
@@ -107,7 +109,7 @@ def test_also_when_recording_stops_before_the_node(
     session.stop(int(block.receive_ns[-1]), finish=False)
     result = replayed(tmp_path / 'a.mcap')
     updates = sum(isinstance(event, Update) for event in session.events)
-    assert result.recorded == Recorded(3 * updates, 3 * updates, None)
+    assert result.recorded == Recorded(5 * updates, 5 * updates, None, by=__version__)
     assert len(result.coastdowns) == 1  # which the recording does not know to have ended
 
 
@@ -138,7 +140,7 @@ def test_another_ship_or_parameters_are_used_and_not_compared(
     (run,) = open_runs([path])
     own = replay(run)
     larger = replay(run, ship=replace(ship, length_m=170.0))
-    assert larger.recorded == Recorded(0, 0, None)
+    assert larger.recorded == Recorded(0, 0, None, by=__version__)
     assert larger.ship.length_m == 170.0
     assert own.coastdowns[0].estimate is not None
     assert larger.coastdowns[0].estimate is not None
@@ -147,7 +149,7 @@ def test_another_ship_or_parameters_are_used_and_not_compared(
         < own.coastdowns[0].estimate.curve.froude[-1]
     )
     speed_only = replay(run, parameters=replace(parameters, estimator='s1_speed'))
-    assert speed_only.recorded == Recorded(0, 0, None)
+    assert speed_only.recorded == Recorded(0, 0, None, by=__version__)
     assert speed_only.coastdowns[0].estimate is not None
     assert speed_only.coastdowns[0].estimate.estimator == 's1_speed'
     # the same as its own, given explicitly, is compared
