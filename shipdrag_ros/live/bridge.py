@@ -146,8 +146,11 @@ class Bridge:
     def show_verdict(self, state: str, sentence: str) -> None:
         """
         Show how far the diagnosis is, and why there is none; `done`: the last one is shown.
+
+        Until its document is there, its sentence is shown alone.
         """
-        self._verdict = {'state': state, 'sentence': sentence}
+        rest: dict[str, list[Any]] = {'sizes': [], 'probabilities': [], 'decide': []}
+        self._verdict = {'state': state, 'sentence': sentence, **rest}
 
     def take_diagnosis(self, found: Mapping[str, Any]) -> None:
         """
