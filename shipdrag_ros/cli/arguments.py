@@ -67,6 +67,19 @@ def stop_time(text: str) -> float | datetime:
     return at
 
 
+def add_stop(parser: argparse.ArgumentParser) -> None:
+    """
+    Add `--stop TIME`.
+    """
+    parser.add_argument(
+        '--stop',
+        type=stop_time,
+        metavar='TIME',
+        help='the engine was stopped then, within some seconds [s from the start of the bag, or '
+        'ISO 8601 with its zone]: evidence that the regimes weigh with the rest',
+    )
+
+
 def number(
     low: float, high: float = math.inf, *, unit: str = '', above: bool = False
 ) -> Callable[[str], float]:

@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest='sails',
         action='store_true',
         help='also sail a simulated ship past the node over ROS topics, replay what it records '
-        'and compare with the truth: PASS, or what failed (15 s once compiled)',
+        'and compare with the truth: PASS, or what failed',
     )
     add_json(parser)
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.cli.arguments import add_json, add_remap, number
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_stop, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.forecast import words
@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='S',
         help='when forecasts are made, from each stop on [s]',
     )
+    add_stop(parser)
     add_remap(parser)
     add_json(parser)
 
@@ -62,14 +63,15 @@ def run(options: argparse.Namespace) -> int:
     ship = None if options.ship is None else Ship.load(options.ship)
     parameters = None if options.parameters is None else Parameters.load(options.parameters)
     results = [
-        replay_run(each, output, ship=ship, parameters=parameters, window=own)
+        replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
         for each, own in open_windowed(options.bags, remap=dict(options.remap), output=output)
     ]
     found = forecast(results, options.after)
-    for line in found.summary().splitlines() if found.why_none else ():
-        output.say(line)
     for each in found.made:
         _show(output, each)
+    for bag, why in found.without:
+        output.heading(bag)
+        output.say(why)
     output.json(document(found))
     return 0
 
@@ -111,6 +113,10 @@ def document(found: Forecasts) -> dict[str, Any]:
             }
             for each in found.made
             if each.checked is None
+        ]
+        + [
+            {'bag': bag, 'stop_ns': None, 'after_s': None, 'reason': why}
+            for bag, why in found.without
         ],
     }
 

@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, stop_time
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, add_stop, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.display import json_text
-from shipdrag_ros.errors import BagError
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation import words as estimate_words
 from shipdrag_ros.estimation.force import Force
@@ -67,13 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='estimate from this part [s from the start of the bag], without looking for a '
         'coastdown, of each bag without a window of its own; what in it is no coastdown is cut',
     )
-    parser.add_argument(
-        '--stop',
-        type=stop_time,
-        metavar='TIME',
-        help='the engine was stopped then, within some seconds [s from the start of the bag, or '
-        'ISO 8601 with its zone]: evidence that the regimes weigh with the rest',
-    )
+    add_stop(parser)
     add_remap(parser)
     parser.add_argument(
         '--compare',
@@ -103,8 +96,6 @@ def run(options: argparse.Namespace) -> int:
         need(*REPORT_MODULES)
         options.out.mkdir(parents=True, exist_ok=True)
     window = None if options.window is None else tuple(options.window)
-    if window is not None and options.stop is not None:
-        raise BagError('--window and --stop: give one of them')
     results = [
         replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
         for each, own in open_windowed(

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from shipdrag_ros.coastdown.events import EndedCoastdown
 from shipdrag_ros.coastdown.running import too_vague
 from shipdrag_ros.display import Table, speed_unit, utc
@@ -70,8 +72,8 @@ class Forecasts(Shown):
     ----------
     made
         In the order of the glides and of time.
-    why_none
-        Why there is no glide, where that is so.
+    without
+        Of each run without a glide, why there is none.
 
     Raises
     ------
@@ -94,10 +96,11 @@ class Forecasts(Shown):
     """
 
     made: tuple[GlideForecast, ...]
-    why_none: str = ''
+    without: tuple[tuple[str, str], ...] = ()
 
     def _lines(self) -> Sequence[str]:
-        return [self.why_none] if self.why_none else [_line(each) for each in self.made]
+        none = [f'{bag}: {why}' for bag, why in self.without]
+        return [*(_line(each) for each in self.made), *none]
 
     def table(self) -> Table:
         """
@@ -188,7 +191,7 @@ def _line(each: GlideForecast) -> str:
     return f'{head}: {said}.{judged}{beside}'
 
 
-def forecast(runs: Sequence[RunResult], after_s: Sequence[float]) -> Forecasts:
+def forecast(runs: Sequence[RunResult], after_s: float | Sequence[float]) -> Forecasts:
     """
     Make forecasts of each glide of some runs.
 
@@ -203,19 +206,23 @@ def forecast(runs: Sequence[RunResult], after_s: Sequence[float]) -> Forecasts:
     EstimationError
         If a time is not above 0, or there is none.
     """
-    if not after_s or not all(0.0 < each < math.inf for each in after_s):
+    try:
+        times_s = np.atleast_1d(np.asarray(after_s, np.float64)).tolist()
+    except (TypeError, ValueError):
+        times_s = []
+    if not times_s or not all(0.0 < each < math.inf for each in times_s):
         raise EstimationError(
-            f'forecasts after {", ".join(map(str, after_s)) or "nothing"}: give times above 0, '
-            'in s from the stop'
+            f'forecasts after {after_s!r}: give times above 0, in s from the stop'
         )
-    made = [
-        each
-        for run in runs
-        if run.replayed is not None
-        for each in forecast_run(run.replayed, after_s)
-    ]
-    why = '' if made else ' '.join(line for run in runs for line in run.summary())
-    return Forecasts(tuple(made), why)
+    made: list[GlideForecast] = []
+    without: list[tuple[str, str]] = []
+    for run in runs:
+        glides = [] if run.replayed is None else list(forecast_run(run.replayed, times_s))
+        made += glides
+        if not glides:
+            dismissed = (f'{utc(one.start_ns)}: {one.text}.' for one in run.dismissed)
+            without.append((run.bag, ' '.join((*run.summary(), *dismissed))))
+    return Forecasts(tuple(made), tuple(without))
 
 
 def forecast_run(result: ReplayResult, after_s: Sequence[float]) -> Iterator[GlideForecast]:
@@ -249,16 +256,17 @@ def _forecast(
     result: ReplayResult, window: Window, after_s: float, followed: Followed | None, unseen: str
 ) -> GlideForecast:
     ship, parameters = result.ship, result.parameters
-    stop_ns, end_ns = window.start_ns, window.start_ns + round(after_s * SECOND_NS)
+    stop_ns, length_s = window.start_ns, (window.end_ns - window.start_ns) / SECOND_NS
     bag = result.run.name
 
     def none(why: str) -> GlideForecast:
         return GlideForecast(bag, ship, stop_ns, after_s, None, why)
 
-    if end_ns >= window.end_ns:
-        return none(f'the glide ends {(window.end_ns - stop_ns) / SECOND_NS:.0f} s after the stop')
+    if after_s >= length_s:
+        return none(f'the glide ends {length_s:.0f} s after the stop')
     try:
-        found = estimate(window.part(stop_ns, end_ns), ship, parameters)
+        so_far = window.part(stop_ns, stop_ns + round(after_s * SECOND_NS))
+        found = estimate(so_far, ship, parameters)
         if why := too_vague(found, parameters):
             return none(why)
         forecast = foretell(

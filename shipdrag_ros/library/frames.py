@@ -47,12 +47,18 @@ class FrameTable(LogTable):
     Raises
     ------
     ImportDataError
-        If the frame has no row, or is a lazy one.
+        If the frame has no row, two columns of one name, or is a lazy one.
     """
 
     def __init__(self, frame: Any) -> None:
         if callable(getattr(frame, 'collect', None)):
             raise ImportDataError('a lazy frame holds no values yet; give frame.collect()')
+        names = [str(name) for name in frame.columns]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ImportDataError(
+                f'the frame has {names.count(twice)} columns {twice!r}; name each differently'
+            )
         named = [(str(name), frame[name]) for name in frame.columns]
         index = getattr(frame, 'index', None)
         if str(getattr(index, 'dtype', '')).startswith('datetime64'):

@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from shipdrag_ros.bags import Run
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError, EstimationError
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
@@ -150,6 +151,12 @@ def replay_run(
             replay(
                 each, ship=ship, parameters=parameters, window=window, stop=stop, progress=progress
             )
+        )
+    if stop is not None:
+        begins = ', '.join(utc(one.start_ns) for one in result.coastdowns) or 'there is none'
+        listener.log(
+            f'{each.name}: the stop that is given is weighed by the regime filter; coastdowns '
+            f'begin at: {begins}'
         )
     if not result.coastdowns:
         astern = _astern(each)

@@ -102,7 +102,7 @@ class Resistance(ShownResistance):
         """
         return document(self.runs)
 
-    def forecast(self, after: Sequence[float] = forecasts.AFTER_S) -> forecasts.Forecasts:
+    def forecast(self, after: float | Sequence[float] = forecasts.AFTER_S) -> forecasts.Forecasts:
         """
         Foretell the rest of each glide, from what was known at some times after its stop.
 

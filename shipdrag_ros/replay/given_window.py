@@ -85,7 +85,8 @@ def read_window(run: Run, parameters: Parameters, window: tuple[float, float]) -
             f'{run.name!r}, which is {length_s:.3f} s long'
         )
     start_ns = span[0] + round(start_s * SECOND_NS)
-    end_ns = min(span[0] + round(end_s * SECOND_NS), span[1])  # of what is not there, nothing
+    # of what is not there, nothing
+    end_ns = span[1] if end_s >= length_s else span[0] + round(end_s * SECOND_NS)
     margin_ns = round((parameters.frozen_s + parameters.late_s) * SECOND_NS) + _SET_CLOCK_NS
     around = run.inputs(start_ns=max(start_ns - margin_ns, 0), end_ns=end_ns + margin_ns)
     block = concatenate([item for item in around if isinstance(item, Block)])

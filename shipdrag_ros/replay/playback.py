@@ -150,12 +150,14 @@ def replay(
     Raises
     ------
     BagError
-        If the bag has no input, no ship file where none is given, or the
-        window or the stop lies outside of it.
+        If the bag has no input, no ship file where none is given, the window or
+        the stop lies outside of it, or both are given.
     ShipFileError, ParameterError
         If those attached to the bag cannot be used.
     """
     used_ship, used_parameters = settings_of(run, ship, parameters)
+    if window is not None and stop is not None:
+        raise BagError(f'{run.name!r}: a window and a stop are given; give one of them')
     if window is not None:
         return _in_window(run, used_ship, used_parameters, window)
     told = None if stop is None else told_ns(run, stop)

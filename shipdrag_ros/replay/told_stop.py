@@ -9,6 +9,7 @@ from datetime import datetime
 import numpy as np
 
 from shipdrag_ros.bags.run import Mark, Run
+from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import SECOND_NS, Block
 
@@ -27,17 +28,18 @@ def told_ns(run: Run, stop: StopTime) -> int:
     """
     span = run.span_ns
     start_ns, end_ns = (0, -1) if span is None else span
-    if isinstance(stop, datetime):
-        at_ns = round(stop.timestamp() * SECOND_NS)
-    else:
-        at_ns = start_ns + round(stop * SECOND_NS)
-    if not start_ns <= at_ns <= end_ns:
-        at_s, length_s = (at_ns - start_ns) / SECOND_NS, max(end_ns - start_ns, 0) / SECOND_NS
+    said, at_s = (
+        (f'{stop} s', stop)
+        if not isinstance(stop, datetime)
+        else (stop.isoformat(), stop.timestamp() - start_ns / SECOND_NS)
+    )
+    length_s = (end_ns - start_ns) / SECOND_NS
+    if not 0.0 <= at_s <= length_s:
         raise BagError(
-            f'stop at {at_s:.3f} s: expected inside of {run.name!r}, '
-            f'which is {length_s:.3f} s long'
+            f'stop at {said}: expected inside of {run.name!r}, which begins at {utc(start_ns)} '
+            f'and is {max(length_s, 0.0):.3f} s long'
         )
-    return at_ns
+    return start_ns + round(at_s * SECOND_NS)
 
 
 class ToldStop(int):

@@ -31,7 +31,10 @@ def recorded_sentence(recorded: Recorded) -> str:
     Say whether the replayed outputs are those in the bag.
     """
     if not recorded.compared:
-        return 'The bag holds no outputs of its own to compare with.'
+        return (
+            'No outputs of the bag were compared: it holds none, or was replayed with another '
+            'ship file, other parameters, a window or a stop.'
+        )
     if recorded.identical == recorded.compared:
         return f'All {recorded.compared} outputs in the bag are identical to the replayed ones.'
     if recorded.largest_difference < _ROUNDING:

@@ -71,8 +71,21 @@ def test_a_script_gets_the_same(found: dict[str, Any], coastdown_bag: Path) -> N
 
 
 def test_no_glide_is_said(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(['forecast', str(steady_bag)]) == 0
-    assert 'No coastdown found' in capsys.readouterr().out
+    assert main(['forecast', str(steady_bag), '--json']) == 0
+    told = capsys.readouterr()
+    assert f'{steady_bag}\nNo coastdown found' in told.err
+    (none,) = json.loads(told.out)['not_made']
+    assert (none['bag'], none['stop_ns']) == (str(steady_bag), None)
+    assert 'No coastdown found' in none['reason']
+
+
+def test_a_bag_without_a_glide_is_said_beside_one_with_a_glide(
+    steady_bag: Path, coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['forecast', str(coastdown_bag), str(steady_bag), '--after', '1e305']) == 0
+    told = capsys.readouterr().out
+    assert 'the glide ends' in told
+    assert 'No coastdown found' in told
 
 
 def test_a_time_that_is_none(coastdown_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -82,3 +95,6 @@ def test_a_time_that_is_none(coastdown_bag: Path, capsys: pytest.CaptureFixture[
     result = sd.estimate(sd.read(coastdown_bag), window=(300.0, 1800.0))
     with pytest.raises(sd.ShipdragError, match='give times above 0'):
         result.forecast(after=())
+    with pytest.raises(sd.ShipdragError, match='give times above 0'):
+        result.forecast(after='soon')  # type: ignore[arg-type]
+    assert len(result.forecast(after=300.0).made) == 1

@@ -105,7 +105,7 @@ def test_the_words_give_every_figure(
         'speed [knots]  resistance [kN]',
         'true r',
         'speed_through_water      1801  1801         -',
-        'no outputs of its own',
+        'No outputs of the bag were compared',
     ):
         assert text in captured.out
     assert captured.err == ''

@@ -117,6 +117,12 @@ def test_a_window_outside_of_the_bag(
         replay(run, window=window)
 
 
+def test_a_window_ends_with_the_bag_at_the_latest(recording: tuple[Path, list[Event]]) -> None:
+    (run,) = open_runs([recording[0]])
+    ends = [replay(run, window=(410.0, end_s)).coastdowns[0].end_ns for end_s in (1e5, 1e305)]
+    assert ends[0] == ends[1]
+
+
 def test_a_window_is_of_stamps_even_if_the_recorder_has_another_clock(
     tmp_path: Path, ship: Ship, voyage: Callable[..., Block], write_run: WriteRun
 ) -> None:

@@ -40,13 +40,16 @@ def test_a_stop_is_of_the_clock_of_the_bag(
     assert starts[0] == starts[1]
 
 
-@pytest.mark.parametrize('stop', [-1.0, 1e6, datetime(2001, 1, 1, tzinfo=UTC)])
+@pytest.mark.parametrize('stop', [-1.0, 1e6, 1e305, datetime(2001, 1, 1, tzinfo=UTC)])
 def test_a_stop_outside_of_the_bag_is_an_error(
     recording: tuple[Path, list[Event]], stop: float | datetime
 ) -> None:
     (run,) = open_runs([recording[0]])
-    with pytest.raises(BagError, match=r'stop at .* s: expected inside of .* s long'):
+    said = '2001-01-01T00:00:00' if isinstance(stop, datetime) else f'{stop} s'
+    with pytest.raises(BagError, match=r'stop at .*expected inside of .* s long') as error:
         replay(run, stop=stop)
+    assert f'stop at {said}' in str(error.value)
+    assert 'begins at 2023-11-14' in str(error.value)
 
 
 def test_a_stop_before_any_speed_is_an_error(recording: tuple[Path, list[Event]]) -> None:
@@ -65,9 +68,30 @@ def test_a_stop_that_is_no_time_is_refused(
     assert 'expected s from the start of the bag, or a time of day' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(('own', 'more'), [('', ['--window', '1', '900']), ('@1:900', [])])
 def test_a_window_beside_a_stop_is_refused(
+    recording: tuple[Path, list[Event]],
+    capsys: pytest.CaptureFixture[str],
+    own: str,
+    more: list[str],
+) -> None:
+    assert main(['replay', f'{recording[0]}{own}', '--stop', '400', *more]) == 1
+    assert 'a window and a stop are given; give one of them' in capsys.readouterr().err
+
+
+def test_what_a_bag_holds_is_not_denied_with_a_stop(
     recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    given = ['replay', str(recording[0]), '--stop', '400', '--window', '1', '900']
-    assert main(given) != 0
-    assert '--window and --stop: give one of them' in capsys.readouterr().err
+    assert main(['replay', str(recording[0]), '--stop', '400']) == 0
+    told = capsys.readouterr()
+    assert 'or was replayed with another ship file' in told.out
+    assert (
+        'the stop that is given is weighed by the regime filter; coastdowns begin at: ' in told.err
+    )
+
+
+def test_a_forecast_takes_a_stop(
+    recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['forecast', str(recording[0]), '--stop', '1e6']) == 1
+    assert 'stop at 1000000.0 s: expected inside of' in capsys.readouterr().err

@@ -15,7 +15,7 @@ def test_every_end_has_words() -> None:
 
 
 def test_the_comparison_with_the_bag_is_said() -> None:
-    assert 'no outputs' in words.recorded_sentence(Recorded(0, 0, None))
+    assert 'it holds none, or was replayed' in words.recorded_sentence(Recorded(0, 0, None))
     assert 'All 7 outputs' in words.recorded_sentence(Recorded(7, 7, None))
     differs = words.recorded_sentence(Recorded(7, 6, '/coastdown_node/speed at 12 ns', 0.1))
     assert '6 of 7' in differs

@@ -114,3 +114,9 @@ def test_numbers_and_their_texts_are_read_alike(values: list[float], side: str) 
     assert {k: each.reason for k, each in bad[0].items()} == {
         k: each.reason for k, each in bad[1].items()
     }
+
+
+def test_two_columns_of_one_name_are_refused() -> None:
+    table = frame(20)
+    with pytest.raises(sd.ShipdragError, match="the frame has 2 columns 'log'"):
+        sd.read(pd.concat([table, table[['log']]], axis=1))
