@@ -8,6 +8,7 @@ import contextlib
 import ipaddress
 import os
 import stat
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -119,7 +120,10 @@ def run(options: argparse.Namespace) -> int:
 
         page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet, ready=announce)
         serve(page, [page_socket], deltas=deltas)
-    return 0
+    # a library's thread may still be in compiled code, where the end of the interpreter aborts it
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 @contextlib.contextmanager
