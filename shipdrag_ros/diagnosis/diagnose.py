@@ -150,10 +150,9 @@ def diagnose(
         explained = found.posterior.best[UNKNOWN]
         notes = (*notes, *swing_notes(explained, model))
     differ = runs_differ(found) if judged.missing else ()
-    place = _where(model, as_stated, found, judged, differ=bool(differ))
     return judged.diagnosis(
         would_decide=would_decide,
-        where=place,
+        where=_where(model, as_stated, found, judged, differ=bool(differ)),
         before=gap_of(model, as_stated.best),
         after=gap_of(model, best.best) if judged.missing else None,
         held_out_before=held_out(model, None),
