@@ -54,6 +54,7 @@ _OWN = (
         '.diagnose',
         'where model and data disagree, and which effect is missing',
     ),
+    Verb('learn', '.learn', 'an effect that has no name, learnt from several runs of one ship'),
     Verb('effect', '.effect', 'files of learnt effects: what is in them, and may they be used'),
     Verb('forecast', '.forecast', 'the rest of each glide foretold, beside what followed'),
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
