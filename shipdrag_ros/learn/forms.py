@@ -30,6 +30,7 @@ _LASTS = (0.25, 0.8)  # share of the longest run: the same
 _NARROW, _BROAD = 0.03, 0.1  # widths of steps, shares of the same
 _HUMPS = (0.06, 0.12, 0.24)
 _SCAN = (-1.8, -1.35, -0.9, -0.45, 0.0, 0.45, 0.9, 1.35, 1.8)  # z where a curve may turn
+_WAYS_ROUND = ((1.0, 0.0), (0.7, 0.7), (0.05, 1.0), (-0.7, 0.7))  # z of two components
 _REFERENCE = 0.2  # Froude number at which A is of the same size whatever the power
 
 
@@ -89,11 +90,13 @@ class LearnableForm:
         first: dict[object, EffectWay] = {}
         for way in ways_of(self.effect(), ship, longest_s, runs):
             first.setdefault(way.mode, way)
-        starts = [(0.0,) * len(self.priors)]
+        starts: list[tuple[float, ...]] = [(0.0, b, c) for b, c in _WAYS_ROUND]
         if len(self.priors) == 1:
             starts = [(z,) for z in _SCAN]
         elif self.priors[1].shape is Shape.LOG_NORMAL:
             starts = [(0.0, z) for z in _SCAN]
+        elif len(self.priors) == 2:
+            starts = list(_WAYS_ROUND)
         return [replace(way, start=start) for way in first.values() for start in starts]
 
 

@@ -34,7 +34,7 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 from shipdrag_ros.simulation.hydrodynamics import quadratic_n
 
-_FITTED = 12  # forms that are fitted, of those that explain most by the linear response
+_FITTED = 16  # forms that are fitted: of each kind the best by the linear response, and more
 _HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
 _LEFT = 0.02  # probability of a form that is said to be left
 _LOOK_ALIKE = 3
@@ -181,8 +181,10 @@ class _Case:
         longest = max(run.duration_s for run in seen)
         every = {form.term.name: form for form in forms(ship, Span(low, top, longest))}
         progress('looking for forms', 0, 0)
-        screened = _comparing(runs, seen, ship, every, library=False).promising(_FITTED)
-        kept = {name: every[name] for name in screened}
+        order = _comparing(runs, seen, ship, every, library=False).promising(len(every))
+        first = {every[name].kind: name for name in reversed(order)}  # the best of each kind
+        chosen = dict.fromkeys((*first.values(), *order))
+        kept = {name: every[name] for name in list(chosen)[:_FITTED]}
         return cls.compared(runs, seen, ship, kept, progress)
 
     @classmethod
