@@ -36,8 +36,8 @@ from strangers.hidden import CURVES, PLAIN, STRANGERS
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.learn.folder import using
-from shipdrag_ros.learn.term import LearntTerm
+from shipdrag_ros.learning.folder import using
+from shipdrag_ros.learning.term import LearntTerm
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation import Scenario, simulate

@@ -29,7 +29,7 @@ PICTURE = (
     ('estimation',),
     ('forecast',),
     ('coastdown', 'diagnosis', 'studies'),
-    ('learn',),
+    ('learning',),
     ('messages',),
     ('bags', 'nmea'),
     ('node', 'replay', 'sources'),

@@ -140,7 +140,7 @@ def _run(line: list[str]) -> int:
 def _more_effects(folders: Sequence[Path]) -> AbstractContextManager[None]:
     if not folders:
         return nullcontext()
-    from shipdrag_ros.learn.folder import read_folders, using
+    from shipdrag_ros.learning.folder import read_folders, using
 
     return using(read_folders(folders))
 

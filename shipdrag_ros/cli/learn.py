@@ -12,8 +12,8 @@ from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.progress import stages
 from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.imports import need
-from shipdrag_ros.learn import words
-from shipdrag_ros.learn.term import check_name
+from shipdrag_ros.learning import words
+from shipdrag_ros.learning.term import check_name
 from shipdrag_ros.library.learning import learn_from
 from shipdrag_ros.ship import Ship
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from shipdrag_ros.learn.search import Learnt
-from shipdrag_ros.learn.search import learn as learn_runs
+from shipdrag_ros.learning.search import Learnt
+from shipdrag_ros.learning.search import learn as learn_runs
 from shipdrag_ros.library.diagnosing import coasts_of
 from shipdrag_ros.library.record import Record
 from shipdrag_ros.library.replaying import (

@@ -38,7 +38,7 @@ from shipdrag_ros.fields import (
     text,
     text_of,
 )
-from shipdrag_ros.learn.expression import (
+from shipdrag_ros.learning.expression import (
     PURE,
     Formula,
     FormulaError,
@@ -207,7 +207,7 @@ class LearntTerm:
 
     Examples
     --------
-    >>> from shipdrag_ros.learn.term import LearntTerm
+    >>> from shipdrag_ros.learning.term import LearntTerm
     >>> term = LearntTerm.from_yaml('''
     ... name: weed
     ... term: {channel: force, scope: hull, variable: speed, shape: step,

@@ -9,7 +9,7 @@ from typing import Any
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.fields import plain
-from shipdrag_ros.learn.search import Learnt
+from shipdrag_ros.learning.search import Learnt
 from shipdrag_ros.report.document import write_page
 
 _SHOWN = 0.001  # probability of a line

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.learn.term import LearntTerm, TermForm, TermParameter
+from shipdrag_ros.learning.term import LearntTerm, TermForm, TermParameter
 from shipdrag_ros.parameter import Prior, Shape, either_sign, log_normal, normal
 from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.effects import EffectWay, ways_of

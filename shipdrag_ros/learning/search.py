@@ -24,8 +24,8 @@ from shipdrag_ros.diagnosis.result import Where
 from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
-from shipdrag_ros.learn.forms import LearnableForm, Span, forms
-from shipdrag_ros.learn.term import LearntTerm, TermEvidence, TermLimit, TermParameter
+from shipdrag_ros.learning.forms import LearnableForm, Span, forms
+from shipdrag_ros.learning.term import LearntTerm, TermEvidence, TermLimit, TermParameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.progress import Progress, silent
