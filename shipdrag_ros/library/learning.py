@@ -95,6 +95,6 @@ def learn_from(
     refuse_overlaps(runs)
     if given is None:
         refuse_two_ships((run, None) for run, _ in runs)
-    coasts, ship, parameters = coasts_of(listener, runs, given, progress)
+    coasts, ship, parameters = coasts_of(listener, runs, given, progress, whole=True)
     coasts = sorted(coasts, key=lambda coast: coast.window.start_ns)
     return learn_runs(coasts, ship, parameters, name=name, progress=progress)

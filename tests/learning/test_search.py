@@ -17,7 +17,7 @@ from shipdrag_ros.learning.term import LearntTerm
 WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'
 # a sharp edge: a broad one looks like a hump about it
 HIDDEN = LearntTerm.from_yaml(WEED.read_text().replace('0.02*sqrt(g*L)', '0.006*sqrt(g*L)'))
-SIZES = {'A': 0.002, 'u_c': 0.09}
+SIZES = {'A': 0.0004, 'u_c': 0.13}
 SHIP = sd.Ship.example()
 RUNS = ((7.0, 0.3), (5.6, 2.1), (6.4, -1.7), (5.0, 0.9))  # speed and heading of each
 
@@ -32,7 +32,7 @@ def sailed(number: int, weed: bool) -> sd.Record:
             speed_m_s=speed,
             heading_rad=heading,
             lead_in_s=600.0,
-            duration_s=1200.0,
+            duration_s=1500.0,
             start=f'2026-06-{number + 1:02d}',
             seed=number,
         )
