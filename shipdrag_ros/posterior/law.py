@@ -80,6 +80,7 @@ class HullLaw:
         """
         step = float(self.speed_m_s[1])
         columns = np.concatenate([self.parts, self.shapes, self.humps])
+        columns[0] += wave_with_friction(ship) * self.parts[1]
 
         def with_slope(value: Float64) -> Float64:
             return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
@@ -114,6 +115,17 @@ def _generic(ship: Ship, speed: Float64) -> Float64:
     )
     wave = _WAVE * (ship.froude(speed) / _WAVE_FROUDE) ** _WAVE_POWER
     return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
+
+
+def wave_with_friction(ship: Ship) -> float:
+    """
+    Return by how much the wave part is off where the friction is, both relative, as stated.
+    """
+    base = ship.baseline
+    if not isinstance(base, CoefficientBaseline) or base.relative_sd.correlation == 0.0:
+        return 0.0
+    sd = base.relative_sd
+    return sd.correlation * sd.wave / sd.friction if sd.friction > 0.0 else 0.0
 
 
 def usual_baseline(ship: Ship) -> Ship:
