@@ -58,12 +58,8 @@ def current() -> DiagnosisResult:
 
 def test_reciprocal_run_is_advised_for_a_current_and_names_it(current: DiagnosisResult) -> None:
     assert current.verdict is Verdict.ONE_OF
-    # another run on the same heading leaves more of it open
-    probability = resolves(current)
-    assert (probability[Measure.RECIPROCAL_RUN] or 0.0) > 0.3
-    assert (probability[Measure.RECIPROCAL_RUN] or 0.0) >= (
-        probability[Measure.ANOTHER_RUN] or 0.0
-    )
+    assert (resolves(current)[Measure.RECIPROCAL_RUN] or 0.0) > 0.3
+    assert Measure.ANOTHER_COURSE in resolves(current)
     back = run('current=0.2', heading_rad=HEADING_RAD + math.pi, seed=2)
     after = diagnose([run('current=0.2'), back], SHIP, Parameters())
     assert [effect.name for effect in after.effects] == ['current']
