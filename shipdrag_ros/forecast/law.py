@@ -23,7 +23,7 @@ from shipdrag_ros.ship import Ship
 
 _POINTS = 25  # of the curve, evenly in ln u
 _ALIKE_RANGE = (0.03, 3.0)  # of ln u, over which errors of the estimate may be alike
-_ROUNDING = 1e-6
+_ROUNDING = 1e-4
 
 
 class KnownCurve(NamedTuple):
@@ -93,7 +93,7 @@ def deceleration(known: KnownCurve, ship: Ship, speed_m_s: Float64) -> Decelerat
     off = measured[:, None] - base[:_POINTS]
     prior = _prior(np.log(u / top), width)
     # (width, roughness, ...): neither changes the mean of a form
-    error = rougher[:, None, None] ** 2 * error + known.level_sd**2
+    error = rougher[:, None, None] ** 2 * error + known.level_sd**2 + _ROUNDING * np.eye(_POINTS)
     of_curve = prior[:, None, :_POINTS, :_POINTS] + error
     to_curve = prior[:, None, :_POINTS, _POINTS:]
     gain = np.linalg.solve(of_curve, to_curve)
@@ -134,5 +134,5 @@ def _measured(known: KnownCurve, ship: Ship, u: Float64) -> tuple[Float64, Float
     correlation = np.sqrt(2.0 * np.outer(alike, alike) / squares) * np.exp(
         -((x[:, None] - x) ** 2) / squares
     )
-    error = np.outer(relative, relative) * correlation + _ROUNDING * np.eye(len(u))
+    error = np.outer(relative, relative) * correlation
     return np.log(r / (1.0 + ship.n_r(u))), error
