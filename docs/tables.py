@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from shipdrag_ros.fields import keys_of
+from shipdrag_ros.forecast import priors as forecast_priors
 from shipdrag_ros.inference import learning
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
 from shipdrag_ros.parameter import Parameter
@@ -184,9 +185,20 @@ def model_priors() -> str:
     """
     Return the table of the priors of the one posterior.
     """
+    return _declared(priors.TABLE)
+
+
+def model_forecast() -> str:
+    """
+    Return the table of the priors of the forecast.
+    """
+    return _declared(forecast_priors.TABLE)
+
+
+def _declared(rows_of: Iterable[priors.Declared]) -> str:
     rows = (
         [f'`{each.letter}`', each.meaning, str(each.prior), each.unit or '-', each.source]
-        for each in priors.TABLE
+        for each in rows_of
     )
     return _table(['letter', 'meaning', 'prior', 'unit', 'source'], rows)
 
@@ -222,6 +234,7 @@ PAGES: Mapping[Path, Tables] = {
         'priors': model_priors,
         'noise priors': model_noise,
         'families': model_families,
+        'forecast priors': model_forecast,
     },
 }
 
