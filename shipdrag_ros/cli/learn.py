@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shipdrag_ros.cli.arguments import add_effects, add_json, add_remap, add_report, unused_file
-from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.progress import stages
+from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
 from shipdrag_ros.imports import need
 from shipdrag_ros.learning import words

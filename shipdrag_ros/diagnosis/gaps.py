@@ -10,6 +10,7 @@ import numpy as np
 
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.result import FORCE, Compared, Gap, RunTrace, Where
+from shipdrag_ros.inference.decision import UNKNOWN
 from shipdrag_ros.inference.rows import CODES, LOG, POSITION
 from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted, RunResidual
 from shipdrag_ros.posterior.hypotheses import IN_GROUND, IN_LOG
@@ -179,7 +180,7 @@ def where(
 
 def _channel(found: ComparedHypotheses) -> str:
     """Return where something smooth explains most."""
-    smooth = [fit for fit in found.fitted if fit.hypothesis.smooth and not fit.hypothesis.names]
+    smooth = [fit for fit in found.fitted if fit.names == UNKNOWN and not fit.hypothesis.names]
     best = max(smooth, key=lambda fit: fit.log_evidence)
     near = {
         fit.hypothesis.smooth

@@ -21,7 +21,7 @@ from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.inference.decision import NONE
-from shipdrag_ros.inference.factored import Factored
+from shipdrag_ros.inference.gaussian import Factored
 from shipdrag_ros.parameter import heavy_tailed
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.posterior.compare import Comparing, Fitted

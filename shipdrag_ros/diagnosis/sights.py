@@ -75,7 +75,8 @@ def sight(run: Observation, seen: Sequence[Observation], ship: Ship) -> RunSight
     rows = Rows(along.rows.time_s - run.lead_in_s, along.rows.kind, along.rows.value)
     steady = int(np.searchsorted(along.rows.time_s, run.lead_in_s))
     stop = StopPrior(max(run.stop_sd_s, 1e-3), run.run_down_s, run.run_down_sd_s)
-    model = RunModel.of(rows, along.variance, steady, ship, stop, speed_m_s=top, low_m_s=low)
+    own = replace(run.ship, baseline=ship.baseline)  # as heavy as she was in this run
+    model = RunModel.of(rows, along.variance, steady, own, stop, speed_m_s=top, low_m_s=low)
     start = model.start.copy()
     start[model.coefficients] = run.speed_m_s
     model = replace(model, start=start, speed_m_s=run.speed_m_s)

@@ -137,7 +137,7 @@ class Fitted:
     @property
     def names(self) -> Names:
         """As the decision takes them."""
-        return UNKNOWN if self.hypothesis.smooth else self.hypothesis.names
+        return UNKNOWN if self.hypothesis.unnamed else self.hypothesis.names
 
     @property
     def log_weight(self) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
@@ -54,6 +55,8 @@ class EffectWay:
         Whether it is part of the ship as her file states it, and no hypothesis.
     kept
         Whether it is as an earlier diagnosis found it, with priors about what that found.
+    nameless
+        Whether many other causes leave the same trace, so that it is no name.
     """
 
     effect: Effect
@@ -64,6 +67,7 @@ class EffectWay:
     run: int | None = None
     stated: bool = False
     kept: bool = False
+    nameless: bool = False
 
     @property
     def mode(self) -> tuple[object, ...]:
@@ -151,7 +155,20 @@ def ways_of(effect: Effect, ship: Ship, longest_s: float, runs: int) -> Iterator
     runs
         Number of runs.
     """
-    parameters = effect.parameters_of(ship)
+    yield from _alike(effect, effect.parameters_of(ship), longest_s, runs)
+    if effect.nameless_at:
+        fixed = tuple(effect.nameless_at.items())
+        left = [q for q in effect.parameters_of(ship) if q.name not in effect.nameless_at]
+        less = math.log(priors.UNNAMED_ODDS / effect.odds)
+        for way in _alike(effect, left, longest_s, runs):
+            log_odds = way.log_odds + less
+            yield replace(way, fixed=way.fixed + fixed, log_odds=log_odds, nameless=True)
+
+
+def _alike(
+    effect: Effect, parameters: Sequence[Parameter], longest_s: float, runs: int
+) -> Iterator[EffectWay]:
+    """Yield the ways of an effect by the parameters that are open."""
     free = [q for q in parameters if q.prior.shape is not Shape.CHOICE]
     choices = [q for q in parameters if q.prior.shape is Shape.CHOICE]
     signed = [q.name for q in free if q.prior.shape is Shape.EITHER_SIGN]

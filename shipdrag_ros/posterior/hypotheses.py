@@ -132,12 +132,20 @@ class Explanation:
     @property
     def names(self) -> tuple[str, ...]:
         """Of the effects, sorted; without those that the ship file states."""
-        return tuple(sorted({way.effect.name for way in self.ways if not way.stated}))
+        named = [way for way in self.ways if not (way.stated or way.nameless)]
+        return tuple(sorted({way.effect.name for way in named}))
+
+    @property
+    def unnamed(self) -> bool:
+        """Whether something without a name is there."""
+        return bool(self.smooth) or any(way.nameless for way in self.ways)
 
     def effects_in(self, run: int | None) -> list[Effect]:
         """Return the effects that are missing in a run; None: in any."""
         return [
-            way.effect for way in self.ways if not way.stated and (run is None or way.acts_in(run))
+            way.effect
+            for way in self.ways
+            if not (way.stated or way.nameless) and (run is None or way.acts_in(run))
         ]
 
     @property

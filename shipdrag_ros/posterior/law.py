@@ -69,7 +69,7 @@ class HullLaw:
         """
         speed = np.linspace(0.0, _ABOVE * top_m_s, _NODES)
         stated = ship.baseline is not None
-        parts = (_stated(ship, speed) if stated else _generic(ship, speed)) / ship.mass_kg
+        parts = parts_n(ship, speed) / ship.mass_kg
         spacing = _SPLINE_FROUDE * float(ship.speed(1.0))
         shapes, humps = _shapes(speed, spacing, parts, low_m_s, top_m_s)
         return cls(speed, parts, shapes, humps[: 0 if stated else None], stated)
@@ -80,6 +80,7 @@ class HullLaw:
         """
         step = float(self.speed_m_s[1])
         columns = np.concatenate([self.parts, self.shapes, self.humps])
+        columns[0] += wave_with_friction(ship) * self.parts[1]
 
         def with_slope(value: Float64) -> Float64:
             return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
@@ -93,10 +94,17 @@ class HullLaw:
         )
 
 
+def parts_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return friction and wave part (2, m) of the ship file, or of her length and volume [N].
+    """
+    return (_generic if ship.baseline is None else _stated)(ship, speed_m_s)
+
+
 def _stated(ship: Ship, speed: Float64) -> Float64:
     """Return friction and wave part [N]; outside the tables with the square of the speed."""
     low, high = ship.baseline_range_m_s
-    inside = np.clip(speed, max(low, 1e-3 * speed[-1]), high)
+    inside = np.clip(speed, max(low, 1e-3 * float(speed.max())), high)
     total = ship.resistance_n(inside)
     if isinstance(ship.baseline, TableBaseline):
         # a table has no parts: its one scale is that of the friction
@@ -114,6 +122,17 @@ def _generic(ship: Ship, speed: Float64) -> Float64:
     )
     wave = _WAVE * (ship.froude(speed) / _WAVE_FROUDE) ** _WAVE_POWER
     return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
+
+
+def wave_with_friction(ship: Ship) -> float:
+    """
+    Return by how much the wave part is off where the friction is, both relative, as stated.
+    """
+    base = ship.baseline
+    if not isinstance(base, CoefficientBaseline) or base.relative_sd.correlation == 0.0:
+        return 0.0
+    sd = base.relative_sd
+    return sd.correlation * sd.wave / sd.friction if sd.friction > 0.0 else 0.0
 
 
 def usual_baseline(ship: Ship) -> Ship:
