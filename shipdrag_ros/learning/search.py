@@ -122,13 +122,13 @@ def learn(
             '`baseline` to her ship file, or learn one with `shipdrag baseline`'
         )
     seen, notes = _observed(runs, ship, parameters, {}, progress)
-    case = _Case.of(runs, seen, ship, progress)
+    case = _LearningCase.of(runs, seen, ship, progress)
     for _ in range(_LOOKS - 1):
         moved = case.moved_s()
         if all(abs(by_s) <= _NEAR_S for by_s in moved.values()):
             break
         seen, notes = _observed(runs, ship, parameters, moved, progress)
-        case = _Case.of(runs, seen, ship, progress)
+        case = _LearningCase.of(runs, seen, ship, progress)
     return _Judged(case, name, notes, progress).answer()
 
 
@@ -162,7 +162,7 @@ def _observed(
 
 
 @dataclass(frozen=True)
-class _Case:
+class _LearningCase:
     """Runs with forms and the library's effects compared."""
 
     runs: tuple[CoastRun, ...]
@@ -175,7 +175,7 @@ class _Case:
     @classmethod
     def of(
         cls, runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, progress: Progress
-    ) -> _Case:
+    ) -> _LearningCase:
         top = max(run.speed_m_s for run in seen)
         low = min(_slowest(run) for run in seen)
         longest = max(run.duration_s for run in seen)
@@ -195,7 +195,7 @@ class _Case:
         ship: Ship,
         kept: dict[str, LearnableForm],
         progress: Progress,
-    ) -> _Case:
+    ) -> _LearningCase:
         progress('comparing forms', 0, 0)
         comparing = _comparing(runs, seen, ship, kept, library=True)
         return cls(tuple(runs), tuple(seen), ship, kept, comparing, comparing.compare())
@@ -206,9 +206,11 @@ class _Case:
         more_s = self.comparing.runs.stop_s(likeliest.at)
         return {run.name: by_s for run, by_s in zip(self.seen, more_s, strict=True)}
 
-    def half(self, which: int, progress: Progress) -> _Case:
+    def half(self, which: int, progress: Progress) -> _LearningCase:
         """Return the same of every second run."""
-        return _Case.compared(self.runs, self.seen[which::2], self.ship, self.forms, progress)
+        return _LearningCase.compared(
+            self.runs, self.seen[which::2], self.ship, self.forms, progress
+        )
 
     def is_form(self, names: Names) -> bool:
         """Say whether a hypothesis is one form alone."""
@@ -260,7 +262,7 @@ def _slowest(run: Observation) -> float:
 class _Judged:
     """What is answered."""
 
-    case: _Case
+    case: _LearningCase
     name: str
     notes: tuple[str, ...]
     progress: Progress
@@ -322,7 +324,8 @@ class _Judged:
         for which in (0, 1):
             half = self.case.half(which, self.progress)
             mine = [fit.log_evidence for fit in half.found.fitted if fit.names == best]
-            top = max(fit.log_evidence for fit in half.found.fitted if len(fit.names) < 2)
+            # alone: what is the form and more beside it does not speak against it
+            top = max(fit.log_evidence for fit in half.found.fitted if _is_alone(fit))
             if not mine or max(mine) - top < _HALF:
                 names = ', '.join(run.name for run in half.seen)
                 return False, (
@@ -416,7 +419,11 @@ class _Judged:
         return 'a further run, from another speed and on another heading'
 
 
-def _names(case: _Case) -> set[str]:
+def _is_alone(fit: Fitted) -> bool:
+    return len(fit.hypothesis.names) + bool(fit.hypothesis.smooth) < 2
+
+
+def _names(case: _LearningCase) -> set[str]:
     return {run.name for run in case.seen}
 
 

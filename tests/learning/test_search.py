@@ -19,7 +19,8 @@ WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed
 HIDDEN = LearntTerm.from_yaml(WEED.read_text().replace('0.02*sqrt(g*L)', '0.006*sqrt(g*L)'))
 SIZES = {'A': 0.0004, 'u_c': 0.13}
 SHIP = sd.Ship.example()
-RUNS = ((7.0, 0.3), (5.6, 2.1), (6.4, -1.7), (5.0, 0.9))  # speed and heading of each
+pytestmark = pytest.mark.timeout(900)  # a busy machine compares for minutes
+RUNS = ((7.0, 0.3), (6.6, -1.7), (6.0, 2.1), (6.2, 0.9))  # speed and heading of each
 
 
 def sailed(number: int, weed: bool) -> sd.Record:
