@@ -89,7 +89,7 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters, *, quick: bool
         speed_m_s=guess.speed_m_s,
         low_m_s=guess.lowest * guess.speed_m_s,
     )
-    found = infer(problem, quick=quick)
+    found = infer(problem, guess.seen, quick=quick)
     return _result(found, record, window, ship, parameters, (*run_down.notes, *_notes(found)))
 
 
@@ -101,8 +101,6 @@ def _notes(found: RunPosterior) -> tuple[str, ...]:
     notes = [f'averaged over what the hull may differ by: {chances}']
     if not found.noise.learnt:
         notes.append('the record is too short to learn slow disturbances from: usual ones are')
-    if not found.converged:
-        notes.append('the linearised posterior did not settle: the band may be too narrow')
     return tuple(notes)
 
 
