@@ -43,15 +43,15 @@ from _coasts import (
     Hull,
     coasts,
 )
+from shipdrag_ros.estimation.ode_fit.families import POWERS
+from shipdrag_ros.estimation.ode_fit.first_fits import fit_robustly
+from shipdrag_ros.estimation.ode_fit.problem import Problem
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import estimate, estimate_final
-from shipdrag_ros.estimation.ode_fit.families import POWERS
-from shipdrag_ros.estimation.ode_fit.first_fits import fit_robustly
-from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
-from shipdrag_ros.estimation.ode_fit.problem import Problem
-from shipdrag_ros.estimation.ode_fit.record import RunRows
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.guess import InitialGuess
+from shipdrag_ros.estimation.record import RunRows
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 

@@ -21,13 +21,13 @@ from typing import NamedTuple
 import numpy as np
 from rich.console import Console
 from rich.progress import track
-
-from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, ode_fit
 from shipdrag_ros.estimation.ode_fit.coast import CURRENT, EXTRAS, LOG_LAG, V0, integrate, predict
 from shipdrag_ros.estimation.ode_fit.families import POWERS, Humps
 from shipdrag_ros.estimation.ode_fit.law import Law, shape_table
-from shipdrag_ros.estimation.ode_fit.steady import BIN_S
+
+from shipdrag_ros.errors import EstimationError
+from shipdrag_ros.estimation import Window, ode_fit
+from shipdrag_ros.estimation.steady import BIN_S
 from shipdrag_ros.inference.learning import of_steady, settings_at
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.inference.settings import SIZE, Settings, noise_of

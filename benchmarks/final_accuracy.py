@@ -20,15 +20,15 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
+from shipdrag_ros.estimation.ode_fit.problem import Problem
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window, estimate
 from shipdrag_ros.estimation.estimators import named
-from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
-from shipdrag_ros.estimation.ode_fit.problem import Problem
-from shipdrag_ros.estimation.ode_fit.record import RunRows
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.guess import InitialGuess
+from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.inference.noise import GaussMarkovNoise
 from shipdrag_ros.inference.settings import SENSORS_ALONE
 from shipdrag_ros.parameters import Parameters

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.ode_fit.steady import white_sd
+from shipdrag_ros.estimation.steady import white_sd
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import bin_means
 from shipdrag_ros.samples import Float64

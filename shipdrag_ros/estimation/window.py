@@ -133,6 +133,17 @@ class Window:
             before=self.before if start_ns == self.start_ns else None,
         )
 
+    def without(self, name: str, why: str) -> Window:
+        """
+        Leave out an input, in the record before too; the reason becomes a note.
+        """
+        none = getattr(self, name)
+        none = Series(none.time_ns[:0], none.value[:0], none.variance[:0])
+        before = None if self.before is None else self.before.without(name, why)
+        return replace(
+            self, **{name: none}, before=before, notes=(*self.notes, f'without {name}: {why}')
+        )
+
     @classmethod
     def from_block(
         cls, block: Block, start_ns: int, end_ns: int, *, before_ns: int | None = None

@@ -30,7 +30,8 @@ from shipdrag_ros.samples import Float64
 
 _ITERATIONS = 12  # of Gauss and Newton, to where the noise is learnt
 _ROUNDS = 12  # linearisations about the mean of the mixture
-_CLOSE = 0.05  # of chi^2, between one mean and the next
+_CLOSE = 0.05  # of chi^2, from one step to the next
+_STILL, _SETTLED = 0.05, 0.5  # of sigma of r(v), between one mean and the next
 _LEAST = 1e-3  # weight of a model; less is left out of the spread
 _ROUGH = 0.02  # of the speed: error of the first step
 _HALVINGS = 8  # of a Gauss-Newton step that leads astray
@@ -328,9 +329,17 @@ def _climbed(problem: RunModel, now: Float64, typical: Settings) -> Float64:
     return now
 
 
-def infer(
-    problem: RunModel, seen: Float64 | None = None, *, quick: bool = False
-) -> RunPosterior:
+def _moved(problem: RunModel, step: Float64, covariance: Float64) -> float:
+    """Return by how many standard deviations r(v) moves at most, over the speeds of the run."""
+    k, speed = problem.coefficients, problem.law.speed_m_s
+    inside = (speed >= problem.low_m_s) & (speed <= problem.speed_m_s)
+    columns = problem.forces.columns[0][:, inside]
+    variance = np.einsum('km,kl,lm->m', columns, covariance[:k, :k], columns)
+    with np.errstate(invalid='ignore', divide='ignore'):
+        return float(np.max(np.abs(step[:k] @ columns) / np.sqrt(variance)))
+
+
+def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False) -> RunPosterior:
     """
     Return the posterior of a run.
 
@@ -357,19 +366,17 @@ def infer(
     away, part = np.inf, 1.0
     for _ in range(_ROUNDS):
         step, covariance, weight = _mixed(problem, now, noise.settings)
-        moved = step[problem.free]
-        spread = covariance[np.ix_(problem.free, problem.free)]
-        before, away = away, float(moved @ np.linalg.solve(spread, moved))
-        if not 0.0 <= away < before:
+        before, away = away, _moved(problem, step, covariance)
+        if not away < before:
             part *= 0.5
         if not np.isfinite(away):
             break
         now = now + part * step
-        if away < _CLOSE:
+        if away < _STILL:
             break
-    if not 0.0 <= away < 1.0:
+    if not away < _SETTLED:
         raise EstimationError(
-            f'the fit of the motion does not settle after {_ROUNDS} rounds: the record allows '
+            f'the fit of the motion does not settle in {_ROUNDS} rounds: the record allows '
             'motions that are too different; give a longer window, one without a turn or thrust, '
             'or a ship file with a baseline'
         )

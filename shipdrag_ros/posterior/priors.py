@@ -162,7 +162,7 @@ FREE_SHAFT = Declared(
     'four-quadrant open-water data of B4-70',
 )
 SHELTERED_M_S = 5.0
-"""Below this speed a current is weaker, with its square: slow craft are tried in basins and ponds."""
+"""Below it a current is weaker, with the square of the speed: slow craft are tried in basins."""
 UNNAMED_ODDS = 0.015
 """Prior odds of something smooth without a name, in each place where it may be."""
 SMOOTH_SIZES = (0.015, 0.05, 0.15)

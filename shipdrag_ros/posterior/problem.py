@@ -81,8 +81,8 @@ class RunModel:
     start : (p,)
         Where the search begins.
     families
-    speed_m_s
-        At the stop, roughly.
+    low_m_s, speed_m_s
+        At the end and at the stop, roughly.
     law
     """
 
@@ -93,6 +93,7 @@ class RunModel:
     grid_s: Float64
     start: Float64
     families: tuple[Family, ...]
+    low_m_s: float
     speed_m_s: float
     law: HullLaw
 
@@ -173,6 +174,7 @@ class RunModel:
             _grid(end, tau_s),
             start,
             families,
+            low_m_s,
             speed_m_s,
             law,
         )
@@ -314,7 +316,9 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
         ((1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)), priors.HALF_NORMAL
     ):
         stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
-        yield _Hull(priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure)
+        yield _Hull(
+            priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
+        )
     chance = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
     for more, (size, part) in product(priors.LOG_UNIFORM, priors.HALF_NORMAL):
         scales = ((more, math.hypot(more, sds[0])), (0.0, sds[1]))

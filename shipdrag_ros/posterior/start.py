@@ -49,10 +49,12 @@ def along_readings(problem: RunModel, seen: Float64) -> tuple[Float64, Float64]:
     lost = _integral(force, time_s)
     way = _integral(lost, time_s)
     place, after = rows.kind == POSITION, np.maximum(rows.time_s, 0.0)
-    of_force = np.array([
-        np.where(place, np.interp(after, time_s, x), np.interp(after, time_s, v))
-        for v, x in zip(lost, way)
-    ])
+    of_force = np.array(
+        [
+            np.where(place, np.interp(after, time_s, x), np.interp(after, time_s, v))
+            for v, x in zip(lost, way)
+        ]
+    )
     table = np.zeros((1 + len(start), len(after)))
     table[1 : 1 + k] = -of_force[1:]
     of_speed = np.where(place, rows.time_s, 1.0)

@@ -13,7 +13,7 @@ from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.coast_terms import RunNuisance
 from shipdrag_ros.diagnosis.observation import _condensed
 from shipdrag_ros.diagnosis.search import search
-from shipdrag_ros.estimation.ode_fit.steady import display_sd, white_sd
+from shipdrag_ros.estimation.steady import display_sd, white_sd
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.samples import Float64
 

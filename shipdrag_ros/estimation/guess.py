@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.ode_fit.steady import block_medians
+from shipdrag_ros.estimation.steady import block_medians
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.samples import Float64
 
@@ -28,8 +28,6 @@ class InitialGuess:
         At time 0.
     quadratic_1_m
         r / v^2.
-    first_m
-        Position at time 0.
     lowest
         Speed at the end over that at the start.
     seen : (2, b)
@@ -38,7 +36,6 @@ class InitialGuess:
 
     speed_m_s: float
     quadratic_1_m: float
-    first_m: float
     lowest: float
     seen: Float64
 
@@ -85,12 +82,9 @@ class InitialGuess:
             )
         first = mean - slope * mean_t
         v0 = min(1.0 / first, _ABOVE * top) if first > 0.0 else _ABOVE * top
-        positions = coast.value[coast.kind == POSITION]
-        first_m = float(positions[0]) if len(positions) else 0.0
         return cls(
             float(v0),
             slope * (1.0 + n_r),
-            first_m,
             float(np.clip(speed[-1] / v0, 0.05, 0.9)),
             np.stack([when, speed]),
         )
