@@ -29,6 +29,7 @@ PICTURE = (
     ('estimation',),
     ('forecast',),
     ('coastdown', 'diagnosis', 'studies'),
+    ('learn',),
     ('messages',),
     ('bags', 'nmea'),
     ('node', 'replay', 'sources'),

@@ -134,6 +134,22 @@ def add_remap(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_effects(parser: argparse.ArgumentParser) -> None:
+    """
+    Add `--effects DIR`.
+    """
+    parser.add_argument(
+        '--effects',
+        dest='effects_from',
+        action='append',
+        default=[],
+        type=Path,
+        metavar='DIR',
+        help='folder of effects as `shipdrag learn` writes them (.yaml), which count beside those '
+        'of the library; may be repeated',
+    )
+
+
 def remap(text: str) -> tuple[str, str]:
     """
     Read `from:=to`.

@@ -7,7 +7,14 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
+from shipdrag_ros.cli.arguments import (
+    add_effects,
+    add_json,
+    add_remap,
+    add_report,
+    number,
+    unused_file,
+)
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.progress import stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
@@ -82,6 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'what was found of hull and instruments counts, less the longer ago it was; water and '
         'weather do not',
     )
+    add_effects(parser)
     add_remap(parser)
     add_json(parser)
 
