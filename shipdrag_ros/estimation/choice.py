@@ -98,12 +98,26 @@ def estimate(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
 
 def estimate_final(window: Window, ship: Ship, parameters: Parameters) -> Estimate:
     """
-    Estimate r(v) from a whole coastdown, with time to do so; as `estimate`.
+    Estimate r(v) from a whole coastdown, with time to do so.
+
+    Parameters
+    ----------
+    window, ship, parameters
+        As `estimate` takes them.
+
+    Returns
+    -------
+    Estimate
+        As of `estimate`; with a note of each input that is silent for part of it.
 
     Raises
     ------
     EstimationError
         If the window does not hold a coastdown that can be estimated.
+
+    Notes
+    -----
+    Source: as `estimate`.
 
     Examples
     --------

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -140,9 +141,8 @@ class Window:
         none = getattr(self, name)
         none = Series(none.time_ns[:0], none.value[:0], none.variance[:0])
         before = None if self.before is None else self.before.without(name, why)
-        return replace(
-            self, **{name: none}, before=before, notes=(*self.notes, f'without {name}: {why}')
-        )
+        changes: dict[str, Any] = {name: none, 'before': before}
+        return replace(self, **changes, notes=(*self.notes, f'without {name}: {why}'))
 
     @classmethod
     def from_block(

@@ -232,8 +232,8 @@ def test_samples_in_any_order_of_arrival(coast, ship) -> None:
 
 
 def test_a_short_coast_over_few_speeds_is_fitted() -> None:
-    # N = 12, seeds 0..11: 9 s in which a ferry slows by a fifth, read behind a filter of 0.3 s. None
-    # fails, RMSE below 20 % of the largest r (18 % found: the prior of a log's offset is that of
+    # N = 12, seeds 0..11: 9 s in which a ferry slows by a fifth, read behind a filter of 0.3 s.
+    # None fails, RMSE below 20 % of the largest r (18 % found: a log's offset is that of
     # ships), and +-2 sigma holds 70 % or more.
     ferry = Ship(length_m=5.0, displaced_volume_m3=1.76)
     time_s, decay = 0.05 * np.arange(181), np.exp(-0.05 / 0.3)
