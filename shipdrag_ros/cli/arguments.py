@@ -67,6 +67,24 @@ def stop_time(text: str) -> float | datetime:
     return at
 
 
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """
+    Add `--ship FILE` and `--parameters FILE`, in place of what is attached to a bag.
+    """
+    parser.add_argument(
+        '--ship',
+        type=Path,
+        metavar='FILE',
+        help='ship file (YAML) (default: the one attached to the bag)',
+    )
+    parser.add_argument(
+        '--parameters',
+        type=Path,
+        metavar='FILE',
+        help='parameters as `name: value` (YAML) (default: those attached to the bag)',
+    )
+
+
 def add_stop(parser: argparse.ArgumentParser) -> None:
     """
     Add `--stop TIME`.

@@ -15,8 +15,7 @@ from shipdrag_ros.cli.arguments import (
     number,
     unused_file,
 )
-from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.progress import stages
+from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis import DiagnosisResult, Verdict, with_effects
 from shipdrag_ros.diagnosis import tables as diagnosis_cells

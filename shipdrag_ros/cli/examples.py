@@ -45,6 +45,7 @@ EXAMPLES = {
     'forecast': (
         'shipdrag forecast run.mcap --after 120 300',
         'shipdrag forecast run.mcap --ship ship.yaml --json forecast.json',
+        'shipdrag forecast run.mcap --if-stopped-now',
     ),
     'fleet': (
         'shipdrag fleet records -o store --workers 1',

@@ -36,8 +36,8 @@ from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
 from shipdrag_ros.ship.facts import advice as fact_advice
+from shipdrag_ros.simulation.effect import COSTS, Cost, Measure
 from shipdrag_ros.simulation.effects import discriminating_measurements
-from shipdrag_ros.simulation.measures import COSTS, Cost, Measure
 
 _MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from shipdrag_ros.diagnosis.model import Hypothesis, Linear, Linearised
-from shipdrag_ros.inference.factored import Factored
+from shipdrag_ros.inference.gaussian import Factored
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Float64

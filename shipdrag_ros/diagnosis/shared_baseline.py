@@ -23,7 +23,7 @@ from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.inference.factored import Factored
+from shipdrag_ros.inference.gaussian import Factored
 from shipdrag_ros.parameter import Shape
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64

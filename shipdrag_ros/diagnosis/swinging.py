@@ -25,7 +25,7 @@ from shipdrag_ros.diagnosis.measured import damping_of
 from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, start
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.search import SearchResult
-from shipdrag_ros.inference.factored import Factored
+from shipdrag_ros.inference.gaussian import Factored
 from shipdrag_ros.inference.noise import apply
 from shipdrag_ros.inference.rows import POSITION
 from shipdrag_ros.parameter import Parameter, free, normal

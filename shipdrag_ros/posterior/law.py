@@ -73,7 +73,7 @@ class HullLaw:
         """
         speed = np.linspace(0.0, _ABOVE * top_m_s, _NODES)
         stated = ship.baseline is not None
-        parts = (_stated(ship, speed) if stated else _generic(ship, speed)) / ship.mass_kg
+        parts = parts_n(ship, speed) / ship.mass_kg
         spacing = _SPLINE_FROUDE * float(ship.speed(1.0))
         shapes, humps = _shapes(speed, spacing, parts, low_m_s, top_m_s)
         at_top = np.interp(top_m_s, speed, parts.sum(axis=0))
@@ -100,10 +100,17 @@ class HullLaw:
         )
 
 
+def parts_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return friction and wave part (2, m) of the ship file, or of her length and volume [N].
+    """
+    return (_generic if ship.baseline is None else _stated)(ship, speed_m_s)
+
+
 def _stated(ship: Ship, speed: Float64) -> Float64:
     """Return friction and wave part [N]; outside the tables with the square of the speed."""
     low, high = ship.baseline_range_m_s
-    inside = np.clip(speed, max(low, 1e-3 * speed[-1]), high)
+    inside = np.clip(speed, max(low, 1e-3 * float(speed.max())), high)
     total = ship.resistance_n(inside)
     if isinstance(ship.baseline, TableBaseline):
         # a table has no parts: its one scale is that of the friction

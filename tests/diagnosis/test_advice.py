@@ -20,8 +20,8 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.simulation import Scenario, sense, simulate, standard_sensors
+from shipdrag_ros.simulation.effect import Cost, Measure
 from shipdrag_ros.simulation.effects import parse
-from shipdrag_ros.simulation.measures import Cost, Measure
 
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 LEAD_IN_S, COAST_S = 1200.0, 1200.0

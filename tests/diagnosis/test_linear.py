@@ -20,7 +20,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import find
-from shipdrag_ros.simulation.faults import lagged
+from shipdrag_ros.simulation.sensors import lagged
 
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 INPUTS = (
