@@ -8,17 +8,18 @@ volume alone, whose waves have humps. s is a spline relative to r, orthogonal to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.motion import Forces
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
 from shipdrag_ros.ship.baseline import TableBaseline
 from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
-from shipdrag_ros.simulation.hydrodynamics import drag_n, friction_n, viscous_n
+from shipdrag_ros.simulation.hydrodynamics import USUAL_FORM_FACTOR, drag_n, friction_n, viscous_n
 
 _NODES = 97  # of the grid of speeds
 _ABOVE = 1.25  # of the highest speed that a fit may try
@@ -29,6 +30,7 @@ _NEGLIGIBLE = 0.03  # size of a column, of the largest
 # without a baseline C_W = _WAVE (Fr / _WAVE_FROUDE)^4, which falls beyond the hump at _HUMP_FROUDE
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
 _HUMP_FROUDE, _HUMP_POWER = 0.5, 8
+_HIGHEST_FROUDE = 1.0  # of the same as a table, for simulations
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,7 @@ class HullLaw:
         """
         step = float(self.speed_m_s[1])
         columns = np.concatenate([self.parts, self.shapes, self.humps, self.dry])
+        columns[0] += wave_with_friction(ship) * self.parts[1]
 
         def with_slope(value: Float64) -> Float64:
             return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
@@ -126,10 +129,46 @@ def _generic(ship: Ship, speed: Float64) -> Float64:
     surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
         ship.length_m, ship.displaced_volume_m3
     )
-    froude = ship.froude(speed)
-    wave = _WAVE * (froude / _WAVE_FROUDE) ** _WAVE_POWER
-    wave = wave / (1.0 + (froude / _HUMP_FROUDE) ** _HUMP_POWER)
+    wave = _usual_wave(ship.froude(speed))
     return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
+
+
+def _usual_wave(froude: Float64) -> Float64:
+    """Return C_W without a baseline."""
+    rising = _WAVE * (froude / _WAVE_FROUDE) ** _WAVE_POWER
+    result: Float64 = rising / (1.0 + (froude / _HUMP_FROUDE) ** _HUMP_POWER)
+    return result
+
+
+def wave_with_friction(ship: Ship) -> float:
+    """
+    Return by how much the wave part is off where the friction is, both relative, as stated.
+    """
+    base = ship.baseline
+    if not isinstance(base, CoefficientBaseline) or base.relative_sd.correlation == 0.0:
+        return 0.0
+    sd = base.relative_sd
+    return sd.correlation * sd.wave / sd.friction if sd.friction > 0.0 else 0.0
+
+
+def usual_baseline(ship: Ship) -> Ship:
+    """
+    Return a ship as she is, with the two parts of any hull where her file states no baseline.
+    """
+    if ship.baseline is not None:
+        return ship
+    froude = np.linspace(0.0, _HIGHEST_FROUDE, 13)
+    surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
+        ship.length_m, ship.displaced_volume_m3
+    )
+    base = CoefficientBaseline(
+        USUAL_FORM_FACTOR,
+        0.0,
+        tuple(froude.tolist()),
+        tuple(_usual_wave(froude).tolist()),
+        CoefficientSd(priors.GENERIC_FRICTION.sd, priors.GENERIC_WAVE.sd),
+    )
+    return replace(ship, baseline=base, wetted_surface_m2=surface)
 
 
 def _shapes(
