@@ -23,7 +23,7 @@ from typing import NamedTuple
 from shipdrag_ros import __version__
 from shipdrag_ros.bags import Run
 from shipdrag_ros.coastdown.events import EndedCoastdown
-from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose, diagnose_fitted
+from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
 from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
 from shipdrag_ros.diagnosis.words import sentence
 from shipdrag_ros.errors import BagError, DiagnosisError, EstimationError, ShipdragError
@@ -285,7 +285,7 @@ def _diagnosis(
     run = CoastRun(Path(result.run.name).name, window, hull.facts)
     try:
         if hull.ship.baseline is None:
-            return diagnose_fitted([run], hull.ship), []
+            return _held(result, hull, run), []
         glide = whole_glide(result, coastdown)
         if glide is None:
             return _held(result, hull, run), []

@@ -108,14 +108,10 @@ class WithoutBaseline(StrEnum):
         speeds. Such an effect acts alike on all ships.
     ZEROS
         Readings of exactly 0 while the ship moves, and right ones when she is faster.
-    CONSTANT_FORCE
-        A constant part of the deceleration beside a form of the resistance
-        that is fitted to the coastdown itself.
     """
 
     LOG_TRACK = 'log_track'
     ZEROS = 'zeros'
-    CONSTANT_FORCE = 'constant_force'
 
 
 def _weight(ship: Ship) -> float:
