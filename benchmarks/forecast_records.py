@@ -285,7 +285,7 @@ def main() -> None:
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--write', action='store_true', help='into docs/forecast.md')
-    parser.add_argument('--estimator', default='auto', help='of the estimate that is used')
+    parser.add_argument('--estimator', default='one', help='of the estimate that is used')
     parser.add_argument('--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'forecast')
     options = parser.parse_args()
     if DATA not in os.environ:
