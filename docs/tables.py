@@ -2,8 +2,8 @@
 """
 Write tables of the docs from the code.
 
-`python docs/tables.py` rewrites what stands between the markers in docs/ros.md,
-docs/effects.md and docs/model.md; a test fails while the two differ.
+`python docs/tables.py` rewrites what stands between the markers in docs/ros.md, docs/effects.md,
+docs/results/effects.txt and docs/model.md; a test fails while the two differ.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from shipdrag_ros.simulation.effects import LIBRARY, confounders, discriminating
 DOCS = Path(__file__).resolve().parent
 ROS = DOCS / 'ros.md'
 EFFECTS = DOCS / 'effects.md'
+EFFECTS_MORE = DOCS / 'results' / 'effects.txt'
 MODEL = DOCS / 'model.md'
 _INPUT_MEANING = {
     'speed_through_water': 'speed log, `linear.x` forward [m/s]',
@@ -227,11 +228,8 @@ Tables = Mapping[str, Callable[[], str]]
 TABLES: Tables = {'inputs': inputs, 'outputs': outputs, 'parameters': parameters}
 PAGES: Mapping[Path, Tables] = {
     ROS: TABLES,
-    EFFECTS: {
-        'effects': effects,
-        'effect parameters': effect_parameters,
-        'confounders': effect_confounders,
-    },
+    EFFECTS: {'effects': effects},
+    EFFECTS_MORE: {'effect parameters': effect_parameters, 'confounders': effect_confounders},
     MODEL: {
         'priors': model_priors,
         'noise priors': model_noise,
