@@ -84,9 +84,7 @@ class RunningCoastdown:
         start, step = self.onset.start_ns, round(self._parameters.update_s * SECOND_NS)
         return min(start + -(-(stamp_ns - start) // step) * step, ALWAYS)
 
-    def update(
-        self, stamp_ns: int, estimator: WindowEstimator, *, gliding: bool = True
-    ) -> Event:
+    def update(self, stamp_ns: int, estimator: WindowEstimator, *, gliding: bool = True) -> Event:
         """
         Estimate from what there is up to a stamp [ns], or say why that cannot be.
 
