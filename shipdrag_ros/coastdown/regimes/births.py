@@ -43,7 +43,6 @@ from shipdrag_ros.coastdown.regimes.state import (
     THE_LOG,
     THE_TRACK,
     TURN,
-    WANDER,
     WEIGHT,
     WINDMILLS,
     BankSetting,
@@ -114,16 +113,6 @@ def _born(
     bank.ramp[j, w[COUNT]] = ramp_s
     w[COUNT] += 1
     return int(j)
-
-
-@compiled(uncounted=True)
-def _jolt(bank: Histories, first: int, hull: HullPrior) -> None:
-    """How a log's filter bears the sudden change of those born from `first` on is not known."""
-    for j in range(first, bank.used[0]):
-        change = math.exp(hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A])
-        if bank.whole[j, REGIME] == BRAKE:
-            change = bank.number[j, FIRST_A] * math.exp(bank.mean[j, OPEN])
-        bank.spread[j, WANDER, WANDER] += (n.LOG_LAG_SD_S * change) ** 2
 
 
 @compiled(uncounted=True)
@@ -252,7 +241,6 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             f[A0], f[A_VAR] = bank.mean[i, LN_A], bank.spread[i, LN_A, LN_A]
             f[P0], f[P_VAR] = bank.mean[i, POWER], bank.spread[i, POWER, POWER]
         left = 0.0  # hazard of all that it may switch to
-        first = bank.used[0]
         if regime in (DRIVEN, LEVEL):
             if regime == LEVEL and age_s < n.LEVEL_LEAST_S * setting.pace:
                 continue
@@ -292,7 +280,6 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
             else:
                 _glides(bank, i, setting, now_s, n.TURN_OUT * hours)
             left = float(n.TURN_OUT)
-        _jolt(bank, first, setting.hull)
         f[WEIGHT] += math.log1p(-min(left * hours, 0.99))
 
 

@@ -69,6 +69,7 @@ from shipdrag_ros.samples import Float64
 _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
+_LAG_SD = float(n.LOG_LAG_SD_S) / _LAG_S  # of the lag
 _ROOT = math.sqrt(2.0 * math.pi)
 
 
@@ -204,6 +205,7 @@ def predict(
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
+        p[LAG, LAG] += (1.0 - keep_f * keep_f) * (_LAG_SD * x[LAG]) ** 2
         x[WAY] += dt * (u + x[CURRENT])
         x[LAG] = keep_f * x[LAG] - u * change
         x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
@@ -299,12 +301,14 @@ def _driving(
     if regime == TURN or (regime == LEVEL and bank.whole[i, KIND] == 1):
         free = float(n.WINDMILL[0]) if regime == TURN else f[FREE]
         at = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0] * u_part
-    if settled and not np.isnan(f[REVS]):
-        return _as_usual(f, nu, at, 0.1, 0.1)
-    density = _normal(nu - at, n.SHAFT_FIRST_SD)
-    if settled:
-        f[REVS] = min(max(nu / at, 0.7), max(1.0 / at, 1.3) if several else 1.3)
-    if several and regime == LEVEL:  # one of them may turn as before
+    if np.isnan(f[REVS]):
+        density = _normal(nu - at, n.SHAFT_FIRST_SD)
+        f[REVS] = nu / at
+    else:
+        gain = 0.1 if settled else 1.0
+        density = _as_usual(f, nu, at, gain, gain)
+    f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
+    if several and not settled:  # one of them may turn as before
         density = 0.5 * (density + (1.0 if nu < 1.1 else 0.0))
     return density
 
