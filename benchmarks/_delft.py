@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.report.drawing import BLUE, ORANGE, STYLE
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.fit import fit_form
-from shipdrag_ros.studies.residual.forms import FORMS
+from shipdrag_ros.studies.residual.fit import FORMS, fit_form
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 

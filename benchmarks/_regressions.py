@@ -12,7 +12,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from shipdrag_ros.regression.polynomial import monomials, terms_up_to
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.forms import RegressionForm
+from shipdrag_ros.studies.residual.fit import RegressionForm
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 WRONG = 0.15  # a prediction this far off, relative, is a bad one

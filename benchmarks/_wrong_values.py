@@ -11,7 +11,7 @@ from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
-from shipdrag_ros.studies.sensitivity.particulars import particulars
+from shipdrag_ros.studies.sensitivity.coast import particulars
 
 ERRORS = (-0.2, -0.1, 0.1, 0.25)  # of the file, relative to the truth
 LEAD_IN_S, COAST_S, SPEED_M_S = 1200.0, 1500.0, 8.0

@@ -27,7 +27,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -45,8 +44,6 @@ from hidden_b import plans as plans_b
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.diagnosis import diagnose as diagnose_coastdowns
-from shipdrag_ros.library import diagnosing as library
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 
 OUT = Path(__file__).parent / 'out'
@@ -144,9 +141,6 @@ def diagnosis(
     if by == 'oracle':
         oracle = import_module('hidden.oracle' if world == 'a' else 'hidden_b.oracle')
         return lambda seen: _timed(oracle.diagnose, seen, WORLDS[world].known(number))
-    if by == 'one':
-        library.diagnose = partial(diagnose_coastdowns, engine='one')
-        by = 'command'
     if by == 'command':
         more: list[str] = []
         if with_facts:
@@ -256,7 +250,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         '--by',
         default='command',
-        help='oracle, command, one (the posterior of docs/model.md) or MODULE:FUNCTION',
+        help='oracle, command or MODULE:FUNCTION',
     )
     parser.add_argument('--as', dest='form', choices=('blocks', 'bags'), default='blocks')
     parser.add_argument('--first', type=int, default=0, help='number of the first case')

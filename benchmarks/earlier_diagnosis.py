@@ -34,11 +34,11 @@ from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
 from shipdrag_ros.diagnosis.carried import carried
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.model import Hypothesis
 from shipdrag_ros.diagnosis.seen_runs import SeenRun
-from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.effects import ways_of
+from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import LIBRARY
 
@@ -129,8 +129,8 @@ def allowed(
     assert weight is not None
 
     def of(names: Sequence[str], kept: bool) -> float:
-        terms = tuple(EffectTerm(LIBRARY[name], ship, kept=kept) for name in names)
-        return weight.log_weight(Hypothesis(tuple(names), terms))
+        ways = (next(ways_of(LIBRARY[name], ship, 1.0, 1)) for name in names)
+        return weight.log_weight(Explanation(tuple(replace(way, kept=kept) for way in ways)))
 
     likeliest = max(of(tuple(each.effects), True) for each in before.candidates)
     return min(max(of(names, False), of(names, True)) - likeliest, 0.0)

@@ -35,7 +35,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, Truth, sense, simulate
-from shipdrag_ros.simulation.noise import GaussMarkov
+from shipdrag_ros.simulation.scenario import GaussMarkov
 
 CONFIG = Path(__file__).parents[1] / 'config'
 COURSE_RAD = 0.7

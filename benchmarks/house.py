@@ -6,7 +6,8 @@ Count the house: how much code there is, and through how many rooms a job goes.
     python benchmarks/house.py --tree OLD --tree . # two trees beside each other
 
 Core code is what a coastdown may need: lines of `shipdrag_ros` without
-docstrings, blanks and comments, and without the studies S2 to S5. The walk is a
+docstrings, blanks and comments, and without the studies S2 to S5; an `__init__` is no
+module. The walk is a
 replay of a simulated coastdown, traced: which calls cross from one room into
 another between the bytes of the bag and those of a published estimate. The
 diagnosis of the same bag shows which modules run in it.
@@ -30,25 +31,21 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = 'shipdrag_ros'
 LINES, PARAMETERS = 60, 8
-# where the studies stood before they had a room
-STUDIES = (
-    'studies/',
-    'residual/',
-    'sensitivity/',
-    'simulation/manoeuvring/',
-    'simulation/cable.py',
-    'report/cable_',
-    'report/fit_',
-    'report/residual_',
-    'report/sensitivity_',
-    'report/steering_',
-    'report/coasting_',
-    'report/surface_',
-    'cli/cable.py',
-    'cli/residual.py',
-    'cli/sensitivity.py',
-    'cli/surface.py',
-)
+# counted by themselves: the ways in and out, the studies and the ground floor
+OUTER = ('bags', 'cli', 'fleet', 'library', 'live', 'messages', 'nmea', 'node', 'report')
+OUTER += ('sources', 'studies', 'trend', '')
+AIMS = {
+    'lines of code, core': 24_000,
+    'lines of code, outer rooms': 14_500,
+    'modules': 210,
+    'calls from room to room, bytes of a bag to bytes published': 25,
+    'modules that run in a diagnosis': 45,
+    f'functions over {LINES} lines of code': 0,
+    f'functions over {PARAMETERS} parameters': 0,
+    'lines of code, tests': 25_000,
+    'lines of code, benchmarks': 10_000,
+    'words, README and docs': 25_000,
+}
 WALK = """
 import json, sys
 from pathlib import Path
@@ -98,6 +95,7 @@ class Count:
     raw: int
     lines: int
     core: int
+    outer: int
     modules: int
     core_modules: int
     long: list[Long]
@@ -152,27 +150,22 @@ def parameters(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     return len(named) - (bool(named) and named[0] in ('self', 'cls'))
 
 
-def is_study(path: Path, package: Path) -> bool:
-    """
-    Return whether a module belongs to a study.
-    """
-    return path.relative_to(package).as_posix().startswith(STUDIES)
-
-
 def count(tree: Path) -> Count:
     """
     Count the package of a tree.
     """
     package = tree / PACKAGE
-    found = Count(0, 0, 0, 0, 0, [], [])
+    found = Count(0, 0, 0, 0, 0, 0, [], [])
     for path in sorted(package.rglob('*.py')):
         held = code_lines(path)
-        core = not is_study(path, package)
+        room = path.relative_to(package).parent.as_posix().partition('/')[0].strip('.')
+        core, module = room != 'studies', path.name != '__init__.py'
         found.raw += len(path.read_text(encoding='utf-8').splitlines())
         found.lines += len(held)
-        found.modules += 1
         found.core += len(held) * core
-        found.core_modules += core
+        found.outer += len(held) * (room in OUTER)
+        found.modules += module
+        found.core_modules += module and core
         for node, is_compiled in functions(path):
             place = f'{path.relative_to(package)}:{node.name}'
             long = len(held & set(range(node.lineno, (node.end_lineno or 0) + 1)))
@@ -224,13 +217,32 @@ def figures(tree: Path, folder: Path) -> dict[str, str]:
         'lines, with docstrings, comments and blanks': f'{held.raw}',
         'lines of code': f'{held.lines}',
         'lines of code, core': f'{held.core}',
+        'lines of code, outer rooms': f'{held.outer}',
         'modules': f'{held.modules}',
         'modules, core': f'{held.core_modules}',
         'calls from room to room, bytes of a bag to bytes published': f'{len(calls)}',
         'modules that run in a diagnosis': f'{len(modules)}',
         f'functions over {LINES} lines of code': f'{len(held.long)}',
         f'functions over {PARAMETERS} parameters': f'{len(held.wide)}',
+        'lines of code, tests': f'{lines(tree / "tests")}',
+        'lines of code, benchmarks': f'{lines(tree / "benchmarks")}',
+        'words, README and docs': f'{words(tree)}',
     }
+
+
+def lines(folder: Path) -> int:
+    """
+    Return how many lines of code a folder has.
+    """
+    return sum(len(code_lines(path)) for path in folder.rglob('*.py'))
+
+
+def words(tree: Path) -> int:
+    """
+    Return how many words the pages have.
+    """
+    pages = [tree / 'README.md', *(tree / 'docs').glob('*.md')]
+    return sum(len(page.read_text(encoding='utf-8').split()) for page in pages)
 
 
 def main() -> None:
@@ -247,10 +259,11 @@ def main() -> None:
     trees = [each.resolve() for each in options.tree or [ROOT]]
     with tempfile.TemporaryDirectory() as folder:
         columns = [figures(tree, Path(folder)) for tree in trees]
-    print('| | ' + ' | '.join(tree.name for tree in trees) + ' |')
-    print('|---|' + '---:|' * len(trees))
+    print('| | ' + ' | '.join(tree.name for tree in trees) + ' | aim |')
+    print('|---|' + '---:|' * len(trees) + '---:|')
     for name in columns[0]:
-        print(f'| {name} | ' + ' | '.join(each[name] for each in columns) + ' |')
+        cells = [name, *(each[name] for each in columns), str(AIMS.get(name, ''))]
+        print(f'| {" | ".join(cells)} |')
     last = count(trees[-1])
     for each in (*last.long, *last.wide):
         print(f'{each.place}: {each.count}')

@@ -2,9 +2,8 @@
 """
 What `shipdrag diagnose` says of measured records, as a user would run it.
 
-Logs of two yachts with no coastdown in them, and the coast of a model ship without
-a stated baseline. Reads the folder that SHIPDRAG_DATA names and draws nothing at
-random. `--write` puts it into docs/results/real_records.txt.
+Logs of two yachts with no coastdown in them. Reads the folder that SHIPDRAG_DATA names
+and draws nothing at random. `--write` puts it into docs/results/real_records.txt.
 """
 
 from __future__ import annotations
@@ -17,13 +16,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from _tables import put
-from real_records import DATA, MODEL_SHIP, PAGE, run_command
+from real_records import DATA, PAGE, run_command
 
 IMPORT_LOG = f'shipdrag import ${DATA}/psaros_lake_geneva.nmea.gz -o yacht.mcap'
 DIAGNOSE_LOG = 'shipdrag diagnose yacht.mcap'
-DIAGNOSE_MODEL = 'shipdrag diagnose {}.mcap --window {:g} {:g}'.format(
-    MODEL_SHIP.name, *MODEL_SHIP.window_s
-)
 
 
 def _irene(year: str, file: str) -> tuple[str, str]:
@@ -37,7 +33,6 @@ RECORDS = {
     'Irene, 2007': _irene('2007', 'irene_2007_regate_1_dec_07'),
     'Irene, 2013': _irene('2013', 'irene_2013_Flensburg2013_regate_3.8'),
     'Irene, 2014': _irene('2014', 'irene_2014_20140611'),
-    'model ship, 26 s of coasting': (MODEL_SHIP.import_command(), DIAGNOSE_MODEL),
 }
 
 

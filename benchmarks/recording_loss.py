@@ -42,8 +42,7 @@ from shipdrag_ros.bags.records import MAGIC, walk
 from shipdrag_ros.bags.recover import compact
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EncodedMessage, encode
-from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.ring import RawMessage
+from shipdrag_ros.node.recorder import RawMessage, Recorder
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship

@@ -32,7 +32,7 @@ from shipdrag_ros.studies.cable.drag import (
     tangent_error,
     tangent_range,
 )
-from shipdrag_ros.studies.cable.face.pictures import LINES, RANGE_COLOR, SURFACES
+from shipdrag_ros.studies.cable.face.verb import LINES, RANGE_COLOR, SURFACES
 
 DOCS = Path(__file__).resolve().parents[1] / 'docs'
 ROUNDED = {

@@ -38,8 +38,7 @@ from matplotlib.figure import Figure
 
 from shipdrag_ros.report.drawing import BLUE, GREEN, STYLE, VERMILION, save
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.residual.fit import ResidualFit, fit_form
-from shipdrag_ros.studies.residual.forms import FORMS
+from shipdrag_ros.studies.residual.fit import FORMS, ResidualFit, fit_form
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 ROOT = Path(__file__).parents[1]

@@ -29,7 +29,7 @@ from shipdrag_ros.regression.polynomial import monomials, terms_up_to
 from shipdrag_ros.regression.surface import SIGNIFICANCE
 from shipdrag_ros.report.drawing import STYLE, save
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.surface.face.pictures import contour_picture, degree_picture
+from shipdrag_ros.studies.surface.face.verb import contour_picture, degree_picture
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / 'docs' / 's5_surfaces.md'

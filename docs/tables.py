@@ -2,8 +2,8 @@
 """
 Write tables of the docs from the code.
 
-`python docs/tables.py` rewrites what stands between the markers in docs/ros.md,
-docs/effects.md and docs/model.md; a test fails while the two differ.
+`python docs/tables.py` rewrites what stands between the markers in docs/ros.md, docs/effects.md,
+docs/results/effects.txt and docs/model.md; a test fails while the two differ.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from shipdrag_ros.fields import keys_of
+from shipdrag_ros.forecast import priors as forecast_priors
 from shipdrag_ros.inference import learning
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS
 from shipdrag_ros.parameter import Parameter
@@ -25,6 +26,7 @@ from shipdrag_ros.simulation.effects import LIBRARY, confounders, discriminating
 DOCS = Path(__file__).resolve().parent
 ROS = DOCS / 'ros.md'
 EFFECTS = DOCS / 'effects.md'
+EFFECTS_MORE = DOCS / 'results' / 'effects.txt'
 MODEL = DOCS / 'model.md'
 _INPUT_MEANING = {
     'speed_through_water': 'speed log, `linear.x` forward [m/s]',
@@ -183,9 +185,20 @@ def model_priors() -> str:
     """
     Return the table of the priors of the one posterior.
     """
+    return _declared(priors.TABLE)
+
+
+def model_forecast() -> str:
+    """
+    Return the table of the priors of the forecast.
+    """
+    return _declared(forecast_priors.TABLE)
+
+
+def _declared(rows_of: Iterable[priors.Declared]) -> str:
     rows = (
         [f'`{each.letter}`', each.meaning, str(each.prior), each.unit or '-', each.source]
-        for each in priors.TABLE
+        for each in rows_of
     )
     return _table(['letter', 'meaning', 'prior', 'unit', 'source'], rows)
 
@@ -215,15 +228,13 @@ Tables = Mapping[str, Callable[[], str]]
 TABLES: Tables = {'inputs': inputs, 'outputs': outputs, 'parameters': parameters}
 PAGES: Mapping[Path, Tables] = {
     ROS: TABLES,
-    EFFECTS: {
-        'effects': effects,
-        'effect parameters': effect_parameters,
-        'confounders': effect_confounders,
-    },
+    EFFECTS: {'effects': effects},
+    EFFECTS_MORE: {'effect parameters': effect_parameters, 'confounders': effect_confounders},
     MODEL: {
         'priors': model_priors,
         'noise priors': model_noise,
         'families': model_families,
+        'forecast priors': model_forecast,
     },
 }
 

@@ -53,6 +53,10 @@ class ParameterError(ProblemsError):
     """Parameters that are unknown, of the wrong type or out of range."""
 
 
+class EffectFileError(ProblemsError):
+    """A file of a learnt effect that cannot be used."""
+
+
 class DataError(ProblemsError):
     """A table of measurements to which nothing can be fitted."""
 

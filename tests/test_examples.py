@@ -77,6 +77,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(ROOT / 'config' / 'parameters.yaml', folder / 'parameters.yaml')
     shutil.copy(ROOT / 'docs' / 'data' / 'river_ships.csv', folder / 'hulls.csv')
     shutil.copy(ROOT / 'docs' / 'data' / 'c_x.csv', folder / 'table.csv')
+    shutil.copytree(ROOT / 'docs' / 'data' / 'effects', folder / 'effects')
     for name in ('NEW.csv', 'new_hulls.csv'):
         (folder / name).write_text('L_B,B_T,C_B,lcb,Fr\n8.2,4.0,0.85,0.005,0.12\n')
     (folder / 'records').mkdir()

@@ -45,3 +45,13 @@ def test_the_page_of_figures_is_as_its_result_files_make_it() -> None:
         said = re.search(rf'{words} ([\d.]+) %', readme.replace('\n', ' '))
         assert said is not None
         assert float(said[1]) == pytest.approx(error, abs=0.051)
+
+
+def test_what_the_readme_says_of_trends_is_what_was_counted() -> None:
+    counted = (ROOT / 'docs' / 'results' / 'trend.txt').read_text(encoding='utf-8')
+    [ships] = re.findall(r'trend_score\.py --ships (\d+)', counted)
+    [share] = re.findall(r'found and dated within a month \| (\d+) %', counted)
+    [false] = re.findall(r'\| false steps \| (\d+) \|', counted)
+    found = round(int(share) / 100 * int(ships))
+    readme = ' '.join((ROOT / 'README.md').read_text(encoding='utf-8').split())
+    assert f'{found} of {ships} simulated ships, with {false} false ones in 100' in readme

@@ -267,7 +267,7 @@ def _case(number: int, seed: int) -> _Case:
         kit = replace(kit, fix='radar', fix_every_s=3.0)
     weather = draw_weather(rng, hull.time_s, hull.speed_m_s)
     bases = _legs(rng, hull, screw, weather, lead, coast, (seed, number))
-    weather, kit, moves = _calm(bases, kit)
+    weather, kit, moves = calm(bases, kit)
     bases = tuple(replace(base, weather=weather) for base in bases)
     stated = draw_stated(rng)
     steady = _steady(bases[0])
@@ -280,7 +280,7 @@ def _case(number: int, seed: int) -> _Case:
         sizes.append(size)
     settings = []
     for run, base in enumerate(bases):
-        setting = _fresh(base)
+        setting = fresh(base)
         for effect in hidden:
             if effect.scope != 'run' or run == 0:
                 effect.apply(setting)
@@ -289,8 +289,10 @@ def _case(number: int, seed: int) -> _Case:
     return _Case(hull, screw, stated, kit, text, *found, moves)
 
 
-def _fresh(base: Setting) -> Setting:
-    """Return a copy whose lists are its own."""
+def fresh(base: Setting) -> Setting:
+    """
+    Return a copy whose lists are its own.
+    """
     lists = ('still', 'timed', 'wind', 'flow', 'helm', 'shear', 'waves')
     return replace(base, **{name: list(getattr(base, name)) for name in lists})
 
@@ -333,8 +335,10 @@ def _legs(
     return tuple(legs)
 
 
-def _calm(bases: tuple[Setting, ...], kit: Kit) -> tuple[Weather, Kit, float]:
-    """Return weather and instruments, good enough to be no effect, and how they move r."""
+def calm(bases: tuple[Setting, ...], kit: Kit) -> tuple[Weather, Kit, float]:
+    """
+    Return weather and instruments, good enough to be no effect, and how they move r.
+    """
     weather = bases[0].weather
     still = replace(weather, wind=(0.0, 0.0), flow=(0.0, 0.0), tide=(0.0, 0.0, 0.0))
     while True:
@@ -375,7 +379,7 @@ def _sized(
         rng = np.random.default_rng([*key, place])
         drawn = Draw(rng, base.hull, base.screw, size, base.coast_s, steady)
         effect = make(drawn)
-        changed = _fresh(base)
+        changed = fresh(base)
         effect.apply(changed)
         moves = moved(changed, base, kit)
         if LEAST <= moves <= MOST:

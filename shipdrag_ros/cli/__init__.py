@@ -12,7 +12,9 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
+from pathlib import Path
 from typing import NamedTuple
 
 from shipdrag_ros import __version__
@@ -52,6 +54,7 @@ _OWN = (
         '.diagnose',
         'where model and data disagree, and which effect is missing',
     ),
+    Verb('effect', '.effect', 'files of learnt effects: what is in them, and may they be used'),
     Verb('forecast', '.forecast', 'the rest of each glide foretold, beside what followed'),
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
     Verb('trend', '.trend', 'added resistance of a fleet against time, which hull to clean'),
@@ -114,7 +117,8 @@ def _run(line: list[str]) -> int:
     verb = next((word for word in line if not word.startswith('-')), '')
     try:
         options = parser(verb).parse_args(line)
-        status: int = options.run(options)
+        with _more_effects(getattr(options, 'effects_from', [])):
+            status: int = options.run(options)
         return status
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -130,6 +134,14 @@ def _run(line: list[str]) -> int:
     except OSError as error:
         print(f'ERROR: {_error_text(error)}', file=sys.stderr)
     return USER_ERROR
+
+
+def _more_effects(folders: Sequence[Path]) -> AbstractContextManager[None]:
+    if not folders:
+        return nullcontext()
+    from shipdrag_ros.learn.folder import read_folders, using
+
+    return using(read_folders(folders))
 
 
 def _error_text(error: OSError) -> str:

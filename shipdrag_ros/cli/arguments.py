@@ -67,6 +67,24 @@ def stop_time(text: str) -> float | datetime:
     return at
 
 
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """
+    Add `--ship FILE` and `--parameters FILE`, in place of what is attached to a bag.
+    """
+    parser.add_argument(
+        '--ship',
+        type=Path,
+        metavar='FILE',
+        help='ship file (YAML) (default: the one attached to the bag)',
+    )
+    parser.add_argument(
+        '--parameters',
+        type=Path,
+        metavar='FILE',
+        help='parameters as `name: value` (YAML) (default: those attached to the bag)',
+    )
+
+
 def add_stop(parser: argparse.ArgumentParser) -> None:
     """
     Add `--stop TIME`.
@@ -131,6 +149,22 @@ def add_remap(parser: argparse.ArgumentParser) -> None:
         type=remap,
         metavar='FROM:=TO',
         help='read topic FROM of the bag as input TO; may be given more than once',
+    )
+
+
+def add_effects(parser: argparse.ArgumentParser) -> None:
+    """
+    Add `--effects DIR`.
+    """
+    parser.add_argument(
+        '--effects',
+        dest='effects_from',
+        action='append',
+        default=[],
+        type=Path,
+        metavar='DIR',
+        help='folder of effects as `shipdrag learn` writes them (.yaml), which count beside those '
+        'of the library; may be repeated',
     )
 
 

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from shipdrag_ros.cli.arguments import add_json, add_remap, new_file
-from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.progress import stages
+from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis.learn_baseline import ENOUGH, LearntBaseline, learn_baseline
 from shipdrag_ros.display import Table

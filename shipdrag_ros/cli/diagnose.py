@@ -7,9 +7,15 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, number, unused_file
-from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.progress import stages
+from shipdrag_ros.cli.arguments import (
+    add_effects,
+    add_json,
+    add_remap,
+    add_report,
+    number,
+    unused_file,
+)
+from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.diagnosis import DiagnosisResult, Verdict, with_effects
 from shipdrag_ros.diagnosis import tables as diagnosis_cells
@@ -34,9 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'missing: a name only where the data decide, the smallest set and what would decide '
         'where they cannot, "unknown" with a place where it is none of them. Coastdowns of all '
         'bags are taken together; effects of the earth are stated along the first one. Without '
-        'a baseline a form of the resistance is fitted to the runs. In a record without a '
-        'coastdown the log is compared with the way over ground, for which neither baseline nor '
-        'ship file is needed.'
+        'a baseline they are compared with all hulls of her length and volume. In a record '
+        'without a coastdown the log is compared with the way over ground, for which neither '
+        'baseline nor ship file is needed.'
     )
     parser.add_argument(
         'bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'MCAP or rosbag2; {HELP}'
@@ -82,6 +88,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'what was found of hull and instruments counts, less the longer ago it was; water and '
         'weather do not',
     )
+    add_effects(parser)
     add_remap(parser)
     add_json(parser)
 

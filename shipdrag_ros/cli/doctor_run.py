@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from shipdrag_ros.bags import open_runs
-from shipdrag_ros.cli.demo import SETTINGS, SHIP
+from shipdrag_ros.cli.demo import SETTINGS, SHIP, ended_by_sigterm, onboard_node, sail
 from shipdrag_ros.cli.node import no_ros
-from shipdrag_ros.cli.onboard import ended_by_sigterm, onboard_node, sail
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library import simulated

@@ -24,6 +24,7 @@ EXAMPLES = {
         'shipdrag simulate --ship ship.yaml -o calm.mcap --lead-in 1800',
         'shipdrag simulate --ship ship.yaml -o fouled.mcap --effect fouling=0.3 '
         '--effect current=0.4,cross_track_m_s=0.1',
+        'shipdrag simulate --ship ship.yaml -o weed.mcap --effects effects --effect weed=0.0014',
     ),
     'simulate-fleet': (
         'shipdrag simulate-fleet -o fleet --ships 1 --months 1 --seed 4',
@@ -37,9 +38,14 @@ EXAMPLES = {
         'shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml',
         'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
     ),
+    'effect': (
+        'shipdrag effect check effects/weed.yaml',
+        'shipdrag effect list --effects effects',
+    ),
     'forecast': (
         'shipdrag forecast run.mcap --after 120 300',
         'shipdrag forecast run.mcap --ship ship.yaml --json forecast.json',
+        'shipdrag forecast run.mcap --if-stopped-now',
     ),
     'fleet': (
         'shipdrag fleet records -o store --workers 1',

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from shipdrag_ros.cli.arguments import add_json, whole
-from shipdrag_ros.cli.output import Output
-from shipdrag_ros.cli.progress import ProgressLines
+from shipdrag_ros.cli.output import Output, ProgressLines
 from shipdrag_ros.display import Table
 from shipdrag_ros.errors import FleetError
 from shipdrag_ros.progress import Progress

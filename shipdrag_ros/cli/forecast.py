@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_stop, number
+from shipdrag_ros.cli.arguments import add_json, add_remap, add_settings, add_stop, number
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.forecast import words
@@ -16,6 +15,7 @@ from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band
 from shipdrag_ros.library.forecasts import AFTER_S, Forecasts, GlideForecast, forecast
 from shipdrag_ros.library.replaying import replay_run
+from shipdrag_ros.library.stopped import IfStopped, if_stopped_now
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 
@@ -30,29 +30,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'beside what followed.'
     )
     parser.add_argument('bags', nargs='+', type=windowed_bag, metavar='BAG', help=f'bag; {HELP}')
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file (YAML) (default: the one attached to the bag)',
-    )
-    parser.add_argument(
-        '--parameters',
-        type=Path,
-        metavar='FILE',
-        help='parameters as `name: value` (YAML) (default: those attached to the bag)',
-    )
-    parser.add_argument(
+    add_settings(parser)
+    when = parser.add_mutually_exclusive_group()
+    when.add_argument(
         '--after',
         nargs='+',
-        type=number(0.0, unit='s', above=True),
-        default=list(AFTER_S),
+        type=_after,
+        default=AFTER_S,
         metavar='S',
-        help='when forecasts are made, from each stop on [s]',
+        help='when forecasts are made, from each stop on [s] (default: '
+        f'{" ".join(f"{each:g}" for each in AFTER_S)})',
+    )
+    when.add_argument(
+        '--if-stopped-now',
+        action='store_true',
+        help='the glide that would begin at the end of the last bag, from the hull as last known: '
+        'the last coastdown in the bags, or else the ship file',
     )
     add_stop(parser)
     add_remap(parser)
     add_json(parser)
+
+
+def _after(text: str) -> float:
+    try:
+        return number(0.0, unit='s', above=True)(text)
+    except argparse.ArgumentTypeError as error:
+        raise argparse.ArgumentTypeError(
+            f'{error}; a bag stands before --after or behind --, as in --after 60 300 -- BAG'
+        ) from error
 
 
 def run(options: argparse.Namespace) -> int:
@@ -66,6 +72,13 @@ def run(options: argparse.Namespace) -> int:
         replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
         for each, own in open_windowed(options.bags, remap=dict(options.remap), output=output)
     ]
+    if options.if_stopped_now:
+        stopped = if_stopped_now(results)
+        output.heading(stopped.bag)
+        output.say(stopped.summary())
+        output.table(stopped.table())
+        output.json(document_of_stop(stopped))
+        return 0
     found = forecast(results, options.after)
     for each in found.made:
         _show(output, each)
@@ -118,6 +131,25 @@ def document(found: Forecasts) -> dict[str, Any]:
             {'bag': bag, 'stop_ns': None, 'after_s': None, 'reason': why}
             for bag, why in found.without
         ],
+    }
+
+
+def document_of_stop(found: IfStopped) -> dict[str, Any]:
+    """
+    Return the document of `--if-stopped-now`: a forecast of which nothing has followed.
+    """
+    milestones = [_milestone(Passed(each, None, None)) for each in found.forecast.milestones]
+    return {
+        'if_stopped_now': {
+            'bag': found.bag,
+            'made_ns': found.forecast.made_ns,
+            'speed_m_s': float(found.forecast.speed_m_s[0]),
+            'measured': found.measured,
+            'hull': found.hull,
+            'gliding': found.gliding,
+            'over_ground': found.forecast.over_ground,
+            'speeds': milestones,
+        }
     }
 
 

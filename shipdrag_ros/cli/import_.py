@@ -15,9 +15,9 @@ from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Format, Option, best_of, head_of
-from shipdrag_ros.sources.join import read_joined
 from shipdrag_ros.sources.log import new_bag
 from shipdrag_ros.sources.reading import job_of
+from shipdrag_ros.sources.run import read_joined
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

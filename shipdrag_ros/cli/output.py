@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where results and logs go: one to stdout, the other to stderr, never mixed."""
+"""Where results and logs go: one to stdout, the other and all progress to stderr, never mixed."""
 
 from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
@@ -16,8 +17,96 @@ from rich.progress import Progress as RichProgress
 from rich.table import Table as RichTable
 
 from shipdrag_ros.cli.arguments import STDOUT
-from shipdrag_ros.display import Table, json_text
+from shipdrag_ros.display import Table, duration, json_text
 from shipdrag_ros.progress import PartDone, Progress
+
+_EVERY_S = 3.0  # between lines
+_COMPILES = 'compiling, once after an installation or an update; this takes about a minute'
+
+
+@contextmanager
+def stages(output: Output) -> Iterator[Progress]:
+    """
+    Show one stage after the other, and compiling where that is really done.
+
+    Parameters
+    ----------
+    output
+        Whose log it goes to.
+
+    Yields
+    ------
+    Progress
+        Called with each stage, how much of it is done, and of how much.
+    """
+    with output.bar() as bar, compiling_said(output.log):
+        yield bar or ProgressLines(output.log, every_s=_EVERY_S, at_once=True).show
+
+
+@contextmanager
+def compiling_said(log: Callable[[str], None]) -> Iterator[None]:
+    """
+    Say once that something is compiled, when the first function is.
+
+    Parameters
+    ----------
+    log
+        Where it is said; not of what is kept from an earlier start.
+    """
+    from numba.core import event  # long to import, and help must come at once
+
+    class Notice(event.Listener):  # type: ignore[misc]
+        said = False
+
+        def on_start(self, event: object) -> None:
+            if not self.said:
+                log(_COMPILES)
+            self.said = True
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    with event.install_listener('numba:compile', Notice()):
+        yield
+
+
+class ProgressLines:
+    """
+    A line of progress now and then.
+
+    Parameters
+    ----------
+    log
+        Where the lines go.
+    every_s
+        Between two of them, at least [s].
+    at_once
+        Whether the first word is printed without waiting.
+    """
+
+    def __init__(self, log: Callable[[str], None], *, every_s: float, at_once: bool) -> None:
+        self._log = log
+        self._every_s = every_s
+        self._text = ''
+        self._begun_s = self._said_s = time.monotonic()
+        self._waits = not at_once
+
+    def show(self, text: str, done: int, total: int) -> None:
+        """
+        Say how far a stage is, with the time left in it, unless a line was said just now.
+        """
+        now_s = time.monotonic()
+        if text != self._text:
+            self._text, self._begun_s = text, now_s
+        if self._waits and (not done or now_s - self._said_s < self._every_s):
+            return
+        self._waits, self._said_s = True, now_s
+        if not done:
+            self._log(text if total < 2 else f'{text}: 0 of {total}')
+            return
+        left_s = (now_s - self._begun_s) / done * (total - done)
+        self._log(f'{text}: {done} of {total}, {duration(round(left_s))} left')
+
 
 _PIPE_WIDTH = 160  # a file or a pipe has no width of its own; tables must not be cut there
 

@@ -8,7 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from shipdrag_ros.cli.arguments import REPORT as REPORT_MODULES
-from shipdrag_ros.cli.arguments import add_json, add_remap, add_report, add_stop, number
+from shipdrag_ros.cli.arguments import (
+    add_json,
+    add_remap,
+    add_report,
+    add_settings,
+    add_stop,
+    number,
+)
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.cli.windowed import HELP, open_windowed, windowed_bag
 from shipdrag_ros.coastdown.events import EndedCoastdown
@@ -46,18 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='MCAP file or rosbag2 directory; each is a run of its own, parts of one recording '
         f'are joined; {HELP}',
     )
-    parser.add_argument(
-        '--ship',
-        type=Path,
-        metavar='FILE',
-        help='ship file (YAML) (default: the one attached to the bag)',
-    )
-    parser.add_argument(
-        '--parameters',
-        type=Path,
-        metavar='FILE',
-        help='parameters as `name: value` (YAML) (default: those attached to the bag)',
-    )
+    add_settings(parser)
     parser.add_argument(
         '--window',
         nargs=2,

@@ -8,7 +8,7 @@ import math
 from collections import Counter
 from pathlib import Path
 
-from shipdrag_ros.cli.arguments import add_json, number, whole
+from shipdrag_ros.cli.arguments import add_effects, add_json, number, whole
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.library import simulated
@@ -91,6 +91,7 @@ def _add_day(parser: argparse.ArgumentParser) -> None:
         + '; '.join(_form(name) for name in LIBRARY)
         + '. docs/effects.md says what each does',
     )
+    add_effects(parser)
     parser.add_argument(
         '--first-heading',
         type=number(-2 * math.pi, 2 * math.pi, unit='rad'),

@@ -2,7 +2,6 @@
 """Which effect is missing where model and data disagree."""
 
 from shipdrag_ros.diagnosis.diagnose import diagnose, with_effects
-from shipdrag_ros.diagnosis.form import diagnose_fitted
 from shipdrag_ros.diagnosis.legs import SailingRecord
 from shipdrag_ros.diagnosis.result import (
     FORCE,
@@ -35,7 +34,6 @@ __all__ = [
     'Verdict',
     'Where',
     'diagnose',
-    'diagnose_fitted',
     'diagnose_sailing',
     'with_effects',
 ]

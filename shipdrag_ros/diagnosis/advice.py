@@ -10,34 +10,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.context import Context
-from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.facts import Facts
+from shipdrag_ros.diagnosis.measured import Measured
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.diagnosis.outcomes import (
     PredictedOutcome,
-    empty,
     of_another_run,
     of_instrument,
     probability_of_naming,
     with_known,
 )
-from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.result import Advice, Candidate
+from shipdrag_ros.diagnosis.sights import sight
 from shipdrag_ros.estimation.ode_fit.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
-from shipdrag_ros.inference.decision import CERTAIN, UNKNOWN, Verdict, WeighedHypothesis, decide
+from shipdrag_ros.inference.decision import (
+    CERTAIN,
+    NONE,
+    UNKNOWN,
+    Names,
+    Verdict,
+    WeighedHypothesis,
+    decide,
+)
 from shipdrag_ros.inference.rows import LOG
+from shipdrag_ros.posterior import motion
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.samples import Block, Channel, Float64
+from shipdrag_ros.ship import Ship
 from shipdrag_ros.ship.facts import advice as fact_advice
-from shipdrag_ros.simulation.effects import discriminating_measurements
-from shipdrag_ros.simulation.measures import COSTS, Cost, Measure
+from shipdrag_ros.simulation.effect import COSTS, Cost, Measure
+from shipdrag_ros.simulation.effects import discriminating_measurements, inseparable
 
 _MOST = 12  # rivals
 _SLOWER = 0.6  # of the first run, at another speed
@@ -56,23 +67,53 @@ _INSTRUMENTS = {
 _RUNS = (Measure.RECIPROCAL_RUN, Measure.OTHER_SPEED, Measure.ANOTHER_RUN)
 
 
-def advice(
-    model: CoastModel,
-    posterior: Posterior,
-    candidates: Sequence[Candidate],
-    progress: Progress = silent,
-) -> tuple[Advice, ...]:
+@dataclass(frozen=True)
+class Undecided:
+    """
+    Runs that cannot be decided.
+
+    Attributes
+    ----------
+    ship
+    seen
+    comparing, found
+        Of these runs.
+    facts
+        That are stated.
+    candidates
+        That the runs cannot separate.
+    """
+
+    ship: Ship
+    seen: Sequence[Observation]
+    comparing: Comparing
+    found: ComparedHypotheses
+    facts: Facts
+    candidates: Sequence[Candidate]
+
+    @cached_property
+    def inseparable(self) -> tuple[frozenset[str], ...]:
+        """Effects that no record separates."""
+        return inseparable(self.found.effects)
+
+    @cached_property
+    def rivals(self) -> dict[Names, Fitted]:
+        """The most probable hypotheses, nothing and something unnamed too."""
+        return {
+            names: self.found.best[names]
+            for place, names in enumerate(self.found.probability)
+            if (place < _MOST or names in (NONE, UNKNOWN))
+            and math.isfinite(self.found.best[names].log_evidence)
+        }
+
+
+def advice(case: Undecided, progress: Progress = silent) -> tuple[Advice, ...]:
     """
     Return what would decide; first what is likely to cost the crew least.
 
     Parameters
     ----------
-    model
-        The runs, and what they are held against.
-    posterior
-        Of what was found.
-    candidates
-        That the runs cannot separate.
+    case
     progress
         Called with how many measurements are tried.
 
@@ -86,45 +127,41 @@ def advice(
     The probability is that something is named after the measurement, averaged over
     what may be the truth; None where it is not simulated.
     """
-    fits = _rivals(posterior)
-    # the evidence of a fit holds the prior
-    rivals = [WeighedHypothesis(names, one.log_evidence, 0.0) for names, one in fits.items()]
+    rivals = [
+        WeighedHypothesis(names, math.log(max(case.found.probability[names], 1e-300)), 0.0)
+        for names in case.rivals
+    ]
     found: list[Advice] = []
     tried = (*_RUNS, *_INSTRUMENTS)
     for done, measure in enumerate(tried):
         progress('trying what would decide', done, len(tried))
-        if _measured(measure, model.seen):
+        if _measured(measure, case.seen):
             continue
-        settings, setting = _settings(measure, model, list(fits.values()))
+        settings, setting = _settings(measure, case)
         if settings and all(
-            np.isfinite(one.slope).all() and len(one.mean)
-            for way in settings
-            for ways in way
-            for one in ways
+            len(each.mean) and np.isfinite(each.slope).all() for way in settings for each in way
         ):
-            named = probability_of_naming(settings, setting, rivals, inseparable=model.inseparable)
+            named = probability_of_naming(settings, setting, rivals, inseparable=case.inseparable)
             found.append(Advice(measure.value, named, COSTS[measure]))
     best = max((each.probability or 0.0 for each in found), default=0.0)
     promising = [each for each in found if (each.probability or 0.0) >= min(_HARDLY, best)]
     ranked = {each: each.probability or 0.0 for each in promising}
-    for each in declared(candidates):
+    for each in declared(case.candidates):
         measure = Measure(each.measure)
-        if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, model.seen):
-            ranked[each] = _reach(measure, candidates, model.inseparable)
-    for name, named in _facts(model, posterior).items():
+        if measure not in (*_RUNS, *_INSTRUMENTS) and not _measured(measure, case.seen):
+            ranked[each] = _reach(measure, case.candidates, case.inseparable)
+    for name, named in _facts(case).items():
         ranked[Advice(fact_advice(name), named, Cost.LOOK)] = named
     return _by_cost(ranked)
 
 
-def _facts(model: CoastModel, posterior: Posterior) -> dict[str, float]:
+def _facts(case: Undecided) -> dict[str, float]:
     """Return the facts that would name something, and how probably."""
-    if model.facts is None:
-        return {}
 
-    def names_one(after: Posterior) -> bool:
-        return decide(after.probability, model.inseparable).verdict is Verdict.NAMED
+    def names_one(after: Mapping[Names, float]) -> bool:
+        return decide(after, case.inseparable).verdict is Verdict.NAMED
 
-    found = model.facts.naming(posterior, names_one)
+    found = case.facts.naming(case.found, names_one)
     return {name: named for name, named in found.items() if named >= _HARDLY}
 
 
@@ -195,18 +232,6 @@ def _reach(
     )
 
 
-def _rivals(posterior: Posterior) -> dict[tuple[str, ...], Fit]:
-    """Return the most probable fits, nothing and something unnamed too."""
-    # one that could not be fitted is none
-    fitted = [names for names, one in posterior.best.items() if np.isfinite(one.covariance).all()]
-    fitted.sort(key=lambda names: -posterior.best[names].log_evidence)
-    return {
-        names: posterior.best[names]
-        for place, names in enumerate(fitted)
-        if place < _MOST or names in ((), UNKNOWN)
-    }
-
-
 def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
     """Say whether the runs hold something already."""
     first = seen[0]
@@ -235,59 +260,73 @@ def _measured(measure: Measure, seen: Sequence[Observation]) -> bool:
             return False
 
 
-def _settings(
-    measure: Measure, model: CoastModel, fits: Sequence[Fit]
-) -> tuple[list[list[list[PredictedOutcome]]], list[int]]:
+def _settings(measure: Measure, case: Undecided) -> tuple[list[list[PredictedOutcome]], list[int]]:
     """Return the ways in which a measurement may be read, and that of each candidate."""
-    first = model.seen[0]
+    first, fits, same = case.seen[0], list(case.rivals.values()), [0] * len(case.rivals)
     if measure in _RUNS:
         opposite = math.pi if measure is Measure.RECIPROCAL_RUN else 0.0
         slower = _SLOWER if measure is Measure.OTHER_SPEED else 1.0
         run = _another(first, first.heading_rad + opposite, slower * first.speed_m_s)
-        return [of_another_run(model, fits, run)], [0] * len(fits)
+        outcomes = of_another_run(case.comparing, fits, sight(run, case.seen, case.ship))
+        return ([outcomes], same) if outcomes else ([], [])
     if measure is not Measure.SHAFT:
-        windows = _windows(measure, model)
-        outcomes, _ = of_instrument(model, fits, _contexts(windows, model))
-        return [outcomes], [0] * len(fits)
+        outcomes, _ = _read(_windows(measure, case), case, fits)
+        return ([outcomes], same) if outcomes else ([], [])
     # whether the water turns the shaft is seen before all else, and differs by rival
-    found: list[tuple[list[list[PredictedOutcome]], list[Float64]]] = []
+    found: list[tuple[list[PredictedOutcome], list[Float64]]] = []
     for after in (_TURNING, _STANDING):
-        windows = _windows(measure, model, after=after)
-        contexts = _contexts(windows, model)
-        if any(len(context.at_shaft) == 0 for context in contexts):
+        windows = _windows(measure, case, after=after)
+        outcomes, values = _read(windows, case, fits)
+        if not outcomes or any(len(each) == 0 for each in values):
             return [], []
-        outcomes, values = of_instrument(model, fits, contexts)
         # the time of the stop and the run-down are read from the shaft as well
-        seen = [RunDown.of(window, model.ship) for window in windows]
+        seen = [RunDown.of(window, case.ship) for window in windows]
         sd = {
-            'stop': [each.stop_sd_s for each in seen],
-            'run-down': [each.run_down_sd_s for each in seen],
+            motion.STOP: [each.stop_sd_s for each in seen],
+            motion.TAU: [each.run_down_sd_s / max(each.run_down_s, 1e-3) for each in seen],
         }
-        found.append((with_known(outcomes, fits, sd), values))
+        found.append((with_known(case.comparing, fits, outcomes, sd), values))
     (where_turning, values), (where_standing, _) = found
     seen_to_stand = [int(np.median(value[:3]) <= _TURNS) for value in values]
     return [where_turning, where_standing], seen_to_stand
 
 
+def _read(
+    windows: Sequence[Window], case: Undecided, fits: Sequence[Fitted]
+) -> tuple[list[PredictedOutcome], list[Float64]]:
+    """Return what rivals predict of an instrument in each run."""
+    runs = []
+    for run, window in zip(case.seen, windows, strict=True):
+        context = Context.of(window, case.ship, run.time_s, run.context.stop)
+        alone = replace(context, value=np.zeros(len(context)))
+        runs.append(sight(replace(run, across=None, context=alone), case.seen, case.ship))
+    return of_instrument(case.comparing, fits, runs)
+
+
 def _another(first: Observation, heading_rad: float, speed_m_s: float) -> Observation:
-    """Return a run of the same rows and noise as the first one."""
+    """Return a run of the same rows and noise as the first one, whose values are 0."""
     context = first.context
     stop = replace(context.stop, heading_rad=heading_rad, speed_m_s=speed_m_s)
     return replace(
         first,
         heading_rad=heading_rad,
         speed_m_s=speed_m_s,
-        along=empty(first.along),
-        across=None if first.across is None else empty(first.across),
+        along=_empty(first.along),
+        across=None if first.across is None else _empty(first.across),
         context=replace(context, stop=stop, value=np.zeros(len(context))),
     )
 
 
-def _windows(measure: Measure, model: CoastModel, *, after: float = 0.0) -> list[Window]:
+def _empty(measured: Measured) -> Measured:
+    rows = measured.rows
+    return replace(measured, rows=rows._replace(value=np.zeros(len(rows.value))))
+
+
+def _windows(measure: Measure, case: Undecided, *, after: float = 0.0) -> list[Window]:
     """Return what an instrument may read in each run; `after` is the shaft after its fall."""
     windows = []
-    channel, draught_m = _INSTRUMENTS[measure], model.ship.draught_m or math.nan
-    for run in model.seen:
+    channel, draught_m = _INSTRUMENTS[measure], case.ship.draught_m or math.nan
+    for run in case.seen:
         stop = run.context.stop
         time_s = np.arange(0.0, run.time_s[-1], _READING_S)
         gusts = 0.5 * _GUSTS_M_S * (-1.0) ** (time_s // 60.0)
@@ -308,11 +347,3 @@ def _windows(measure: Measure, model: CoastModel, *, after: float = 0.0) -> list
             )
         )
     return windows
-
-
-def _contexts(windows: Sequence[Window], model: CoastModel) -> list[Context]:
-    """Return what an instrument would add to each run."""
-    return [
-        Context.of(window, model.ship, run.time_s, run.context.stop)
-        for window, run in zip(windows, model.seen, strict=True)
-    ]

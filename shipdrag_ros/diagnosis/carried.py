@@ -19,11 +19,12 @@ from functools import cached_property
 
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis, check
 from shipdrag_ros.diagnosis.facts import Facts
-from shipdrag_ros.diagnosis.model import Hypothesis
-from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.seen_runs import CarriedEffect, SeenRun, WeighedEarlier
-from shipdrag_ros.diagnosis.terms import EffectTerm
+from shipdrag_ros.inference.decision import UNKNOWN, marginals
 from shipdrag_ros.parameter import Parameter, Prior, Shape, log_normal, normal
+from shipdrag_ros.posterior.compare import ComparedHypotheses
+from shipdrag_ros.posterior.effects import EffectWay, kept_way
+from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effect import Effect, Scope
 from shipdrag_ros.simulation.effects import LIBRARY, find
@@ -128,7 +129,7 @@ class Carried:
     now_ns: int
     weighed: tuple[_Weighed, ...]
 
-    def log_weight(self, hypothesis: Hypothesis) -> float:
+    def log_weight(self, hypothesis: Explanation) -> float:
         """
         Return the log evidence of the diagnoses for a hypothesis.
 
@@ -142,29 +143,23 @@ class Carried:
         float
             0 on the average over the priors of the effects.
         """
-        terms = [t for t in hypothesis.terms if isinstance(t, EffectTerm) and not t.stated]
-        there = {term.effect.name for term in terms}
-        kept = {term.effect.name for term in terms if term.kept}
+        ways = [way for way in hypothesis.ways if not way.stated]
+        there = {way.effect.name for way in ways}
+        kept = {way.effect.name for way in ways if way.kept}
         return math.fsum(
             each.log_weight(there, {name for name in kept if self._source(name) is each})
             for each in self.weighed
         )
 
-    def kept(self, name: str) -> tuple[Prior, ...]:
+    def ways(self, effects: Sequence[Effect]) -> list[EffectWay]:
         """
-        Return priors of the sizes of an effect that is as it was.
-
-        Parameters
-        ----------
-        name
-            Of the effect.
-
-        Returns
-        -------
-        tuple of Prior
-            Of each parameter; empty where no diagnosis held the effect possible.
+        Return effects that are as they were found; of each that a diagnosis held possible.
         """
-        return self._kept.get(name, ())
+        return [
+            kept_way(effect, self._kept[effect.name], self.ship)
+            for effect in effects
+            if effect.name in self._kept
+        ]
 
     @cached_property
     def _kept(self) -> dict[str, tuple[Prior, ...]]:
@@ -175,24 +170,11 @@ class Carried:
                 found[name] = self._sizes(find(name), source)
         return {name: priors for name, priors in found.items() if priors}
 
-    def judged(self, posterior: Posterior) -> tuple[WeighedEarlier, ...]:
+    def judged(self, found: ComparedHypotheses) -> tuple[WeighedEarlier, ...]:
         """
-        Return what of each diagnosis counts, and what has become of it.
-
-        Parameters
-        ----------
-        posterior
-            Of hypotheses, the diagnoses included.
-
-        Returns
-        -------
-        tuple of WeighedEarlier
-            The latest first.
+        Return what of each diagnosis counts, and what has become of it; the latest first.
         """
-        now: dict[str, float] = {}
-        for names, probability in posterior.probability.items():
-            for name in names:
-                now[name] = now.get(name, 0.0) + probability
+        now = marginals(found.probability)
         return tuple(
             WeighedEarlier(
                 each.diagnosis.name,
@@ -203,7 +185,7 @@ class Carried:
                         then,
                         stays,
                         now.get(name, 0.0),
-                        resized=self._source(name) is each and _resized(name, posterior),
+                        resized=self._source(name) is each and _resized(name, found),
                     )
                     for name, stays in each.stays.items()
                     if (then := each.diagnosis.probability(name)) >= _LEAST
@@ -239,13 +221,12 @@ class Carried:
         return tuple(priors) if all(prior.second > 0.0 for prior in priors) else ()
 
 
-def _resized(name: str, posterior: Posterior) -> bool:
+def _resized(name: str, found: ComparedHypotheses) -> bool:
     """Say whether an effect is likelier of any size than as it was found."""
-    for names in posterior.named():
-        if name in names and names in posterior.best:
-            terms = posterior.best[names].hypothesis.terms
-            own = [t for t in terms if isinstance(t, EffectTerm) and not t.stated]
-            return not any(term.kept for term in own if term.effect.name == name)
+    for names in found.probability:
+        if name in names and names != UNKNOWN:
+            ways = [way for way in found.best[names].hypothesis.ways if not way.stated]
+            return not any(way.kept for way in ways if way.effect.name == name)
     return False
 
 

@@ -3,45 +3,43 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
-from shipdrag_ros.diagnosis.advice import advice
-from shipdrag_ros.diagnosis.carried import carried
-from shipdrag_ros.diagnosis.coast import CoastModel
-from shipdrag_ros.diagnosis.differing import runs_differ, with_differing
+from shipdrag_ros.diagnosis.advice import Undecided, advice
+from shipdrag_ros.diagnosis.carried import Carried, carried
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, stated_facts
-from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.gaps import frozen, gap_of, held_out, traces, where
-from shipdrag_ros.diagnosis.limits import limits_of
-from shipdrag_ros.diagnosis.nameless import with_nameless
+from shipdrag_ros.diagnosis.gaps import gap_of, held_out, traces, where
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.one import diagnose_one
 from shipdrag_ros.diagnosis.result import (
     FORCE,
     LOG_TRACK,
     Advice,
     DiagnosisResult,
     EffectEstimate,
-    Where,
 )
-from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs, with_unnamed
 from shipdrag_ros.diagnosis.seen_runs import SeenRun
+from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.diagnosis.speeds import CoastRun
-from shipdrag_ros.diagnosis.swinging import swing_notes, with_swinging
 from shipdrag_ros.diagnosis.units import asked, ratio_before_the_stop, waiting
-from shipdrag_ros.diagnosis.verdict import Judgement, judge
+from shipdrag_ros.diagnosis.verdict import judge, limits_of, runs_differ
 from shipdrag_ros.errors import DiagnosisError, EstimationError
-from shipdrag_ros.inference.decision import UNKNOWN, Verdict
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing
+from shipdrag_ros.posterior.hypotheses import Explanation
+from shipdrag_ros.posterior.law import usual_baseline
 from shipdrag_ros.progress import Progress, silent
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
+from shipdrag_ros.simulation.effects import LIBRARY
 
-_NEAR_S = 4.0  # by which a stop may be moved without seeing the run anew
+_NEAR_S = 4.0  # by which a stop may be moved without looking at the run again
 _LOOKS = 3  # at a run
+_DAY_NS = 12 * 3600 * 10**9  # between runs, from where the hull may be another
+_ONE_DAY, _OTHER_DAYS = 0.03, 0.3  # chance that an effect of the hull differs between runs
 
 
 def diagnose(
@@ -53,7 +51,6 @@ def diagnose(
     earlier: Sequence[EarlierDiagnosis] = (),
     advise: bool = True,
     progress: Progress = silent,
-    engine: Literal['fits', 'one'] = 'fits',
 ) -> DiagnosisResult:
     """
     Name the effect that is missing in a ship's model.
@@ -63,7 +60,8 @@ def diagnose(
     runs
         One or more; effects of the earth are stated along the first one.
     ship
-        With a baseline; the effects that its file states are part of the model.
+        Its baseline, or a wide one in its place; the effects that its file states are part
+        of the model.
     parameters
         For the noise of the sensors and the convention of the heading.
     facts
@@ -74,26 +72,24 @@ def diagnose(
         Whether to work out what would decide, which takes as long as all the rest.
     progress
         Called with each stage, how much of it is done, and of how much.
-    engine
-        'one': the posterior of docs/model.md, without advice, traces and earlier diagnoses.
 
     Returns
     -------
-    Diagnosis
-        Of baseline 'stated'.
+    DiagnosisResult
+        Of baseline 'stated', or 'fitted_here' where the ship file has none.
 
     Raises
     ------
     DiagnosisError
-        If the ship has no baseline, or no run enough steady record, or an earlier
-        diagnosis is of another ship, of later runs or of one of these.
+        If no run has enough steady record, or an earlier diagnosis is of another ship,
+        of later runs or of one of these.
     EstimationError
         If no run has enough samples.
 
     Notes
     -----
-    Source: Bayesian comparison of models by their evidence, MacKay (2003), *Information Theory,
-    Inference, and Learning Algorithms*, chapter 28.
+    Source: docs/model.md; Bayesian comparison of models by their evidence, MacKay (2003),
+    *Information Theory, Inference, and Learning Algorithms*, chapter 28.
 
     A run that has too little of either is left out, and a note says so.
 
@@ -119,70 +115,81 @@ def diagnose(
     >>> [effect.name for effect in diagnosis.effects]
     ['log_scale']
     """
-    still = {run.name: 0.0 for run in runs}
-    seen, notes = _observed(runs, ship, parameters, still, progress)
+    stated = ship.baseline is not None
+    baseline = 'stated' if stated else 'fitted_here'
+    seen, notes = _observed(runs, ship, parameters, {}, progress)
     questions = [
         f'{run.name}: {ask}' for run in seen if (ask := asked(ratio_before_the_stop(run)))
     ]
     if questions:
         return waiting(
             '; '.join(questions),
-            baseline='stated',
+            baseline=baseline,
             notes=notes,
             coastdowns_used=len(seen),
             runs=_seen_runs(seen),
         )
-    if engine == 'one':
-        if earlier:
-            notes = (*notes, 'earlier diagnoses do not count in the one posterior yet')
-        return _by_one((seen, notes), runs, ship, parameters, facts, progress)
-    model, found, stated, notes = _searched(
-        (seen, notes), runs, ship, parameters, facts, earlier, progress
-    )
-    seen = model.seen
-    best, judged = found.best, judge(found)
+    case = _compared((seen, notes), runs, ship, parameters, facts, earlier, progress)
+    seen, comparing, found = case.seen, case.comparing, case.found
+    judged = judge(found)
+    verdict = judged.decision.verdict
     would_decide: tuple[Advice, ...] = ()
-    if advise and judged.verdict is Verdict.ONE_OF:
-        would_decide = advice(model, judged.posterior, judged.candidates, progress)
-    as_stated = frozen(model)
-    explained = best if judged.missing else found.nothing
-    if judged.verdict is Verdict.UNKNOWN:
-        explained = found.posterior.best[UNKNOWN]
-        notes = (*notes, *swing_notes(explained, model))
-    differ = runs_differ(found) if judged.missing else ()
-    return judged.diagnosis(
+    if advise and verdict is Verdict.ONE_OF:
+        left = Undecided(ship, seen, comparing, found, case.facts, judged.candidates)
+        would_decide = advice(left, progress)
+    names = [run.name for run in seen]
+    before, best = comparing.as_stated if stated else found.best[NONE], found.best[judged.top]
+    differ = runs_differ(best, names) if judged.missing else ()
+    return DiagnosisResult(
+        verdict=verdict,
+        effects=judged.effects,
+        candidates=judged.candidates,
+        nothing=found.probability.get(NONE, 0.0),
+        unnamed=found.probability.get(UNKNOWN, 0.0),
         would_decide=would_decide,
-        where=_where(model, as_stated, found, judged, differ=bool(differ)),
-        before=gap_of(model, as_stated.best),
-        after=gap_of(model, best.best) if judged.missing else None,
-        held_out_before=held_out(model, None),
-        held_out_after=held_out(model, best) if judged.missing else None,
-        baseline='stated',
-        notes=notes,
-        traces=traces(model, as_stated.best, explained.best),
+        where=None
+        if verdict is Verdict.NONE
+        else where(seen, comparing, found, before, of_force=bool(differ)),
+        before=gap_of(seen, comparing.residuals(before)),
+        after=gap_of(seen, comparing.residuals(best)) if judged.missing else None,
+        held_out_before=held_out(seen, comparing, before),
+        held_out_after=held_out(seen, comparing, best) if judged.missing else None,
+        baseline=baseline,
+        best=judged.best,
+        notes=(*case.notes, *_without_a_baseline(stated)),
+        traces=traces(seen, comparing, before, judged.explained),
         coastdowns_used=len(seen),
         examined=(FORCE, LOG_TRACK) if any(map(_has_both, seen)) else (FORCE,),
-        facts=stated.weighed(judged.posterior, [run.name for run in seen]),
+        facts=case.facts.weighed(found, names),
         runs_differ=differ,
         runs=_seen_runs(seen),
-        earlier=() if model.earlier is None else model.earlier.judged(judged.posterior),
-        limits=limits_of(found, model, [effect.name for effect in judged.effects]),
+        earlier=() if case.earlier is None else case.earlier.judged(found),
+        limits=limits_of(found, comparing, judged.decision.effects),
     )
 
 
-def _where(
-    model: CoastModel, as_stated: Fit, found: SearchResult, judged: Judgement, *, differ: bool
-) -> Where | None:
-    """Say where model and data are apart."""
-    if judged.verdict is Verdict.NONE:
-        return None
-    place = where(model, as_stated, found.smooth)
-    if differ and place is not None:  # an error alike in all runs would pass for the log's
-        return replace(place, channel=FORCE)
-    return place
+def _without_a_baseline(stated: bool) -> tuple[str, ...]:
+    if stated:
+        return ()
+    return (
+        'the ship file has no baseline: the runs are compared with the range of all hulls of '
+        'her length and volume, in which fouling, a propeller or a cable cannot be seen',
+    )
 
 
-def _searched(
+@dataclass(frozen=True)
+class _Case:
+    """Runs with all hypotheses about them compared."""
+
+    seen: tuple[Observation, ...]
+    comparing: Comparing
+    found: ComparedHypotheses
+    facts: Facts
+    earlier: Carried | None
+    notes: tuple[str, ...]
+
+
+def _compared(
     first: tuple[tuple[Observation, ...], tuple[str, ...]],
     runs: Sequence[CoastRun],
     ship: Ship,
@@ -190,48 +197,59 @@ def _searched(
     facts: Sequence[Fact],
     earlier: Sequence[EarlierDiagnosis],
     progress: Progress,
-) -> tuple[CoastModel, SearchResult, Facts, tuple[str, ...]]:
-    """Search, and see the runs anew where that moves their stops; notes on them besides."""
-    moved_s = {run.name: 0.0 for run in runs}
-    for _ in range(_LOOKS):
-        seen, notes = (
-            _observed(runs, ship, parameters, moved_s, progress)
-            if any(moved_s.values())
-            else first
-        )
+) -> _Case:
+    """Compare hypotheses, and look at the runs again where their stops are moved by that."""
+    moved_s: dict[str, float] = {}
+    seen, notes = first
+    for look in range(_LOOKS):
+        if look:
+            # effects are simulated from the stop as the run was seen
+            seen, notes = _observed(runs, ship, parameters, moved_s, progress)
         stated = _stated(runs, seen, ship, facts)
         before = carried(earlier, ship, _seen_runs(seen), stated)
-        model = CoastModel(ship, seen, seen[0].heading_rad, stated, before)
-        found = search(model, progress=progress)
-        more_s = {run.name: model.stop_moved_s(found.best, j) for j, run in enumerate(seen)}
-        if all(abs(by_s) <= _NEAR_S for by_s in more_s.values()):
+        progress('comparing hypotheses', 0, 0)
+        comparing = compare(seen, ship, stated, before)
+        found = comparing.compare()
+        likeliest = max(found.fitted, key=lambda fit: fit.log_weight)
+        more_s = comparing.runs.stop_s(likeliest.at)
+        if all(abs(by_s) <= _NEAR_S for by_s in more_s):
             break
-        moved_s = {name: by_s + more_s.get(name, 0.0) for name, by_s in moved_s.items()}
-    found = with_swinging(found, model)
-    found = with_pairs(with_differing(found, model), progress=progress)
-    found = with_nameless(found, model)
-    return model, with_unnamed(found), stated, notes
+        for run, by_s in zip(seen, more_s, strict=True):
+            moved_s[run.name] = moved_s.get(run.name, 0.0) + by_s
+    return _Case(seen, comparing, found, stated, before, notes)
 
 
-def _by_one(
-    first: tuple[tuple[Observation, ...], tuple[str, ...]],
-    runs: Sequence[CoastRun],
-    ship: Ship,
-    parameters: Parameters,
-    facts: Sequence[Fact],
-    progress: Progress,
-) -> DiagnosisResult:
-    """Diagnose by the one posterior, which observes the runs again where it moves their stops."""
+def compare(
+    seen: Sequence[Observation], ship: Ship, facts: Facts, earlier: Carried | None = None
+) -> Comparing:
+    """
+    Return the comparison of all hypotheses about some runs of a ship.
 
-    def observe(
-        moved_s: Mapping[str, float],
-    ) -> tuple[tuple[Observation, ...], tuple[str, ...]]:
-        if not any(moved_s.values()):
-            return first
-        return _observed(runs, ship, parameters, moved_s, progress)
+    Parameters
+    ----------
+    seen
+    ship
+    facts
+        That are stated.
+    earlier
+        What earlier diagnoses say of the runs.
+    """
 
-    answer = diagnose_one(observe, ship, lambda these: _stated(runs, these, ship, facts))
-    return replace(answer, runs=_seen_runs(first[0]))
+    def log_known(hypothesis: Explanation) -> float:
+        before = 0.0 if earlier is None else earlier.log_weight(hypothesis)
+        return facts.log_likelihood(hypothesis) + before
+
+    effects = [effect for effect in LIBRARY.values() if not effect.missing(seen[0].ship)]
+    since_ns = [run.context.stop.since_ns for run in seen]
+    chance = _OTHER_DAYS if max(since_ns) - min(since_ns) > _DAY_NS else _ONE_DAY
+    return Comparing(
+        ship_runs(seen, ship),
+        ship,
+        effects,
+        log_known,
+        () if earlier is None else earlier.ways(effects),
+        math.log(chance),
+    )
 
 
 def _stated(
@@ -280,7 +298,11 @@ def _observed(
             by_s = moved_s.get(run.name, 0.0)
             seen.append(
                 Observation.of(
-                    run.window, run.ship or ship, parameters, name=run.name, stop_moved_s=by_s
+                    run.window,
+                    usual_baseline(run.ship or ship),
+                    parameters,
+                    name=run.name,
+                    stop_moved_s=by_s,
                 )
             )
         except (DiagnosisError, EstimationError) as error:

@@ -14,9 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.result import WeighedFact
-from shipdrag_ros.inference.decision import UNKNOWN
+from shipdrag_ros.inference.decision import UNKNOWN, Names
 from shipdrag_ros.posterior.compare import ComparedHypotheses
 from shipdrag_ros.ship import Fact, Ship
 from shipdrag_ros.ship.facts import DATE, KNOWN, overriding
@@ -90,7 +89,7 @@ class Facts:
         )
 
     def weighed(
-        self, posterior: Posterior | ComparedHypotheses, runs: Sequence[str]
+        self, posterior: ComparedHypotheses, runs: Sequence[str]
     ) -> tuple[WeighedFact, ...]:
         """
         Return how probable it is that each fact is wrong.
@@ -126,7 +125,7 @@ class Facts:
         return tuple(found)
 
     def naming(
-        self, posterior: Posterior, decides: Callable[[Posterior], bool]
+        self, posterior: ComparedHypotheses, decides: Callable[[Mapping[Names, float]], bool]
     ) -> dict[str, float]:
         """
         Return how probably something is named once a fact more is known.
@@ -136,7 +135,7 @@ class Facts:
         posterior
             Of hypotheses, with the facts that are stated.
         decides
-            Whether a posterior names something.
+            Whether probabilities name something.
 
         Returns
         -------
@@ -159,7 +158,7 @@ class Facts:
             ]
             if not kind.values:
                 so.append({names: 1.0 - each for names, each in so[0].items()})
-            found[name] = math.fsum(_decided(posterior, each, decides) for each in so)
+            found[name] = math.fsum(_decided(posterior.probability, each, decides) for each in so)
         return found
 
     def _so(self, stated: StatedFact, hypothesis: Missing) -> tuple[float, Fact]:
@@ -239,12 +238,13 @@ def _likelihood(so: float, fact: Fact) -> float:
 
 
 def _decided(
-    posterior: Posterior, so: Mapping[tuple[str, ...], float], decides: Callable[[Posterior], bool]
+    probability: Mapping[Names, float],
+    so: Mapping[Names, float],
+    decides: Callable[[Mapping[Names, float]], bool],
 ) -> float:
     """Return the probability of an answer, if something is named after it; else 0."""
-    joint = {names: so[names] * p for names, p in posterior.probability.items()}
+    joint = {names: so[names] * p for names, p in probability.items()}
     total = math.fsum(joint.values())
     if total <= 0.0:
         return 0.0
-    after = Posterior(posterior.best, {names: p / total for names, p in joint.items()})
-    return total if decides(after) else 0.0
+    return total if decides({names: p / total for names, p in joint.items()}) else 0.0

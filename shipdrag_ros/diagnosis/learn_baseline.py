@@ -200,7 +200,7 @@ def _scaled(
     source: str,
 ) -> Baseline:
     """Return the baseline with what was learnt, in the form that it has."""
-    base = problem.model.ship.baseline
+    base = problem.ship.baseline
     if isinstance(base, CoefficientBaseline):
         friction, wave = 1.0 + mean
         return replace(
@@ -277,7 +277,7 @@ def _source(shared: Shared, runs: int, speed_m_s: tuple[float, float], begun: Sh
 def _warnings(runs: Sequence[CleanRun], ship: Ship, problem: SharedBaseline) -> list[str]:
     found = []
     if ship.baseline is None:
-        base = problem.model.ship.baseline
+        base = problem.ship.baseline
         assert base is not None
         found.append(f'the ship file states no baseline: it is a table of r(v), {base.source}')
     if len(runs) < ENOUGH:

@@ -13,16 +13,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.direct import diagnosis_of_speeds
-from shipdrag_ros.diagnosis.fitting import Fit
+from shipdrag_ros.diagnosis.advice import declared
 from shipdrag_ros.diagnosis.legs import Direction, Legs, SailingRecord, left_text
-from shipdrag_ros.diagnosis.result import LOG_TRACK, DiagnosisResult, Where
-from shipdrag_ros.diagnosis.sailing_model import SailingModel, shown
-from shipdrag_ros.diagnosis.search import SearchResult, search, with_pairs, with_unnamed
+from shipdrag_ros.diagnosis.result import (
+    LOG_TRACK,
+    Candidate,
+    DiagnosisResult,
+    EffectEstimate,
+    Gap,
+    Where,
+)
+from shipdrag_ros.diagnosis.sailing_model import SailingFit, SailingModel, SailingPosterior, shown
 from shipdrag_ros.diagnosis.units import asked, waiting
-from shipdrag_ros.diagnosis.verdict import judge
 from shipdrag_ros.diagnosis.zeros import stands_still, with_zeros, zeros_alone
 from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, Verdict, decide, mixture
+from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.simulation.effect import Scope, WithoutBaseline
 from shipdrag_ros.simulation.effects import LIBRARY
@@ -77,28 +83,78 @@ def _diagnosed(legs: Legs, no_coastdown: str) -> DiagnosisResult:
     """Diagnose legs on which the log turns."""
     model = SailingModel.learnt(legs)
     # legs that no effect and no noise explains
-    outlier = np.abs(model.fit_of(model.together).best.tables[0][0]) > _OUTLIER
+    outlier = np.abs(model.all_together.white) > _OUTLIER
     if outlier.any():
         legs = legs[np.flatnonzero(~outlier)]
         model = SailingModel.learnt(legs)
-    found = with_unnamed(with_pairs(search(model)))
-    judged = judge(found)
-    return diagnosis_of_speeds(
-        judged,
-        _where(model, found.best),
+    found = model.compare()
+    decided = decide(found.probability, model.inseparable)
+    top = next(names for names in found.probability if names != UNKNOWN)
+    missing = bool(top) and decided.verdict in (Verdict.NAMED, Verdict.ONE_OF)
+    candidates = tuple(Candidate(n, p, _sized(found, n, p)) for n, p in decided.candidates)
+    best = found.best[top]
+    return DiagnosisResult(
+        verdict=decided.verdict,
+        effects=tuple(_named(found, name, p) for name, p in sorted(decided.effects.items())),
+        candidates=candidates,
+        nothing=found.probability.get(NONE, 0.0),
+        unnamed=found.probability.get(UNKNOWN, 0.0),
+        would_decide=declared(candidates) if decided.verdict is Verdict.ONE_OF else (),
+        where=None if decided.verdict is Verdict.NONE else _where(model, best),
+        before=_gap(found.best[NONE]),
+        after=_gap(best) if missing else None,
+        held_out_before=None,
+        held_out_after=None,
         baseline='none',
+        best=_sized(found, top, found.probability[top]),
         notes=(
             *_about(model, int(outlier.sum())),
-            *(_why(model, found) if judged.missing else ()),
+            *(_why(model, found, best) if missing else ()),
         ),
         examined=(LOG_TRACK,),
         no_coastdown=no_coastdown,
     )
 
 
-def _where(model: SailingModel, best: Fit) -> Where:
+def _gap(fit: SailingFit) -> Gap:
+    return Gap(float(np.sqrt(np.mean(fit.residual_m_s**2))), None, fit.chi2)
+
+
+def _sized(
+    found: SailingPosterior, names: Names, probability: float
+) -> tuple[EffectEstimate, ...]:
+    """Return the effects of a hypothesis with their sizes, by name."""
+    if names == UNKNOWN:
+        return ()
+    fit, sized, place = found.best[names], [], 0
+    for way in fit.ways:
+        sizes = {}
+        for i, q in enumerate(way.unknowns, place):
+            z, sd = float(fit.z[i]), float(fit.sd[i])
+            sizes[q.name] = Parameter(q.prior.at(z), abs(q.prior.slope(z)) * sd)
+        place += len(way.unknowns)
+        sized.append(EffectEstimate(way.effect.name, probability, sizes))
+    return tuple(sorted(sized, key=lambda effect: effect.name))
+
+
+def _named(found: SailingPosterior, name: str, probability: float) -> EffectEstimate:
+    """Return an effect with its sizes over all hypotheses that hold it."""
+    holding = [
+        (p, effect.parameters)
+        for names, p in found.probability.items()
+        for effect in _sized(found, names, p)
+        if effect.name == name
+    ]
+    sizes = {
+        key: Parameter(*mixture((p, e[key].value, e[key].sd) for p, e in holding))
+        for key in holding[0][1]
+    }
+    return EffectEstimate(name, probability, sizes)
+
+
+def _where(model: SailingModel, best: SailingFit) -> Where:
     """Return where log and ground disagree; which is wrong is known only of a name."""
-    legs, names = model.legs, best.hypothesis.names
+    legs, names = model.legs, best.names
     of_log = bool(names) and all(LIBRARY[name].scope is Scope.SENSOR for name in names)
     half = 0.5 * legs.length_s
     return Where(
@@ -130,11 +186,11 @@ def _about(model: SailingModel, outliers: int) -> list[str]:
     return found
 
 
-def _why(model: SailingModel, found: SearchResult) -> list[str]:
+def _why(model: SailingModel, found: SailingPosterior, best: SailingFit) -> list[str]:
     """Say why it is this and none of the others."""
-    legs, best, names = model.legs, found.best, found.best.hypothesis.names
+    legs, names = model.legs, best.names
     lines = [f'log over ground: {_by_speed(legs)}']
-    action = model.action(best.hypothesis, best.best.z)
+    action = model.action(best.ways, best.z)
     if any(action.current_m_s):
         east, north = action.current_m_s
         lines.append(f'the water moves by {east:+.3f} m/s to the east, {north:+.3f} to the north')
@@ -142,15 +198,15 @@ def _why(model: SailingModel, found: SearchResult) -> list[str]:
         lines.append(f'log over ground by course: {_by_course(legs)}')
     for effect in model.together:
         alike = [sets for sets in model.inseparable if effect.name in sets and sets & set(names)]
-        probability = found.posterior.probability.get((effect.name,), 0.0)
+        probability = found.probability.get((effect.name,), 0.0)
         if effect.name in names or alike or probability > _POSSIBLE:
             continue
-        alone = found.posterior.best[(effect.name,)]
+        alone = found.best[effect.name,]
         lines.append(
             f'why not {effect.name}: {effect.without_baseline[WithoutBaseline.LOG_TRACK]}; alone '
-            f'it leaves chi2 {alone.chi2_per_row:.2f} a leg, {" and ".join(names)} '
-            f'{best.chi2_per_row:.2f}, and is less probable by '
-            f'{best.log_likelihood - alone.log_likelihood:.0f} nats'
+            f'it leaves chi2 {alone.chi2:.2f} a leg, {" and ".join(names)} '
+            f'{best.chi2:.2f}, and is less probable by '
+            f'{0.5 * len(legs) * (alone.chi2 - best.chi2):.0f} nats'
         )
     return lines
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-What a log reads in any sailing, held against the way over ground: the hypotheses.
+What a log reads in any sailing, compared with the way over ground: the hypotheses.
 
 Slow water, turbulence at the log and small errors that every instrument has are
 noise, whose colour is learnt beside all effects at once: none of them can hide in
@@ -10,19 +10,20 @@ it, and it cannot pass for one of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from itertools import combinations
 
 import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import least_squares, minimize
 
-from shipdrag_ros.diagnosis.direct import DirectModel, learn_factor
-from shipdrag_ros.diagnosis.fitting import Fit, fit
 from shipdrag_ros.diagnosis.legs import Direction, Legs
-from shipdrag_ros.diagnosis.model import UNNAMED_ODDS, Hypothesis, nothing_missing, start
-from shipdrag_ros.diagnosis.terms import EffectTerm, cubic_bsplines
-from shipdrag_ros.parameter import Parameter, free, normal
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Names, WeighedHypothesis, probabilities
+from shipdrag_ros.posterior import priors
+from shipdrag_ros.posterior.effects import EffectWay, ways_of
+from shipdrag_ros.posterior.hypotheses import bsplines
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import ConstantAddedMass, Ship
 from shipdrag_ros.simulation import Action, Frame, Scenario
@@ -38,7 +39,9 @@ _TYPICAL_S = (120.0, 1200.0)  # correlation of the log's error and of slow water
 _WATER_M_S = 0.04
 _SD_OF_LOG = np.array([1.0, 1.0, 0.7, 0.8, 0.8])
 _EVALUATIONS = 400
+_LONGEST_S = 1.0  # no effect that sailing shows is counted from a time
 _SAILED = (Measure.OTHER_SPEED, Measure.RECIPROCAL_RUN, Measure.ANOTHER_COURSE)
+_LIKELY = 0.03  # probability of names that may leave something smooth
 # what log and track show acts alike on all ships, so that any will do
 _ANY_SHIP = Ship(
     length_m=10.0, displaced_volume_m3=10.0, added_mass=ConstantAddedMass(value=0.07, sd=0.0)
@@ -46,29 +49,85 @@ _ANY_SHIP = Ship(
 
 
 @dataclass(frozen=True)
-class LogErrorTerm:
+class SailingFit:
     """
-    An error of the log that bends with the speed, beyond a scale and an offset.
+    A hypothesis about legs at its best.
 
     Attributes
     ----------
-    sd_m_s
-        Of each of its sizes.
+    ways
+        Of the effects that are there.
+    smooth
+        Whether the log errs besides in a way that bends with the speed, without a name.
+    z, sd : (p,)
+        Unknowns, standard normal under the prior, those of the effects first.
+    residual_m_s, white : (n,)
+        What is left, and the same in units of the noise.
+    slopes : (n, p)
+        Of what is read by the unknowns, whitened.
+    log_evidence
+        By Laplace's method, without the prior odds.
     """
 
-    sd_m_s: float
-    one_size: ClassVar[Sequence[int]] = ()
+    ways: tuple[EffectWay, ...]
+    smooth: bool
+    z: Float64
+    sd: Float64
+    residual_m_s: Float64
+    white: Float64
+    slopes: Float64
+    log_evidence: float
 
-    @cached_property
-    def unknowns(self) -> tuple[Parameter, ...]:
-        """Sizes about some speeds [m/s]."""
-        return tuple(free(f'log {k}', normal(self.sd_m_s)) for k in range(_SPLINES))
+    @property
+    def names(self) -> Names:
+        """As the decision takes them."""
+        return UNKNOWN if self.smooth else tuple(sorted(way.effect.name for way in self.ways))
+
+    @property
+    def log_odds(self) -> float:
+        """Prior log odds over nothing."""
+        unnamed = math.log(priors.UNNAMED_ODDS) if self.smooth else 0.0
+        return sum(way.log_odds for way in self.ways) + unnamed
+
+    @property
+    def chi2(self) -> float:
+        """Of a leg."""
+        return float(np.mean(self.white**2))
 
 
 @dataclass(frozen=True)
-class SailingModel(DirectModel):
+class SailingPosterior:
     """
-    What a log reads on legs, by hypothesis; a `Model`.
+    Hypotheses about legs with their probabilities.
+
+    Attributes
+    ----------
+    probability
+        Of each set of names, most probable first.
+    best
+        The likeliest fit of each.
+    """
+
+    probability: dict[Names, float]
+    best: dict[Names, SailingFit]
+
+    @classmethod
+    def of(cls, fits: Iterable[SailingFit]) -> SailingPosterior:
+        """Give fits their probabilities."""
+        fits = list(fits)
+        best: dict[Names, SailingFit] = {}
+        for fit in fits:
+            old = best.get(fit.names)
+            if old is None or fit.log_evidence + fit.log_odds > old.log_evidence + old.log_odds:
+                best[fit.names] = fit
+        weighed = (WeighedHypothesis(f.names, f.log_evidence, f.log_odds) for f in fits)
+        return cls(probabilities(weighed), best)
+
+
+@dataclass(frozen=True)
+class SailingModel:
+    """
+    What a log reads on legs, by hypothesis.
 
     Attributes
     ----------
@@ -79,7 +138,6 @@ class SailingModel(DirectModel):
 
     legs: Legs
     factor: Float64
-    channels: ClassVar[tuple[str, ...]] = ('log',)
 
     @classmethod
     def learnt(cls, legs: Legs) -> SailingModel:
@@ -97,18 +155,29 @@ class SailingModel(DirectModel):
             priors.
         """
         white = cls(legs, np.eye(len(legs)) * 0.05)
-        rough = white.fit_of(white.together).best
-        residual = rough.residuals[0]
+        rough = white.all_together
+        residual = rough.residual_m_s
         typical = max(float(np.median(np.abs(residual))), 1e-3)
         units = np.array([typical, typical, _WATER_M_S, *_TYPICAL_S])
-        factor = learn_factor(
-            lambda x: _covariance(legs, units * np.exp(x)),
-            residual,
-            white.factor @ rough.tables[0][1:].T * _WIDE,
-            sd_of_log=_SD_OF_LOG,
-            evaluations=_EVALUATIONS,
-        )
-        return cls(legs, factor)
+        slopes = white.factor @ rough.slopes * _WIDE
+        open_ = slopes @ slopes.T
+
+        def cost(x: Float64) -> float:
+            factor = np.linalg.cholesky(_covariance(legs, units * np.exp(x)) + open_)
+            left = solve_triangular(factor, residual, lower=True, check_finite=False)
+            log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+            return float(left @ left) + log_det + float(((x / _SD_OF_LOG) ** 2).sum())
+
+        corners = np.vstack([np.zeros(len(_SD_OF_LOG)), 0.7 * np.eye(len(_SD_OF_LOG))])
+        options = {
+            'maxfev': _EVALUATIONS,
+            'xatol': 0.05,
+            'fatol': 0.05,
+            'initial_simplex': corners,
+        }
+        found = minimize(cost, corners[0], method='Nelder-Mead', options=options)
+        covariance = _covariance(legs, units * np.exp(found.x))
+        return cls(legs, np.asarray(np.linalg.cholesky(covariance), np.float64))
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
@@ -134,92 +203,99 @@ class SailingModel(DirectModel):
         return tuple(found)
 
     @cached_property
-    def nothing(self) -> Hypothesis:
-        """The log reads the speed through water, and the water lies still."""
-        return Hypothesis((), (), log_prior=math.log(nothing_missing(self.effects, places=1)))
+    def all_together(self) -> SailingFit:
+        """The fit of all effects that sailing separates at once."""
+        return self.fit(self._plain(self.together))
 
-    def with_effect(self, base: Hypothesis, effect: Effect) -> list[Hypothesis]:
-        """
-        Return a hypothesis with one effect more.
-        """
-        term = EffectTerm(effect, _ANY_SHIP)
-        return [base.with_effect(effect.name, term, log_odds=math.log(effect.odds))]
+    @staticmethod
+    def _plain(effects: Sequence[Effect]) -> tuple[EffectWay, ...]:
+        """Return effects whose sizes are any near 0, of either sign."""
+        return tuple(next(ways_of(effect, _ANY_SHIP, _LONGEST_S, 1)) for effect in effects)
 
-    def with_discrepancy(self, base: Hypothesis, channel: str) -> Hypothesis:
+    def compare(self) -> SailingPosterior:
         """
-        Return a hypothesis with a smooth error of the log besides.
+        Compare nothing, each effect, pairs of them, and what errs smoothly besides.
+        """
+        ways = self._plain(self.effects)
+        pairs = [
+            both for both in combinations(ways, 2) if both[0].effect.goes_with(both[1].effect)
+        ]
+        fits = [self.fit(each) for each in ((), *((way,) for way in ways), *pairs)]
+        fits.append(self.fit((), smooth=True))
+        found = SailingPosterior.of(fits)
+        beside = [
+            self.fit(found.best[names].ways, smooth=True)
+            for names, p in found.probability.items()
+            if names not in (NONE, UNKNOWN) and p > _LIKELY
+        ]
+        return SailingPosterior.of([*fits, *beside])
 
-        Where it stands alone, a scale and an offset are part of it.
+    def action(self, ways: Sequence[EffectWay], z: Float64) -> Action:
         """
-        straight = [e for e in self.effects if _LOG in e.errs_in and not base.names]
-        more = (
-            *(EffectTerm(effect, _ANY_SHIP) for effect in straight),
-            LogErrorTerm(_SPLINE_SD * float(self.legs.ground_m_s.max())),
-        )
-        log_prior = base.log_prior + math.log(UNNAMED_ODDS)
-        return replace(base, terms=(*base.terms, *more), log_prior=log_prior, discrepancy=channel)
-
-    @property
-    def measured(self) -> Float64:
-        """What the log reads [m/s]."""
-        return self.legs.log_m_s
-
-    def predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
+        Return what effects do together at some unknowns.
         """
-        Return what the log reads [m/s], (n, k), at unknowns (p, k).
-        """
-        found = np.empty((len(self.legs), z.shape[1]))
-        for k, column in enumerate(z.T):
-            found[:, k] = self._predict(hypothesis, column)
+        found, place = Action(), 0
+        for way in ways:
+            own = z[place : place + len(way.unknowns)].tolist()
+            place += len(way.unknowns)
+            found += way.action(self._frame, own)
         return found
 
-    def action(self, hypothesis: Hypothesis, z: Float64) -> Action:
+    def fit(self, ways: tuple[EffectWay, ...], *, smooth: bool = False) -> SailingFit:
         """
-        Return what the effects of a hypothesis do together.
+        Return the fit of a hypothesis.
 
         Parameters
         ----------
-        hypothesis
-        z : (p,)
-            Its unknowns.
+        ways
+            Of its effects.
+        smooth
+            Whether the log errs besides, bending with the speed. Where nothing else is there,
+            a scale and an offset are part of it.
         """
-        found = Action()
-        for part, place in hypothesis.parts:
-            if isinstance(part, EffectTerm):
-                values = [u.prior.at(float(z[place + i])) for i, u in enumerate(part.unknowns)]
-                found += part.action(self._frame, 0, values)
-        return found
+        # what stands alone as an error of the log may also be straight
+        straight = [e for e in self.effects if _LOG in e.errs_in] if smooth and not ways else []
+        acting = (*ways, *self._plain(straight))
+        own = sum(len(way.unknowns) for way in acting)
+        start = np.zeros(own + (_SPLINES if smooth else 0))
+        start[:own] = [each for way in acting for each in way.start]
+        n = len(self.legs)
 
-    def _predict(self, hypothesis: Hypothesis, z: Float64) -> Float64:
-        action, extra = self.action(hypothesis, z), np.zeros(len(self.legs))
-        for part, place in hypothesis.parts:
-            if isinstance(part, LogErrorTerm):
-                values = [u.prior.at(float(z[place + i])) for i, u in enumerate(part.unknowns)]
-                extra += np.array(values) @ self._splines
+        def left(z: Float64) -> Float64:
+            read = self._reads(acting, z)
+            if smooth:
+                read = read + z[own:] @ self._splines
+            white = solve_triangular(
+                self.factor, self.legs.log_m_s - read, lower=True, check_finite=False
+            )
+            return np.concatenate([white, z])
+
+        if len(start) == 0:
+            best, slopes = start, np.zeros((n, 0))
+        else:
+            found = least_squares(left, start, method='lm')
+            best, slopes = found.x, found.jac[:n]
+        both = left(best)
+        hessian = slopes.T @ slopes + np.eye(len(best))
+        log_det = float(np.linalg.slogdet(hessian)[1])
+        return SailingFit(
+            ways,
+            smooth,
+            best,
+            np.sqrt(np.diag(np.linalg.inv(hessian))),
+            self.factor @ both[:n],
+            both[:n],
+            slopes,
+            -0.5 * (float(both @ both) + log_det),
+        )
+
+    def _reads(self, ways: Sequence[EffectWay], z: Float64) -> Float64:
+        action = self.action(ways, z)
         # distances that are too long by a factor: the current is by the same
         radar = 1.0 + action.radar_factor
         east, north = action.current_m_s
         through = self.legs.through_water((east * radar, north * radar)) / radar
-        return (1.0 + action.log_factor) * through + action.log_offset_m_s + extra
-
-    def fit_of(self, effects: Sequence[Effect]) -> Fit:
-        """
-        Return the fit of some effects at once.
-
-        Parameters
-        ----------
-        effects
-            Of this model.
-
-        Returns
-        -------
-        Fit
-            Of all of them in one hypothesis.
-        """
-        hypothesis = self.nothing
-        for effect in effects:
-            (hypothesis,) = self.with_effect(hypothesis, effect)
-        return fit(self, [hypothesis], [start(self, hypothesis)])[0]
+        return (1.0 + action.log_factor) * through + action.log_offset_m_s
 
     @cached_property
     def _frame(self) -> Frame:
@@ -228,11 +304,12 @@ class SailingModel(DirectModel):
 
     @cached_property
     def _splines(self) -> Float64:
-        """What neither a scale nor an offset is, (6, n)."""
+        """What neither a scale nor an offset is, (6, n) [m/s]."""
         speed = self.legs.ground_m_s
-        splines = cubic_bsplines(speed / speed.max(), _SPLINES).T
+        splines = bsplines(speed / speed.max(), _SPLINES).T
         line = np.array([np.ones(len(speed)), speed]).T
-        found: Float64 = (splines - line @ np.linalg.lstsq(line, splines, rcond=1e-6)[0]).T
+        bent = splines - line @ np.linalg.lstsq(line, splines, rcond=1e-6)[0]
+        found: Float64 = _SPLINE_SD * float(speed.max()) * bent.T
         return found
 
 

@@ -16,16 +16,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shipdrag_ros.diagnosis.coast import CoastModel
-from shipdrag_ros.diagnosis.coast_terms import BaselineTerm, baseline_parts
-from shipdrag_ros.diagnosis.fitting import Fit, fit
-from shipdrag_ros.diagnosis.model import start
 from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.sights import ship_runs
 from shipdrag_ros.diagnosis.speeds import CoastRun
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.inference.factored import Factored
-from shipdrag_ros.parameter import Shape
+from shipdrag_ros.inference.decision import NONE
+from shipdrag_ros.inference.gaussian import Factored
+from shipdrag_ros.parameter import heavy_tailed
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.compare import Comparing, Fitted
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import CoefficientSd, Ship, TableBaseline
 
@@ -225,23 +224,28 @@ class SharedBaseline:
 
     Attributes
     ----------
-    model
+    ship
+        Whose baseline may differ in all its parts.
+    comparing
+        Of the runs.
     fitted
         Nothing missing, all runs together.
     names
-        Of the scales of the baseline; its shapes follow them.
-    unit : (q,)
-        Standard deviation of each shared unknown before the data.
+        Of the scales of the baseline, the first of the unknowns that runs share.
+    unit, mean : (q,)
+        Standard deviation and mean, in that unit, of each shared unknown before the data.
     normals
-        One a run, of z of the shared unknowns.
+        One a run, of the shared unknowns in their units.
     speed_m_s
         Lowest and highest of all runs.
     """
 
-    model: CoastModel
-    fitted: Fit
+    ship: Ship
+    comparing: Comparing
+    fitted: Fitted
     names: tuple[str, ...]
     unit: Float64
+    mean: Float64
     normals: tuple[Normal, ...]
     speed_m_s: tuple[float, float]
 
@@ -265,30 +269,40 @@ class SharedBaseline:
             About the fit of all runs at once.
         """
         ship = _opened(ship)
-        seen = tuple(Observation.of(run.window, ship, parameters, name=run.name) for run in runs)
-        model = CoastModel(ship, seen, seen[0].heading_rad)
-        nothing = model.nothing
-        fitted = fit(model, [nothing], [start(model, nothing)])[0]
-        if not np.isfinite(fitted.best.cost):
+        seen = [Observation.of(run.window, ship, parameters, name=run.name) for run in runs]
+        comparing = Comparing(ship_runs(seen, ship), ship, ())
+        fitted = next(fit for fit in comparing.compare().fitted if fit.names == NONE)
+        if fitted.tables is None:
             low, high = ship.baseline_range_m_s
             raise DiagnosisError(
                 f'{len(runs)} run(s) cannot be fitted with a baseline stated from {low:.3g} to '
                 f'{high:.3g} m/s; state it over all speeds of the runs, or leave it out'
             )
-        unknowns = nothing.terms[0].unknowns
-        # scales of the parts, then the shape; the rest is each run's own
-        scales = [
-            i for i, unknown in enumerate(unknowns) if unknown.prior.shape is Shape.HEAVY_TAILED
-        ]
-        shapes = [i for i, unknown in enumerate(unknowns) if unknown.name.startswith('shape')]
-        shared = [*scales, *shapes]
-        speeds = [model.predict(j, fitted.best).speed for j in range(len(seen))]
+        names, sds = _stated(ship)
+        _, mean, precision = comparing.prior_of(fitted)
+        own = comparing.runs.own
+        shared = np.delete(np.arange(len(fitted.at)), np.concatenate(own))
+        unit = precision[shared] ** -0.5
+        unit[: len(sds)] = sds
+        normals = []
+        for place, both in zip(own, comparing.equations(fitted), strict=True):
+            open_ = both[1:, 1:].copy()
+            open_[place, place] += precision[place]
+            negative_gradient = both[1:, 0].copy()
+            negative_gradient[place] += (precision * mean)[place]
+            order = np.concatenate([shared, place])
+            in_unit = np.concatenate([unit, np.ones(len(place))])
+            matrix = open_[np.ix_(order, order)] * np.outer(in_unit, in_unit)
+            normals.append(Normal.without(matrix, negative_gradient[order] * in_unit, len(shared)))
+        speeds = [table.speed_m_s for table in fitted.tables]
         return cls(
-            model,
+            ship,
+            comparing,
             fitted,
-            tuple(unknowns[i].name for i in scales),
-            np.array([unknowns[i].prior.slope(0.0) for i in shared]),
-            tuple(_normal(fitted, j, shared) for j in range(len(seen))),
+            names,
+            unit,
+            (mean + fitted.at)[shared] / unit,
+            tuple(normals),
             (
                 max(min(float(speed.min()) for speed in speeds), 0.0),
                 max(float(speed.max()) for speed in speeds),
@@ -297,19 +311,18 @@ class SharedBaseline:
 
     @property
     def along(self) -> Float64:
-        """What a factor of 2 on a run does to z of the shared unknowns."""
+        """What a factor of 2 on a run does to the shared unknowns, in their units."""
         whole = np.zeros(len(self.unit))
         whole[: len(self.names)] = 1.0 / self.unit[: len(self.names)]
         return whole
 
     def shared(self, normals: Sequence[Normal]) -> Shared:
         """Return what runs share, with the prior of the baseline."""
-        z = self.fitted.best.z[: len(self.unit)]
-        unknowns = self.fitted.hypothesis.unknowns[: len(self.unit)]
-        weight = np.array(
-            [unknown.prior.weight(at) for unknown, at in zip(unknowns, z, strict=True)]
-        )
-        prior = Normal(np.diag(weight), -weight * z)
+        away = self.z(None) - self.mean
+        weight = np.ones(len(away))
+        for i in range(len(self.names)):  # a baseline may be far worse than it says
+            weight[i] = heavy_tailed(1.0).weight(float(away[i]))
+        prior = Normal(np.diag(weight), -weight * away)
         return share(normals, prior, self.along, usual_scatter=float(self.unit[0]))
 
     def of_parts(self, shared: Shared) -> tuple[Float64, Float64]:
@@ -327,21 +340,25 @@ class SharedBaseline:
 
     def relative_parts(self, speed_m_s: Float64) -> Float64:
         """Return what each shared unknown adds to the resistance, relative, (q, n)."""
-        term = self.fitted.hypothesis.terms[0]
-        assert isinstance(term, BaselineTerm)
-        speed = np.maximum(speed_m_s, 1e-3 * term.top_m_s)
-        parts = baseline_parts(term.ship, term.top_m_s, speed.tobytes())
-        result: Float64 = parts / term.ship.resistance_n(speed)
+        law = self.comparing.runs.runs[0].model.law
+        columns = np.concatenate([law.parts, law.shapes, law.humps])
+        speed = np.maximum(speed_m_s, 1e-3 * law.speed_m_s[-1])
+        found = np.zeros((len(self.unit), len(speed)))
+        for i, column in enumerate(columns):
+            found[i] = np.interp(speed, law.speed_m_s, column)
+        result: Float64 = found / np.interp(speed, law.speed_m_s, law.parts.sum(axis=0))
         return result
 
-    def z(self, shared: Shared) -> Float64:
-        """Return the shared unknowns."""
-        result: Float64 = self.fitted.best.z[: len(self.unit)] + shared.step
-        return result
+    def z(self, shared: Shared | None) -> Float64:
+        """Return the shared unknowns in their units; None: as all runs were fitted."""
+        own = np.concatenate(self.comparing.runs.own)
+        fitted: Float64 = np.delete(self.fitted.at, own) / self.unit
+        return fitted if shared is None else fitted + shared.step
 
     def chi2_per_row(self, run: int) -> float:
         """Return what a run's own factor on the baseline leaves."""
-        normal, left = self.normals[run], self.fitted.best.tables[run][0]
+        normal = self.normals[run]
+        left = self.comparing.residuals(self.fitted)[run].whitened
         gained = float(self.along @ normal.negative_gradient) ** 2
         gained /= float(self.along @ normal.matrix @ self.along)
         return (float(left @ left) - gained) / len(left)
@@ -360,20 +377,10 @@ def _opened(ship: Ship) -> Ship:
     return replace(ship, baseline=replace(base, relative_sd=parts))
 
 
-def _normal(fitted: Fit, run: int, shared: list[int]) -> Normal:
-    """Return what a run shows of the shared unknowns, whatever its place and speed."""
-    best = fitted.best
-    table, unknowns = best.tables[run], best.hypothesis.unknowns
-    own = [
-        i
-        for i in range(len(best.z))
-        if i not in shared and np.any(table[1 + i])  # places of other runs are not in it
-    ]
-    rows = table[[1 + i for i in (*shared, *own)]]
-    matrix, negative_gradient = rows @ rows.T, rows @ table[0]
-    for place, i in enumerate(own, start=len(shared)):
-        if i < len(unknowns):  # the steady speeds have no prior
-            weight = unknowns[i].prior.weight(best.z[i])
-            matrix[place, place] += weight
-            negative_gradient[place] -= weight * best.z[i]
-    return Normal.without(matrix, negative_gradient, len(shared))
+def _stated(ship: Ship) -> tuple[tuple[str, ...], list[float]]:
+    """Return the names of the scales of a baseline, and how well they are stated."""
+    base = ship.baseline
+    assert base is not None
+    if isinstance(base, TableBaseline):
+        return ('resistance',), [base.relative_sd]
+    return ('friction', 'wave'), [base.relative_sd.friction, base.relative_sd.wave]

@@ -1,23 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the posterior of a search to what is answered, with sizes."""
+"""From compared hypotheses to what is answered: sizes, limits, and how runs differ."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any
 
-import numpy as np
-
-from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.posterior import Posterior
-from shipdrag_ros.diagnosis.result import Candidate, DiagnosisResult, EffectEstimate
-from shipdrag_ros.diagnosis.search import SearchResult
-from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.inference.decision import UNKNOWN, Names, Verdict, decide, mixture
+from shipdrag_ros.diagnosis.result import Candidate, EffectEstimate, Limit, RunSize
+from shipdrag_ros.inference.decision import (
+    NONE,
+    UNKNOWN,
+    Decision,
+    Names,
+    Verdict,
+    decide,
+    mixture,
+)
+from shipdrag_ros.inference.limits import quantile
 from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.posterior.effects import EffectWay
+from shipdrag_ros.simulation.effects import inseparable
+
+_SHARE = 0.95  # of a size, below its limit
 
 
 @dataclass(frozen=True)
@@ -28,130 +33,141 @@ class Judgement:
     Attributes
     ----------
     found
-    posterior
-        Of all hypotheses.
-    verdict
+    decision
     effects
         That are named.
     candidates
     """
 
-    found: SearchResult
-    posterior: Posterior
-    verdict: Verdict
+    found: ComparedHypotheses
+    decision: Decision
     effects: tuple[EffectEstimate, ...]
     candidates: tuple[Candidate, ...]
 
     @property
+    def top(self) -> Names:
+        """What is most probable of all that has a name, or nothing."""
+        return next(names for names in self.found.probability if names != UNKNOWN)
+
+    @property
     def missing(self) -> bool:
         """Whether the most probable hypothesis explains something that is missing."""
-        names = self.found.best.hypothesis.names
-        return self.verdict in (Verdict.NAMED, Verdict.ONE_OF) and bool(names)
+        return bool(self.top) and self.decision.verdict in (Verdict.NAMED, Verdict.ONE_OF)
+
+    @property
+    def explained(self) -> Fitted:
+        """What explains the runs: nothing, the likeliest names or something without a name."""
+        if self.decision.verdict is Verdict.UNKNOWN:
+            return self.found.best[UNKNOWN]
+        return self.found.best[self.top if self.missing else NONE]
 
     @property
     def best(self) -> tuple[EffectEstimate, ...]:
-        """Effects of the most probable hypothesis, with their parameters."""
-        fit = self.found.best
-        return sized(fit, self.posterior.probability[fit.hypothesis.names])
-
-    def diagnosis(self, **rest: Any) -> DiagnosisResult:
-        """
-        Return the result.
-
-        Parameters
-        ----------
-        **rest
-            What the verdict does not show, as in `DiagnosisResult`.
-        """
-        return DiagnosisResult(
-            verdict=self.verdict,
-            effects=self.effects,
-            candidates=self.candidates,
-            nothing=self.posterior.nothing,
-            unnamed=self.posterior.unnamed,
-            best=self.best,
-            **rest,
-        )
+        """Effects of the most probable names, with their sizes."""
+        return sized(self.found.best[self.top], self.found.probability[self.top])
 
 
-def judge(found: SearchResult, unseen: Mapping[str, float] = MappingProxyType({})) -> Judgement:
+def judge(found: ComparedHypotheses) -> Judgement:
     """
-    Return the verdict on what a search found.
-
-    Parameters
-    ----------
-    found
-        With pairs, where they are looked for.
-    unseen
-        Prior odds of effects that these data cannot show: what is so without them is so with them.
-
-    Returns
-    -------
-    Judgement
-        The decision that the posterior probabilities alone make.
+    Return the decision that the posterior probabilities alone make.
     """
-    fits = found.posterior.best
-    posterior = _with_unseen(found.posterior, unseen)
-    decision = decide(posterior.probability, found.model.inseparable)
-    candidates = tuple(
-        Candidate(names, p, sized(fits[names], p) if names in fits and names != UNKNOWN else ())
-        for names, p in decision.candidates
+    decided = decide(found.probability, inseparable(found.effects))
+    return Judgement(
+        found,
+        decided,
+        tuple(_named(found, name, p) for name, p in sorted(decided.effects.items())),
+        tuple(
+            Candidate(names, p, () if names == UNKNOWN else sized(found.best[names], p))
+            for names, p in decided.candidates
+        ),
     )
-    named = tuple(_named(posterior, name, p) for name, p in sorted(decision.effects.items()))
-    return Judgement(found, posterior, decision.verdict, named, candidates)
 
 
-def _with_unseen(posterior: Posterior, odds: Mapping[str, float]) -> Posterior:
-    """Return the posterior with effects whose evidence is that of nothing."""
-    total = 1.0 + posterior.nothing * math.fsum(odds.values())
-    both: dict[Names, float] = dict(posterior.probability)
-    both |= {(name,): posterior.nothing * each for name, each in odds.items()}
-    return Posterior(posterior.best, {names: p / total for names, p in both.items()})
-
-
-def _named(posterior: Posterior, name: str, probability: float) -> EffectEstimate:
-    """Return an effect with its sizes over all hypotheses that hold it."""
-    holding = [
-        (p, effect)
-        for names, p in posterior.probability.items()
-        if name in names and names != UNKNOWN
-        for effect in sized(posterior.best[names], p)
-        if effect.name == name
-    ]
-    _, first = max(holding, key=lambda each: each[0])
-    sizes = {}
-    for key in first.parameters:
-        parts = [(p, effect.parameters[key]) for p, effect in holding]
-        sizes[key] = Parameter(*mixture((p, size.value, size.sd) for p, size in parts))
-    return EffectEstimate(name, probability, sizes)
-
-
-def sized(fit: Fit, probability: float) -> tuple[EffectEstimate, ...]:
+def sized(fit: Fitted, probability: float) -> tuple[EffectEstimate, ...]:
     """
-    Return the effects of a hypothesis with their sizes, by name.
+    Return the effects of a hypothesis with their sizes, by name; of runs that differ the last.
+    """
+    found = {
+        way.effect.name: EffectEstimate(way.effect.name, probability, sizes)
+        for way, sizes in _sizes(fit)
+        if not way.stated
+    }
+    return tuple(found[name] for name in sorted(found))
+
+
+def _sizes(fit: Fitted) -> list[tuple[EffectWay, dict[str, Parameter]]]:
+    """Return the parameters of each way."""
+    found, place = [], 0
+    assert fit.z is not None
+    assert fit.sd is not None
+    for way in fit.hypothesis.ways:
+        values = {name: Parameter(value, 0.0) for name, value in way.fixed}
+        for i, q in enumerate(way.unknowns, place):
+            z, sd = float(fit.z[i]), float(fit.sd[i])
+            values[q.name] = Parameter(q.prior.at(z), abs(q.prior.slope(z)) * sd)
+        place += len(way.unknowns)
+        found.append((way, {q.name: values[q.name] for q in way.effect.parameters}))
+    return found
+
+
+def runs_differ(fit: Fitted, names: Sequence[str]) -> tuple[RunSize, ...]:
+    """
+    Return the size in each run, where a hypothesis has one for each.
 
     Parameters
     ----------
     fit
-        Of the hypothesis.
-    probability
-        Of its names.
-
-    Returns
-    -------
-    tuple of EffectEstimate
-        Of the effects that have parameters of their own; not those that the ship
-        file states.
+    names
+        Of the runs.
     """
+    ways = [(way, sizes) for way, sizes in _sizes(fit) if not way.stated]
+    effects = [way.effect.name for way, _ in ways]
     found = []
-    for part, place in fit.hypothesis.parts:
-        if not isinstance(part, EffectTerm) or part.stated:
+    for way, sizes in ways:
+        if way.run is not None and effects.count(way.effect.name) > 1:
+            first = way.effect.parameters[0].name
+            found.append(RunSize(names[way.run], way.effect.name, first, sizes[first]))
+    return tuple(found)
+
+
+def _named(found: ComparedHypotheses, name: str, probability: float) -> EffectEstimate:
+    """Return an effect with its sizes over all hypotheses that hold it."""
+    holding = [
+        (p, effect)
+        for names, p in found.probability.items()
+        if name in names and names != UNKNOWN
+        for effect in sized(found.best[names], p)
+        if effect.name == name
+    ]
+    keys = max(holding, key=lambda each: each[0])[1].parameters
+    sizes = {
+        key: Parameter(
+            *mixture((p, e.parameters[key].value, e.parameters[key].sd) for p, e in holding)
+        )
+        for key in keys
+    }
+    return EffectEstimate(name, probability, sizes)
+
+
+def limits_of(
+    found: ComparedHypotheses, comparing: Comparing, named: Collection[str]
+) -> dict[str, Limit]:
+    """
+    Return the limit of each effect that is not named, by name.
+    """
+    amounts = comparing.named_from(inseparable(found.effects))
+    limits = {}
+    for effect in found.effects:
+        sizes = found.sizes(effect.name)
+        if effect.name in named or not sizes:
             continue
-        values = {name: Parameter(value, 0.0) for name, value in part.fixed}
-        for i, unknown in enumerate(part.unknowns, place):
-            z, sd = float(fit.best.z[i]), float(np.sqrt(fit.covariance[i, i]))
-            prior = unknown.prior
-            values[unknown.name] = Parameter(prior.at(z), abs(prior.slope(z)) * sd)
-        ordered = {q.name: values[q.name] for q in part.effect.parameters}
-        found.append(EffectEstimate(part.effect.name, probability, ordered))
-    return tuple(sorted(found, key=lambda effect: effect.name))
+        grows = effect.size_power > 0.0
+        bound = quantile(sizes, _SHARE if grows else 1.0 - _SHARE)
+        limits[effect.name] = Limit(
+            effect.parameters[0].name,
+            'upper_95' if grows else 'lower_95',
+            bound,
+            amounts.get(effect.name),
+            comparing.percent_of_r(effect.name, bound),
+        )
+    return limits

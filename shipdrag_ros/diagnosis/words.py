@@ -367,7 +367,7 @@ def baseline(found: DiagnosisResult, ship: Ship | None) -> str:
         return 'no baseline was needed: log and way over ground are held against each other'
     given = None if ship is None else ship.baseline
     if found.baseline == 'fitted_here' or given is None:
-        return 'none is stated: a form of the resistance was fitted to these runs'
+        return 'none is stated: the runs are compared with all hulls of her length and volume'
     if isinstance(given, CoefficientBaseline):
         sd = given.relative_sd
         known = f'friction ± {200.0 * sd.friction:g} %, wave ± {200.0 * sd.wave:g} %'

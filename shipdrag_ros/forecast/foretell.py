@@ -11,12 +11,14 @@ gives every band. No random numbers.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.result import Estimate
-from shipdrag_ros.forecast.law import deceleration
+from shipdrag_ros.forecast import priors
+from shipdrag_ros.forecast.law import KnownCurve, deceleration
 from shipdrag_ros.forecast.result import Forecast, Z
 from shipdrag_ros.parameters import SPEEDS_M_S
 from shipdrag_ros.samples import Float64
@@ -24,20 +26,59 @@ from shipdrag_ros.ship import Ship
 
 FRACTIONS = (0.9, 0.75, 0.5, 0.25)
 """Of the speed at the stop, that are always spoken of."""
-# sizes of what disturbs a glide, as the priors of the noise have them (`inference/learning.py`)
-GUST = 0.04
-"""Standard deviation of a gust, of the deceleration at the stop."""
-GUST_TIMES = 18.0
-"""Correlation time of a gust, over the root of the damping [1/s]."""
-DRIFT_M_S, DRIFT_SPEED_M_S, DRIFT_S = 0.02, 5.0, 600.0
-"""Slow motion of the water, less of it for craft below that speed, and its correlation time."""
-CURRENT_M_S = 0.4
-"""Standard deviation of a current that no input shows."""
-READING, READING_WHITE = 1e-3, 0.3
-"""Slow error of the instrument: of the speed at the stop, or of its white noise."""
 _NODES = 64  # of the glide, evenly in ln u
 _BEYOND = 0.5  # of the lowest speed that is spoken of, until which is foretold
+_ROUNDS = 12  # in which the delay by a run-down settles
 _WIDEST = 10.0  # of the logarithm of a figure, on either side
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beginning:
+    """
+    From where a glide goes on.
+
+    Attributes
+    ----------
+    made_ns
+        Stamp of the last reading [ns].
+    stop_m_s
+        Speed at the stop.
+    speed_m_s, speed_sd_m_s
+        Now, through water.
+    white_m_s
+        White noise of the best reading of the speed.
+    current_m_s, current_sd_m_s
+        Where distances are over ground; None: they are through water.
+    run_down_s, run_down_sd_s
+        Of a shaft that has not been stopped yet.
+    """
+
+    made_ns: int
+    stop_m_s: float
+    speed_m_s: float
+    speed_sd_m_s: float
+    white_m_s: float = 0.0
+    current_m_s: float | None = None
+    current_sd_m_s: float = 0.0
+    run_down_s: float = 0.0
+    run_down_sd_s: float = 0.0
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Beginning:
+        """
+        Return the end of a window; over ground where positions were used.
+        """
+        speeds = [sd for name, sd in estimate.noise_sd.items() if name.startswith('speed')]
+        over_ground = 'position' in estimate.samples
+        return cls(
+            made_ns=estimate.end_ns,
+            stop_m_s=float(estimate.curve.speed_m_s[-1]),
+            speed_m_s=estimate.last_speed_m_s,
+            speed_sd_m_s=estimate.last_speed_sigma_m_s,
+            white_m_s=min((sd for sd in speeds if math.isfinite(sd)), default=0.0),
+            current_m_s=(estimate.current_m_s or 0.0) if over_ground else None,
+            current_sd_m_s=estimate.current_sigma_m_s or 0.0,
+        )
 
 
 def foretell(
@@ -48,12 +89,31 @@ def foretell(
     speeds_m_s: tuple[float, ...] = SPEEDS_M_S,
 ) -> Forecast:
     """
+    Foretell the rest of a glide from its estimate so far, of any estimator, as `foretell_from`.
+    """
+    known = KnownCurve.of(estimate)
+    return foretell_from(
+        Beginning.of(estimate), known, ship, froude_min=froude_min, speeds_m_s=speeds_m_s
+    )
+
+
+def foretell_from(
+    now: Beginning,
+    known: KnownCurve,
+    ship: Ship,
+    *,
+    froude_min: float = 0.0,
+    speeds_m_s: tuple[float, ...] = SPEEDS_M_S,
+) -> Forecast:
+    """
     Foretell the rest of a glide.
 
     Parameters
     ----------
-    estimate
-        Of the glide so far, of any estimator.
+    now
+        From where.
+    known
+        r(v), as it is known.
     ship
         For n_r and the hull.
     froude_min
@@ -64,8 +124,7 @@ def foretell(
     Returns
     -------
     Forecast
-        Of times and distances to the lower speeds, from the last reading on. Distances are over
-        ground where positions were used.
+        Of times and distances to the lower speeds, from the last reading on.
 
     Raises
     ------
@@ -75,49 +134,51 @@ def foretell(
     Notes
     -----
     By law and gusts, times and distances are log-normal: a weak deceleration delays more than a
-    strong one hastens.
+    strong one hastens. The thrust of a shaft that runs down delays by its share of a, over time.
     """
-    now, stop = estimate.last_speed_m_s, float(estimate.curve.speed_m_s[-1])
-    wanted = {*(part * stop for part in FRACTIONS), *speeds_m_s, float(ship.speed(froude_min))}
-    targets = tuple(sorted((u for u in wanted if 0.0 < u < now), reverse=True))
+    wanted = {*(part * now.stop_m_s for part in FRACTIONS), *speeds_m_s}
+    wanted.add(float(ship.speed(froude_min)))
+    targets = tuple(sorted((u for u in wanted if 0.0 < u < now.speed_m_s), reverse=True))
     if not targets:
         raise EstimationError(
-            f'nothing is left to foretell: at {now:.3g} m/s she is slower than '
-            f'{FRACTIONS[-1]:.0%} of {stop:.3g} m/s and than {", ".join(map(str, speeds_m_s))} '
-            'm/s: give a lower speed in forecast_speeds'
+            f'nothing is left to foretell: at {now.speed_m_s:.3g} m/s she is slower than '
+            f'{FRACTIONS[-1]:.0%} of {now.stop_m_s:.3g} m/s and than '
+            f'{", ".join(map(str, speeds_m_s))} m/s: give a lower speed in forecast_speeds'
         )
-    u = np.exp(np.linspace(math.log(now), math.log(_BEYOND * targets[-1]), _NODES))
-    found = deceleration(estimate, ship, np.append(u, stop))
+    u = np.exp(np.linspace(math.log(now.speed_m_s), math.log(_BEYOND * targets[-1]), _NODES))
+    found = deceleration(known, ship, np.append(u, now.stop_m_s))
     a = np.exp(found.log_m_s2)
     weights = _weights(u, a[:-1])
-    time = weights.sum(axis=1)
-    covariance = found.covariance[:-1, :-1] + _gusts(u, a, time)
-    over_ground = 'position' in estimate.samples
-    current = (estimate.current_m_s or 0.0) if over_ground else 0.0
-    ground = u + current
-    way = (weights * ground).sum(axis=1)
+    gliding = weights.sum(axis=1)
+    covariance = found.covariance[:-1, :-1] + found.roughness * _gusts(u, a, gliding)
+    ground = u + (now.current_m_s or 0.0)
     by_way = weights * ground
-    # what is wrong with the present speed, and with the reading that will show a lower one
-    late = (estimate.last_speed_sigma_m_s / a[0]) ** 2
-    reading = (_reading_sd(estimate, stop) / a[:-1]) ** 2
-    drift = _drift(estimate, stop, time) if over_ground else np.zeros(_NODES)
-    times = _bands(time, _variance(weights, covariance), late + reading)
+    drift = np.zeros(_NODES) if now.current_m_s is None else _drift(now, gliding)
+    # what is wrong with the present speed, with the reading that will show a lower one, and with
+    # the run-down
+    late = (now.speed_sd_m_s / a[0]) ** 2
+    reading = (_reading_sd(now) / a[:-1]) ** 2
+    held, held_way = _run_down(now.run_down_s, gliding, a[:-1], ground)
+    longer, longer_way = _run_down(now.run_down_s + now.run_down_sd_s, gliding, a[:-1], ground)
+    times = _bands(
+        gliding + held, _variance(weights, covariance), late + reading + (longer - held) ** 2
+    )
     ways = _bands(
-        way,
+        by_way.sum(axis=1) + held_way,
         _variance(by_way, covariance),
-        late * ground[0] ** 2 + reading * ground**2 + drift,
+        late * ground[0] ** 2 + reading * ground**2 + drift + (longer_way - held_way) ** 2,
     )
     return Forecast(
-        estimate.end_ns,
-        stop,
+        now.made_ns,
+        now.stop_m_s,
         u,
         times,
         ways,
-        estimate.last_speed_sigma_m_s,
-        current,
+        now.speed_sd_m_s,
+        now.current_m_s or 0.0,
         np.sqrt(drift),
         targets,
-        over_ground,
+        now.current_m_s is not None,
     )
 
 
@@ -132,31 +193,43 @@ def _weights(u: Float64, a: Float64) -> Float64:
     return weights
 
 
+def _run_down(
+    run_down_s: float, gliding_s: Float64, a: Float64, ground: Float64
+) -> tuple[Float64, Float64]:
+    """Return by how much a thrust a_0 exp(-t / run_down) delays each speed, and its way."""
+    delay = np.zeros_like(gliding_s)
+    if run_down_s > 0.0:
+        over = a[0] / a
+        share = 0.5 * (over[1:] + over[:-1])
+        for _ in range(_ROUNDS):
+            left = -run_down_s * np.diff(np.exp(-(gliding_s + delay) / run_down_s))
+            delay = np.concatenate([[0.0], np.cumsum(share * left)])
+    way = np.diff(delay) * 0.5 * (ground[1:] + ground[:-1])
+    return delay, np.concatenate([[0.0], np.cumsum(way)])
+
+
 def _variance(weights: Float64, covariance: Float64) -> Float64:
     return np.asarray(((weights @ covariance) * weights).sum(axis=1))
 
 
 def _gusts(u: Float64, a: Float64, time: Float64) -> Float64:
     """Return the covariance of a Gauss-Markov force, in parts of the deceleration."""
-    size = GUST * a[-1] / a[:-1]
+    size = priors.GUST.sd * a[-1] / a[:-1]
     damping = 2.0 * a[0] / u[0]
-    length = GUST_TIMES / math.sqrt(damping)
+    length = priors.GUST_TIME.mean / math.sqrt(damping)
     return np.asarray(np.outer(size, size) * np.exp(-np.abs(time[:, None] - time) / length))
 
 
-def _drift(estimate: Estimate, stop: float, time: Float64) -> Float64:
+def _drift(now: Beginning, time: Float64) -> Float64:
     """Return the variance of the way that the water makes."""
-    size = DRIFT_M_S * min(1.0, stop / DRIFT_SPEED_M_S)
-    ratio = time / DRIFT_S
-    slow = 2.0 * (size * DRIFT_S) ** 2 * (ratio + np.expm1(-ratio))
-    sd = estimate.current_sigma_m_s or 0.0
-    return np.asarray(slow + (sd * time) ** 2)
+    size = priors.DRIFT.sd * min(1.0, now.stop_m_s / priors.DRIFT_SPEED.mean)
+    ratio = time / priors.DRIFT_TIME.mean
+    slow = 2.0 * (size * priors.DRIFT_TIME.mean) ** 2 * (ratio + np.expm1(-ratio))
+    return np.asarray(slow + (now.current_sd_m_s * time) ** 2)
 
 
-def _reading_sd(estimate: Estimate, stop: float) -> float:
-    speeds = [sd for name, sd in estimate.noise_sd.items() if name.startswith('speed')]
-    white = min((sd for sd in speeds if math.isfinite(sd)), default=0.0)
-    return max(READING * stop, READING_WHITE * white)
+def _reading_sd(now: Beginning) -> float:
+    return max(priors.READING.sd * now.stop_m_s, priors.READING_OF_WHITE.sd * now.white_m_s)
 
 
 def _bands(median: Float64, scaled: Float64, added: Float64) -> Float64:

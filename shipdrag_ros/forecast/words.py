@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from shipdrag_ros.display import LIGHT_KG, Table, ship_speed
 from shipdrag_ros.forecast.followed import Passed
@@ -49,23 +49,28 @@ def sentence(milestone: Milestone, mass_kg: float, was_s: float | None = None) -
     return text if was_s is None else f'{text}; was {clock(was_s)}'
 
 
+def cells(band: Band, show: Callable[[float], str]) -> tuple[str, str]:
+    """
+    Return a median, and its band.
+    """
+    return show(band.median), f'{show(band.low)} to {show(band.high)}'
+
+
 def table(compared: Sequence[Passed], mass_kg: float) -> Table:
     """
     Show milestones beside what followed, a line each.
     """
 
-    def cells(band: Band, was: float | None, time: bool) -> tuple[str, ...]:
-        def show(value: float) -> str:
-            return clock(value) if time else way(value, mass_kg)
-
-        followed = _NOT_SHOWN if was is None else show(was)
-        return show(band.median), f'{show(band.low)} to {show(band.high)}', followed
+    def far(metres: float) -> str:
+        return way(metres, mass_kg)
 
     rows = tuple(
         (
             ship_speed(each.foretold.speed_m_s, mass_kg),
-            *cells(each.foretold.time_s, each.was_s, time=True),
-            *cells(each.foretold.distance_m, each.was_m, time=False),
+            *cells(each.foretold.time_s, clock),
+            _NOT_SHOWN if each.was_s is None else clock(each.was_s),
+            *cells(each.foretold.distance_m, far),
+            _NOT_SHOWN if each.was_m is None else far(each.was_m),
         )
         for each in compared
     )

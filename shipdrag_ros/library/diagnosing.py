@@ -15,7 +15,6 @@ from shipdrag_ros.diagnosis import (
     DiagnosisResult,
     SailingRecord,
     diagnose,
-    diagnose_fitted,
     diagnose_sailing,
 )
 from shipdrag_ros.diagnosis.earlier import EarlierDiagnosis
@@ -23,7 +22,7 @@ from shipdrag_ros.diagnosis.result import WeighedFact
 from shipdrag_ros.diagnosis.seen_runs import SeenRun, WeighedEarlier
 from shipdrag_ros.diagnosis.together import with_log_track
 from shipdrag_ros.diagnosis.whole_glides import with_whole_glides
-from shipdrag_ros.errors import DiagnosisError
+from shipdrag_ros.errors import DiagnosisError, EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.library.replaying import Listener, WindowedRun, WindowSpan, refuse_two_ships
@@ -121,35 +120,36 @@ def _of_coastdowns(
     if not seen.coasts:
         log_track = _sailing(runs, seen.no_coastdown, progress)
         return _unused(log_track, (*seen.ship.facts, *facts), earlier)
-    if seen.ship.baseline is None:
-        progress('fitting a form of the resistance', 0, 0)
-        found = diagnose_fitted(seen.coasts, seen.ship)
-        found = _with_log_track(found, runs, progress)
-        found = _unused(found, (*seen.ship.facts, *facts), earlier)
-        at = tuple(SeenRun(coast.name, coast.window.start_ns) for coast in seen.coasts)
-        found = replace(found, runs=at)
-    else:
-        found = diagnose(
-            seen.coasts,
-            seen.ship,
-            seen.parameters,
-            facts=facts,
-            earlier=earlier,
-            progress=progress,
-        )
+    found = _of_force(runs, seen, facts, earlier, progress)
     unused = tuple(f'no coastdown was found {each}' for each in seen.without)
     return replace(found, notes=(*found.notes, *unused), estimates=seen.estimates)
 
 
-def _with_log_track(
-    found: DiagnosisResult, runs: Sequence[WindowedRun], progress: Progress
+def _of_force(
+    runs: Sequence[WindowedRun],
+    seen: _Coastdowns,
+    facts: Sequence[Fact],
+    earlier: Sequence[EarlierDiagnosis],
+    progress: Progress,
 ) -> DiagnosisResult:
-    """Compare the logs with the ways over ground too; a note says why not."""
+    """Diagnose coastdowns; without a baseline the logs and the ways over ground as well."""
+    diagnosed = partial(
+        diagnose, seen.coasts, seen.ship, seen.parameters, facts=facts, progress=progress
+    )
+    if seen.ship.baseline is not None:
+        return diagnosed(earlier=earlier)
     try:
-        return with_log_track(found, _sailing(runs, '', progress))
+        found = diagnosed()
+    except (DiagnosisError, EstimationError) as error:
+        sailing = _sailing(runs, f'No coastdown could be diagnosed: {error}.', progress)
+        return _unused(sailing, (*seen.ship.facts, *facts), earlier)
+    unused = _unused(found, (), earlier).earlier
+    try:
+        found = with_log_track(found, _sailing(runs, '', progress))
     except DiagnosisError as error:
         why = f'the log was not compared with the way over ground: {str(error).strip()}'
-        return replace(found, notes=(*found.notes, why))
+        found = replace(found, notes=(*found.notes, why))
+    return replace(found, earlier=unused)
 
 
 def _unused(

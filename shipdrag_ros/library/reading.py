@@ -86,7 +86,7 @@ def read(
     >>> sd.read(frame, ship=ship, columns={'speed_through_water': 'log:kn'}, time='t')
     <Record: a ship without a name, 1 run, 1200 messages>
     """
-    from shipdrag_ros.library.frames import is_frame
+    from shipdrag_ros.library.logs import is_frame
 
     if not isinstance(ship, Ship | str | PathLike | None):
         raise BagError(f'ship={ship!r}: expected a Ship, or the path of a ship file')

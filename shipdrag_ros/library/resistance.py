@@ -13,7 +13,7 @@ from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import tables as estimate_tables
 from shipdrag_ros.estimation.force import Force, ForceCurve
 from shipdrag_ros.estimation.reciprocal import Combined
-from shipdrag_ros.library import forecasts
+from shipdrag_ros.library import forecasts, stopped
 from shipdrag_ros.library.record import Coastdown, Record, force_columns
 from shipdrag_ros.library.replaying import Notes, WindowSpan, replay_run
 from shipdrag_ros.library.shown import ShownResistance, writing
@@ -122,6 +122,22 @@ class Resistance(ShownResistance):
             If a time is not above 0, or there is none.
         """
         return forecasts.forecast(self.runs, after)
+
+    def if_stopped_now(self) -> stopped.IfStopped:
+        """
+        Foretell the glide if the engine were stopped at the end of the record.
+
+        Returns
+        -------
+        IfStopped
+            From the hull as last known: the last coastdown, or else the ship file.
+
+        Raises
+        ------
+        EstimationError
+            If no speed was read at its end, or nothing is known of the hull.
+        """
+        return stopped.if_stopped_now(self.runs)
 
     def _lines(self) -> Sequence[str]:
         lines = [line for run in self.runs for line in (*run.summary(), *_warnings(run))]

@@ -16,24 +16,23 @@ from typing import Any
 from shipdrag_ros.errors import ShipdragError
 from shipdrag_ros.live import acceptance
 from shipdrag_ros.live.acceptance import Check, Held
+from shipdrag_ros.live.ahead import Ahead
 from shipdrag_ros.live.earlier import PastRun
 from shipdrag_ros.live.figures import (
     PagePart,
     at_usual_speed,
-    checked_part,
     curve_part,
-    forecast_part,
     past_part,
     ship_part,
     to_go_s,
 )
 from shipdrag_ros.live.headline import ENDED_S, GOAL, SILENT_S, Ended, Situation, headline
 from shipdrag_ros.live.outputs import (
-    ComingGlide,
     Curve,
     Figure,
     read_curve,
     read_forecast,
+    read_path,
     read_resistance,
     read_speed,
 )
@@ -103,8 +102,7 @@ class Bridge:
         self._speed: Figure | None = None
         self._resistance: Figure | None = None
         self._curve: Curve | None = None
-        self._coming: list[ComingGlide] = []
-        self._foretold: PagePart | None = None
+        self._ahead = Ahead()
         self._verdict: PagePart = {'state': '', 'sentence': ''}  # as the health says it
         self._found: PagePart | None = None  # the last diagnosis
         self._notes: deque[tuple[int, str]] = deque(maxlen=_MESSAGES)
@@ -121,6 +119,7 @@ class Bridge:
             case Samples(block):
                 self.trace.add(block)
                 self._recent.add(block)
+                self._ahead.add(block)
                 self._note_course()
             case Health():
                 self._heard_s = now_s
@@ -254,21 +253,13 @@ class Bridge:
                     age_s = (curve.stamp_ns - self._coast_ns) * 1e-9
                     self._bands.append((age_s, curve.band(self._ship)))
         elif name == 'forecast':
-            self._take_forecast(read_forecast(payload))
+            self._ahead.take(read_forecast(payload), self._ship, self._speed, self._coast_ns)
+        elif name == 'forecast_path':
+            self._ahead.take_path(read_path(payload), self._coast_ns)
         elif name == 'events':
             self._take_event(payload)
         elif name == 'diagnosis':
             self.take_diagnosis(json.loads(types.deserialize(types.STRING, payload).data))
-
-    def _take_forecast(self, coming: ComingGlide | None) -> None:
-        if coming is not None:
-            self._coming.append(coming)
-            self._foretold = forecast_part(coming, self._ship)
-            return
-        self._foretold = None
-        if self._coming and self._speed is not None and self._coast_ns is not None:
-            self._foretold = checked_part(self._coming, self._speed, self._coast_ns)
-        self._coming = []
 
     def _take_event(self, payload: bytes) -> None:
         note = read_event(payload)
@@ -283,14 +274,15 @@ class Bridge:
             self.add_past(run)
             if run.curve is None:
                 self._curve = None  # what was drawn of it is no result
+            self._ahead.end(run.ended_by)
             self._coast_ns = None
         elif note.kind is EventKind.RESET:
             self._coast_ns = None
 
     def _begin(self, start_ns: int) -> None:
         self._coast_ns, self._bands = start_ns, []
-        self._curve = self._resistance = self._speed = self._foretold = None
-        self._coming = []
+        self._curve = self._resistance = self._speed = None
+        self._ahead.begin()
         before = [course for second, course in self._courses if second * 10**9 <= start_ns]
         self._course_at_stop = before[-1] if before else self._recent.direction(self._now_s)
 
@@ -315,18 +307,27 @@ class Bridge:
         """
         now = self._situation(now_s)
         said = headline(now)
+        of_run = _is_of_run(now)
         return {
             'headline': {'tone': said.tone.value, 'text': said.text, 'action': said.action},
             'ship': ship_part(self._ship),
             'figures': self._figures(now_s),
             'curve': curve_part(self._curve),
-            'forecast': self._foretold,
+            'forecast': self._ahead.forecast if of_run else None,
+            'if_stopped': None if of_run else self._if_stopped(now_s),
+            'track': self._ahead.track,
             'inputs': self._inputs(now.silent_s or 0.0),
             'checks': self._checks(now, now_s),
             'verdict': self._found if self._done else self._verdict,
             'past': [past_part(run, self._ship) for run in self.past[-PAST_RUNS:]],
             'notes': [[stamp // 1_000_000_000, text] for stamp, text in self._notes],
         }
+
+    def _if_stopped(self, now_s: float) -> PagePart:
+        speed = self.speed(now_s)
+        read = speed is not None and (speed.age_s or 0.0) <= _OLD_S
+        value = speed.value_m_s if speed is not None and read else None
+        return self._ahead.if_stopped(self._ship, value, self.past, self._now_s)
 
     @property
     def _done(self) -> bool:
@@ -442,8 +443,7 @@ class Bridge:
         speed = self.speed(now_s)
         speed_m_s = None if speed is None else speed.value_m_s
         second, coasting = self._now_s, now.coast_s is not None
-        of_run = coasting or (now.ended is not None and now.ended.ago_s < ENDED_S)
-        lead_s = self._lead_at_stop if of_run else None if now.trouble else now.lead_s
+        lead_s = self._lead_at_stop if _is_of_run(now) else None if now.trouble else now.lead_s
         course = self._recent.direction(second)
         before = self._course_at_stop if coasting else None
         if before is None and self._courses:
@@ -468,3 +468,8 @@ class Bridge:
         if status is None or status.level != STALE:
             return check
         return replace(check, held=Held.SILENT, text=status.message)
+
+
+def _is_of_run(now: Situation) -> bool:
+    """Say whether she coasts, or has until a while ago."""
+    return now.coast_s is not None or (now.ended is not None and now.ended.ago_s < ENDED_S)

@@ -16,12 +16,14 @@ import numpy as np
 from shipdrag_ros.display import LIGHT_KG, M_S_PER_KNOT
 from shipdrag_ros.estimation.force import clean_hull
 from shipdrag_ros.live.earlier import PastRun
-from shipdrag_ros.live.outputs import ComingGlide, Curve, Figure
+from shipdrag_ros.live.outputs import ComingGlide, ComingPath, Curve, Figure
+from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
 _CLEAN_POINTS = 60
 _CURVE_POINTS = 60
 _PAST_POINTS = 24
+_TRACK_POINTS = 60
 _SPOKEN_OF_M_S = 2.0 * M_S_PER_KNOT
 
 PagePart = dict[str, Any]
@@ -136,6 +138,43 @@ def checked_part(made: Sequence[ComingGlide], last: Figure, start_ns: int) -> Pa
         'foretold_s': [foretold_s, low_s, high_s],
         'was_s': (last.stamp_ns - then.stamp_ns) * 1e-9,
     }
+
+
+def track_part(
+    heard_m: Float64, path: ComingPath, coming: ComingGlide | None, time_s: float | None
+) -> PagePart:
+    """
+    Return the track since the stop and the one to come, about the last position heard.
+
+    Parameters
+    ----------
+    heard_m : (n, 2)
+        Positions since the stop.
+    path
+        Those to come.
+    coming
+        The forecast that they belong to; None where it is over.
+    time_s
+        At which a mark with its band is set on the track to come; None: there is none.
+    """
+    here = heard_m[-1]
+    part: PagePart = {
+        'was': _thinned(heard_m - here),
+        'ahead': _thinned(path.place_m - here),
+        'mark': None,
+        'over': coming is None,
+    }
+    if coming is not None and time_s is not None:
+        way = path.place_m[-1] - path.place_m[0]
+        far = [np.interp(time_s, coming.points[:, 0], coming.points[:, i]) for i in (4, 5, 6)]
+        ahead = path.place_m[0] + np.outer(far, way / max(float(np.hypot(*way)), 1e-9))
+        part['mark'] = np.round(ahead - here, 2).tolist()
+    return part
+
+
+def _thinned(place_m: Float64) -> list[list[float]]:
+    few = np.unique(np.linspace(0, len(place_m) - 1, _TRACK_POINTS).round().astype(int))
+    return [[round(float(x), 2), round(float(y), 2)] for x, y in place_m[few]]
 
 
 def _rounded(values: Any) -> list[float]:

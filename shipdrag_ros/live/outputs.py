@@ -11,7 +11,14 @@ import numpy as np
 from shipdrag_ros.estimation.force import usual_within
 from shipdrag_ros.messages import MalformedMessage, types
 from shipdrag_ros.messages.reporting import CURVE_FIELDS, FORECAST_FIELDS
-from shipdrag_ros.messages.topics import FORECAST, RESISTANCE, RESISTANCE_CURVE, SPEED, OutputTopic
+from shipdrag_ros.messages.topics import (
+    FORECAST,
+    FORECAST_PATH,
+    RESISTANCE,
+    RESISTANCE_CURVE,
+    SPEED,
+    OutputTopic,
+)
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 
@@ -154,6 +161,38 @@ def read_forecast(payload: bytes) -> ComingGlide | None:
     """
     stamp_ns, points = _points(FORECAST, FORECAST_FIELDS, payload)
     return ComingGlide(stamp_ns, points) if len(points) >= 2 else None
+
+
+@dataclass(frozen=True)
+class ComingPath:
+    """
+    The positions to come.
+
+    Attributes
+    ----------
+    stamp_ns
+    place_m : (n, 2)
+        In the plane of the positions since the stop, two of them at least.
+    """
+
+    stamp_ns: int
+    place_m: Float64
+
+
+def read_path(payload: bytes) -> ComingPath | None:
+    """
+    Read `~/forecast_path`; None where it is withdrawn, or she has no positions.
+
+    Raises
+    ------
+    MalformedMessage
+        If it is none.
+    """
+    message = types.deserialize(FORECAST_PATH.type, payload)
+    places = [(each.pose.position.x, each.pose.position.y) for each in message.poses]
+    place = np.array(places, np.float64).reshape(-1, 2)
+    place = place[np.isfinite(place).all(axis=1)]
+    return ComingPath(types.stamp_ns(message), place) if len(place) >= 2 else None
 
 
 def _points(topic: OutputTopic, names: tuple[str, ...], payload: bytes) -> tuple[int, Float64]:

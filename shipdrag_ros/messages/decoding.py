@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipdrag_ros.messages import types
-from shipdrag_ros.messages.gather import GatherResult, gather
+from shipdrag_ros.messages.gather import GatherResult, gather, steps
 from shipdrag_ros.messages.joints import Joints, MessageRows, read_joints
-from shipdrag_ros.messages.layout import steps
 from shipdrag_ros.messages.topics import Source
 from shipdrag_ros.samples import Block, Channel, Float64, Int64, UInt8
 

@@ -35,8 +35,7 @@ from shipdrag_ros.messages import (
     silence_mark,
     types,
 )
-from shipdrag_ros.node.recorder import Recorder
-from shipdrag_ros.node.ring import RawMessage
+from shipdrag_ros.node.recorder import RawMessage, Recorder
 from shipdrag_ros.samples import BACKWARD_JUMP_NS
 
 Publish = Callable[[OutputMessage], None]

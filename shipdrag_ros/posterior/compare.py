@@ -37,6 +37,7 @@ from shipdrag_ros.posterior.hypotheses import (
     IN_TIME,
     Explanation,
     PriorFamilies,
+    RunSight,
     RunTable,
     ShipRuns,
     half,
@@ -45,7 +46,7 @@ from shipdrag_ros.posterior.laplace import of_family
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import Effect
+from shipdrag_ros.simulation.effect import Effect, Scope
 
 _ITERATIONS = 8  # of Gauss and Newton
 _CLOSE = 0.1  # of -2 ln posterior
@@ -60,6 +61,7 @@ _TYPICAL_SMOOTH = 0.05  # size of something smooth, with which the noise is lear
 _RUN_DOWNS, _FEWEST = 8.0, 5  # after the stop no thrust is left; rows of a curve
 _AMOUNT_SD = 0.6  # of a size that is not 0, in parts of the one that is tried
 _EXACT = 1e16  # precision of what does not act
+_DIFFERING = 4  # likeliest effects of the hull that may differ between runs
 
 
 @compiled
@@ -135,7 +137,7 @@ class Fitted:
     @property
     def names(self) -> Names:
         """As the decision takes them."""
-        return UNKNOWN if self.hypothesis.smooth else self.hypothesis.names
+        return UNKNOWN if self.hypothesis.unnamed else self.hypothesis.names
 
     @property
     def log_weight(self) -> float:
@@ -234,8 +236,12 @@ class Comparing:
     ship
     effects
         That may be missing.
-    log_facts
-        Logarithm of how probable it is that all facts are stated, under a hypothesis.
+    log_known
+        Logarithm of how probable facts and earlier diagnoses are, under a hypothesis.
+    kept
+        Further ways, of effects that are as an earlier diagnosis found them.
+    log_differs
+        Prior log odds that an effect of the hull differs between the runs.
     """
 
     def __init__(
@@ -243,31 +249,33 @@ class Comparing:
         runs: ShipRuns,
         ship: Ship,
         effects: Sequence[Effect],
-        log_facts: Callable[[Explanation], float] = lambda hypothesis: 0.0,
+        log_known: Callable[[Explanation], float] = lambda hypothesis: 0.0,
+        kept: Sequence[EffectWay] = (),
+        log_differs: float = -math.inf,
     ) -> None:
-        self.runs, self.effects, self.log_facts = runs, tuple(effects), log_facts
+        self.runs, self.effects, self.log_known = runs, tuple(effects), log_known
+        self.log_differs = log_differs
         self.stated = tuple(stated_way(each, ship) for each in ship.effects)
         self.base = Explanation(self.stated)
         self.noise: list[_RunNoise] = []
         kinds = {int(k) for run in runs.runs for k in np.unique(run.model.rows.kind)}
         both = LOG in kinds and len(kinds) > 1
-        self.smooth = (IN_SPEED, IN_TIME, IN_LOG, IN_GROUND) if both else (IN_SPEED, IN_TIME)
+        # without a baseline the hull is something smooth in any case
+        in_force = (IN_SPEED, IN_TIME) if runs.runs[0].model.law.stated else (IN_TIME,)
+        self.smooth = (*in_force, IN_LOG, IN_GROUND) if both else in_force
         longest = max(float(run.model.rows.time_s[-1]) for run in runs.runs)
         self.ways: dict[str, list[EffectWay]] = {
             effect.name: list(ways_of(effect, ship, longest, len(runs.runs)))
             for effect in self.effects
         }
+        for way in kept:
+            self.ways[way.effect.name].append(way)
 
     def compare(self) -> ComparedHypotheses:
         """
         Fit and weigh nothing, each effect, pairs where they may count, and something smooth.
         """
-        self.noise = [self._usual(j) for j in range(len(self.runs.runs))]
-        start = np.zeros(self.runs.width(self.base))
-        start[: self.runs.size] = self.runs.start
-        nothing = Fitted(self.base, start)
-        self._climb([nothing])
-        self.nothing = nothing
+        nothing = self.fit_nothing()
         ways = [way for each in self.ways.values() for way in each]
         scores, amounts, responses = self._score(nothing, ways)
         self._learn(nothing, ways, scores, responses)
@@ -285,14 +293,64 @@ class Comparing:
         if pairs:
             self._climb(pairs)
             every += self._weigh(pairs)
+        differing = self._differing(every)
+        if differing:
+            self._climb(differing)
+            every += self._weigh(differing)
         every += self._weigh(self._beside(every))
         return ComparedHypotheses(self.runs, self.effects, tuple(every))
+
+    def fit_nothing(self) -> Fitted:
+        """Fit the runs with nothing missing, under usual noise."""
+        self.noise = [self._usual(j) for j in range(len(self.runs.runs))]
+        start = np.zeros(self.runs.width(self.base))
+        start[: self.runs.size] = self.runs.start
+        self.nothing = Fitted(self.base, start)
+        self._climb([self.nothing])
+        return self.nothing
+
+    def equations(self, fit: Fitted) -> list[Float64]:
+        """
+        Return products of the whitened rows of each run, (1 + p, 1 + p), under usual noise.
+
+        Residual first, then the derivatives by all unknowns.
+        """
+        assert fit.tables is not None
+        found = []
+        for j, table in enumerate(fit.tables):
+            total = np.zeros((1 + len(fit.at), 1 + len(fit.at)))
+            _put(total, self._of_run(j, table, self.noise[j].typical)[0][0], table.place)
+            found.append(total)
+        return found
+
+    def prior_of(self, fit: Fitted) -> tuple[int, Float64, Float64]:
+        """Return the likeliest family of a hypothesis: number, mean and precision (p,)."""
+        families = self.runs.priors(fit.hypothesis, fit.at)
+        total = np.asarray(sum(self.equations(fit)), np.float64)
+        logs, _, _ = _solve(total[None], families.mean, families.precision, 0, 0)
+        best = int(np.argmax(logs[0] + families.log_chance))
+        return best, families.mean[best], families.precision[best]
+
+    def white(self, j: int, table: RunTable, like: RunSight) -> Float64:
+        """Return the lines of the motion of a table, whitened as those of run j."""
+        rows, lines = like.model.rows, table.along.copy()
+        whiten(
+            rows, lines, noise_of(self.noise[j].typical, 0, rows, table.white, like.model.steady)
+        )
+        return lines
+
+    def noise_sd(self, j: int, table: RunTable) -> Float64:
+        """Return the standard deviation of each row of the motion, slow disturbances in it."""
+        lines = np.eye(table.along.shape[1])
+        whitener = self.white(j, table._replace(along=lines), self.runs.runs[j]).T
+        result: Float64 = np.sqrt(np.sum(np.linalg.inv(whitener) ** 2, axis=1))
+        return result
 
     @property
     def as_stated(self) -> Fitted:
         """The ship as her file states her, and how the runs began."""
         fit = Fitted(replace(self.base, frozen=True), self.nothing.at.copy())
-        fit.at[: self.runs.coefficients] = 0.0
+        fit.at[: self.runs.size] = self.runs.as_stated(self.nothing.at)
         self._climb([fit])
         return fit
 
@@ -303,10 +361,7 @@ class Comparing:
         assert fit.tables is not None
         found = []
         for j, table in enumerate(fit.tables):
-            model = self.runs.runs[j].model
-            noise = noise_of(self.noise[j].typical, 0, model.rows, table.white, model.steady)
-            line = table.along[:1].copy()
-            whiten(model.rows, line, noise)
+            line = self.white(j, table._replace(along=table.along[:1]), self.runs.runs[j])
             whitened = np.concatenate([line[0], table.rest[0]])
             found.append(RunResidual(table.along[0], table.residual, whitened))
         return found
@@ -499,7 +554,7 @@ class Comparing:
         """
         score, information = self._given_way(base, responses)
         own = np.maximum(np.diag(information), 0.0)
-        amounts = np.array([_amount(each.ways[-1]) for each in hypotheses])
+        amounts = np.array([_amount(each.ways[-1]) for each in hypotheses]).reshape(-1, 2)
         prior, held = amounts[:, 0], amounts[:, 1]
         slope = score + held * prior
         found: Float64 = 0.5 * (slope**2 / (own + held) - held * prior**2)
@@ -660,7 +715,7 @@ class Comparing:
             log_evidence += total - (at_usual if several and j else 0.0)
             weights.append(np.exp(logs - total))
             moments.append((z, variance))
-        log_evidence += self.log_facts(fit.hypothesis)
+        log_evidence += self.log_known(fit.hypothesis)
         fit.log_evidence = log_evidence if math.isfinite(log_evidence) else -math.inf
         first = self.runs.size
         q = len(fit.hypothesis.unknowns)
@@ -725,6 +780,29 @@ class Comparing:
         for _, fit in sorted(tried, key=lambda each: -each[0]):
             kept.setdefault(fit.hypothesis.names, fit)
         return list(kept.values())[:_PAIRS]
+
+    def _differing(self, fits: Sequence[Fitted]) -> list[Fitted]:
+        """Return the likeliest effects of the hull, with a size for each run."""
+        count = len(self.runs.runs)
+        if count < 2 or not math.isfinite(self.log_differs):
+            return []
+        best = ComparedHypotheses(self.runs, self.effects, tuple(fits)).best
+        of_hull = [
+            best[e.name,] for e in self.effects if e.scope is Scope.HULL and (e.name,) in best
+        ]
+        found = []
+        for alike in sorted(of_hull, key=lambda fit: -fit.log_weight)[:_DIFFERING]:
+            *stated, way = alike.hypothesis.ways
+            own = [replace(way, run=j, log_odds=0.0) for j in range(count)]
+            own[0] = replace(own[0], log_odds=way.log_odds + self.log_differs)
+            hypothesis = Explanation((*stated, *own))
+            at = self._widened(self.nothing, hypothesis)
+            first = self.runs.size + len(self.base.unknowns)
+            q = len(way.unknowns)
+            for j in range(count):
+                at[first + j * q : first + (j + 1) * q] = alike.at[first : first + q]
+            found.append(Fitted(hypothesis, at))
+        return found
 
     def _beside(self, fits: Sequence[Fitted]) -> list[Fitted]:
         """Return likely names with something smooth besides, linear where the names are best."""

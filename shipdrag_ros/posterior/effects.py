@@ -17,7 +17,8 @@ from itertools import product
 import numpy as np
 from scipy.special import ndtri
 
-from shipdrag_ros.parameter import Parameter, Shape, normal
+from shipdrag_ros.parameter import Parameter, Prior, Shape, normal
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship, StatedEffect
 from shipdrag_ros.simulation.action import Action
@@ -52,6 +53,10 @@ class EffectWay:
         Where it is alone, of an effect of a single run; None: in all runs.
     stated
         Whether it is part of the ship as her file states it, and no hypothesis.
+    kept
+        Whether it is as an earlier diagnosis found it, with priors about what that found.
+    nameless
+        Whether many other causes leave the same trace, so that it is no name.
     """
 
     effect: Effect
@@ -61,18 +66,21 @@ class EffectWay:
     log_odds: float
     run: int | None = None
     stated: bool = False
+    kept: bool = False
+    nameless: bool = False
 
     @property
     def mode(self) -> tuple[object, ...]:
         """What separates it from other ways of the effect, where its fit begins apart."""
         signs = tuple(q.prior.first > 0.0 for q in self.unknowns)
-        return self.effect.name, self.fixed, signs, self.run
+        return self.effect.name, self.fixed, signs, self.run, self.kept
 
     @property
     def components(self) -> list[int]:
         """Places of components, which may have either sign: where one is small, so are all."""
         found = [i for i, q in enumerate(self.unknowns) if q.prior.shape is Shape.NORMAL]
-        return found if len(found) > 1 and not self.stated else []
+        known = self.stated or self.kept
+        return found if len(found) > 1 and not known else []
 
     def acts_in(self, run: int) -> bool:
         """Say whether it does anything in a run."""
@@ -90,6 +98,8 @@ class EffectWay:
     def resized(self, amount: float) -> float:
         """Return z of the size of which there is so much more of the trace than is tried."""
         tried, first = self.tried()[0], self.unknowns[0].prior
+        if self.kept:
+            return self.start[0]
         if first.shape is Shape.HALF_NORMAL:
             amount = max(amount, 0.1)
         if first.shape is not Shape.LOG_NORMAL:
@@ -113,6 +123,24 @@ def stated_way(stated: StatedEffect, ship: Ship) -> EffectWay:
     return EffectWay(effect, tuple(unknowns), (), (0.0,) * len(unknowns), 0.0, stated=True)
 
 
+def kept_way(effect: Effect, sizes: Sequence[Prior], ship: Ship) -> EffectWay:
+    """
+    Return an effect that is as an earlier diagnosis found it.
+
+    Parameters
+    ----------
+    effect
+    sizes
+        Priors of its parameters, about what was found.
+    ship
+    """
+    unknowns = tuple(
+        replace(q, prior=prior) for q, prior in zip(effect.parameters_of(ship), sizes, strict=True)
+    )
+    start = (0.0,) * len(unknowns)
+    return EffectWay(effect, unknowns, (), start, math.log(effect.odds), kept=True)
+
+
 def ways_of(effect: Effect, ship: Ship, longest_s: float, runs: int) -> Iterator[EffectWay]:
     """
     Yield all ways and starts of an effect.
@@ -127,7 +155,20 @@ def ways_of(effect: Effect, ship: Ship, longest_s: float, runs: int) -> Iterator
     runs
         Number of runs.
     """
-    parameters = effect.parameters_of(ship)
+    yield from _alike(effect, effect.parameters_of(ship), longest_s, runs)
+    if effect.nameless_at:
+        fixed = tuple(effect.nameless_at.items())
+        left = [q for q in effect.parameters_of(ship) if q.name not in effect.nameless_at]
+        less = math.log(priors.UNNAMED_ODDS / effect.odds)
+        for way in _alike(effect, left, longest_s, runs):
+            log_odds = way.log_odds + less
+            yield replace(way, fixed=way.fixed + fixed, log_odds=log_odds, nameless=True)
+
+
+def _alike(
+    effect: Effect, parameters: Sequence[Parameter], longest_s: float, runs: int
+) -> Iterator[EffectWay]:
+    """Yield the ways of an effect by the parameters that are open."""
     free = [q for q in parameters if q.prior.shape is not Shape.CHOICE]
     choices = [q for q in parameters if q.prior.shape is Shape.CHOICE]
     signed = [q.name for q in free if q.prior.shape is Shape.EITHER_SIGN]

@@ -104,6 +104,11 @@ class RunSight:
         result: Float64 = np.clip(time_s / time_s[-1], 0.0, 1.0)
         return result
 
+    @cached_property
+    def form_bumps(self) -> Float64:
+        """What the error of a formula is made of, (4, n)."""
+        return bsplines(self.over_run, _FORMS)
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -117,7 +122,7 @@ class Explanation:
     smooth
         Where something smooth without a name is besides; '' without.
     frozen
-        Whether the hull is as stated to the digit: no hypothesis, but what a gap is seen by.
+        Whether all is as stated to the digit: no hypothesis, but what a gap is seen by.
     """
 
     ways: tuple[EffectWay, ...] = ()
@@ -127,12 +132,20 @@ class Explanation:
     @property
     def names(self) -> tuple[str, ...]:
         """Of the effects, sorted; without those that the ship file states."""
-        return tuple(sorted(way.effect.name for way in self.ways if not way.stated))
+        named = [way for way in self.ways if not (way.stated or way.nameless)]
+        return tuple(sorted({way.effect.name for way in named}))
+
+    @property
+    def unnamed(self) -> bool:
+        """Whether something without a name is there."""
+        return bool(self.smooth) or any(way.nameless for way in self.ways)
 
     def effects_in(self, run: int | None) -> list[Effect]:
         """Return the effects that are missing in a run; None: in any."""
         return [
-            way.effect for way in self.ways if not way.stated and (run is None or way.acts_in(run))
+            way.effect
+            for way in self.ways
+            if not (way.stated or way.nameless) and (run is None or way.acts_in(run))
         ]
 
     @property
@@ -203,6 +216,8 @@ class RunTable(NamedTuple):
         Noise of the rows, and how the hull damps there.
     residual : (q,)
         Of `rest`, not whitened.
+    speed_m_s : (n,)
+        Through water, at the rows of the motion.
     """
 
     along: Float64
@@ -210,6 +225,7 @@ class RunTable(NamedTuple):
     place: Int64
     white: Noise
     residual: Float64
+    speed_m_s: Float64
 
 
 @dataclass(frozen=True)
@@ -244,6 +260,13 @@ class ShipRuns:
             place[[k + i for i in own]] = first + np.arange(len(own))
             found.append(place)
         return tuple(found)
+
+    @property
+    def own(self) -> list[Int64]:
+        """Places of the unknowns that belong to each run alone."""
+        k = self.coefficients
+        mine = [k + i for i in (*_OWN, _PORT, _HEADING, _SCATTER)]
+        return [place[mine] for place in self.places]
 
     @cached_property
     def size(self) -> int:
@@ -291,7 +314,9 @@ class ShipRuns:
         width, size = self.width(hypothesis), self.size
         q = len(hypothesis.unknowns)
         name = priors.SMOOTH if hypothesis.smooth == IN_SPEED else priors.NOTHING
-        hulls = [each for each in self.runs[0].model.families if each.name == name]
+        families = self.runs[0].model.families
+        # without a baseline the hull is something smooth in any case
+        hulls = [each for each in families if each.name == name] or list(families)
         total = math.fsum(each.chance for each in hulls)
         sizes = priors.SMOOTH_SIZES if width > size + q + _FORMS * len(hypothesis.forms) else (1,)
         components = []
@@ -310,7 +335,7 @@ class ShipRuns:
                     k = self.coefficients
                     mean[:k], precision[:k] = hull.mean[:k], hull.precision[:k]
                     if hypothesis.frozen:
-                        precision[:k] = _FROZEN
+                        precision[self._stated] = _FROZEN
                     precision[size + q + _FORMS * len(hypothesis.forms) :] = amount**-2.0
                     for i, each in enumerate(components):
                         if which >> i & 1:
@@ -320,12 +345,21 @@ class ShipRuns:
                     chances.append(hull.chance / total / len(sizes) / 2 ** len(components))
         return PriorFamilies(np.array(means) - now, np.array(precisions), np.log(chances))
 
+    @cached_property
+    def _stated(self) -> Int64:
+        """Places of what a ship file states, or would: all but how runs began, and filters."""
+        began = (motion.SPEED, motion.STOP, motion.PLACE, _PORT, _HEADING)
+        free = [self.coefficients + i for i in (*began, motion.LAG, motion.GROUND_LAG)]
+        kept = np.concatenate([place[free] for place in self.places])
+        return np.setdiff1d(np.arange(self.size), kept)
+
     def _base(self, name: str, number: int) -> tuple[Float64, Float64]:
         """Return mean and precision of the unknowns that are no coefficients, in a family."""
         mean, precision = np.zeros(self.size), np.ones(self.size)
         k = self.coefficients
         for run, place in zip(self.runs, self.places):
-            alike = [each for each in run.model.families if each.name == name]
+            own = run.model.families
+            alike = [each for each in own if each.name == name] or own
             family = alike[number % len(alike)]  # a run without a log has fewer
             mean[place[k:-4]], precision[place[k:-4]] = family.mean[k:], family.precision[k:]
             mean[place[k + _FREE]] = priors.FREE_SHAFT.mean
@@ -349,7 +383,7 @@ class ShipRuns:
         """
         found: list[list[RunTable] | None] = [[] for _ in hypotheses]
         for j in range(len(self.runs)):
-            for i, table in enumerate(self._run(j, hypotheses, at)):
+            for i, table in enumerate(self.linearise_run(j, hypotheses, at)):
                 mine = found[i]
                 if mine is not None and table is not None:
                     mine.append(table)
@@ -357,9 +391,10 @@ class ShipRuns:
                     found[i] = None
         return found
 
-    def _run(
+    def linearise_run(
         self, j: int, hypotheses: Sequence[Explanation], at: Sequence[Float64]
     ) -> list[RunTable | None]:
+        """Return the rows of one run under each hypothesis; None as in `linearise`."""
         run, batch = self.runs[j], _Asked()
         plans = [self._plan(j, h, x, batch) for h, x in zip(hypotheses, at, strict=True)]
         shown = batch.simulate(run)
@@ -425,11 +460,10 @@ class ShipRuns:
             along[first + i] = (shown.along[column] - shown.along[plan.acting]) / _STEP_Z
             rest[first + i] = (shown.rest[column] - shown.rest[plan.acting]) / _STEP_Z
         rest[1 + k + _FREE] = (shown.rest[plan.turned] - shown.rest[plan.acting]) / _STEP_Z
-        bumps = bsplines(run.over_run, _FORMS)
         for i, (form, column) in enumerate(zip(hypothesis.forms, plan.without)):
             sd, to = hypothesis.ways[form].effect.formula_sd, first + q + _FORMS * i
             trace = sd * (shown.along[plan.acting] - shown.along[column])
-            along[to : to + _FORMS] = bumps * trace
+            along[to : to + _FORMS] = run.form_bumps * trace
             if a:
                 trace = sd * (shown.rest[plan.acting, :a] - shown.rest[column, :a])
                 even = bsplines(np.linspace(0.0, 1.0, a), _FORMS)
@@ -445,7 +479,7 @@ class ShipRuns:
         damping, inertia = motion.damping_of(forces, own[:k], np.maximum(speed, 0.0))
         white = model.white._replace(damping_1_s=damping, inertia=inertia)
         places = np.concatenate([place, self.size + np.arange(q), self.size + q + mine])
-        return RunTable(along, rest @ run.whitener.T, places, white, rest[0].copy())
+        return RunTable(along, rest @ run.whitener.T, places, white, rest[0].copy(), speed)
 
     def _beyond(self, j: int, hypothesis: Explanation) -> Int64:
         """Return places, behind the effects' unknowns, of those that a run has."""

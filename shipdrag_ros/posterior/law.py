@@ -8,17 +8,18 @@ volume alone, whose waves have humps. s is a spline relative to r, orthogonal to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipdrag_ros.posterior import priors
 from shipdrag_ros.posterior.motion import Forces
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.ship import Ship
+from shipdrag_ros.ship import CoefficientBaseline, CoefficientSd, Ship
 from shipdrag_ros.ship.baseline import TableBaseline
 from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
-from shipdrag_ros.simulation.hydrodynamics import drag_n, friction_n, viscous_n
+from shipdrag_ros.simulation.hydrodynamics import USUAL_FORM_FACTOR, drag_n, friction_n, viscous_n
 
 _NODES = 97  # of the grid of speeds
 _ABOVE = 1.25  # of the highest speed that a fit may try
@@ -27,6 +28,7 @@ _ALIKE, _OWN = 5.0, 0.02  # spacings over which neighbours are alike, and the pa
 _NEGLIGIBLE = 0.03  # size of a column, of the largest
 # C_W = _WAVE (Fr / _WAVE_FROUDE)^4 without a baseline
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
+_HIGHEST_FROUDE, _HIGHEST_WAVE = 1.0, 0.1  # of the same as a table, for simulations
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ class HullLaw:
         """
         speed = np.linspace(0.0, _ABOVE * top_m_s, _NODES)
         stated = ship.baseline is not None
-        parts = (_stated(ship, speed) if stated else _generic(ship, speed)) / ship.mass_kg
+        parts = parts_n(ship, speed) / ship.mass_kg
         spacing = _SPLINE_FROUDE * float(ship.speed(1.0))
         shapes, humps = _shapes(speed, spacing, parts, low_m_s, top_m_s)
         return cls(speed, parts, shapes, humps[: 0 if stated else None], stated)
@@ -78,6 +80,7 @@ class HullLaw:
         """
         step = float(self.speed_m_s[1])
         columns = np.concatenate([self.parts, self.shapes, self.humps])
+        columns[0] += wave_with_friction(ship) * self.parts[1]
 
         def with_slope(value: Float64) -> Float64:
             return np.stack([value, np.gradient(value, step, axis=-1, edge_order=2)])
@@ -91,10 +94,17 @@ class HullLaw:
         )
 
 
+def parts_n(ship: Ship, speed_m_s: Float64) -> Float64:
+    """
+    Return friction and wave part (2, m) of the ship file, or of her length and volume [N].
+    """
+    return (_generic if ship.baseline is None else _stated)(ship, speed_m_s)
+
+
 def _stated(ship: Ship, speed: Float64) -> Float64:
     """Return friction and wave part [N]; outside the tables with the square of the speed."""
     low, high = ship.baseline_range_m_s
-    inside = np.clip(speed, max(low, 1e-3 * speed[-1]), high)
+    inside = np.clip(speed, max(low, 1e-3 * float(speed.max())), high)
     total = ship.resistance_n(inside)
     if isinstance(ship.baseline, TableBaseline):
         # a table has no parts: its one scale is that of the friction
@@ -112,6 +122,38 @@ def _generic(ship: Ship, speed: Float64) -> Float64:
     )
     wave = _WAVE * (ship.froude(speed) / _WAVE_FROUDE) ** _WAVE_POWER
     return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
+
+
+def wave_with_friction(ship: Ship) -> float:
+    """
+    Return by how much the wave part is off where the friction is, both relative, as stated.
+    """
+    base = ship.baseline
+    if not isinstance(base, CoefficientBaseline) or base.relative_sd.correlation == 0.0:
+        return 0.0
+    sd = base.relative_sd
+    return sd.correlation * sd.wave / sd.friction if sd.friction > 0.0 else 0.0
+
+
+def usual_baseline(ship: Ship) -> Ship:
+    """
+    Return a ship as she is, with the two parts of any hull where her file states no baseline.
+    """
+    if ship.baseline is not None:
+        return ship
+    froude = np.linspace(0.0, _HIGHEST_FROUDE, 13)
+    wave = _WAVE * (froude / _WAVE_FROUDE) ** _WAVE_POWER
+    surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
+        ship.length_m, ship.displaced_volume_m3
+    )
+    base = CoefficientBaseline(
+        USUAL_FORM_FACTOR,
+        0.0,
+        tuple(froude.tolist()),
+        tuple(np.minimum(wave, _HIGHEST_WAVE).tolist()),
+        CoefficientSd(priors.GENERIC_FRICTION.sd, priors.GENERIC_WAVE.sd),
+    )
+    return replace(ship, baseline=base, wetted_surface_m2=surface)
 
 
 def _shapes(

@@ -19,7 +19,7 @@ import numpy as np
 from shipdrag_ros.inference.noise import WHITE, Noise
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.posterior import motion, priors
-from shipdrag_ros.posterior.law import HullLaw
+from shipdrag_ros.posterior.law import HullLaw, wave_with_friction
 from shipdrag_ros.posterior.motion import EXTRAS, Forces
 from shipdrag_ros.samples import Float64, Int64
 from shipdrag_ros.ship import CoefficientBaseline, Ship
@@ -273,9 +273,11 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
             yield priors.SMOOTH, 1.0 / len(priors.WIDE), scales, size
         return
     if isinstance(base, CoefficientBaseline):
-        sds = max(base.relative_sd.friction, _EXACT), max(base.relative_sd.wave, _EXACT)
+        alone = base.relative_sd.wave * math.sqrt(1.0 - base.relative_sd.correlation**2)
+        sds = max(base.relative_sd.friction, _EXACT), max(alone, _EXACT)
     else:
         sds = max(base.relative_sd, _EXACT), _EXACT
+    with_it = wave_with_friction(ship)  # what is more of friction alone is not of the waves
     for (wide, chance), (size, part) in product(
         ((1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)), priors.HALF_NORMAL
     ):
@@ -283,14 +285,15 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
         yield priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
     chance = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
     for more, (size, part) in product(priors.LOG_UNIFORM, priors.HALF_NORMAL):
-        scales = ((more, math.hypot(more, sds[0])), (0.0, sds[1]))
+        of_wave = -with_it * more, math.hypot(with_it * more, sds[1])
+        scales = ((more, math.hypot(more, sds[0])), of_wave)
         shape = math.hypot(size * unsure, priors.SHAPE_OF_MORE.mean * more)
         yield priors.FRICTION_ALONE, chance * part, scales, shape
     chance = priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM)
     for size in priors.LOG_UNIFORM:
         # friction, waves and shape all differ
-        of_wave = math.hypot(size, sds[1]) if sds[1] > _EXACT else _EXACT
-        scales = ((0.0, math.hypot(size, sds[0])), (0.0, of_wave))
+        wide = math.hypot(size, with_it * size, sds[1]) if sds[1] > _EXACT else _EXACT
+        scales = ((0.0, math.hypot(size, sds[0])), (0.0, wide))
         yield priors.SMOOTH, chance, scales, size
 
 
@@ -306,6 +309,6 @@ def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
     ship = Ship.example()
     for which in (ship, replace(ship, baseline=None)):
         for name, chance, scales, size in _hulls(which):
-            friction, wave = (f'{mean:g} ± {sd:.2g}' for mean, sd in scales)
+            friction, wave = (f'{mean + 0.0:g} ± {sd:.2g}' for mean, sd in scales)
             beside = name if which.baseline is not None else f'{name}, no baseline'
             yield beside, chance, friction, wave, f'{size:.2g}'

@@ -11,17 +11,6 @@ from shipdrag_ros.display import Table
 from shipdrag_ros.regression import Prediction, Surface
 
 
-def sentence(surface: Surface, target: str) -> str:
-    """
-    Say in words what was found.
-    """
-    rmse = float(np.sqrt(surface.fit.variance))
-    return (
-        f'{target} is a polynomial of degree {surface.degree} in '
-        f'{", ".join(surface.inputs)}: {len(surface.polynomial.powers)} terms, RMSE {rmse:.4g}.'
-    )
-
-
 def degrees(surface: Surface) -> Table:
     """
     Show all degrees tried, as the table of S5 with the test beside it.

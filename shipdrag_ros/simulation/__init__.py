@@ -4,8 +4,7 @@
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.columns import Columns, simulate_columns
 from shipdrag_ros.simulation.effect import Effect, Frame, Measure, Scope
-from shipdrag_ros.simulation.noise import GaussMarkov
-from shipdrag_ros.simulation.scenario import STOP, EngineOrder, Scenario, Turn
+from shipdrag_ros.simulation.scenario import STOP, EngineOrder, GaussMarkov, Scenario, Turn
 from shipdrag_ros.simulation.sensors import (
     STANDARD_INPUTS,
     STANDARD_SD,

@@ -19,9 +19,9 @@ from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.faults import lagged, log_flow, log_reading
 from shipdrag_ros.simulation.kernel import Records, SurgeLaw, follow_columns
 from shipdrag_ros.simulation.scenario import Scenario, Turn
+from shipdrag_ros.simulation.sensors import lagged, log_flow, log_reading
 from shipdrag_ros.simulation.surge import own_action, steps_of
 from shipdrag_ros.simulation.terms import (
     acted,

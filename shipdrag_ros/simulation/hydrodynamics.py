@@ -12,7 +12,7 @@ from shipdrag_ros.ship.baseline import ittc57
 from shipdrag_ros.ship.consistency import usual_wetted_surface_m2
 
 ROPES = (0.01, 0.04)  # C0 of towed ropes in practice
-_USUAL_FORM_FACTOR = 0.2  # where the baseline is a table
+USUAL_FORM_FACTOR = 0.2  # where the baseline is a table
 
 
 def friction_n(ship: Ship, speed_m_s: Float64) -> Float64:
@@ -29,7 +29,7 @@ def friction_n(ship: Ship, speed_m_s: Float64) -> Float64:
     ITTC-57. A baseline that is a table has no form factor: k = 0.2.
     """
     base = ship.baseline
-    k = base.form_factor if isinstance(base, CoefficientBaseline) else _USUAL_FORM_FACTOR
+    k = base.form_factor if isinstance(base, CoefficientBaseline) else USUAL_FORM_FACTOR
     reynolds = speed_m_s * ship.length_m / ship.water.kinematic_viscosity_m2_s
     return (1.0 + k) * ittc57(reynolds) * _force_n(ship, speed_m_s)
 

@@ -21,8 +21,7 @@ from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import Frame
 from shipdrag_ros.simulation.effects import action_of
 from shipdrag_ros.simulation.kernel import SurgeLaw, follow
-from shipdrag_ros.simulation.noise import GaussMarkov
-from shipdrag_ros.simulation.scenario import Scenario
+from shipdrag_ros.simulation.scenario import GaussMarkov, Scenario
 from shipdrag_ros.simulation.terms import (
     acted,
     columns_of,

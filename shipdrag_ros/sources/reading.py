@@ -13,8 +13,7 @@ from shipdrag_ros.bags.locate import is_bag
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.sources import formats
 from shipdrag_ros.sources.format import Format, ImportResult, Job, best_of, head_of
-from shipdrag_ros.sources.join import read_joined
-from shipdrag_ros.sources.run import run_of
+from shipdrag_ros.sources.run import read_joined, run_of
 
 
 @dataclass(frozen=True)

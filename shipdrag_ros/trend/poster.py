@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from shipdrag_ros.display import Section, Table, day, ship_speed, speed_unit
-from shipdrag_ros.forecast.foretell import GUST
+from shipdrag_ros.forecast.priors import GUST
 from shipdrag_ros.forecast.result import Band, Z
 from shipdrag_ros.forecast.words import clock, way
 from shipdrag_ros.report.document import write_page
@@ -112,7 +112,7 @@ def _passage(
 def _band(values: Float64, sigma: Float64) -> Band:
     n = len(values)
     logs = np.log(values)
-    own = Z * np.hypot(float(np.sqrt(np.mean(sigma**2))), GUST)
+    own = Z * np.hypot(float(np.sqrt(np.mean(sigma**2))), GUST.sd)
     scatter = 0.0
     if n > 1:
         scatter = float(student.ppf(0.95, n - 1) * logs.std(ddof=1) * np.sqrt(1.0 + 1.0 / n))

@@ -98,3 +98,37 @@ def test_a_time_that_is_none(coastdown_bag: Path, capsys: pytest.CaptureFixture[
     with pytest.raises(sd.ShipdragError, match='give times above 0'):
         result.forecast(after='soon')  # type: ignore[arg-type]
     assert len(result.forecast(after=300.0).made) == 1
+
+
+def test_a_bag_behind_the_times_is_told_where_to_stand(
+    coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(['forecast', '--after', '300', str(coastdown_bag)])
+    assert 'as in --after 60 300 -- BAG' in capsys.readouterr().err
+    assert main(['forecast', '--after', '300', '--', str(coastdown_bag)]) == 0
+    assert '5:00 after the stop' in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        main(['forecast', '--help'])
+    assert '(default: 60 120 300)' in ' '.join(capsys.readouterr().out.split())
+
+
+def test_if_she_were_stopped_now(
+    steady_bag: Path, coastdown_bag: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(['forecast', str(steady_bag), '--if-stopped-now', '--json']) == 0
+    told = capsys.readouterr()
+    assert 'by the clean hull of the ship file' in told.err
+    found = json.loads(told.out)['if_stopped_now']
+    assert found['measured'] == 'through water'
+    assert {2.0, 1.0} <= {each['speed_m_s'] for each in found['speeds']}
+    same = sd.estimate(sd.read(steady_bag)).if_stopped_now()
+    assert same.forecast.milestones[0].time_s.median == found['speeds'][0]['time_s']['median']
+    assert list(same.to_frame()['time_median_s']) == [
+        each['time_s']['median'] for each in found['speeds']
+    ]
+
+    assert main(['forecast', str(coastdown_bag), '--if-stopped-now']) == 0
+    said = capsys.readouterr().out
+    assert 'Gliding already at ' in said
+    assert ', by the coastdown of ' in said

@@ -15,7 +15,7 @@ import numba
 import pytest
 
 from shipdrag_ros.cli import main
-from shipdrag_ros.cli.progress import ProgressLines, compiling_said
+from shipdrag_ros.cli.output import ProgressLines, compiling_said
 
 
 @pytest.fixture(scope='module')
@@ -35,7 +35,7 @@ def diagnosed(bag: Path, *, stderr: int) -> subprocess.Popen[bytes]:
 
 def test_lines_are_told_now_and_then_with_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [100.0]
-    monkeypatch.setattr('shipdrag_ros.cli.progress.time.monotonic', lambda: clock[0])
+    monkeypatch.setattr('shipdrag_ros.cli.output.time.monotonic', lambda: clock[0])
     said: list[str] = []
     lines = ProgressLines(said.append, every_s=15.0, at_once=False)
     for done in range(5):
@@ -48,7 +48,7 @@ def test_the_first_word_comes_at_once_and_the_others_wait(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = [100.0]
-    monkeypatch.setattr('shipdrag_ros.cli.progress.time.monotonic', lambda: clock[0])
+    monkeypatch.setattr('shipdrag_ros.cli.output.time.monotonic', lambda: clock[0])
     said: list[str] = []
     lines = ProgressLines(said.append, every_s=3.0, at_once=True)
     lines.show('reading', 0, 0)

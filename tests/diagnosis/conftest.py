@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from shipdrag_ros.diagnosis.coast import CoastModel
 from shipdrag_ros.diagnosis.observation import Observation
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
@@ -19,7 +18,7 @@ from shipdrag_ros.simulation.effects import parse
 SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 
 
-def model_of(*effects: str) -> CoastModel:
+def seen_of(*effects: str) -> Observation:
     """See a run in which effects are hidden."""
     scenario = Scenario(speed_m_s=8.0, lead_in_s=1200.0, duration_s=1200.0, heading_rad=0.7)
     truth = simulate(SHIP, scenario, effects=[parse(text) for text in effects], reference_rad=0.7)
@@ -28,16 +27,15 @@ def model_of(*effects: str) -> CoastModel:
     window = Window.from_block(
         block, first + 1200 * 10**9, int(block.stamp_ns.max()), before_ns=first
     )
-    seen = Observation.of(window, SHIP, Parameters(), name='run')
-    return CoastModel(SHIP, (seen,), seen.heading_rad)
+    return Observation.of(window, SHIP, Parameters(), name='run')
 
 
-@pytest.fixture(name='model_of')
-def model_of_fixture() -> Callable[..., CoastModel]:
+@pytest.fixture(name='seen_of')
+def seen_of_fixture() -> Callable[..., Observation]:
     """
     Return what sees a run in which effects are hidden.
     """
-    return model_of
+    return seen_of
 
 
 @pytest.fixture(scope='package', name='cargo')

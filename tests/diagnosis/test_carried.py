@@ -8,20 +8,21 @@ from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose, words
 from shipdrag_ros.diagnosis.carried import Carried, carried
 from shipdrag_ros.diagnosis.earlier import EarlierCandidate, EarlierDiagnosis
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact
-from shipdrag_ros.diagnosis.model import Hypothesis
-from shipdrag_ros.diagnosis.posterior import Posterior
 from shipdrag_ros.diagnosis.seen_runs import SeenRun
-from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.errors import DiagnosisError
 from shipdrag_ros.estimation import Window
-from shipdrag_ros.parameter import Parameter
+from shipdrag_ros.parameter import Parameter, Prior
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
+from shipdrag_ros.posterior.effects import ways_of
+from shipdrag_ros.posterior.hypotheses import Explanation, ShipRuns
 from shipdrag_ros.ship import Fact, Ship, StatedEffect
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effect import Scope
@@ -31,7 +32,6 @@ SHIP = Ship.load(Path(__file__).parents[2] / 'config' / 'vitus_bering.yaml')
 DAY_NS = 86400 * 10**9
 NOW_NS = START_NS + 1000 * DAY_NS
 RUNS = (SeenRun('now', NOW_NS),)
-NOTHING = Posterior({}, {(): 1.0})
 NO_SD = Parameter(0.35, math.nan)
 SIZES = {
     'fouling': {'friction_factor': Parameter(0.35, 0.04)},
@@ -65,8 +65,20 @@ def known(*given: EarlierDiagnosis, ship: Ship = SHIP, facts: tuple[Fact, ...] =
 
 def weight(found: Carried, *names: str, kept: tuple[str, ...] = ()) -> float:
     """Return by how much a hypothesis is likelier."""
-    terms = tuple(EffectTerm(find(name), SHIP, kept=name in kept) for name in names)
-    return math.exp(found.log_weight(Hypothesis(names, terms)))
+    ways = (next(ways_of(find(name), SHIP, 1000.0, 1)) for name in names)
+    hypothesis = Explanation(tuple(replace(way, kept=way.effect.name in kept) for way in ways))
+    return math.exp(found.log_weight(hypothesis))
+
+
+def sizes(found: Carried, name: str) -> list[Prior]:
+    """Return priors of an effect that is as it was; none where no diagnosis held it."""
+    return [q.prior for way in found.ways([find(name)]) for q in way.unknowns]
+
+
+def nothing() -> ComparedHypotheses:
+    """Compare nothing with nothing."""
+    alone = Fitted(Explanation(), np.zeros(0), log_evidence=0.0)
+    return ComparedHypotheses(ShipRuns(()), (), (alone,))
 
 
 def test_an_effect_declares_that_it_lasts_where_it_is_of_hull_or_instruments() -> None:
@@ -97,8 +109,8 @@ def test_never_sure_that_it_is_there_and_never_that_it_is_not() -> None:
 def test_water_and_weather_of_another_day_say_nothing() -> None:
     found = known(earlier(1.0, current=0.99))
     assert weight(found, 'current') == pytest.approx(weight(found))
-    assert found.kept('current') == ()
-    (told,) = found.judged(NOTHING)
+    assert sizes(found, 'current') == []
+    (told,) = found.judged(nothing())
     assert told.effects == ()
     assert told.unused[0].startswith('current: water, weather')
 
@@ -122,18 +134,18 @@ def subsets(names: tuple[str, ...]) -> list[tuple[str, ...]]:
 
 
 def test_a_size_that_stays_is_known_less_well_the_more_time_has_passed() -> None:
-    (soon,) = known(earlier(1.0, fouling=0.9)).kept('fouling')
-    (late,) = known(earlier(300.0, fouling=0.9)).kept('fouling')
+    (soon,) = sizes(known(earlier(1.0, fouling=0.9)), 'fouling')
+    (late,) = sizes(known(earlier(300.0, fouling=0.9)), 'fouling')
     assert soon.first == late.first == pytest.approx(0.35)
     assert 0.1 < soon.second < 0.25 < late.second
-    (scale,) = known(earlier(1.0, log_scale=0.9)).kept('log_scale')
+    (scale,) = sizes(known(earlier(1.0, log_scale=0.9)), 'log_scale')
     assert (scale.first, scale.second) == pytest.approx((-0.1, 0.0174), abs=1e-3)
     # a size whose sd could not be found may be anything
     unknown = replace(
         earlier(1.0),
         candidates=(EarlierCandidate(0.9, {'fouling': {'friction_factor': NO_SD}}),),
     )
-    assert known(unknown).kept('fouling')[0].second > 0.8
+    assert sizes(known(unknown), 'fouling')[0].second > 0.8
 
 
 @pytest.mark.parametrize('size', [Parameter(1e-200, 1e12), Parameter(5e-324, 1.0)])
@@ -141,7 +153,7 @@ def test_a_size_far_less_well_known_than_it_is_large_may_be_anything(size: Param
     given = replace(
         earlier(1.0), candidates=(EarlierCandidate(0.9, {'fouling': {'friction_factor': size}}),)
     )
-    assert known(given).kept('fouling')[0].second == 1.0
+    assert sizes(known(given), 'fouling')[0].second == 1.0
 
 
 def test_a_hull_cleaned_in_between_is_no_longer_fouled() -> None:
@@ -161,7 +173,7 @@ def test_of_the_hull_the_latest_diagnosis_counts_alone() -> None:
     found = known(replace(old, name='old.json'), new)
     assert [each.diagnosis.name for each in found.weighed] == ['then.json', 'old.json']
     assert 'fouling' not in found.weighed[1].stays
-    assert found.judged(NOTHING)[1].unused[0].endswith('and then.json is later')
+    assert found.judged(nothing())[1].unused[0].endswith('and then.json is later')
     # one without a baseline speaks of the instruments alone
     sailing = replace(earlier(5.0, log_scale=0.9), of_force=False)
     assert 'fouling' in known(sailing, replace(old, name='old.json')).weighed[1].stays

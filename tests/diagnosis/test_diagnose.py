@@ -95,7 +95,7 @@ def test_what_is_in_one_run_alone_is_not_asked_of_the_other() -> None:
     ('effect', 'name', 'parameter', 'value'),
     [
         ('current=0.3', 'current', 'along_track_m_s', 0.3),
-        ('log_scale=0.05', 'log_scale', 'factor', 0.05),
+        ('log_scale=0.1', 'log_scale', 'factor', 0.1),
     ],
 )
 def test_what_is_hidden_is_named_and_then_no_longer_missing(

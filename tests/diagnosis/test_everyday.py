@@ -3,21 +3,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from shipdrag_ros.diagnosis.coast import CoastModel
-from shipdrag_ros.diagnosis.coast_terms import RunNuisance
-from shipdrag_ros.diagnosis.observation import _condensed
-from shipdrag_ros.diagnosis.search import search
+from shipdrag_ros.diagnosis.diagnose import compare
+from shipdrag_ros.diagnosis.facts import Facts
+from shipdrag_ros.diagnosis.observation import Observation, _condensed
 from shipdrag_ros.estimation.ode_fit.steady import display_sd, white_sd
+from shipdrag_ros.inference.decision import NONE, Names
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
 
-MODEL = Callable[..., CoastModel]
+SHIP = Ship.example()
 LEAD_IN_S = 1200.0
 EDGES = np.arange(0.0, LEAD_IN_S + 301.0, 6.0)
 
@@ -35,11 +35,12 @@ def steady(seed: int, lag_s: float) -> tuple[Float64, Float64]:
     return time, 0.03 * noise
 
 
-def test_the_filter_of_a_log_is_no_effect(model_of: MODEL) -> None:
-    everyday = search(model_of('log_lag=8')).posterior
-    assert everyday.nothing > 0.5
-    slow = search(model_of('log_lag=60')).posterior
-    assert slow.probability[('log_lag',)] > 0.9
+def test_the_filter_of_a_log_is_no_effect(seen_of: Callable[..., Observation]) -> None:
+    def probability(*effects: str) -> Mapping[Names, float]:
+        return compare((seen_of(*effects),), SHIP, Facts(SHIP)).compare().probability
+
+    assert probability('log_lag=8')[NONE] > 0.5
+    assert probability('log_lag=60')['log_lag',] > 0.9
 
 
 def test_noise_behind_a_filter_is_that_of_its_means() -> None:
@@ -72,28 +73,3 @@ def test_a_coarse_display_hides_more_while_the_speed_stands() -> None:
     before, after = rows.time_s < LEAD_IN_S - 20.0, rows.time_s > LEAD_IN_S + 20.0
     assert np.sqrt(rows.variance[before]).min() > 0.01
     assert np.median(rows.variance[after]) < np.median(rows.variance[before])
-
-
-@pytest.mark.parametrize('form', range(3))
-def test_thrust_that_falls_in_its_own_way_leaves_what_the_motion_shows(form: int) -> None:
-    # a quadratic resistance of 0.02 m/s^2 at 8 m/s, and a tenth of one form of thrust besides
-    steady_m_s2, run_down_s, size = 0.02, 8.0, 0.1
-    shape = (lambda s: 1.0, lambda s: s, lambda s: 0.5 * s * s)[form]
-
-    def rate(more: float) -> Callable[[float, Float64], Float64]:
-        def of(time: float, speed: Float64) -> Float64:
-            s = time / run_down_s
-            thrust = np.exp(-s) * (1.0 + more * shape(s))
-            return steady_m_s2 * (thrust - (speed / 8.0) ** 2)
-
-        return of
-
-    time = np.linspace(0.0, 900.0, 181)
-    plain, more = (
-        solve_ivp(rate(each), (0.0, 900.0), [8.0], t_eval=time, rtol=1e-9).y[0]
-        for each in (0.0, size)
-    )
-    found = RunNuisance(0, 0.0, 0.0, has_positions=True)._fall(
-        time, plain, steady_m_s2, run_down_s
-    )[form]
-    assert np.abs(size * found - (more - plain)).max() < 0.1 * np.abs(more - plain).max()

@@ -11,10 +11,10 @@ import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, Verdict, diagnose
 from shipdrag_ros.diagnosis.facts import Facts, StatedFact, stated_facts
-from shipdrag_ros.diagnosis.model import Hypothesis
-from shipdrag_ros.diagnosis.terms import EffectTerm
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.effects import ways_of
+from shipdrag_ros.posterior.hypotheses import Explanation
 from shipdrag_ros.ship import Fact, Propeller, Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
 from shipdrag_ros.simulation.effects import find, parse
@@ -24,12 +24,12 @@ YEAR_NS = round(365.25 * 86400.0 * 1e9)
 CABLE, RUDDER = Fact('no_towed_cable'), Fact('helm_amidships')
 
 
-def hypothesis(*names: str, only_run: int | None = None) -> Hypothesis:
-    terms = tuple(EffectTerm(find(name), SHIP, only_run=only_run) for name in names)
-    return Hypothesis(names, terms)
+def hypothesis(*names: str, only_run: int | None = None) -> Explanation:
+    ways = (next(ways_of(find(name), SHIP, 1000.0, 1)) for name in names)
+    return Explanation(tuple(replace(way, run=only_run) for way in ways))
 
 
-def chance(fact: Fact, found: Hypothesis, *, ship: Ship = SHIP, run: int | None = None) -> float:
+def chance(fact: Fact, found: Explanation, *, ship: Ship = SHIP, run: int | None = None) -> float:
     stated = StatedFact(fact, run, YEAR_NS)
     return math.exp(Facts(ship, (stated,)).log_likelihood(found))
 

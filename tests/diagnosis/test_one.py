@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.diagnosis import CoastRun, DiagnosisResult, diagnose
+from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation
-from shipdrag_ros.diagnosis.one import compare
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.inference.decision import NONE
 from shipdrag_ros.parameters import Parameters
@@ -42,7 +42,7 @@ def window_of(effects: tuple[str, ...], heading_rad: float = 0.7, seed: int = 5)
 def answer(*effects: str, ship: Ship = SHIP, facts: tuple[Fact, ...] = ()) -> DiagnosisResult:
     """Diagnose one run."""
     run = CoastRun('first', window_of(effects))
-    return diagnose([run], ship, Parameters(), facts=facts, engine='one')
+    return diagnose([run], ship, Parameters(), facts=facts)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_a_limit_grows_where_the_run_shows_less() -> None:
             if len((series := getattr(window, name)).time_ns)
         },
     )
-    found = diagnose([CoastRun('short', short)], SHIP, Parameters(), engine='one')
+    found = diagnose([CoastRun('short', short)], SHIP, Parameters())
     assert found.limits['wind'].value > 1.1 * whole
 
 
@@ -126,9 +126,9 @@ def test_two_runs_share_what_belongs_to_both() -> None:
         CoastRun('out', window_of(('current=0.3',))),
         CoastRun('back', window_of(('current=0.3',), 0.7 + np.pi, 6)),
     ]
-    found = diagnose(runs, SHIP, Parameters(), engine='one')
+    found = diagnose(runs, SHIP, Parameters())
     assert [effect.name for effect in found.effects] == ['current']
-    alone = diagnose(runs[:1], SHIP, Parameters(), engine='one')
+    alone = diagnose(runs[:1], SHIP, Parameters())
     both = found.effects[0].parameters['along_track_m_s']
     one = next(e for c in alone.candidates for e in c.effects if e.name == 'current')
     assert both.sd < one.parameters['along_track_m_s'].sd
@@ -142,7 +142,7 @@ def test_the_answer_is_the_same_to_the_bit() -> None:
 
 def test_probabilities_are_those_of_evidence_and_odds() -> None:
     seen = Observation.of(window_of(('wind=14',)), SHIP, Parameters(), name='run')
-    found, _ = compare((seen,), SHIP, Facts(SHIP))
+    found = compare((seen,), SHIP, Facts(SHIP)).compare()
     assert sum(found.probability.values()) == pytest.approx(1.0)
     names = {each.names for each in found.fitted}
     assert {(name,) for name, effect in LIBRARY.items() if not effect.missing(SHIP)} <= names

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,8 +31,8 @@ def rivals(share: dict[tuple[str, ...], float]) -> list[Rival]:
 
 def resolved(prospects: list[PredictedOutcome], found: list[Rival]) -> float:
     """With one way in which the measurement is read; nothing predicts what the first does."""
-    ways = [[one] for one in (*prospects, prospects[0])]
-    return probability_of_naming([ways], [0] * len(ways), found, inseparable=())
+    outcomes = [*prospects, prospects[0]]
+    return probability_of_naming([outcomes], [0] * len(outcomes), found, inseparable=())
 
 
 @pytest.mark.parametrize('apart', [0.0, 1.0, 3.0, 6.0])
@@ -58,8 +57,8 @@ def test_what_is_open_in_both_tells_nothing_apart() -> None:
 
 
 def test_each_truth_is_read_in_its_own_way() -> None:
-    alike = [[prospect([0.0])], [prospect([0.0])], [prospect([0.0])]]
-    apart = [[prospect([0.0])], [prospect([9.0])], [prospect([0.0])]]
+    alike = [prospect([0.0]), prospect([0.0]), prospect([0.0])]
+    apart = [prospect([0.0]), prospect([9.0]), prospect([0.0])]
     found = probability_of_naming(
         [alike, apart], [0, 1, 0], rivals({HULL: 0.5, WIND: 0.5}), inseparable=()
     )
@@ -73,7 +72,7 @@ def test_third_rival_that_is_not_told_apart_keeps_a_set() -> None:
 
 
 def test_what_no_record_tells_apart_is_never_named() -> None:
-    both = [[prospect([0.0])], [prospect([9.0])], [prospect([0.0])]]
+    both = [prospect([0.0]), prospect([9.0]), prospect([0.0])]
     inseparable = [frozenset((WIND[0], 'waves'))]
     share = rivals({HULL: 0.3, WIND: 0.7})
     found = probability_of_naming([both], [0, 0, 0], share, inseparable=inseparable)
@@ -82,16 +81,5 @@ def test_what_no_record_tells_apart_is_never_named() -> None:
 
 def test_a_name_that_every_rival_holds_is_named_already() -> None:
     alone, pair = Rival(HULL, math.log(0.6), 0.0), Rival(('fouling', 'wind'), math.log(0.4), 0.0)
-    same = [[prospect([0.0])], [prospect([0.0])], [prospect([0.0])]]
+    same = [prospect([0.0]), prospect([0.0]), prospect([0.0])]
     assert probability_of_naming([same], [0, 0, 0], [alone, pair, NOTHING], inseparable=()) == 1.0
-
-
-def test_what_may_have_been_there_once_is_drawn_both_ways() -> None:
-    again = replace(prospect([6.0]), log_weight=math.log(0.5))
-    gone = replace(prospect([0.0]), log_weight=math.log(0.5))
-    ways = [[again, gone], [prospect([0.0])], [prospect([0.0])]]
-    found = probability_of_naming(
-        [ways], [0, 0, 0], rivals({HULL: 0.5, WIND: 0.5}), inseparable=()
-    )
-    # only where it is there again is it named: else the other is as good, or twice as good
-    assert found == pytest.approx(0.25, abs=0.04)

@@ -156,7 +156,7 @@ def test_a_record_without_coastdown_has_a_page_without_traces(
     # the score is of another method
     fitted = written(replace(sailing, baseline='fitted_here'), score=SCORE)
     assert 'not scored' in fitted.text
-    assert 'a form of the resistance was fitted to these runs' in fitted.text
+    assert 'the runs are compared with all hulls of her length and volume' in fitted.text
 
 
 def test_pictures_show_what_they_are_given(found: DiagnosisResult) -> None:

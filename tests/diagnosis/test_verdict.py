@@ -1,63 +1,73 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fits become probabilities, and these a verdict; nothing stands between."""
+"""Compared hypotheses become probabilities, and these a verdict; nothing stands between."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from shipdrag_ros.diagnosis.fitting import Fit
-from shipdrag_ros.diagnosis.model import Hypothesis, Linear
-from shipdrag_ros.diagnosis.posterior import posterior_of
-from shipdrag_ros.diagnosis.search import likely
-from shipdrag_ros.diagnosis.terms import EffectTerm
-from shipdrag_ros.inference.decision import UNKNOWN, Verdict, decide
+from shipdrag_ros.diagnosis.verdict import judge, runs_differ
+from shipdrag_ros.inference.decision import NONE, UNKNOWN, Verdict
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Fitted
+from shipdrag_ros.posterior.effects import ways_of
+from shipdrag_ros.posterior.hypotheses import Explanation, ShipRuns
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation.effects import find
 
+SHIP = Ship.example()
 
-def fitted(*names: str, evidence: float, discrepancy: str = '') -> Fit:
-    """Return a fit with some evidence."""
-    hypothesis = Hypothesis(names, (), (), discrepancy=discrepancy)
-    white = np.ones((1, 100))
-    return Fit(Linear(hypothesis, np.zeros(0), (white,), (white[0],)), np.zeros((0, 0)), evidence)
+
+def fitted(*names: str, weight: float, smooth: str = '', way: int = 0) -> Fitted:
+    """Return a fit of some evidence times prior odds."""
+    ways = tuple(list(ways_of(find(name), SHIP, 1000.0, 1))[way] for name in names)
+    hypothesis = Explanation(ways, smooth)
+    q = len(hypothesis.unknowns)
+    log = weight - hypothesis.log_odds
+    return Fitted(hypothesis, np.zeros(q), log_evidence=log, z=np.zeros(q), sd=np.ones(q))
+
+
+def compared(*fits: Fitted) -> ComparedHypotheses:
+    return ComparedHypotheses(ShipRuns(()), (), fits)
 
 
 def test_evidence_and_prior_are_all_that_counts() -> None:
-    fits = fitted(evidence=0.0), fitted('current', evidence=1.0), fitted('wind', evidence=-1.0)
-    found = posterior_of(fits)
+    fits = fitted(weight=0.0), fitted('current', weight=1.0), fitted('wind', weight=-1.0)
+    found = compared(*fits).probability
     total = 1.0 + math.e + math.exp(-1.0)
-    assert found.nothing == pytest.approx(1.0 / total)
-    assert found.probability[('current',)] == pytest.approx(math.e / total)
-    assert found.named() == [('current',), (), ('wind',)]
+    assert found[NONE] == pytest.approx(1.0 / total)
+    assert found['current',] == pytest.approx(math.e / total)
+    assert list(found) == [('current',), (), ('wind',)]
 
 
-def test_several_starts_of_a_hypothesis_count_once() -> None:
-    once = posterior_of([fitted(evidence=0.0), fitted('current', evidence=0.0)])
-    twice = posterior_of([fitted(evidence=0.0), *[fitted('current', evidence=0.0)] * 3])
-    assert once.probability == twice.probability
-
-
-def test_ways_to_be_there_add_up(cargo: Ship) -> None:
-    def turning(sign: float) -> Fit:
-        term = EffectTerm(find('turning'), cargo, signs=(('rate_rad_s', sign),))
-        hypothesis = Hypothesis(('turning',), (term,))
-        white = np.ones((1, 100))
-        linear = Linear(hypothesis, np.zeros(4), (white,), (white[0],))
-        return Fit(linear, np.eye(4), 0.0)
-
-    found = posterior_of([fitted(evidence=0.0), turning(1.0), turning(-1.0)])
-    assert found.nothing == pytest.approx(1.0 / 3.0)
+def test_ways_to_be_there_add_up() -> None:
+    both = [fitted('turning', weight=0.0, way=way) for way in (0, -1)]
+    assert compared(fitted(weight=0.0), *both).probability[NONE] == pytest.approx(1.0 / 3.0)
 
 
 def test_a_name_with_something_smooth_besides_is_something_without_a_name() -> None:
-    name, more = (fitted('current', evidence=e, discrepancy=d) for e, d in ((0, ''), (3, 'log')))
-    found = posterior_of([fitted(evidence=-50.0), name, more])
-    assert found.unnamed == pytest.approx(math.exp(3.0) / (1.0 + math.exp(3.0)))
-    assert decide(found.probability).verdict is Verdict.UNKNOWN
+    more = fitted('current', weight=3.0, smooth='log')
+    found = compared(fitted(weight=-50.0), fitted('current', weight=0.0), more)
+    assert found.probability[UNKNOWN] == pytest.approx(math.exp(3.0) / (1.0 + math.exp(3.0)))
     assert found.best[UNKNOWN] is more
-    # only a name that is likely can have such a rival
-    assert likely(found) == []
-    assert likely(posterior_of([fitted(evidence=-50.0), name])) == [name]
+    judged = judge(found)
+    assert judged.decision.verdict is Verdict.UNKNOWN
+    assert judged.explained is more
+    assert not judged.missing
+
+
+def test_a_size_for_each_run_is_one_name() -> None:
+    alike = fitted('fouling', weight=0.0)
+    (way,) = alike.hypothesis.ways
+    own = tuple(replace(way, run=j) for j in range(2))
+    z = np.array([0.1, 1.0])
+    each = replace(alike, hypothesis=Explanation(own), at=z, z=z, sd=np.full(2, 0.01))
+    assert each.names == ('fouling',)
+    first, last = runs_differ(each, ['out', 'back'])
+    assert (first.run, last.run) == ('out', 'back')
+    assert first.size.value < last.size.value
+    (named,) = judge(compared(fitted(weight=-9.0), each)).effects
+    assert named.parameters['friction_factor'] == last.size
+    assert runs_differ(alike, ['out', 'back']) == ()

@@ -16,7 +16,7 @@ from shipdrag_ros.estimation.ode_fit.batch_means import batch_means
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.noise import GaussMarkov
+from shipdrag_ros.simulation.scenario import GaussMarkov
 
 SHIP = Ship.load(files('shipdrag_ros') / 'data/vitus_bering.yaml')
 DRAG_1_M = 3e-4  # v' = -DRAG v^2

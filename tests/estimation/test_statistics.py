@@ -25,7 +25,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, Sensor, Truth, sense, simulate
-from shipdrag_ros.simulation.noise import GaussMarkov
+from shipdrag_ros.simulation.scenario import GaussMarkov
 
 CONFIG = Path(__file__).parents[2] / 'config'
 SPEED, SPAN_S, STEADY_S, N = 8.2, 1500.0, 1800.0, 500

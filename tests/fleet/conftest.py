@@ -11,8 +11,7 @@ import pytest
 
 from shipdrag_ros.cli import main
 from shipdrag_ros.fleet.find import BagToRead, find
-from shipdrag_ros.fleet.job import BagJob
-from shipdrag_ros.fleet.local import Identity, content_hash, identify
+from shipdrag_ros.fleet.job import BagJob, Identity, content_hash, identify
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIP = ROOT / 'config' / 'vitus_bering.yaml'

@@ -15,7 +15,7 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Followed, interval_score
 from shipdrag_ros.forecast.foretell import foretell
-from shipdrag_ros.forecast.law import deceleration
+from shipdrag_ros.forecast.law import KnownCurve, deceleration
 from shipdrag_ros.forecast.result import Band
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS
@@ -75,7 +75,7 @@ def test_it_comes_as_it_was_foretold(
 def test_it_is_the_integral_of_the_law(early: Estimate, ship: Ship) -> None:
     found = foretell(early, ship)
     u = np.linspace(found.speed_m_s[0], found.speed_m_s[-1], 4000)
-    a = np.exp(deceleration(early, ship, u[::40]).log_m_s2)
+    a = np.exp(deceleration(KnownCurve.of(early), ship, u[::40]).log_m_s2)
     per_m_s = 1.0 / np.interp(-u, -u[::40], a)
     assert found.time_s[-1, 0] == pytest.approx(-np.trapezoid(per_m_s, u), rel=1e-2)
     assert np.all(np.diff(found.time_s[:, 0]) > 0.0)
@@ -98,13 +98,33 @@ def test_a_wider_estimate_gives_a_wider_band(early: Estimate, ship: Ship) -> Non
     )
     wide = foretell(replace(early, curve=curve), ship).milestones[0].time_s
     narrow = foretell(early, ship).milestones[0].time_s
-    assert wide.high - wide.low > 1.2 * (narrow.high - narrow.low)
+    assert wide.high / wide.low > 1.1 * narrow.high / narrow.low
 
 
 def test_the_law_is_less_known_where_nothing_was_seen(early: Estimate, ship: Ship) -> None:
     u = early.last_speed_m_s * np.array([1.0, 0.7, 0.4])
-    sd = np.sqrt(np.diag(deceleration(early, ship, u).covariance))
+    sd = np.sqrt(np.diag(deceleration(KnownCurve.of(early), ship, u).covariance))
     assert sd[0] < sd[1] < sd[2]
+
+
+@pytest.mark.parametrize('power', [0.0, 1.0, 2.0])
+def test_a_law_that_is_no_hull_is_learnt(power: float) -> None:
+    craft = replace(Ship.example(), baseline=None, propulsion=None)
+    u = np.linspace(4.0, 8.0, 40)
+    r = 0.02 * (1.0 + craft.n_r(u)) * (u / 8.0) ** power
+    known = KnownCurve(u, r, 0.01 * r, np.full(40, 0.4))
+    found = deceleration(known, craft, np.array([2.0]))
+    off = abs(found.log_m_s2[0] - np.log(0.02 * 0.25**power))
+    assert off < 2.0 * np.sqrt(found.covariance[0, 0]) < 0.8
+
+
+def test_a_curve_that_no_law_fits_is_taken_for_rough(early: Estimate, ship: Ship) -> None:
+    known = KnownCurve.of(early)
+    u = np.array([early.last_speed_m_s])
+    waves = 1.0 + 0.2 * np.sin(60.0 * np.log(known.speed_m_s))
+    sharp = known._replace(sigma_m_s2=0.02 * known.resistance_m_s2, alike=0.0 * known.alike)
+    bent = sharp._replace(resistance_m_s2=waves * sharp.resistance_m_s2)
+    assert deceleration(sharp, ship, u).roughness < 2.0 < deceleration(bent, ship, u).roughness
 
 
 def test_the_targets(early: Estimate, ship: Ship) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from shipdrag_ros.inference.averaging import average
-from shipdrag_ros.inference.factored import Factored
-from shipdrag_ros.inference.gaussian import condense, deviations, posterior, root
+from shipdrag_ros.inference.gaussian import Factored, condense, deviations, posterior, root
 from shipdrag_ros.samples import Float64
 
 K, N = 5, 40

@@ -12,7 +12,7 @@ from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, noise_of
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.simulation.noise import GaussMarkov
+from shipdrag_ros.simulation.scenario import GaussMarkov
 
 RATE, INERTIA, SPEED = 7e-3, 1.1, 8.0
 

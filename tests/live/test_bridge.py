@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -192,10 +193,22 @@ def test_the_rest_of_the_glide_is_shown_and_then_compared(bags: list[Path]) -> N
     timeline.read()
     bridge = Bridge(Ship.load(SHIP))
     play(timeline, timeline.start_ns + 300 * 10**9, bridge)
-    assert bridge.parts(0.0)['forecast'] is None
+    before = bridge.parts(0.0)
+    assert before['forecast'] is None
+    assert before['if_stopped']['hull'] == 'the clean hull of the ship file'
+    time_s, low_s, high_s = before['if_stopped']['time_s']
+    assert 0.0 < low_s < time_s < (high_s or math.inf)
+    assert before['track'] is None
     bridge = Bridge(Ship.load(SHIP))
     play(timeline, timeline.end_ns - 30 * 10**9, bridge)
-    coming = bridge.parts(0.0)['forecast']
+    during = bridge.parts(0.0)
+    assert during['if_stopped'] is None
+    coming, track = during['forecast'], during['track']
+    assert track['was'][-1] == [0.0, 0.0]
+    assert track['was'][0][0] < -1000.0  # she sails east
+    low, mark, high = (track['mark'][i][0] for i in (1, 0, 2))
+    assert 0.0 < low < mark < high
+    assert mark == pytest.approx(coming['way_m'], abs=60.0)
     time_s, low_s, high_s = coming['time_s']
     assert 0.0 < low_s < time_s < (high_s or math.inf)
     assert coming['rows'][0][0] == 0.0
@@ -203,16 +216,47 @@ def test_the_rest_of_the_glide_is_shown_and_then_compared(bags: list[Path]) -> N
     bridge = Bridge(Ship.load(SHIP))
     play(timeline, timeline.end_ns, bridge)
     checked = bridge.parts(0.0)['forecast']
+    assert checked['withdrawn'] == 'the record ends'
+    assert bridge.parts(0.0)['track']['over']
     foretold_s, low_s, high_s = checked['foretold_s']
     assert low_s < checked['was_s'] < high_s
     assert 100.0 < checked['was_s'] < 300.0
     assert low_s < foretold_s < high_s
 
 
+def test_why_it_is_not_said_what_a_stop_would_do() -> None:
+    assert Bridge().parts(0.0)['if_stopped'] == {'why': 'the ship is not known yet'}
+    assert Bridge(Ship.load(SHIP)).parts(0.0)['if_stopped'] == {'why': 'no speed is read'}
+
+
+def test_the_last_run_is_the_hull_that_is_known(bags: list[Path]) -> None:
+    (run,) = open_runs(bags[:1])
+    timeline = Timeline(run, Ship.load(SHIP), Parameters())
+    timeline.read()
+    bridge = Bridge(Ship.load(SHIP))
+    play(timeline, timeline.end_ns, bridge)
+    (other,) = open_runs(bags[1:])
+    later = Bridge(Ship.load(SHIP))
+    day_ns = 86400 * 10**9
+    (past,) = bridge.past
+    later.add_past(replace(past, start_ns=past.start_ns - day_ns, end_ns=past.end_ns - day_ns))
+    ahead = Timeline(other, Ship.load(SHIP), Parameters())
+    ahead.read()
+    play(ahead, ahead.start_ns + 300 * 10**9, later)
+    assert later.parts(0.0)['if_stopped']['hull'].startswith('the coastdown of ')
+
+
 def test_bytes_that_are_none_of_the_outputs_change_nothing() -> None:
     bridge = Bridge(Ship.load(SHIP))
     before = bridge.parts(0.0)
-    for name in ('speed', 'resistance', 'resistance_curve', 'events', 'diagnosis'):
+    for name in (
+        'speed',
+        'resistance',
+        'resistance_curve',
+        'events',
+        'diagnosis',
+        'forecast_path',
+    ):
         bridge.hear(NodeMessage(name, b'\x00\x01'), 0.0)
     assert bridge.parts(0.0) == before
 

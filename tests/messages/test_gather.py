@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from shipdrag_ros.messages import TOPICS, MalformedMessage, Source, Unreadable, decode, types
 from shipdrag_ros.messages.decoding import decode_batch
-from shipdrag_ros.messages.layout import steps
+from shipdrag_ros.messages.gather import steps
 from shipdrag_ros.samples import concatenate
 
 SOURCES = [

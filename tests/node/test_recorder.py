@@ -19,8 +19,13 @@ from shipdrag_ros.bags.retention import Keep, Removed
 from shipdrag_ros.bags.writer import BagWriter
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.messages import EventKind, EventNote, OutputMessage, event_message
-from shipdrag_ros.node.recorder import DEFAULT_LIMITS, EVERYTHING, Recorder, RecordingState
-from shipdrag_ros.node.ring import RawMessage
+from shipdrag_ros.node.recorder import (
+    DEFAULT_LIMITS,
+    EVERYTHING,
+    RawMessage,
+    Recorder,
+    RecordingState,
+)
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from shipdrag_ros.node.ring import SEGMENT_BYTES, RawMessage, RawRing
+from shipdrag_ros.node.recorder import SEGMENT_BYTES, RawMessage, RawRing
 
 SECOND_NS = 10**9
 

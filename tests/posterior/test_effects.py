@@ -11,6 +11,7 @@ import pytest
 from shipdrag_ros.parameter import Shape, log_normal
 from shipdrag_ros.posterior.effects import retardation_of as found_retardation
 from shipdrag_ros.posterior.effects import ways_of
+from shipdrag_ros.posterior.priors import UNNAMED_ODDS
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Scenario, simulate_columns
 from shipdrag_ros.simulation.effect import Frame
@@ -44,8 +45,10 @@ def test_every_effect_of_the_library_has_ways_that_act() -> None:
         if effect.missing(ship):
             continue
         ways = list(ways_of(effect, ship, 600.0, 2))
-        odds = {way.mode: np.exp(way.log_odds) for way in ways}
-        assert np.isclose(sum(odds.values()), effect.odds), effect.name
+        odds = {way.mode: (way.nameless, np.exp(way.log_odds)) for way in ways}
+        named, nameless = (sum(p for n, p in odds.values() if n is each) for each in (False, True))
+        assert np.isclose(named, effect.odds), effect.name
+        assert np.isclose(nameless, UNNAMED_ODDS if effect.nameless_at else 0.0), effect.name
         for way in ways:
             assert way.action(frame, way.tried()) != Action(), effect.name
             assert len(way.start) == len(way.unknowns)

@@ -2,6 +2,7 @@
 // The page: one picture, kept by frames from the server, drawn where it has changed.
 
 import { Chart, drawCurve, drawShafts, drawSpeeds } from './charts.js';
+import { drawTrack } from './track.js';
 import { BRIDGE, SI, day, dayAndTime, figure, heading, length, percent, timeOfDay } from './units.js';
 
 const OLD_MS = 4000; // the server says something every second
@@ -94,7 +95,9 @@ function thin() {
 const SHOWN = {
   headline: showHeadline,
   figures: showFigures,
-  forecast: showForecast,
+  forecast: showGlide,
+  if_stopped: showGlide,
+  track: showTrack,
   checks: showChecks,
   inputs: showInputs,
   verdict: showVerdict,
@@ -107,7 +110,8 @@ const SHOWN = {
 
 function show(changed, rows) {
   for (const [name, draw] of Object.entries(SHOWN)) if (changed.has(name)) draw(picture[name]);
-  if (changed.has('ship')) { text('ship', picture.ship?.name || 'Shipdrag'); showFigures(picture.figures); showPast(picture.past); }
+  if (changed.has('ship')) { text('ship', picture.ship?.name || 'Shipdrag'); showFigures(picture.figures); showPast(picture.past); showGlide(); }
+  if (changed.has('forecast')) showTrack(picture.track);
   if (['ship', 'curve', 'past', 'all'].some(name => changed.has(name))) showCurve();
   if (rows || changed.has('all')) showTraces();
 }
@@ -172,21 +176,40 @@ function showFigures(part) {
 /** A time as minutes and seconds. */
 function minutes(s) { return s == null ? '…' : `${Math.floor(Math.round(s) / 60)}:${String(Math.round(s) % 60).padStart(2, '0')}`; }
 
-function showForecast(part) {
-  if (!part) { setFigure('figure-glide', '–', '', ''); text('note-glide', 'foretold while she coasts'); return; }
-  const speed = `${units.toSpeed(part.speed_m_s).toFixed(units === SI ? 2 : 1)} ${units.speed}`;
-  const span = (low, high) => (high == null ? `${minutes(low)} or later` : `${minutes(low)} to ${minutes(high)}`);
-  if (part.was_s != null) {
-    const [foretold, low, high] = part.foretold_s;
-    setFigure('figure-glide', minutes(part.was_s), 'min', '');
-    text('note-glide', `to ${speed}; foretold half-way ${minutes(foretold)} (${span(low, high)})`);
+function speedOf(part) { return `${units.toSpeed(part.speed_m_s).toFixed(units === SI ? 2 : 1)} ${units.speed}`; }
+
+function span(low, high) { return high == null ? `${minutes(low)} or later` : `${minutes(low)} to ${minutes(high)}`; }
+
+function far(metres) { return units === SI || picture.ship?.mass_kg < 1e4 ? `${metres.toFixed(0)} m` : `${(metres / 1852).toFixed(2)} nm`; }
+
+/** The rest of the glide, what it was, or the glide if she were stopped now. */
+function showGlide() {
+  const { forecast, if_stopped: stopped } = picture;
+  const part = forecast ?? stopped;
+  text('glide-name', forecast || !stopped ? 'Rest of the glide' : 'If the engine were stopped now');
+  if (!part || part.why) { setFigure('figure-glide', '–', '', ''); text('note-glide', part ? `not foretold: ${part.why}` : 'foretold once the first estimate is accepted'); return; }
+  if (part.withdrawn) {
+    const [foretold, low, high] = part.foretold_s ?? [];
+    setFigure('figure-glide', part.was_s == null ? '–' : minutes(part.was_s), 'min', '');
+    const compared = part.was_s == null ? '' : ` To ${speedOf(part)}, half-way: foretold ${minutes(foretold)} (${span(low, high)}), was ${minutes(part.was_s)}.`;
+    text('note-glide', `Withdrawn: ${part.withdrawn}.${compared}`);
     return;
   }
   const [time, low, high] = part.time_s;
-  const mass = picture.ship?.mass_kg;
-  const far = part.way_m == null ? '' : `, ${units === SI || mass < 1e4 ? `${part.way_m.toFixed(0)} m` : `${(part.way_m / 1852).toFixed(2)} nm`}`;
   setFigure('figure-glide', minutes(time), 'min', '');
-  text('note-glide', `${speed} in ${minutes(time)} (${span(low, high)})${far}`);
+  const way = part.way_m == null ? '' : `, ${far(part.way_m)}`;
+  text('note-glide', `${speedOf(part)} in ${minutes(time)} (${span(low, high)})${way}${part.hull ? `; by ${part.hull}` : ''}`);
+}
+
+function showTrack(part) {
+  el('track-part').hidden = !part;
+  if (!part) return;
+  const glide = picture.forecast?.time_s ? picture.forecast : null;
+  const label = glide ? `${minutes(glide.time_s[0])}: ${speedOf(glide)}` : '';
+  const long = units === SI || picture.ship?.mass_kg < 1e4;
+  drawTrack(el('track'), part, { label, unit: long ? 1 : 1852, far: length => (long ? `${length} m` : `${Number((length / 1852).toPrecision(2))} nm`) });
+  text('track-say', part.over ? 'Since the stop (solid), and as it was foretold half-way (dashed).'
+    : `Since the stop (solid), and to come (dashed)${part.mark ? `; the mark is where she is in ${minutes(glide.time_s[0])}, with its band of 90 %` : ''}.`);
 }
 
 function signed(list, rows) {

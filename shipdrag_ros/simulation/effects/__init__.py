@@ -9,6 +9,7 @@ diagnosis and documentation find it here.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from itertools import combinations
 from pkgutil import iter_modules
@@ -23,6 +24,7 @@ from shipdrag_ros.simulation.effect import Effect, Frame, Measure
 __all__ = [
     'LIBRARY',
     'action_of',
+    'added',
     'confounders',
     'discriminating_measurements',
     'find',
@@ -39,7 +41,31 @@ def _found() -> Iterator[Effect]:
         yield effect
 
 
-LIBRARY: Mapping[str, Effect] = MappingProxyType({effect.name: effect for effect in _found()})
+_EVERY = {effect.name: effect for effect in _found()}
+LIBRARY: Mapping[str, Effect] = MappingProxyType(_EVERY)
+
+
+@contextmanager
+def added(effects: Sequence[Effect]) -> Iterator[None]:
+    """
+    Have more effects in the library of this process, for a while.
+
+    Raises
+    ------
+    SimulationError
+        If a name is taken.
+    """
+    taken = [effect.name for effect in effects if effect.name in _EVERY]
+    if taken:
+        raise SimulationError(
+            f'effect {taken[0]!r}: the library has one of this name; give it another'
+        )
+    _EVERY.update({effect.name: effect for effect in effects})
+    try:
+        yield
+    finally:
+        for effect in effects:
+            del _EVERY[effect.name]
 
 
 def find(name: str) -> Effect:

@@ -53,8 +53,5 @@ EFFECT = Effect(
     },
     without_baseline={
         WithoutBaseline.LOG_TRACK: 'a current turns with the course',
-        WithoutBaseline.CONSTANT_FORCE: 'current stands in the set for a speed that is imported '
-        'as through water and was measured over ground (motion capture, GNSS); a log does not '
-        'feel one',
     },
 )

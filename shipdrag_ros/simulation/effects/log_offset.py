@@ -35,7 +35,6 @@ EFFECT = Effect(
     errs_in=('speed_through_water',),
     without_baseline={
         WithoutBaseline.LOG_TRACK: 'an offset is the same at all speeds',
-        WithoutBaseline.CONSTANT_FORCE: '',
     },
     lasts_s=365.0 * DAY_S,
 )

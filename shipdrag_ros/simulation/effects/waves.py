@@ -15,7 +15,6 @@ from shipdrag_ros.simulation.effect import (
     Frame,
     Measure,
     Scope,
-    WithoutBaseline,
 )
 
 _LENGTHS = 0.5  # of a wave, in lengths of the ship: shorter ones than those that heave her
@@ -65,6 +64,5 @@ EFFECT = Effect(
         'locked_propeller': (Measure.RECIPROCAL_RUN,),
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.SHAFT),
     },
-    without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
     facts={'no_waves': DENIES, 'calm': DENIES},
 )

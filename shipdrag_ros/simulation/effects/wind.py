@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from shipdrag_ros.parameter import Parameter, normal
 from shipdrag_ros.simulation.action import Action
-from shipdrag_ros.simulation.effect import DENIES, Effect, Frame, Measure, Scope, WithoutBaseline
+from shipdrag_ros.simulation.effect import DENIES, Effect, Frame, Measure, Scope
 
 
 def _act(frame: Frame, head_m_s: float, cross_m_s: float) -> Action:
@@ -47,6 +47,5 @@ EFFECT = Effect(
         'residual_thrust': (Measure.RECIPROCAL_RUN, Measure.WIND, Measure.SHAFT),
     },
     needs=('air',),
-    without_baseline={WithoutBaseline.CONSTANT_FORCE: ''},
     facts={'calm': DENIES},
 )

@@ -12,10 +12,9 @@ from math import cos, pi, remainder, sin
 from typing import Any, TypeGuard
 
 from shipdrag_ros.samples import SHAFTS, Channel
-from shipdrag_ros.sources.format import CERTAIN, NO, POSSIBLE, Format, Head, Job
+from shipdrag_ros.sources.format import CERTAIN, GEAR, NO, POSSIBLE, Format, Head, Job
 from shipdrag_ros.sources.log import Log, iso_ns
 from shipdrag_ros.sources.opened import Lines
-from shipdrag_ros.sources.options import GEAR
 from shipdrag_ros.sources.stream import Origin, Reading, StreamResult, Tally, read_stream
 
 _SELF = 'vessels.self'

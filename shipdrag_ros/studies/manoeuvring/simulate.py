@@ -3,13 +3,254 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from shipdrag_ros.compiled import compiled
 from shipdrag_ros.errors import SimulationError
 from shipdrag_ros.samples import Float64
-from shipdrag_ros.studies.manoeuvring.kernel import STATES, Helm, HullModel, follow_columns
 from shipdrag_ros.studies.manoeuvring.manoeuvre import Manoeuvre, Motions
 from shipdrag_ros.studies.manoeuvring.ship import FORM, SteeredShip
+
+STATES = 7  # of a path: u, v, r, x, y, heading, rudder
+MotionState = tuple[float, float, float, float, float, float, float]
+
+
+class HullModel(NamedTuple):
+    """
+    What all columns share.
+
+    Attributes
+    ----------
+    length_m, speed_m_s
+    surge_inertia
+        m' - X'udot.
+    sway_by_y, sway_by_n, yaw_by_y, yaw_by_n
+        Inverse of the inertia in sway and yaw.
+    rate_rad_s, lag_s
+        Rudder machine.
+    """
+
+    length_m: float
+    speed_m_s: float
+    surge_inertia: float
+    sway_by_y: float
+    sway_by_n: float
+    yaw_by_y: float
+    yaw_by_n: float
+    rate_rad_s: float
+    lag_s: float
+
+
+class Helm(NamedTuple):
+    """
+    What the helmsman does: both manoeuvres are one rule.
+
+    Attributes
+    ----------
+    order_rad
+        Size of each order.
+    reverse_rad
+        Heading at which the order changes sides; infinite: never.
+    first
+        1: first to starboard, -1: to port.
+    attentive
+        True: the order changes at the very moment; else at the next look.
+    step_s
+        Of the integration.
+    approach
+        Steps with the rudder amidships before the first order.
+    """
+
+    order_rad: float
+    reverse_rad: float
+    first: float
+    attentive: bool
+    step_s: float
+    approach: int
+
+
+@compiled
+def _accelerations(
+    hull: HullModel, c: Float64, du: float, v: float, r: float, d: float
+) -> tuple[float, float, float]:
+    """
+    Return du/dt, dv/dt, dr/dt in SI.
+
+    `du` is the change of speed; `c` the derivatives in the order of `FORM`.
+    """
+    square = (hull.speed_m_s + du) ** 2 + v * v
+    speed = np.sqrt(square)
+    u, v, r = du / speed, v / speed, r * hull.length_m / speed
+    vv, uu, dd = v * v, u * u, d * d
+    surge = (
+        u * (c[0] + u * (c[1] + u * c[2]))
+        + vv * c[3]
+        + r * (r * c[4] + v * c[7])
+        + dd * (c[5] + u * c[6])
+        + v * d * (c[8] + u * c[9])
+    )
+    sway = (
+        v * (c[10] + vv * c[12] + u * c[14])
+        + r * (c[11] + vv * c[13] + u * c[15])
+        + d * (c[16] + dd * c[17] + u * c[18] + uu * c[19] + v * d * c[20] + vv * c[21])
+        + (c[22] + u * c[23] + uu * c[24])
+    )
+    yaw = (
+        v * (c[25] + vv * c[27] + u * c[29])
+        + r * (c[26] + vv * c[28] + u * c[30])
+        + d * (c[31] + dd * c[32] + u * c[33] + uu * c[34] + v * d * c[35] + vv * c[36])
+        + (c[37] + u * c[38] + uu * c[39])
+    )
+    force = square / hull.length_m
+    return (
+        force * surge / hull.surge_inertia,
+        force * (hull.sway_by_y * sway + hull.sway_by_n * yaw),
+        force / hull.length_m * (hull.yaw_by_y * sway + hull.yaw_by_n * yaw),
+    )
+
+
+@compiled
+def _rudder(hull: HullModel, d: float, ordered: float, after_s: float) -> float:
+    """Return the angle some time later: it moves at its largest rate, then as a lag does."""
+    gap = ordered - d
+    nearest = hull.rate_rad_s * hull.lag_s
+    ramp_s = (abs(gap) - nearest) / hull.rate_rad_s
+    if after_s <= ramp_s:
+        return float(d + np.copysign(hull.rate_rad_s, gap) * after_s)
+    if ramp_s > 0.0:
+        return float(ordered - np.copysign(nearest, gap) * np.exp((ramp_s - after_s) / hull.lag_s))
+    return float(ordered - gap * np.exp(-after_s / hull.lag_s))
+
+
+@compiled
+def _step(
+    hull: HullModel, c: Float64, state: MotionState, ordered: float, h: float
+) -> MotionState:
+    """Return the state a step later, in which the rudder moves smoothly."""
+    du, v, r, x, y, heading, d = state
+    e = 0.5 * h
+    middle_d, end_d = _rudder(hull, d, ordered, e), _rudder(hull, d, ordered, h)
+    du1, v1, r1 = _accelerations(hull, c, du, v, r, d)
+    du2, v2, r2 = _accelerations(hull, c, du + e * du1, v + e * v1, r + e * r1, middle_d)
+    du3, v3, r3 = _accelerations(hull, c, du + e * du2, v + e * v2, r + e * r2, middle_d)
+    du4, v4, r4 = _accelerations(hull, c, du + h * du3, v + h * v3, r + h * r3, end_d)
+    end_du = du + h * (du1 + 2.0 * (du2 + du3) + du4) / 6.0
+    end_v = v + h * (v1 + 2.0 * (v2 + v3) + v4) / 6.0
+    end_heading = heading + h * (r + h * (r1 + r2 + r3) / 6.0)
+    # no force depends on the place: Simpson's rule on the way
+    start = _over_ground(hull, du, v, heading)
+    middle = _over_ground(hull, du + e * du2, v + e * v2, heading + e * (r + 0.5 * e * r1))
+    end = _over_ground(hull, end_du, end_v, end_heading)
+    return (
+        end_du,
+        end_v,
+        r + h * (r1 + 2.0 * (r2 + r3) + r4) / 6.0,
+        x + h * (start[0] + 4.0 * middle[0] + end[0]) / 6.0,
+        y + h * (start[1] + 4.0 * middle[1] + end[1]) / 6.0,
+        end_heading,
+        end_d,
+    )
+
+
+@compiled
+def _over_ground(hull: HullModel, du: float, v: float, heading: float) -> tuple[float, float]:
+    cos, sin = np.cos(heading), np.sin(heading)
+    ahead = hull.speed_m_s + du
+    return ahead * cos - v * sin, ahead * sin + v * cos
+
+
+@compiled
+def _advance(
+    hull: HullModel, c: Float64, state: MotionState, ordered: float, h: float
+) -> MotionState:
+    """Return the state a time later, in two steps where the rudder leaves its largest rate."""
+    ramp_s = abs(ordered - state[6]) / hull.rate_rad_s - hull.lag_s
+    if 0.0 < ramp_s < h:
+        state = _step(hull, c, state, ordered, ramp_s)
+        h -= ramp_s
+    after: MotionState = _step(hull, c, state, ordered, h)
+    return after
+
+
+@compiled
+def _reached(before: MotionState, after: MotionState, heading: float, h: float) -> float:
+    """Return the part of a step after which a heading is reached."""
+    low, high = 0.0, 1.0
+    gain = after[5] - before[5]
+    start, end = h * before[2], h * after[2]
+    rises = gain > 0.0
+    for _ in range(50):
+        p = 0.5 * (low + high)
+        # cubic through headings and yaw rates at both ends
+        q = 1.0 - p
+        at = before[5] + p * p * (3.0 - 2.0 * p) * gain + p * q * (q * start - p * end)
+        if (at >= heading) == rises:
+            high = p
+        else:
+            low = p
+    return high
+
+
+@compiled
+def _follow(
+    hull: HullModel, helm: Helm, c: Float64, steps: int, looks: int, path: Float64
+) -> None:
+    """Fill the path (n, STATES) of one ship, with so many looks between two rows."""
+    state = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for _ in range(helm.approach):
+        state = _advance(hull, c, state, 0.0, helm.step_s)
+    # places count from the first order, headings from the course before
+    state = (state[0], state[1], state[2], 0.0, 0.0, state[5], state[6])
+    side = helm.first
+    for row in range(len(path)):
+        for i in range(STATES):
+            path[row, i] = state[i]
+        if row == len(path) - 1:
+            break
+        for _ in range(looks):
+            if side * state[5] >= helm.reverse_rad:
+                side = -side
+            for _ in range(steps):
+                # the derivatives count a rudder that turns the ship to port positive
+                after = _advance(hull, c, state, -side * helm.order_rad, helm.step_s)
+                if helm.attentive and side * after[5] >= helm.reverse_rad:
+                    p = _reached(state, after, side * helm.reverse_rad, helm.step_s)
+                    state = _advance(hull, c, state, -side * helm.order_rad, p * helm.step_s)
+                    side = -side
+                    after = _advance(
+                        hull, c, state, -side * helm.order_rad, (1.0 - p) * helm.step_s
+                    )
+                state = after
+
+
+@compiled
+def follow_columns(
+    hull: HullModel, helm: Helm, derivatives: Float64, steps: int, looks: int, paths: Float64
+) -> None:
+    """
+    Follow ships from steady sailing through one manoeuvre.
+
+    Parameters
+    ----------
+    derivatives : (k, 40)
+        In the order of `FORM`.
+    steps
+        Of the integration between two looks of the helmsman.
+    looks
+        Of the helmsman between two rows of a path.
+    paths : (k, n, STATES)
+        Filled with u, v, r, x, y, heading and rudder angle, u the change of
+        speed; SI.
+
+    Notes
+    -----
+    Runge-Kutta of fourth order, each step between two kinks of the rudder.
+    """
+    for column in range(len(derivatives)):
+        _follow(hull, helm, derivatives[column], steps, looks, paths[column])
+
 
 _STEP_S = 0.5  # of the integration; the rudder, quickest of all, is followed exactly
 _LONGEST_APPROACH_S = 3600.0

@@ -24,12 +24,13 @@ from shipdrag_ros.studies.sensitivity.coast import (
     POSITION_SD_M,
     SLOWED,
     Coast,
+    Particular,
     coast_from,
+    particulars,
     slowest_m_s,
 )
 from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Responses, Selection, vary
 from shipdrag_ros.studies.sensitivity.mimics import Mimic, mimics
-from shipdrag_ros.studies.sensitivity.particulars import Particular, particulars
 
 _CHECK_FRACTION = 0.85  # of the speed, in the check
 _SMALL, _FOUR = slice(0, 2), slice(0, 4)  # columns of CHANGES

@@ -19,8 +19,7 @@ from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import Action, Effect, Frame
 from shipdrag_ros.simulation.effects import LIBRARY
-from shipdrag_ros.studies.sensitivity.coast import Coast
-from shipdrag_ros.studies.sensitivity.particulars import Particular
+from shipdrag_ros.studies.sensitivity.coast import Coast, Particular
 
 WORST = 0.5  # relative error beyond which no value is thought to be wrong
 _SPEED_STEP = 1e-3

@@ -20,7 +20,7 @@ from shipdrag_ros.inference.rows import LOG, POSITION, Rows
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
-from shipdrag_ros.simulation.noise import GaussMarkov
+from shipdrag_ros.simulation.scenario import GaussMarkov
 
 MS_NS = 1_000_000
 

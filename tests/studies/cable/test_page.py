@@ -11,7 +11,6 @@ import numpy as np
 
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.studies.cable.drag import Cable, CableSurface, Tangent, tangent_range
-from shipdrag_ros.studies.cable.face import pictures as cable_pictures
 from shipdrag_ros.studies.cable.face import verb as words
 from shipdrag_ros.studies.face import show
 
@@ -38,7 +37,7 @@ def test_an_open_range_is_told() -> None:
 
 def test_the_picture_shows_the_lines_and_the_range() -> None:
     for tolerance in (0.1, 2.0):
-        top, bottom = cable_pictures.tangent_picture(TANGENT, tolerance).axes
+        top, bottom = words.tangent_picture(TANGENT, tolerance).axes
         drag, touching, naive = (np.asarray(line.get_data()) for line in top.get_lines()[:3])
         np.testing.assert_allclose(drag[1], TANGENT.drag.force_n(drag[0]), rtol=1e-14)
         assert np.all(touching[1] <= drag[1] + 1e-9)
@@ -54,6 +53,6 @@ def test_the_picture_shows_the_lines_and_the_range() -> None:
 
 
 def test_the_cable_is_marked_among_the_coefficients() -> None:
-    (axis,) = cable_pictures.coefficient_picture(CABLE).axes
+    (axis,) = words.coefficient_picture(CABLE).axes
     *_, mark = axis.get_lines()
     assert (mark.get_xdata()[0], mark.get_ydata()[0]) == (CABLE.slenderness, CABLE.c0)

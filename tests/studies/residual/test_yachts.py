@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipdrag_ros.studies.residual.fit import fit_form
-from shipdrag_ros.studies.residual.forms import FORMS
+from shipdrag_ros.studies.residual.fit import FORMS, fit_form
 from shipdrag_ros.studies.residual.hulls import Hulls
 
 FOLDER = os.environ.get('SHIPDRAG_DATA')

@@ -11,7 +11,7 @@ import pytest
 
 from shipdrag_ros.parameter import Parameter
 from shipdrag_ros.ship import ConstantAddedMass, Propulsion, Ship, StatedEffect, TableBaseline
-from shipdrag_ros.studies.sensitivity.particulars import particulars
+from shipdrag_ros.studies.sensitivity.coast import particulars
 
 CARGO = Ship.load(Path(__file__).resolve().parents[3] / 'config' / 'vitus_bering.yaml')
 SPEED = 7.0

@@ -16,7 +16,6 @@ from shipdrag_ros.studies.face import show
 from shipdrag_ros.studies.residual.face import verb as words
 from shipdrag_ros.studies.residual.fit import ResidualFit, fit_residual
 from shipdrag_ros.studies.residual.hulls import Hulls
-from shipdrag_ros.studies.surface.face import pictures as fit_pictures
 from shipdrag_ros.studies.surface.face import verb as surface_words
 
 REFUSED = Prediction(1.5, float('inf'), ('x 9 is outside <0..1> of the data',))
@@ -103,13 +102,13 @@ def test_hulls_that_others_leave_open_have_no_picture(
 
 def test_pictures_show_the_data() -> None:
     found, values = surface(2)
-    degree = fit_pictures.degree_picture(found).axes[0]
+    degree = surface_words.degree_picture(found).axes[0]
     np.testing.assert_allclose(degree.lines[0].get_ydata(), np.sqrt(found.table.variance))
-    rest = fit_pictures.residual_picture(found.polynomial(points(2)), values, 'c').axes[0]
+    rest = surface_words.residual_picture(found.polynomial(points(2)), values, 'c').axes[0]
     np.testing.assert_allclose(rest.lines[0].get_ydata(), found.fit.residuals, atol=1e-12)
     error, leverage = np.array([0.1, -0.2, 0.3]), np.array([0.5, 0.9, 2.0])
-    left = fit_pictures.left_out_picture(error, leverage, 'c').axes[0]
+    left = surface_words.left_out_picture(error, leverage, 'c').axes[0]
     np.testing.assert_array_equal(left.lines[0].get_ydata(), [0.1, -0.2])
     np.testing.assert_array_equal(left.lines[1].get_ydata(), [0.3])
-    contour = fit_pictures.contour_picture(found, points(2), 'c').axes[0]
+    contour = surface_words.contour_picture(found, points(2), 'c').axes[0]
     assert contour.get_xlabel() == 'x0'

@@ -9,7 +9,7 @@ from typing import Any
 
 from shipdrag_ros.errors import ImportDataError
 from shipdrag_ros.progress import PartDone
-from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, Format, Head, Job, Option
+from shipdrag_ros.sources.format import LIKELY, NO, POSSIBLE, RATE, Format, Head, Job, Option
 from shipdrag_ros.sources.formats.csv.cells import (
     ORDERS,
     zone_of,
@@ -30,7 +30,6 @@ from shipdrag_ros.sources.formats.csv.guess import (
 )
 from shipdrag_ros.sources.formats.csv.importer import TableColumns, TableResult, read_csv
 from shipdrag_ros.sources.log import Log
-from shipdrag_ros.sources.options import RATE
 from shipdrag_ros.sources.table import LogTable
 
 

@@ -3,10 +3,19 @@
 
 from __future__ import annotations
 
-from shipdrag_ros.sources.format import CERTAIN, NO, Format, Head, Job
+from shipdrag_ros.sources.format import (
+    CERTAIN,
+    DATE,
+    GEAR,
+    NO,
+    RATE,
+    TRANSDUCER,
+    Format,
+    Head,
+    Job,
+)
 from shipdrag_ros.sources.formats.n2k.frames import parse
 from shipdrag_ros.sources.log import Log
-from shipdrag_ros.sources.options import DATE, GEAR, RATE, TRANSDUCER
 from shipdrag_ros.sources.stream import StreamResult, read_stream
 
 

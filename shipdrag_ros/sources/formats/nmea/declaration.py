@@ -6,10 +6,20 @@ from __future__ import annotations
 import re
 
 from shipdrag_ros.nmea.reading import Checksum
-from shipdrag_ros.sources.format import CERTAIN, LIKELY, NO, Format, Head, Job, Option, head_of
+from shipdrag_ros.sources.format import (
+    CERTAIN,
+    DATE,
+    LIKELY,
+    NO,
+    TRANSDUCER,
+    Format,
+    Head,
+    Job,
+    Option,
+    head_of,
+)
 from shipdrag_ros.sources.formats.nmea.importer import NmeaResult, read_nmea
 from shipdrag_ros.sources.log import Log
-from shipdrag_ros.sources.options import DATE, TRANSDUCER
 
 _SENTENCE = re.compile(r'[$!](?:[A-Z][A-Z0-9]{4}|P[A-Z0-9]{2,}),[^*]*(\*[0-9A-Fa-f]{2})?')
 # sentences that wrap NMEA 2000, which has a format of its own

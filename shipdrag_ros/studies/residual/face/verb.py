@@ -21,11 +21,19 @@ from shipdrag_ros.ship import Ship
 from shipdrag_ros.sources.numbers import read_numbers
 from shipdrag_ros.studies.face import Presentation, show
 from shipdrag_ros.studies.residual.baseline import with_residual
-from shipdrag_ros.studies.residual.fit import AUTO, ResidualFit, fit_residual, leave_hulls_out
-from shipdrag_ros.studies.residual.forms import FORMS
+from shipdrag_ros.studies.residual.fit import (
+    AUTO,
+    FORMS,
+    ResidualFit,
+    fit_residual,
+    leave_hulls_out,
+)
 from shipdrag_ros.studies.residual.hulls import OPTIONAL, REQUIRED, Hulls
-from shipdrag_ros.studies.surface.face.pictures import left_out_picture, residual_picture
-from shipdrag_ros.studies.surface.face.verb import prediction_documents
+from shipdrag_ros.studies.surface.face.verb import (
+    left_out_picture,
+    prediction_documents,
+    residual_picture,
+)
 
 _FIT = 'The fit'
 

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag effect`: files of learnt effects checked, and all effects listed."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from shipdrag_ros.cli.arguments import add_effects, add_json
+from shipdrag_ros.cli.output import Output
+from shipdrag_ros.display import Table
+from shipdrag_ros.learn.term import OWN, LearntTerm
+from shipdrag_ros.simulation.effects import LIBRARY
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'A learnt effect is data: a formula with units, which is read and never run. `check` '
+        'refuses wrong units, names that are not known, poles inside the valid range and all '
+        'that is no formula; `list` shows the effects of the library and of the folders given.'
+    )
+    verbs = parser.add_subparsers(
+        title='what to do', metavar='WHAT', dest='what', required=True, help='check or list'
+    )
+    check = verbs.add_parser('check', help='may a file be used, and if not, why')
+    check.add_argument('files', nargs='+', type=Path, metavar='FILE', help='learnt effect (YAML)')
+    add_json(check)
+    every = verbs.add_parser('list', help='the effects of the library, and those learnt')
+    add_effects(every)
+    add_json(every)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Check files, or list effects.
+    """
+    output = Output(options.json)
+    return _check(options.files, output) if options.what == 'check' else _list(output)
+
+
+def _check(files: list[Path], output: Output) -> int:
+    document = []
+    for path in files:
+        term = LearntTerm.load(path)  # the first that cannot be used is the error
+        output.say(f'{path}: {term.name} can be used: {term.form.expression} [N]')
+        document.append({'file': str(path), 'name': term.name, 'channel': term.form.channel})
+    output.json({'effects': document})
+    return 0
+
+
+def _list(output: Output) -> int:
+    rows, document = [], []
+    for effect in LIBRARY.values():
+        where = 'library' if effect.name in OWN else 'learnt'
+        sizes = ', '.join(f'{q.name} [{q.unit or "-"}]' for q in effect.parameters)
+        rows.append((effect.name, effect.scope.value, sizes, where))
+        names = [q.name for q in effect.parameters]
+        document.append(
+            {'name': effect.name, 'scope': effect.scope.value, 'parameters': names, 'from': where}
+        )
+    output.table(Table(('effect', 'scope', 'parameters', 'from'), tuple(rows)))
+    output.json({'effects': document})
+    return 0

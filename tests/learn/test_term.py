@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files of learnt effects: sound ones act as their formula says, hostile ones are refused."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from shipdrag_ros.errors import EffectFileError
+from shipdrag_ros.learn.term import LearntTerm
+from shipdrag_ros.ship import GRAVITY_M_S2, Ship
+from shipdrag_ros.simulation import Scenario, simulate
+from shipdrag_ros.simulation.effect import Frame
+
+ROOT = Path(__file__).resolve().parents[2]
+WEED = (ROOT / 'docs' / 'data' / 'effects' / 'weed.yaml').read_text(encoding='utf-8')
+SPEED = 'term: {channel: force, scope: hull, variable: %s, shape: decay, expression: "%s", '
+FADING = """
+name: fading
+term: {channel: force, scope: hull, variable: time, shape: decay,
+  expression: "0.5*rho*A*nabla**(2/3)*u**2*exp(-t/(tau*sqrt(L/g)))",
+  valid: {t: [0, 3000], u: [0.5, 8]}}
+parameters: {A: {value: 0.02, sd: 0.001}, tau: {value: 100, sd: 5}}
+"""
+TURNED = """
+name: turned
+term: {channel: force, scope: earth, variable: heading, shape: periodic,
+  expression: "rho*g*nabla*(A*cos(psi) + B*sin(psi))", valid: {u: [0.5, 8]}}
+parameters: {A: {value: 2e-4, sd: 1e-5}, B: {value: 1e-4, sd: 1e-5}}
+"""
+
+
+def plain(text: str) -> dict[str, Any]:
+    """Return the plain data of a text."""
+    return dict(YAML(typ='safe').load(text))
+
+
+def refused(whole: Any) -> None:
+    """Expect a plain error of the text of some data."""
+    import io
+
+    stream = io.StringIO()
+    YAML(typ='safe').dump(whole, stream)
+    with pytest.raises(EffectFileError):
+        LearntTerm.from_yaml(stream.getvalue())
+
+
+def test_a_term_acts_as_its_formula_says() -> None:
+    ship, term = Ship.example(), LearntTerm.from_yaml(WEED)
+    frame = Frame(ship, Scenario(speed_m_s=6.0), 0.0)
+    speed = np.linspace(1.2, 7.8, 40)
+    root = math.sqrt(GRAVITY_M_S2 * ship.length_m)
+    step = 0.5 * (1.0 + np.tanh((0.09 * root - speed) / (0.02 * root)))
+    wanted = 0.5 * ship.water.density_kg_m3 * 0.002 * ship.length_m**2 * speed**2 * step
+    found = term.effect().action(frame, 0.002, 0.09).resistance_n(speed)
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)
+
+
+def test_beyond_its_speeds_a_force_goes_on_as_the_square() -> None:
+    ship, term = Ship.example(), LearntTerm.from_yaml(WEED)
+    inside, beyond = term.force_n(ship, 0.0, (0.002, 0.09), np.array([7.9, 15.8]))
+    assert beyond == pytest.approx(4.0 * inside)
+    assert term.force_n(ship, 0.0, (0.002, 0.09), np.array([0.0]))[0] == 0.0
+
+
+def test_a_force_in_time_is_followed() -> None:
+    ship, term = Ship.example(), LearntTerm.from_yaml(FADING)
+    scenario = Scenario(speed_m_s=6.0, duration_s=900.0)
+    frame = Frame(ship, scenario, 0.0)
+    action = term.effect().action(frame, 0.02, 100.0)
+    after = np.linspace(0.0, 900.0, 200)
+    area = sum(turn.drag_area_m2 * turn.share(after) for turn in action.turns)
+    tau_s = 100.0 * math.sqrt(ship.length_m / GRAVITY_M_S2)
+    whole = 0.02 * ship.displaced_volume_m3 ** (2 / 3)
+    assert np.abs(area - whole * np.exp(-after / tau_s)).max() < 0.003 * whole
+
+
+def test_a_force_of_the_earth_turns_with_the_heading() -> None:
+    ship, term = Ship.example(), LearntTerm.from_yaml(TURNED)
+    speed = np.array([3.0])
+    forces = []
+    for heading in (0.0, math.pi):
+        frame = Frame(ship, Scenario(speed_m_s=6.0, heading_rad=heading), 0.0)
+        forces.append(float(term.effect().action(frame, 2e-4, 1e-4).resistance_n(speed)[0]))
+    assert forces[0] == pytest.approx(-forces[1])
+    assert forces[0] > 0.0
+
+
+def test_more_of_it_slows_the_ship_more() -> None:
+    from shipdrag_ros.learn.folder import using
+    from shipdrag_ros.simulation.effects import LIBRARY, parse
+
+    ship, terms = Ship.example(), [LearntTerm.from_yaml(WEED), LearntTerm.from_yaml(FADING)]
+    with using(terms):
+        for name in ('weed', 'fading'):
+            last = [
+                simulate(
+                    ship, Scenario(speed_m_s=6.0, duration_s=900.0), effects=effects
+                ).speed_through_water_m_s[-1]
+                for effects in ([], [parse(f'{name}=0.002')], [parse(f'{name}=0.004')])
+            ]
+            assert last[0] > last[1] > last[2]
+    assert 'weed' not in LIBRARY
+
+
+@pytest.mark.parametrize('text', [WEED, FADING, TURNED])
+def test_a_term_survives_its_own_text_and_a_process(text: str) -> None:
+    term = LearntTerm.from_yaml(text)
+    assert LearntTerm.from_yaml(term.to_yaml()) == term
+    assert pickle.loads(pickle.dumps(term.effect())).act(
+        Frame(Ship.example(), Scenario(speed_m_s=6.0), 0.0), 0.001, 0.1
+    )
+
+
+WRONG_FORMULAS = (
+    '0.5*rho*A*L**2*u**2*u_c*v',
+    '0.5*A*L**2*u**2*u_c',
+    'A*u_c',
+    'rho*g*nabla*A',
+    'rho*g*nabla*A/(u_c*sqrt(g*L) - u)*u',
+    'rho*g*nabla*A/(u - 3*u_c/u_c*sqrt(g*L)/sqrt(g*L)*u/u)',
+    'rho*g*nabla*A*exp(u*u_c)',
+    'rho*g*nabla*A*step(u - u_c*sqrt(g*L), 0*u)',
+    'rho*g*nabla*A*step(u - u_c*sqrt(g*L), u - u)',
+    'rho*g*nabla*A*sqrt(u_c - 0.5)*u/u',
+    'rho*g*nabla*A*u_c*t',
+    'rho*g*nabla*A*u_c*cos(psi)',
+    'rho*g*nabla*A*u_c*exp(50*u/sqrt(g*L)*50)',
+    'rho*g*nabla*A*u_c**(u/sqrt(g*L)*0 - 500)*u/u',
+    '__import__("os").system("touch /tmp/x")*A*u_c',
+    'A.__class__.__mro__[1].__subclasses__()',
+    'open("/etc/passwd").read()',
+    'eval("1")',
+    'exec("import os")',
+    '(lambda: A)()*u_c',
+    '[A for A in (1,)][0]*u_c',
+    'A if u_c else A',
+    '9**9**9**9*A*u_c',
+    'A' * 500,
+    '(' * 190 + 'A' + ')' * 190,
+    '',
+)
+WRONG: dict[str, tuple[Any, ...]] = {
+    'name': ('', 'Weed', '../weed', 'a b', 'fouling', 'x' * 61, 7, None, ['a'], 'weed\n',
+             '__init__'),
+    'term.channel': ('thrust', 'log', 'water', 'ground', 'inertia', '', 1, None),
+    'term.scope': ('world', '', 0, None, 'Hull'),
+    'term.variable': ('depth', 'wind', 'shaft', 'mood', '', 3, None, 'time', 'heading'),
+    'term.shape': ('wiggle', '', None, 5),
+    'term.valid': ({}, {'u': [7.9, 1.1]}, {'u': [1.1]}, {'u': [1.0, 2.0, 3.0]}, {'v': [0, 1]},
+                   {'u': [-1, 3]}, {'u': [0, math.inf]}, {'u': [0, math.nan]}, {'u': 'all'},
+                   [0, 1], None, {'u': [0, 1e9]}, {'u': [True, 2]}),
+    'term.expression': WRONG_FORMULAS,
+    'parameters.A.value': (math.nan, math.inf, -math.inf, 1e300, 10**400, '1', True, None, [1]),
+    'parameters.A.sd': (-1.0, math.nan, math.inf, '0', None, 1e300),
+    'parameters.A.unit': ('m', 'kg', 'parsec', '', 2, True, None, 's'),
+    'parameters.u_c.value': (math.nan, '0.1', None, 1e300),
+    'parameters.u_c.unit': ('m/s', 'm2', 'N', 'x'),
+    'parameters': ({}, None, [], 'A', {'A': {'value': 1, 'sd': 0}}, {'rho': {'value': 1, 'sd': 0}},
+                   {f'p{k}': {'value': 1, 'sd': 0} for k in range(7)}),
+    'covariance': ([[1.0]], [[1, 2], [3, 4]], [[1, 2, 3], [1, 2, 3]], 'x', [[-1, 0], [0, 1]],
+                   [[1, 9], [9, 1]], [[math.nan, 0], [0, 1]], [[1, 0]]),
+    'looks_like': ('all', [1], ['x' * 200], 3),
+    'limits': ({'z': {'upper_95': 1}}, {'A': 1}, {'A': {'upper_95': math.inf}}, [1]),
+    'evidence': ({}, {'runs': 1}, 'much', {'runs': [], 'over_nothing': math.nan, 'over_smooth': 1,
+                 'halves_agree': True, 'held_out_gap_cut': 0.5},
+                 {'runs': [], 'over_nothing': 1, 'over_smooth': 1, 'halves_agree': 'yes',
+                  'held_out_gap_cut': 0.5},
+                 {'runs': [], 'over_nothing': 1, 'over_smooth': 1, 'halves_agree': True,
+                  'held_out_gap_cut': 2.0}),
+}  # fmt: skip
+
+
+def cases() -> Iterator[tuple[str, Any]]:
+    """Yield keys, each with a value that must not pass; then keys that are missing."""
+    for key, values in WRONG.items():
+        yield from ((key, value) for value in values)
+
+
+HOSTILE_TEXTS = (
+    '', 'null', '[]', '7', 'a: [', '\t', '!!python/object/apply:os.system ["true"]',
+    'a: &x [1]\nb: *x', '%YAML 9.9\n---\n{}', '---\na: 1\n---\nb: 2', '{' * 500, '- ' * 5000,
+    'a: 1\na: 2', 'x' * 2_000_000, '\x00', 'name: weed\nname: weed',
+    '!!binary "aGVsbG8="', '!!set {a, b}', '? [a]\n: b', 'name: !!str weed',
+)  # fmt: skip
+
+
+def test_two_hundred_wrong_files_are_refused() -> None:
+    count = 0
+    for key, value in cases():
+        whole: Any = copy.deepcopy(plain(WEED))
+        *path, last = key.split('.')
+        place = whole
+        for part in path:
+            place = place[part]
+        place[last] = value
+        refused(whole)
+        count += 1
+        # an unknown key beside it, or nothing at all in its place
+        place[last + 'x'] = place.pop(last)
+        refused(whole)
+        count += 1
+    for text in HOSTILE_TEXTS:
+        with pytest.raises(EffectFileError):
+            LearntTerm.from_yaml(text)
+        count += 1
+    assert count >= 200
+
+
+def test_nothing_is_executed(tmp_path: Path) -> None:
+    mark = tmp_path / 'mark'
+    for formula in (
+        f'__import__("pathlib").Path("{mark}").touch()',
+        f'open("{mark}", "w")',
+        f'exec("open(\\"{mark}\\", \\"w\\")")',
+    ):
+        whole = plain(WEED)
+        whole['term']['expression'] = formula
+        refused(whole)
+    assert not mark.exists()
+
+
+PLAIN = st.recursive(
+    st.one_of(st.none(), st.booleans(), st.floats(), st.integers(), st.text(max_size=20)),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=8), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+@given(
+    key=st.sampled_from(['name', 'term', 'parameters', 'covariance', 'evidence', 'limits']),
+    value=PLAIN,
+)
+@settings(max_examples=200, deadline=None)
+def test_any_value_of_a_key_passes_or_is_a_plain_error(key: str, value: Any) -> None:
+    import io
+
+    whole = plain(WEED) | {key: value}
+    stream = io.StringIO()
+    YAML(typ='safe').dump(whole, stream)
+    try:
+        term = LearntTerm.from_yaml(stream.getvalue())
+    except EffectFileError:
+        return
+    assert np.isfinite(term.force_n(Ship.example(), 0.0, (0.001, 0.09), np.array([2.0]))).all()
+
+
+def test_a_cut_or_turned_file_passes_or_is_a_plain_error() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(300):
+        letters = list(WEED)
+        for _ in range(int(rng.integers(1, 6))):
+            letters[int(rng.integers(len(letters)))] = chr(int(rng.integers(32, 127)))
+        text = ''.join(letters)[: int(rng.integers(50, len(letters) + 1))]
+        try:
+            LearntTerm.from_yaml(text)
+        except EffectFileError:
+            continue
