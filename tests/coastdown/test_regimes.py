@@ -51,12 +51,13 @@ def of(kind, events):
 
 @pytest.mark.parametrize(
     ('sensors', 'within_s'),
-    [((LOG,), 20.0), ((LOG, SHAFT), 15.0), ((TRACK, COMPASS), 30.0), ((LOG, TRACK), 20.0)],
+    [((LOG,), 20.0), ((LOG, SHAFT), 25.0), ((TRACK, COMPASS), 30.0), ((LOG, TRACK), 25.0)],
 )
 @pytest.mark.parametrize('seed', [1, 2])
 def test_a_coastdown_is_found_and_dated(ship, record, sensors, within_s, seed) -> None:
     block = record(sensors=sensors, seed=seed)
     (ended,) = [each for each in of(EndedCoastdown, events_of(ship, block)) if not each.withdrawn]
+    # the thrust falls as exp(-t / 8 s): a twentieth is left after 24 s
     assert abs(ended.start_ns - START_NS - 900 * S) < within_s * S
     assert ended.end_ns > START_NS + 1700 * S
     assert ended.estimate is not None
