@@ -309,6 +309,6 @@ def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
     ship = Ship.example()
     for which in (ship, replace(ship, baseline=None)):
         for name, chance, scales, size in _hulls(which):
-            friction, wave = (f'{mean:g} ± {sd:.2g}' for mean, sd in scales)
+            friction, wave = (f'{mean + 0.0:g} ± {sd:.2g}' for mean, sd in scales)
             beside = name if which.baseline is not None else f'{name}, no baseline'
             yield beside, chance, friction, wave, f'{size:.2g}'
