@@ -323,7 +323,7 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
         )
     chance = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
     for more, (size, part) in product(priors.LOG_UNIFORM, priors.HALF_NORMAL):
-        of_wave = -with_it * more, math.hypot(with_it * more, sds[1])
+        of_wave = 0.0 - with_it * more, math.hypot(with_it * more, sds[1])
         scales = ((more, math.hypot(more, sds[0])), of_wave)
         shape = math.hypot(size * unsure, priors.SHAPE_OF_MORE.mean * more)
         yield _Hull(priors.FRICTION_ALONE, chance * part, scales, shape)
