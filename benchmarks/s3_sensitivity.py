@@ -48,17 +48,14 @@ from shipdrag_ros.studies.sensitivity.coasting import CoastStudy, study_coast
 from shipdrag_ros.studies.sensitivity.face import coasting as coasting_words
 from shipdrag_ros.studies.sensitivity.face import pictures as sensitivity_pictures
 from shipdrag_ros.studies.sensitivity.face import steering as steering_words
-from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm, partial_contribution
+from shipdrag_ros.studies.sensitivity.loss import CHANGES, Losses, Norm
 from shipdrag_ros.studies.sensitivity.steering import (
     APPROACH_S,
-    DESIGN,
-    TINY,
     Experiment,
     Observations,
     SteeringStudy,
     experiment,
     respond,
-    respond_by_groups,
     study,
 )
 
@@ -208,63 +205,6 @@ def observations() -> Table:
     return Table(heads, tuple(rows))
 
 
-def numbers_kept() -> Table:
-    """
-    Show how close a reduced model comes, by how many numbers it keeps.
-    """
-    rows = []
-    for keep in (16, 20, 22, 24, 26, 28, 30, 34):
-        found = study(SHIP, PAPER, keep=keep)
-        rows.append((str(keep), *_checked(found)))
-    heads = (
-        'derivatives',
-        'measurements',
-        'overshoots [deg]',
-        'rms heading [deg]',
-        'derivatives of as many measurements',
-        'overshoots [deg]',
-        'rms heading [deg]',
-    )
-    return Table(heads, tuple(rows))
-
-
-def _checked(found: SteeringStudy) -> list[str]:
-    cells = [str(found.independent)]
-    for place, check in enumerate((found.check, found.group_check)):
-        if place:
-            cells.append(str(len(found.group_derivatives)))
-        over = np.degrees(check.overshoots_rad[1])
-        cells.append(' / '.join(f'{value:.2f}' for value in over) or '-')
-        cells.append(f'{np.degrees(check.rms_difference["heading_rad"]):.1f}')
-    return cells
-
-
-def sets_of_manoeuvres() -> Table:
-    """
-    Show how much of a trace is its own in several manoeuvres, by derivative and by measurement.
-    """
-    chosen = (
-        (zigzag(15.0),),
-        (zigzag(35.0),),
-        (zigzag(5.0), zigzag(35.0)),
-        (zigzag(5.0), zigzag(35.0), turn(20.0)),
-        DESIGN,
-    )
-    rows = []
-    for manoeuvres in chosen:
-        shares = [
-            partial_contribution(
-                np.hstack([ask(SHIP, one, changes=TINY).slopes() for one in manoeuvres])
-            )
-            for ask in (respond, respond_by_groups)
-        ]
-        name = 'all nine' if manoeuvres is DESIGN else ', '.join(one.name for one in manoeuvres)
-        figures = [f'{value:.2%}' for each in shares for value in (np.median(each), each.min())]
-        rows.append((name, *figures))
-    heads = ('', 'of 40 derivatives: median', 'least', 'of 26 measurements: median', 'least')
-    return Table(heads, tuple(rows))
-
-
 def surge() -> list[tuple[str, Float64]]:
     """
     Return the surge speed after changes of Xu, the paper's figure 1.
@@ -407,11 +347,7 @@ def page(
         '![25/25 zigzag of the full and of the reduced models](pictures/s3_check.png)',
         '',
         'The reduced 24 keep the form of the motion and lose its timing, a little more with every '
-        'turn. A mean loss ranks derivatives one by one; what several',
-        'small ones do together it does not know, so that more of them is not always closer. '
-        'For as many measurements the groups are closer up to 19, and alike from 20 on:',
-        '',
-        *lines_of(numbers_kept()),
+        'turn.',
         '',
         '## Which manoeuvre to sail',
         '',
@@ -425,11 +361,6 @@ def page(
         'A sensitive derivative is thus not yet one that a',
         'trial identifies, as the paper hopes (after Rhee and Kim); the multiples are, for good '
         'reason, stated and not fitted.',
-        '',
-        'A gentle and a hard zigzag with the multiples tied show more than all nine without; '
-        'partial contributions:',
-        '',
-        *lines_of(sets_of_manoeuvres()),
         '',
         '![Loss of each derivative in each manoeuvre](pictures/s3_design.png)',
         '',

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where results and logs go: one to stdout, the other to stderr, never mixed."""
+"""Where results and logs go: one to stdout, the other and all progress to stderr, never mixed."""
 
 from __future__ import annotations
 

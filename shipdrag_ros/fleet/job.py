@@ -3,7 +3,8 @@
 One bag to its rows: replayed, and each coastdown diagnosed by itself.
 
 What a worker does. The rows depend on the bag and on what lies beside it alone,
-so that it does not matter which worker makes them, or how often.
+so that it does not matter which worker makes them, or how often. Its files
+are fetched to the disk of the worker.
 """
 
 from __future__ import annotations

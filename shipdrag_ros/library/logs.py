@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Logs, tables and frames made runs; what belongs together is joined."""
+"""Logs, tables and frames (of pandas, polars, others) made runs; files of one ship are joined."""
 
 from __future__ import annotations
 

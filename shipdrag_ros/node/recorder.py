@@ -4,7 +4,7 @@ Recording while the node runs: what came in, what went out, in that order.
 
 A thread writes; here nothing waits for a disk, so that one that is slow, full
 or gone stops no estimate. What was not written is counted. Another thread removes
-old recordings.
+old recordings. The latest messages are kept for a recording that starts later.
 """
 
 from __future__ import annotations

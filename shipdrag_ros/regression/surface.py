@@ -3,7 +3,10 @@
 Polynomial surfaces whose degree the data choose.
 
 S5 raises the degree while the error falls substantially; that is the plateau
-of S1 in other words, so its table and its rule serve here too.
+of S1 in other words, so its table and its rule serve here too. A fit is
+not used outside the data; inside the range of each input is not enough: of long ships
+with much beam and short ones with little, neither long and narrow nor short and wide are
+known.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a format of log files declares: how it is recognised, read and shown."""
+"""What a format of log files declares: how it is recognised, read and shown, and its options."""
 
 from __future__ import annotations
 

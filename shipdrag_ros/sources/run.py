@@ -3,7 +3,9 @@
 A log as a run: what was read of a file is replayed as a bag of it would be.
 
 Its samples are encoded and decoded again, some at a time, as those of a bag are,
-so that both give the same to the last bit and a `--remap` means the same.
+so that both give the same to the last bit and a `--remap` means the same. Several
+files of one ship are one run; a ship is nowhere twice at one time: logs that say so are
+of two, and refused.
 """
 
 from __future__ import annotations

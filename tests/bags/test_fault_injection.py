@@ -244,7 +244,7 @@ def test_a_bit_flipped_in_every_kind_of_record(
     rng = random.Random(1)
     for record in _each_kind(sample):
         # opcode, low, middle and high byte of the length, content
-        places = [0, 1, 4, 8, *(rng.randrange(9, record.end - record.offset) for _ in range(6))]
+        places = [0, 1, 4, 8, *(rng.randrange(9, record.end - record.offset) for _ in range(3))]
         for place in places:
             bit = rng.randrange(8)
             content = bytearray(sample.content)

@@ -3,7 +3,8 @@
 A regression of residual resistance on shape, and the guard over it.
 
 S4 shows that such regressions meet the hulls they were made from and mislead
-for all others. So what leaves here says where it may be used.
+for all others. So what leaves here says where it may be used. The
+published forms of the coefficient stand first.
 """
 
 from __future__ import annotations

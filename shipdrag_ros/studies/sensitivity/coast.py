@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A coastdown as its instruments read it, in their standard deviations."""
+"""A coastdown as its instruments read it, in their sds; values of a ship file to change."""
 
 from __future__ import annotations
 
