@@ -324,8 +324,7 @@ class _Judged:
         for which in (0, 1):
             half = self.case.half(which, self.progress)
             mine = [fit.log_evidence for fit in half.found.fitted if fit.names == best]
-            # alone: what is the form and more beside it does not speak against it
-            top = max(fit.log_evidence for fit in half.found.fitted if _is_alone(fit))
+            top = max(fit.log_evidence for fit in half.found.fitted)
             if not mine or max(mine) - top < _HALF:
                 names = ', '.join(run.name for run in half.seen)
                 return False, (
@@ -417,10 +416,6 @@ class _Judged:
                 'what goes by the time does not'
             )
         return 'a further run, from another speed and on another heading'
-
-
-def _is_alone(fit: Fitted) -> bool:
-    return len(fit.hypothesis.names) + bool(fit.hypothesis.smooth) < 2
 
 
 def _names(case: _LearningCase) -> set[str]:
