@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from shipdrag_ros.errors import ShipdragError
     from shipdrag_ros.library.diagnosis import Diagnosis, diagnose
+    from shipdrag_ros.library.learning import learn
     from shipdrag_ros.library.reading import read
     from shipdrag_ros.library.record import Coastdown, Record
     from shipdrag_ros.library.resistance import Resistance, estimate
@@ -41,6 +42,7 @@ __all__ = [
     'Trends',
     'diagnose',
     'estimate',
+    'learn',
     'read',
     'simulate',
     'trends',
@@ -57,6 +59,7 @@ _HOME = {
     'Trends': 'library.trends',
     'diagnose': 'library.diagnosis',
     'estimate': 'library.resistance',
+    'learn': 'library.learning',
     'read': 'library.reading',
     'simulate': 'library.simulated',
     'trends': 'library.trends',

@@ -30,7 +30,7 @@ PICTURE = (
     ('estimation',),
     ('forecast',),
     ('coastdown', 'diagnosis', 'studies'),
-    ('learn',),
+    ('learning',),
     ('messages',),
     ('bags', 'nmea'),
     ('node', 'replay', 'sources'),

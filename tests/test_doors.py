@@ -41,6 +41,7 @@ DOORS = (
     ('library.resistance', 'estimate'),
     ('library.diagnosis', 'Diagnosis'),
     ('library.diagnosis', 'diagnose'),
+    ('library.learning', 'learn'),
     ('library.simulated', 'simulate'),
     ('library.trends', 'Trends'),
     ('library.trends', 'trends'),

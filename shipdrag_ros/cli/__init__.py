@@ -54,6 +54,7 @@ _OWN = (
         '.diagnose',
         'where model and data disagree, and which effect is missing',
     ),
+    Verb('learn', '.learn', 'an effect that has no name, learnt from several runs of one ship'),
     Verb('effect', '.effect', 'files of learnt effects: what is in them, and may they be used'),
     Verb('forecast', '.forecast', 'the rest of each glide foretold, beside what followed'),
     Verb('fleet', '.fleet', 'replay and diagnose every bag below folders, one row a coastdown'),
@@ -139,7 +140,7 @@ def _run(line: list[str]) -> int:
 def _more_effects(folders: Sequence[Path]) -> AbstractContextManager[None]:
     if not folders:
         return nullcontext()
-    from shipdrag_ros.learn.folder import read_folders, using
+    from shipdrag_ros.learning.folder import read_folders, using
 
     return using(read_folders(folders))
 

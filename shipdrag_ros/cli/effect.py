@@ -9,7 +9,7 @@ from pathlib import Path
 from shipdrag_ros.cli.arguments import add_effects, add_json
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
-from shipdrag_ros.learn.term import OWN, LearntTerm
+from shipdrag_ros.learning.term import OWN, LearntTerm
 from shipdrag_ros.simulation.effects import LIBRARY
 
 

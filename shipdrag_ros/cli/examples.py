@@ -38,6 +38,10 @@ EXAMPLES = {
         'shipdrag diagnose out.mcap back.mcap --report diagnosis.html --write ship_now.yaml',
         'shipdrag diagnose run.mcap --ship ship.yaml --window 600 1800',
     ),
+    'learn': (
+        'shipdrag learn out.mcap back.mcap -o weed.yaml --name weed_2 --report learnt.html',
+        'shipdrag learn clean_1.mcap clean_2.mcap --ship ship.yaml -o new.yaml --json learnt.json',
+    ),
     'effect': (
         'shipdrag effect check effects/weed.yaml',
         'shipdrag effect list --effects effects',

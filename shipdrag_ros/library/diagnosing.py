@@ -187,6 +187,8 @@ def coasts_of(
     runs: Sequence[WindowedRun],
     given: Ship | None,
     progress: Progress = silent,
+    *,
+    whole: bool = False,
 ) -> tuple[list[CoastRun], Ship, Parameters]:
     """
     Find the coastdowns of all bags.
@@ -201,6 +203,8 @@ def coasts_of(
         The ship; None: the one attached to the first run.
     progress
         Called with each stage, how much of it is done, and of how much.
+    whole
+        Whether parts of a glide count that are no coastdown, though no instrument shows why.
 
     Returns
     -------
@@ -213,14 +217,14 @@ def coasts_of(
         If there is none.
     """
     seen = _found(listener, runs, given, progress)
-    if not seen.coasts:
+    if not (seen.coasts or (whole and seen.whole)):
         raise DiagnosisError(
             f'no coastdown was found {"; ".join(seen.without)}. Give a record in which the engine '
             'was stopped after steady sailing'
         )
     for each in seen.without:
         listener.log(f'no coastdown was found {each}')
-    return seen.coasts, seen.ship, seen.parameters
+    return (seen.whole if whole and seen.whole else seen.coasts), seen.ship, seen.parameters
 
 
 @dataclass(frozen=True)

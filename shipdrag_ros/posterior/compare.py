@@ -300,6 +300,15 @@ class Comparing:
         every += self._weigh(self._beside(every))
         return ComparedHypotheses(self.runs, self.effects, tuple(every))
 
+    def promising(self, most: int) -> list[str]:
+        """
+        Return names of the effects that explain most by the linear response, the best first.
+        """
+        ways = [way for each in self.ways.values() for way in each]
+        scores, _, _ = self._score(self.fit_nothing(), ways)
+        names = [ways[i].effect.name for i in np.argsort(-scores).tolist()]
+        return list(dict.fromkeys(names))[:most]
+
     def fit_nothing(self) -> Fitted:
         """Fit the runs with nothing missing, under usual noise."""
         self.noise = [self._usual(j) for j in range(len(self.runs.runs))]

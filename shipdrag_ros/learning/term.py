@@ -11,8 +11,8 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, dataclass, field
 from enum import StrEnum, auto
 from functools import cached_property, partial
 from os import PathLike
@@ -38,7 +38,7 @@ from shipdrag_ros.fields import (
     text,
     text_of,
 )
-from shipdrag_ros.learn.expression import (
+from shipdrag_ros.learning.expression import (
     PURE,
     Formula,
     FormulaError,
@@ -113,6 +113,7 @@ _KNOTS = 24  # of a force in time: straight between them
 _FOR_EVER_S = 1e7
 _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
 _ALIKE = 1e-6  # relative
+_ROUNDING = 1e-3  # of correlations in a text
 
 
 def _unit() -> Kind:
@@ -206,7 +207,7 @@ class LearntTerm:
 
     Examples
     --------
-    >>> from shipdrag_ros.learn.term import LearntTerm
+    >>> from shipdrag_ros.learning.term import LearntTerm
     >>> term = LearntTerm.from_yaml('''
     ... name: weed
     ... term: {channel: force, scope: hull, variable: speed, shape: step,
@@ -436,11 +437,7 @@ def _problems(term: LearntTerm) -> list[str]:
 
 def _plain_problems(term: LearntTerm) -> list[str]:
     """Return what is wrong beside the formula."""
-    found = []
-    if not _NAME.fullmatch(term.name):
-        found.append(f'name: {term.name[:60]!r}, expected small letters, digits and _')
-    if term.name in OWN:
-        found.append(f'name: {term.name!r} is an effect of the library; give it another')
+    found = list(_name_problems(term.name))
     count = len(term.parameters)
     if not 1 <= count <= MOST_PARAMETERS:
         found.append(f'parameters: {count} of them, expected 1..{MOST_PARAMETERS}')
@@ -457,7 +454,7 @@ def _plain_problems(term: LearntTerm) -> list[str]:
         matrix = np.array(term.covariance)
         if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=0.0):
             found.append('covariance: not symmetric')
-        elif np.linalg.eigvalsh(matrix).min() < -1e-9 * max(np.abs(matrix).max(), 1e-300):
+        elif not _is_covariance(matrix):
             found.append('covariance: no covariance, as a variance of it is negative')
     unknown = [name for name in term.limits or {} if name not in term.parameters]
     if unknown:
@@ -467,6 +464,37 @@ def _plain_problems(term: LearntTerm) -> list[str]:
     if any(len(each) > 100 for each in (*term.looks_like, *(term.evidence or _NONE).runs)):
         found.append('looks_like, evidence.runs: a text of more than 100 characters')
     return found
+
+
+def _is_covariance(matrix: Float64) -> bool:
+    """Say whether no variance of a sum is negative, by more than rounding of a text."""
+    variance = np.diag(matrix)
+    if np.any(variance < 0.0) or np.any(matrix[variance == 0.0] != 0.0):
+        return False
+    scale = 1.0 / np.sqrt(np.where(variance > 0.0, variance, 1.0))
+    return bool(np.linalg.eigvalsh(matrix * np.outer(scale, scale)).min() > -_ROUNDING)
+
+
+def check_name(name: str) -> str:
+    """
+    Return a name that a term may have.
+
+    Raises
+    ------
+    EffectFileError
+        If it may not.
+    """
+    problems = list(_name_problems(name))
+    if problems:
+        raise EffectFileError(name[:60], problems)
+    return name
+
+
+def _name_problems(name: str) -> Iterator[str]:
+    if not _NAME.fullmatch(name):
+        yield f'name: {name[:60]!r}, expected small letters, digits and _'
+    if name in OWN:
+        yield f'name: {name!r} is an effect of the library; give it another'
 
 
 _NONE = TermEvidence((), 0.0, 0.0, False, 0.0)
@@ -530,10 +558,3 @@ def _refuse_mixed(term: LearntTerm) -> None:
         worth = np.broadcast_to(worth, speed.shape)
         if np.ptp(worth) > _ALIKE * np.abs(worth).max():
             raise FormulaError('goes by time, and is not u**2 times a function of t alone')
-
-
-def renamed(term: LearntTerm, name: str) -> LearntTerm:
-    """
-    Return the same term under another name.
-    """
-    return replace(term, name=name)

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 
 from shipdrag_ros.errors import EffectFileError
-from shipdrag_ros.learn.term import LearntTerm
+from shipdrag_ros.learning.term import LearntTerm
 from shipdrag_ros.simulation.effects import added
 
 MOST_FILES = 200
@@ -40,7 +40,7 @@ def using(terms: Sequence[LearntTerm]) -> AbstractContextManager[None]:
 
     Examples
     --------
-    >>> from shipdrag_ros.learn.folder import using
+    >>> from shipdrag_ros.learning.folder import using
     >>> with using([]):
     ...     pass
     """

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.errors import EffectFileError, SimulationError
-from shipdrag_ros.learn.folder import read_folders, using
+from shipdrag_ros.learning.folder import read_folders, using
 from shipdrag_ros.simulation.effects import LIBRARY
 
 WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'

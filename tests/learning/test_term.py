@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from shipdrag_ros.errors import EffectFileError
-from shipdrag_ros.learn.term import LearntTerm
+from shipdrag_ros.learning.term import LearntTerm
 from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation import Scenario, simulate
 from shipdrag_ros.simulation.effect import Frame
@@ -97,7 +97,7 @@ def test_a_force_of_the_earth_turns_with_the_heading() -> None:
 
 
 def test_more_of_it_slows_the_ship_more() -> None:
-    from shipdrag_ros.learn.folder import using
+    from shipdrag_ros.learning.folder import using
     from shipdrag_ros.simulation.effects import LIBRARY, parse
 
     ship, terms = Ship.example(), [LearntTerm.from_yaml(WEED), LearntTerm.from_yaml(FADING)]

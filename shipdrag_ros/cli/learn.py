@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`shipdrag learn`: an effect that has no name, learnt from several runs of one ship."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from shipdrag_ros.cli.arguments import add_effects, add_json, add_remap, add_report, unused_file
+from shipdrag_ros.cli.output import Output, stages
+from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
+from shipdrag_ros.imports import need
+from shipdrag_ros.learning import words
+from shipdrag_ros.learning.term import check_name
+from shipdrag_ros.library.learning import learn_from
+from shipdrag_ros.ship import Ship
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """
+    Add the arguments of the verb.
+    """
+    parser.description = (
+        'Look for one form, of a force by speed, time or heading, that explains what several '
+        'coastdowns of one ship share and the library has no name for. It is written as a term '
+        'with units, which --effects takes, where the evidence of all runs is for it, beside '
+        'something smooth without a formula, and each half of the runs shows it. Else nothing is '
+        'written, and it is said what is known and which run would decide.'
+    )
+    parser.add_argument(
+        'bags',
+        nargs='+',
+        type=windowed_bag,
+        metavar='BAG_OR_STORE',
+        help=f'bag, or a store of `shipdrag fleet`, of which all bags are taken; {HELP}',
+    )
+    parser.add_argument(
+        '--ship',
+        type=Path,
+        metavar='FILE',
+        help='ship file with a baseline (default: the one attached to the first bag)',
+    )
+    parser.add_argument(
+        '-o',
+        '--out',
+        required=True,
+        type=unused_file('.yaml'),
+        metavar='FILE',
+        help='file of the effect, where one is learnt; an existing one is not overwritten',
+    )
+    parser.add_argument(
+        '--name',
+        metavar='NAME',
+        help='what the effect is called, small letters, digits and _ (default: that of the file)',
+    )
+    add_report(parser, of='result')
+    add_effects(parser)
+    add_remap(parser)
+    add_json(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """
+    Learn, and write what was learnt.
+    """
+    output = Output(options.json)
+    name = check_name(options.name or options.out.stem)
+    given = None if options.ship is None else Ship.load(options.ship)
+    bags = _bags(options.bags)
+    runs = open_windowed(bags, remap=dict(options.remap), output=output)
+    with stages(output) as progress:
+        found = learn_from(output, runs, given, name, progress)
+    output.say(words.sentence(found))
+    for line in words.lines(found):
+        output.say(line)
+    output.heading('How probable')
+    output.table(words.table(found))
+    if found.term is not None:
+        options.out.write_text(found.term.to_yaml(), encoding='utf-8')
+        output.log(f'effect in {options.out}')
+    else:
+        output.log(f'{options.out} is not written')
+    if options.report is not None:
+        words.write_report(options.report, found)
+        output.log(f'report in {options.report}')
+    output.json(words.document(found))
+    return 0
+
+
+def _bags(given: Sequence[WindowedBag]) -> list[WindowedBag]:
+    """Return bags, those of each store in its place."""
+    found: list[WindowedBag] = []
+    for each in given:
+        if not (each.path / 'coastdowns').is_dir():
+            found.append(each)
+            continue
+        need('pyarrow')
+        from shipdrag_ros.fleet.store import read_bags
+
+        rows = read_bags(each.path).to_pylist()
+        found += [
+            WindowedBag(Path(row['root'], row['bag']), None) for row in rows if row['coastdowns']
+        ]
+    return found

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+The forms that are tried: variable, curve and scope of a force, each a declared term.
+
+Sizes are pure numbers, times density, gravity, length and displaced volume, so that what is
+learnt carries to a sister. Where a curve turns is looked for among the speeds and times that the
+runs hold.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shipdrag_ros.learning.term import LearntTerm, TermForm, TermParameter
+from shipdrag_ros.parameter import Prior, Shape, either_sign, log_normal, normal
+from shipdrag_ros.posterior import priors
+from shipdrag_ros.posterior.effects import EffectWay, ways_of
+from shipdrag_ros.ship import GRAVITY_M_S2, Ship
+from shipdrag_ros.simulation.effect import Effect
+
+SMOOTH_OVER_FORM = 30.0
+"""Prior odds of something smooth without a formula, over each form."""
+_SIZE = either_sign(0.008, 1.0)  # of A: 3 to 40 % of the resistance of most hulls
+_TURNS_AT = (0.55, 0.45)  # share of the highest speed: median, sd of the logarithm
+_LASTS = (0.25, 0.8)  # share of the longest run: the same
+_NARROW, _BROAD = 0.03, 0.1  # widths of steps, shares of the same
+_HUMPS = (0.06, 0.12, 0.24)
+_SCAN = (-1.8, -1.35, -0.9, -0.45, 0.0, 0.45, 0.9, 1.35, 1.8)  # z where a curve may turn
+_WAYS_ROUND = ((1.0, 0.0), (0.7, 0.7), (0.05, 1.0), (-0.7, 0.7))  # z of two components
+_REFERENCE = 0.2  # Froude number at which A is of the same size whatever the power
+
+
+@dataclass(frozen=True)
+class Span:
+    """
+    What the runs hold.
+
+    Attributes
+    ----------
+    low_m_s, top_m_s
+        Speeds through water.
+    longest_s
+        Of a coastdown.
+    """
+
+    low_m_s: float
+    top_m_s: float
+    longest_s: float
+
+
+@dataclass(frozen=True)
+class LearnableForm:
+    """
+    One form.
+
+    Attributes
+    ----------
+    kind
+        Variable and shape: what a form is right or wrong in.
+    term
+        With sizes of what is expected, until it is fitted.
+    priors
+        Of its parameters.
+    """
+
+    kind: tuple[str, str]
+    term: LearntTerm
+    priors: tuple[Prior, ...]
+
+    def effect(self) -> Effect:
+        """
+        Return it as an effect that may be missing.
+        """
+        plain = self.term.effect()
+        parameters = tuple(
+            replace(q, prior=prior, low=-math.inf, high=math.inf)
+            for q, prior in zip(plain.parameters, self.priors, strict=True)
+        )
+        odds = priors.UNNAMED_ODDS / SMOOTH_OVER_FORM
+        return replace(plain, parameters=parameters, odds=odds)
+
+    def ways(self, ship: Ship, longest_s: float, runs: int) -> list[EffectWay]:
+        """
+        Return its ways, with a start wherever its curve may turn.
+        """
+        first: dict[object, EffectWay] = {}
+        for way in ways_of(self.effect(), ship, longest_s, runs):
+            first.setdefault(way.mode, way)
+        starts: list[tuple[float, ...]] = [(0.0, b, c) for b, c in _WAYS_ROUND]
+        if len(self.priors) == 1:
+            starts = [(z,) for z in _SCAN]
+        elif self.priors[1].shape is Shape.LOG_NORMAL:
+            starts = [(0.0, z) for z in _SCAN]
+        elif len(self.priors) == 2:
+            starts = list(_WAYS_ROUND)
+        return [replace(way, start=start) for way in first.values() for start in starts]
+
+
+def forms(ship: Ship, span: Span) -> tuple[LearnableForm, ...]:
+    """
+    Return all forms for some runs of a ship.
+    """
+    return tuple(
+        _form(number, ship, span, *each)
+        for number, each in enumerate(
+            (*_by_speed(ship, span), *_by_time(ship, span), *_by_heading())
+        )
+    )
+
+
+_Declared = tuple[str, str, str, dict[str, Prior]]
+
+
+def _form(
+    number: int,
+    ship: Ship,
+    span: Span,
+    variable: str,
+    shape: str,
+    expression: str,
+    parameters: dict[str, Prior],
+) -> LearnableForm:
+    valid = {'u': (round(span.low_m_s, 3), round(1.05 * span.top_m_s, 3))}
+    if variable == 'time':
+        valid['t'] = (0.0, round(1.05 * span.longest_s, 1))
+    term = LearntTerm(
+        name=f'form_{number}_{variable}_{shape}',
+        form=TermForm(
+            'force',
+            'earth' if variable == 'heading' else 'hull',
+            variable,
+            shape,
+            expression,
+            valid,
+        ),
+        parameters={name: TermParameter(prior.at(0.0), 0.0) for name, prior in parameters.items()},
+    )
+    return LearnableForm((variable, shape), term, tuple(parameters.values()))
+
+
+def _as_power(power: int) -> str:
+    """Return a force as a power of the speed, of one size at the reference."""
+    if power == 2:
+        return '0.5*rho*A*nabla**(2/3)*u**2'
+    head = f'0.5*rho*A*nabla**(2/3)*g*L*{_REFERENCE**2:g}'
+    return head if power == 0 else f'{head}*(u/({_REFERENCE:g}*sqrt(g*L)))**{power}'
+
+
+def _by_speed(ship: Ship, span: Span) -> Iterator[_Declared]:
+    root = math.sqrt(GRAVITY_M_S2 * ship.length_m)
+    top = span.top_m_s / root
+    size = {'A': _SIZE}
+    turns = size | {'u_c': log_normal(_TURNS_AT[0] * top, _TURNS_AT[1])}
+    for power in (0, 1, 3, 4, 6):
+        yield 'speed', 'constant' if power == 0 else 'power', _as_power(power), size
+    for power in (0, 2):
+        base = _as_power(power)
+        for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
+            for width in (_NARROW, _BROAD):
+                step = f'step({side}, {width * top:.3g}*sqrt(g*L))'
+                yield 'speed', 'step', f'{base}*{step}', turns
+        for width in _HUMPS:
+            away = f'((u - u_c*sqrt(g*L))/({width * top:.3g}*sqrt(g*L)))**2'
+            yield 'speed', 'hump', f'{base}*exp(-{away})', turns
+        yield 'speed', 'decay', f'{base}*exp(-u/(u_c*sqrt(g*L)))', turns
+    for side in ('u_c*sqrt(g*L) - u', 'u - u_c*sqrt(g*L)'):
+        for power in (1, 2):
+            ramp = f'(max({side}, 0*u)/({_REFERENCE:g}*sqrt(g*L)))**{power}'
+            yield 'speed', 'ramp', f'{_as_power(0)}*{ramp}', turns
+
+
+def _by_time(ship: Ship, span: Span) -> Iterator[_Declared]:
+    unit = math.sqrt(ship.length_m / GRAVITY_M_S2)
+    longest = span.longest_s / unit
+    lasts = {'A': _SIZE, 'tau': log_normal(_LASTS[0] * longest, _LASTS[1])}
+    base, tau = _as_power(2), 'tau*sqrt(L/g)'
+    yield 'time', 'decay', f'{base}*exp(-t/({tau}))', lasts
+    yield 'time', 'decay', f'{base}*(1 - exp(-t/({tau})))', lasts
+    yield 'time', 'ramp', f'{base}*min(t/({tau}), 1)', lasts
+    yield 'time', 'ramp', f'{base}*max(1 - t/({tau}), 0)', lasts
+    for side in (f't - {tau}', f'{tau} - t'):
+        for width in (_NARROW, _BROAD):
+            yield (
+                'time',
+                'step',
+                f'{base}*step({side}, {width * longest:.3g}*sqrt(L/g))',
+                lasts,
+            )
+    for width in _HUMPS:
+        away = f'((t - {tau})/({width * longest:.3g}*sqrt(L/g)))**2'
+        yield 'time', 'hump', f'{base}*exp(-{away})', lasts
+    for period in (0.15, 0.3, 0.6):
+        turn = f'{2.0 * np.pi / (period * longest):.4g}*t*sqrt(g/L)'
+        both = f'(A*cos({turn}) + B*sin({turn}))'
+        yield 'time', 'periodic', base.replace('A', both), _two()
+
+
+def _by_heading() -> Iterator[_Declared]:
+    both = '(A*cos(psi) + B*sin(psi))'
+    for power in (0, 1, 2):
+        yield 'heading', 'periodic', _as_power(power).replace('A', both), _two()
+    some = _as_power(2) + '*(1 + b*cos(psi) + c*sin(psi))'
+    yield 'heading', 'periodic', some, {'A': _SIZE, 'b': normal(0.7), 'c': normal(0.7)}
+
+
+def _two() -> dict[str, Prior]:
+    return {name: normal(1.2 * _SIZE.first) for name in 'AB'}

@@ -1,0 +1,450 @@
+# SPDX-License-Identifier: Apache-2.0
+"""
+From several runs of one ship to the effect that they share and nobody has a name for.
+
+Forms are hypotheses like the effects of the library, in the one posterior of docs/model.md, and
+something smooth without a formula stands beside them. A form is written where it holds the
+probability, and where each half of the runs shows it too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shipdrag_ros.diagnosis import CoastRun
+from shipdrag_ros.diagnosis.facts import stated_facts
+from shipdrag_ros.diagnosis.gaps import held_out, where
+from shipdrag_ros.diagnosis.observation import Observation
+from shipdrag_ros.diagnosis.result import Where
+from shipdrag_ros.diagnosis.sights import ship_runs
+from shipdrag_ros.errors import DiagnosisError, EstimationError
+from shipdrag_ros.inference.decision import CERTAIN, NONE, UNKNOWN, Names
+from shipdrag_ros.learning.forms import LearnableForm, Span, forms
+from shipdrag_ros.learning.term import LearntTerm, TermEvidence, TermLimit, TermParameter
+from shipdrag_ros.parameters import Parameters
+from shipdrag_ros.posterior.compare import ComparedHypotheses, Comparing, Fitted
+from shipdrag_ros.progress import Progress, silent
+from shipdrag_ros.samples import Float64
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation.effects import LIBRARY
+from shipdrag_ros.simulation.hydrodynamics import quadratic_n
+
+_FITTED = 16  # forms that are fitted: of each kind the best by the linear response, and more
+_HALF = math.log(1.0 / 3.0)  # least Bayes factor of a form in each half, against the best there
+_LEFT = 0.02  # probability of a form that is said to be left
+_LOOK_ALIKE = 3
+_LOOKS, _NEAR_S = 2, 4.0  # at runs, and by which a stop may move without another
+_UPPER = 1.645
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """
+    What was learnt of some runs.
+
+    Attributes
+    ----------
+    term
+        None where none may be written; then `reason` says why.
+    reason, next_run
+        Sentences; '' with a term.
+    probability
+        Of nothing, of the library's names, of something smooth, and of forms by variable and
+        shape; most probable first.
+    where
+        In which channel, when and at which speeds model and data disagree; None where they do
+        not.
+    largest_percent
+        Of the resistance at the highest speed, by the likeliest form; NaN without one.
+    runs
+        Names of the runs that were used.
+    notes
+        On those that were not, and on the way.
+    """
+
+    term: LearntTerm | None
+    reason: str
+    next_run: str
+    probability: dict[str, float]
+    where: Where | None
+    largest_percent: float
+    runs: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def learn(
+    runs: Sequence[CoastRun],
+    ship: Ship,
+    parameters: Parameters,
+    *,
+    name: str = 'learnt',
+    progress: Progress = silent,
+) -> Learnt:
+    """
+    Learn an effect from runs of one ship.
+
+    Parameters
+    ----------
+    runs
+        In the order in which they were made; each half of them, every second run, must show it.
+    ship
+        With a baseline; the effects of her file are part of the model.
+    parameters
+        For the noise of the sensors and the convention of the heading.
+    name
+        That a term is given.
+    progress
+        Called with each stage, how much of it is done, and of how much.
+
+    Returns
+    -------
+    Learnt
+        With a term, or with what is known without one.
+
+    Raises
+    ------
+    DiagnosisError
+        If the ship has no baseline, or no run enough steady record.
+
+    Notes
+    -----
+    Source: evidence of models, MacKay (2003), *Information Theory, Inference, and Learning
+    Algorithms*, chapter 28.
+    """
+    if ship.baseline is None:
+        raise DiagnosisError(
+            f'ship {ship.name!r} has no baseline, and what is learnt is what it lacks; add '
+            '`baseline` to her ship file, or learn one with `shipdrag baseline`'
+        )
+    seen, notes = _observed(runs, ship, parameters, {}, progress)
+    case = _LearningCase.of(runs, seen, ship, progress)
+    for _ in range(_LOOKS - 1):
+        moved = case.moved_s()
+        if all(abs(by_s) <= _NEAR_S for by_s in moved.values()):
+            break
+        seen, notes = _observed(runs, ship, parameters, moved, progress)
+        case = _LearningCase.of(runs, seen, ship, progress)
+    return _Judged(case, name, notes, progress).answer()
+
+
+def _observed(
+    runs: Sequence[CoastRun],
+    ship: Ship,
+    parameters: Parameters,
+    moved_s: dict[str, float],
+    progress: Progress,
+) -> tuple[list[Observation], tuple[str, ...]]:
+    """Return the runs that can be used, and why others cannot."""
+    seen, refused = [], {}
+    for done, run in enumerate(runs):
+        progress('learning the noise before the stop, of each run', done, len(runs))
+        try:
+            seen.append(
+                Observation.of(
+                    run.window,
+                    run.ship or ship,
+                    parameters,
+                    name=run.name,
+                    stop_moved_s=moved_s.get(run.name, 0.0),
+                )
+            )
+        except (DiagnosisError, EstimationError) as error:
+            refused[run.name] = error
+    if not seen:
+        which, why = next(iter(refused.items()))
+        raise DiagnosisError(f'{which}: {why}')
+    return seen, tuple(f'left out: {which}: {why}' for which, why in refused.items())
+
+
+@dataclass(frozen=True)
+class _LearningCase:
+    """Runs with forms and the library's effects compared."""
+
+    runs: tuple[CoastRun, ...]
+    seen: tuple[Observation, ...]
+    ship: Ship
+    forms: dict[str, LearnableForm]
+    comparing: Comparing
+    found: ComparedHypotheses
+
+    @classmethod
+    def of(
+        cls, runs: Sequence[CoastRun], seen: Sequence[Observation], ship: Ship, progress: Progress
+    ) -> _LearningCase:
+        top = max(run.speed_m_s for run in seen)
+        low = min(_slowest(run) for run in seen)
+        longest = max(run.duration_s for run in seen)
+        every = {form.term.name: form for form in forms(ship, Span(low, top, longest))}
+        progress('looking for forms', 0, 0)
+        order = _comparing(runs, seen, ship, every, library=False).promising(len(every))
+        first = {every[name].kind: name for name in reversed(order)}  # the best of each kind
+        chosen = dict.fromkeys((*first.values(), *order))
+        kept = {name: every[name] for name in list(chosen)[:_FITTED]}
+        return cls.compared(runs, seen, ship, kept, progress)
+
+    @classmethod
+    def compared(
+        cls,
+        runs: Sequence[CoastRun],
+        seen: Sequence[Observation],
+        ship: Ship,
+        kept: dict[str, LearnableForm],
+        progress: Progress,
+    ) -> _LearningCase:
+        progress('comparing forms', 0, 0)
+        comparing = _comparing(runs, seen, ship, kept, library=True)
+        return cls(tuple(runs), tuple(seen), ship, kept, comparing, comparing.compare())
+
+    def moved_s(self) -> dict[str, float]:
+        """Return by how much each stop is later than it is taken for."""
+        likeliest = max(self.found.fitted, key=lambda fit: fit.log_weight)
+        more_s = self.comparing.runs.stop_s(likeliest.at)
+        return {run.name: by_s for run, by_s in zip(self.seen, more_s, strict=True)}
+
+    def half(self, which: int, progress: Progress) -> _LearningCase:
+        """Return the same of every second run."""
+        return _LearningCase.compared(
+            self.runs, self.seen[which::2], self.ship, self.forms, progress
+        )
+
+    def is_form(self, names: Names) -> bool:
+        """Say whether a hypothesis is one form alone."""
+        return len(names) == 1 and names[0] in self.forms
+
+    def of_kind(self, names: Names) -> str:
+        """Return what a hypothesis is called: of forms, variable and shape."""
+        if names == NONE:
+            return 'nothing is missing'
+        if names == UNKNOWN:
+            return 'something smooth'
+        # a form is what it is, whatever of the library may be beside it
+        of_forms = {' '.join(self.forms[name].kind) for name in names if name in self.forms}
+        return ' and '.join(sorted(of_forms or names))
+
+
+def _comparing(
+    runs: Sequence[CoastRun],
+    seen: Sequence[Observation],
+    ship: Ship,
+    kept: dict[str, LearnableForm],
+    *,
+    library: bool,
+) -> Comparing:
+    """Return a comparison of forms, beside the library or not."""
+    own = [e for e in LIBRARY.values() if not e.missing(ship)] if library else []
+    effects = [*own, *(form.effect() for form in kept.values())]
+    facts_of = {run.name: run.facts for run in runs}
+    stops = [run.context.stop for run in seen]
+    at_ns = [stop.since_ns + round(stop.lead_in_s * 1e9) for stop in stops]
+    stated = [(facts_of[run.name], ns) for run, ns in zip(seen, at_ns, strict=True)]
+    known = stated_facts(ship, stated).log_likelihood
+    comparing = Comparing(ship_runs(seen, ship), ship, effects, known)
+    longest = max(run.duration_s for run in seen)
+    for name, form in kept.items():
+        comparing.ways[name] = form.ways(ship, longest, len(seen))
+    return comparing
+
+
+def _slowest(run: Observation) -> float:
+    """Return about the speed at the end."""
+    late = run.along.rows.value[run.along.rows.kind == run.along.rows.kind.min()][-5:]
+    if run.along.rows.kind.min() > 1:  # places alone
+        return 0.3 * run.speed_m_s
+    return max(float(np.median(late)), 0.05 * run.speed_m_s)
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """What is answered."""
+
+    case: _LearningCase
+    name: str
+    notes: tuple[str, ...]
+    progress: Progress
+
+    def answer(self) -> Learnt:
+        """Return a term, or why there is none."""
+        case = self.case
+        kinds: dict[str, float] = {}
+        for names, p in case.found.probability.items():
+            kind = case.of_kind(names)
+            kinds[kind] = kinds.get(kind, 0.0) + p
+        kinds = dict(sorted(kinds.items(), key=lambda each: -each[1]))
+        best = next((n for n in case.found.probability if case.is_form(n)), None)
+        reason = self._reason(kinds, best)
+        term = None
+        if not reason and best is not None:
+            agree, why = self._halves(best)
+            reason = '' if agree else why
+        if not reason and best is not None:
+            term = self._term(case.found.best[best], best[0])
+        return Learnt(
+            term,
+            reason,
+            '' if term else self._next_run(kinds),
+            kinds,
+            self._where(kinds),
+            math.nan if best is None else self._percent(best),
+            tuple(run.name for run in case.seen),
+            self.notes,
+        )
+
+    def _reason(self, kinds: dict[str, float], best: Names | None) -> str:
+        """Say why nothing may be written before the halves are looked at; '' where it may."""
+        first, probability = next(iter(kinds.items()))
+        count = len(self.case.seen)
+        if first == self.case.of_kind(NONE):
+            return f'nothing is missing in {count} run(s), probability {probability:.2f}'
+        by_name = math.fsum(
+            p
+            for names, p in self.case.found.probability.items()
+            if names not in (NONE, UNKNOWN) and not set(names) & set(self.case.forms)
+        )
+        if by_name > 0.5:
+            return (
+                f'{first} of the library explains it, probability {kinds[first]:.2f}; '
+                '`shipdrag diagnose` names it'
+            )
+        if count < 2:
+            return 'one run never tells forms apart'
+        if first == self.case.of_kind(UNKNOWN):
+            return f'something smooth explains it without a formula, probability {probability:.2f}'
+        if best is None or kinds[self.case.of_kind(best)] < CERTAIN:
+            left = ', '.join(kind for kind, p in kinds.items() if p > _LEFT)
+            return f'no form is certain; left are {left}'
+        return ''
+
+    def _halves(self, best: Names) -> tuple[bool, str]:
+        """Say whether each half of the runs shows a form."""
+        for which in (0, 1):
+            half = self.case.half(which, self.progress)
+            mine = [fit.log_evidence for fit in half.found.fitted if fit.names == best]
+            top = max(fit.log_evidence for fit in half.found.fitted)
+            if not mine or max(mine) - top < _HALF:
+                names = ', '.join(run.name for run in half.seen)
+                return False, (
+                    f'{self.case.of_kind(best)} explains all runs, and half of them ({names}) say '
+                    'otherwise'
+                )
+        return True, ''
+
+    def _term(self, fit: Fitted, name: str) -> LearntTerm:
+        """Return the form as it was fitted, with what it rests on."""
+        form, case = self.case.forms[name], self.case
+        values, covariance = _fitted(case.comparing, fit)
+        sds = np.sqrt(np.diag(covariance))
+        names = list(form.term.parameters)
+        alone = [f for f in case.found.fitted if not f.hypothesis.names]
+        evidence = {
+            other: max(f.log_evidence for f in alone if f.names == other)
+            for other in (NONE, UNKNOWN)
+        }
+        before = held_out(case.seen, case.comparing, case.comparing.as_stated)
+        after = held_out(case.seen, case.comparing, fit)
+        cut = -1.0
+        if before and after and before.rms_speed_m_s and after.rms_speed_m_s is not None:
+            cut = 1.0 - after.rms_speed_m_s / before.rms_speed_m_s
+        return replace(
+            form.term,
+            name=self.name,
+            parameters={
+                key: TermParameter(float(f'{value:.6g}'), float(f'{sd:.4g}'))
+                for key, value, sd in zip(names, values, sds, strict=True)
+            },
+            covariance=tuple(tuple(float(f'{x:.6g}') for x in row) for row in covariance),
+            evidence=TermEvidence(
+                tuple(_digest(run) for run in case.runs if run.name in _names(case)),
+                round(float(fit.log_evidence - evidence[NONE]), 1),
+                round(float(fit.log_evidence - evidence[UNKNOWN]), 1),
+                halves_agree=True,
+                held_out_gap_cut=round(float(cut), 3),
+            ),
+            looks_like=self._looks_like(),
+            limits={names[0]: TermLimit(float(f'{abs(values[0]) + _UPPER * sds[0]:.4g}'))},
+        )
+
+    def _looks_like(self) -> tuple[str, ...]:
+        """Return the effects of the library that come nearest."""
+        single = [
+            (fit.log_evidence, names[0])
+            for names, fit in self.case.found.best.items()
+            if len(names) == 1 and names != UNKNOWN and names[0] in LIBRARY
+        ]
+        return tuple(name for _, name in sorted(single, reverse=True)[:_LOOK_ALIKE])
+
+    def _where(self, kinds: dict[str, float]) -> Where | None:
+        if next(iter(kinds)) == self.case.of_kind(NONE):
+            return None
+        case = self.case
+        stated = case.comparing.as_stated
+        return where(case.seen, case.comparing, case.found, stated, of_force=False)
+
+    def _percent(self, best: Names) -> float:
+        """Return how large a form is, of the resistance, where it is largest."""
+        case, fit = self.case, self.case.found.best[best]
+        way = fit.hypothesis.ways[-1]
+        assert fit.z is not None
+        values = [q.prior.at(z) for q, z in zip(way.unknowns, fit.z[-len(way.unknowns) :])]
+        run = case.comparing.runs.runs[0]
+        speed = np.linspace(_slowest(case.seen[0]), case.seen[0].speed_m_s, 50)
+        action = way.effect.action(run.frame, *values)
+        force = action.resistance_n(speed)
+        if action.turns:  # one after the other
+            areas = np.cumsum([turn.drag_area_m2 for turn in action.turns])
+            density = case.ship.water.density_kg_m3
+            force = quadratic_n(density, float(np.abs(areas).max()), speed)
+        return float(100.0 * np.max(np.abs(force) / case.ship.resistance_n(speed)))
+
+    def _next_run(self, kinds: dict[str, float]) -> str:
+        """Say which run would decide."""
+        left = [kind for kind, p in kinds.items() if p > _LEFT]
+        variables = {word for kind in left for word in kind.split()} & {'speed', 'time', 'heading'}
+        speeds = {round(run.speed_m_s, 1) for run in self.case.seen}
+        if next(iter(kinds)) == self.case.of_kind(NONE):
+            return 'none: a diagnosis says how large an effect could still be'
+        if 'heading' in variables:
+            return 'a run on another heading, at a speed of one of these'
+        if len(variables) > 1 or len(self.case.seen) < 2:
+            used = ', '.join(f'{v:g}' for v in sorted(speeds))
+            return (
+                f'a run from another speed than {used} m/s: what goes by the speed stays there, '
+                'what goes by the time does not'
+            )
+        return 'a further run, from another speed and on another heading'
+
+
+def _names(case: _LearningCase) -> set[str]:
+    return {run.name for run in case.seen}
+
+
+def _fitted(comparing: Comparing, fit: Fitted) -> tuple[Float64, Float64]:
+    """Return values and covariance of the parameters of the last way of a fit."""
+    way = fit.hypothesis.ways[-1]
+    assert fit.z is not None
+    assert fit.sd is not None
+    count = len(way.unknowns)
+    z, sd = fit.z[-count:], fit.sd[-count:]
+    _, _, precision = comparing.prior_of(fit)
+    total = np.asarray(sum(comparing.equations(fit)), np.float64)[1:, 1:] + np.diag(precision)
+    scale = 1.0 / np.sqrt(np.diag(total))
+    inverse = np.linalg.inv(total * np.outer(scale, scale)) * np.outer(scale, scale)
+    first = comparing.runs.size + len(fit.hypothesis.unknowns) - count
+    own = inverse[first : first + count, first : first + count]
+    spread = np.sqrt(np.diag(own))
+    slopes = np.array([q.prior.slope(at) for q, at in zip(way.unknowns, z)]) * sd / spread
+    values = np.array([q.prior.at(at) for q, at in zip(way.unknowns, z)])
+    return values, own * np.outer(slopes, slopes)
+
+
+def _digest(run: CoastRun) -> str:
+    """Return what a run is known by: its readings."""
+    found = hashlib.sha256()
+    for series in (run.window.speed_through_water, run.window.position):
+        found.update(np.ascontiguousarray(series.time_ns).tobytes())
+        found.update(np.ascontiguousarray(series.value).tobytes())
+    return found.hexdigest()[:16]

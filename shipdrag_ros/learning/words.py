@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What was learnt, in words, as tables and as a document."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from shipdrag_ros.display import Section, Table
+from shipdrag_ros.fields import plain
+from shipdrag_ros.learning.search import Learnt
+from shipdrag_ros.report.document import write_page
+
+_SHOWN = 0.001  # probability of a line
+
+
+def sentence(found: Learnt) -> str:
+    """
+    Return what was learnt.
+    """
+    term = found.term
+    if term is None or term.evidence is None:
+        return f'Nothing is written: {found.reason}.'
+    form, rest = term.form, term.evidence
+    sizes = ', '.join(f'{key} {q.value:.3g} ± {q.sd:.2g}' for key, q in term.parameters.items())
+    return (
+        f'{term.name}: a {form.channel} by {form.variable} ({form.shape}), {sizes}, from '
+        f'{len(found.runs)} runs; {rest.held_out_gap_cut:.0%} of the gap of a run is gone that '
+        'it was not learnt on.'
+    )
+
+
+def lines(found: Learnt) -> list[str]:
+    """
+    Return what else is to be said.
+    """
+    said = list(found.notes)
+    if found.where is not None:
+        begin, end = found.where.time_s
+        low, high = found.where.speed_m_s
+        said.append(
+            f'Model and data disagree in the {found.where.channel}, {begin:.0f} to {end:.0f} s '
+            f'after the stop, at {low:.1f} to {high:.1f} m/s.'
+        )
+    if found.term is not None:
+        said.append(f'It is {found.term.form.expression} [N].')
+        if found.term.looks_like:
+            said.append(f'Effects that come nearest: {", ".join(found.term.looks_like)}.')
+    if math.isfinite(found.largest_percent):
+        said.append(
+            f'The likeliest form is up to {found.largest_percent:.0f} % of the resistance.'
+        )
+    if found.next_run:
+        said.append(f'What would decide: {found.next_run}.')
+    return said
+
+
+def table(found: Learnt) -> Table:
+    """
+    Return how probable each answer is.
+    """
+    return Table(
+        ('what explains the runs', 'probability'),
+        tuple((kind, f'{p:.3f}') for kind, p in found.probability.items() if p >= _SHOWN),
+    )
+
+
+def document(found: Learnt) -> dict[str, Any]:
+    """
+    Return it as plain data; `learnt` is None where nothing is written.
+    """
+    term = found.term
+    place = None
+    if found.where is not None:
+        place = {
+            'channel': found.where.channel,
+            'time_s': list(found.where.time_s),
+            'speed_m_s': list(found.where.speed_m_s),
+        }
+    return {
+        'learnt': None
+        if term is None
+        else {
+            'name': term.name,
+            'term': plain(term.form),
+            'parameters': plain(term.parameters),
+            'evidence': plain(term.evidence),
+        },
+        'reason': found.reason or None,
+        'next_run': found.next_run or None,
+        'probability': found.probability,
+        'where': place,
+        'largest_percent': found.largest_percent,
+        'runs': list(found.runs),
+        'notes': list(found.notes),
+    }
+
+
+def write_report(path: Path, found: Learnt) -> None:
+    """
+    Write it as a page; an existing one is replaced.
+    """
+    sections = [Section('What explains the runs', tables=(('', table(found)),), text=lines(found))]
+    write_page(path, 'Learnt effect', sections, sentence=sentence(found))

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What several runs share is learnt, written and known by its name; what is not, is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shipdrag_ros as sd
+from shipdrag_ros.learning import words
+from shipdrag_ros.learning.folder import using
+from shipdrag_ros.learning.search import Learnt
+from shipdrag_ros.learning.term import LearntTerm
+
+WEED = Path(__file__).resolve().parents[2] / 'docs' / 'data' / 'effects' / 'weed.yaml'
+# a sharp edge: a broad one looks like a hump about it
+HIDDEN = LearntTerm.from_yaml(WEED.read_text().replace('0.02*sqrt(g*L)', '0.006*sqrt(g*L)'))
+SIZES = {'A': 0.0004, 'u_c': 0.13}
+SHIP = sd.Ship.example()
+pytestmark = pytest.mark.timeout(900)  # a busy machine compares for minutes
+RUNS = ((7.0, 0.3), (6.6, -1.7), (6.0, 2.1), (6.2, 0.9))  # speed and heading of each
+
+
+def sailed(number: int, weed: bool) -> sd.Record:
+    """Return a run of a ship with weed that no library knows, or without."""
+    speed, heading = RUNS[number]
+    with using([HIDDEN]):
+        return sd.simulate(
+            SHIP,
+            {'weed': SIZES} if weed else {},
+            speed_m_s=speed,
+            heading_rad=heading,
+            lead_in_s=600.0,
+            duration_s=1500.0,
+            start=f'2026-06-{number + 1:02d}',
+            seed=number,
+        )
+
+
+@pytest.fixture(scope='module')
+def learnt() -> Learnt:
+    return sd.learn([sailed(number, True) for number in range(4)], ship=SHIP, name='kelp')
+
+
+def test_four_runs_show_the_form_and_its_size(learnt: Learnt) -> None:
+    term = learnt.term
+    assert term is not None, learnt.reason
+    assert (term.form.variable, term.form.shape) == ('speed', 'step')
+    values = tuple(each.value for each in term.parameters.values())
+    speed = np.linspace(1.5, 6.5, 60)
+    true = HIDDEN.force_n(SHIP, 0.0, tuple(SIZES.values()), speed)
+    found = term.force_n(SHIP, 0.0, values, speed)
+    # nine in ten of what it does to the ship are known
+    assert np.sqrt(np.mean((found - true) ** 2)) < 0.2 * np.sqrt(np.mean(true**2))
+
+
+def test_what_is_written_says_what_it_rests_on(learnt: Learnt) -> None:
+    assert learnt.term is not None
+    again = LearntTerm.from_yaml(learnt.term.to_yaml())
+    assert again == learnt.term
+    rest = again.evidence
+    assert rest is not None
+    assert len(set(rest.runs)) == 4
+    assert rest.halves_agree
+    assert rest.over_nothing > 3.0
+    assert rest.over_smooth > 0.0
+    assert rest.held_out_gap_cut > 0.3
+    assert 'kelp: a force by speed (step)' in words.sentence(learnt)
+    assert words.document(learnt)['learnt']['name'] == 'kelp'
+
+
+def test_a_later_run_is_named(learnt: Learnt) -> None:
+    assert learnt.term is not None
+    later = sailed(1, True)
+    with using([learnt.term]):
+        found = sd.diagnose(later, ship=SHIP)
+    assert [effect.name for effect in found.effects] == ['kelp']
+
+
+@pytest.mark.parametrize('count', [1, 2])
+def test_nothing_is_written_of_a_ship_that_lacks_nothing(count: int) -> None:
+    found = sd.learn([sailed(number, False) for number in range(count)], ship=SHIP)
+    assert found.term is None
+    assert 'nothing is missing' in found.reason
+    assert found.where is None
+
+
+def test_one_run_writes_nothing_and_says_what_would_decide(tmp_path: Path) -> None:
+    found = sd.learn(sailed(0, True), ship=SHIP)
+    assert found.term is None
+    assert 'one run' in found.reason
+    assert 'another speed' in found.next_run
+    assert found.where is not None
+    assert found.where.channel == 'force'
+    document = words.document(found)
+    assert document['learnt'] is None
+    assert document['next_run']
+    words.write_report(tmp_path / 'page.html', found)
+    assert 'Nothing is written' in (tmp_path / 'page.html').read_text()
+
+
+def test_what_the_library_names_is_not_learnt() -> None:
+    runs = [
+        sd.simulate(
+            SHIP,
+            {'fouling': 0.6},
+            speed_m_s=speed,
+            lead_in_s=600.0,
+            start=f'2026-06-{number + 1:02d}',
+            seed=number,
+        )
+        for number, (speed, _) in enumerate(RUNS[:2])
+    ]
+    found = sd.learn(runs, ship=SHIP)
+    assert found.term is None
+
+
+def test_a_ship_without_a_baseline_is_an_error() -> None:
+    from dataclasses import replace
+
+    with pytest.raises(sd.ShipdragError, match='no baseline'):
+        sd.learn(sailed(0, False), ship=replace(SHIP, baseline=None))
