@@ -145,7 +145,7 @@ class Score:
 
 
 def replay(
-    ship: Path, bag: Path, window: tuple[float, float] | None, estimator: str = 'auto'
+    ship: Path, bag: Path, window: tuple[float, float] | None, estimator: str = 'one'
 ) -> dict[str, Any]:
     """
     Replay a bag with the public command.
@@ -232,7 +232,7 @@ def chosen(world: World, half: str, hidden: str, first: int, count: int) -> list
 
 
 def scored(
-    world: World, numbers: Sequence[int], given: bool, estimator: str = 'auto'
+    world: World, numbers: Sequence[int], given: bool, estimator: str = 'one'
 ) -> Iterator[tuple[int, int, Score | None, str]]:
     """
     Yield case, run, score, and the error where the command failed.
@@ -320,7 +320,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument('--count', type=int, default=40, help='how many cases')
     parser.add_argument('--seed', type=int, default=cases_b.SEED, help='of world b')
     parser.add_argument('--given', action='store_true', help='the time of the stop is given')
-    parser.add_argument('--estimator', default='auto', help='the parameter of that name')
+    parser.add_argument('--estimator', default='one', help='the parameter of that name')
     parser.add_argument('--each', action='store_true', help='print each run')
     parser.add_argument('--out', type=Path, help='one line of JSON a run')
     options = parser.parse_args(arguments)

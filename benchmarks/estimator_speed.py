@@ -92,10 +92,10 @@ def whole(n: int) -> dict[str, Callable[[], object]]:
         return partial(method, window, plain.truth.ship, Parameters(estimator=estimator))
 
     return {
-        'live (log_time)': of('log_time', estimate, plain.window),
-        'live, steady record of 30 min': of('log_time', estimate, steady.window),
-        'final (motion)': of('auto', estimate_final, plain.window),
-        'final, steady record of 30 min': of('auto', estimate_final, steady.window),
+        'live': of('one', estimate, plain.window),
+        'live, steady record of 30 min': of('one', estimate, steady.window),
+        'final': of('one', estimate_final, plain.window),
+        'final, steady record of 30 min': of('one', estimate_final, steady.window),
         'S1 joint': of('s1_joint', estimate, plain.window),
     }
 

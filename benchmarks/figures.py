@@ -80,7 +80,7 @@ FIGURES = tuple(
         (
             'How long does an estimate take?',
             'estimator_speed',
-            rf'live \(log_time\){_THIRD}[\s\S]*?final \(motion\){_THIRD}',
+            rf'live{_THIRD}[\s\S]*?final{_THIRD}',
             '{0} during a coastdown, {1} after it',
         ),
         (

@@ -92,7 +92,7 @@ def main() -> None:
     parser.add_argument('--first', type=int, default=539)
     parser.add_argument('--count', type=int, default=30)
     parser.add_argument('--seed', type=int, default=31)
-    parser.add_argument('--estimator', default='auto')
+    parser.add_argument('--estimator', default='one')
     parser.add_argument('--write', action='store_true', help='into docs/forecast.md')
     options = parser.parse_args()
     world = World.a() if options.world == 'a' else World.b(options.seed)

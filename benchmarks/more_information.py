@@ -24,7 +24,7 @@ from rich.console import Console
 from rich.progress import track
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, ode_fit
+from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.estimation.reciprocal import combine
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Channel, Float64
@@ -85,8 +85,8 @@ def scores(number: int, seed: int) -> Float64:
             for count in (1, 2, 3)
         ]
 
-    found = [ode_fit.estimate(each, ship, Parameters()) for each in windows(0)]
-    second = ode_fit.estimate(windows(1)[-1], ship, Parameters())
+    found = [estimate_final(each, ship, Parameters()) for each in windows(0)]
+    second = estimate_final(windows(1)[-1], ship, Parameters())
     both = combine([found[-1], second], [0.0, math.pi])
     curves: list[Curve] = [
         (each.speed_m_s, each.resistance_m_s2, each.sigma_repeatable_m_s2)

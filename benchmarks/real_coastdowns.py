@@ -235,7 +235,7 @@ def judged_words(coast: KnownCoast, said: Said) -> str:
     return '<br>'.join(line.replace('|', '/') for line in lines)
 
 
-def row(coast: KnownCoast, out: Path, estimator: str = 'auto') -> str:
+def row(coast: KnownCoast, out: Path, estimator: str = 'one') -> str:
     """
     Replay a record both ways and return its line of the table.
     """
@@ -285,7 +285,7 @@ def main() -> None:
     parser.add_argument(
         '--out', type=Path, default=ROOT / 'benchmarks' / 'out' / 'real_coastdowns'
     )
-    parser.add_argument('--estimator', default='auto', help='the parameter of that name')
+    parser.add_argument('--estimator', default='one', help='the parameter of that name')
     options = parser.parse_args()
     if DATA not in os.environ:
         print(f'skipped: {DATA} is not set, it names the folder of the measured records')

@@ -30,8 +30,8 @@ from shipdrag_ros.simulation import START_NS
 SEEDS = range(5000, 5300)
 G, VISCOSITY = 9.81, 1.19e-6
 METHODS = {
-    'final': (estimate_final, 'auto'),
-    'live': (estimate, 'auto'),
+    'final': (estimate_final, 'one'),
+    'live': (estimate, 'one'),
     'S1 joint': (estimate, 's1_joint'),
 }
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-Makes the pictures of pages in docs/pictures: bridge.png, diagnosis.png and fleet.png.
+Makes the pictures of pages in docs/pictures: bridge*.png, diagnosis.png and fleet.png.
 
     python docs/screenshots.py [bridge] [diagnosis] [fleet] [--store STORE]
 
@@ -75,19 +75,21 @@ def played(bags: list[Path]) -> Iterator[tuple[str, BagSource]]:
 
 
 def bridge(folder: Path, open_page: Callable[..., Page]) -> None:
-    """The second run of a pair, six minutes after the stop."""
+    """The second run of a pair: before the stop, seven minutes after it, and at its end."""
     first = coastdown(folder, 1, '--start', '2026-06-01T08:00:00')
     heading = ('--heading', '3.1416', '--first-heading', '0')
     second = coastdown(folder, 2, *heading, '--start', '2026-06-01T09:30:00')
     with played([first, second]) as (url, source):
-        page = open_page(url, height=1000)
+        page = open_page(url, height=1400)
         page.wait_for_selector('#verdict h3', timeout=120_000)
         player = source.player()
         assert player is not None
-        source.control('seek', player['start_s'] + 1800 + 420)
-        page.locator('#headline', has_text='COASTDOWN').wait_for()
-        page.wait_for_timeout(1000)
-        save(page, 'bridge.png')
+        save(page, 'bridge_after.png')
+        for at_s, said, name in ((1500, 'STEADY', 'bridge_before'), (2220, 'COAST', 'bridge')):
+            source.control('seek', player['start_s'] + at_s)
+            page.locator('#headline', has_text=said).wait_for()
+            page.wait_for_timeout(1000)
+            save(page, f'{name}.png')
 
 
 def diagnosis(folder: Path, open_page: Callable[..., Page]) -> None:

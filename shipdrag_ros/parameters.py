@@ -31,15 +31,12 @@ from shipdrag_ros.fields import (
 )
 
 _SECTION = 'ros__parameters'
-FORMER_ESTIMATORS = {'warped': 'log_time', 'motion': 'ode_fit'}
+FORMER_ESTIMATORS = dict.fromkeys(('auto', 'log_time', 'ode_fit', 'warped', 'motion'), 'one')
 """Names that an estimator had before, and what they are now; a file may not use them."""
 # every module of that folder is one; listed without importing it
-ESTIMATORS = (
-    'auto',
-    *(
-        module.name
-        for module in iter_modules([str(Path(__file__).parent / 'estimation' / 'estimators')])
-    ),
+ESTIMATORS = tuple(
+    module.name
+    for module in iter_modules([str(Path(__file__).parent / 'estimation' / 'estimators')])
 )
 """Values of the parameter `estimator`."""
 SPEEDS_M_S = (2.0, 1.0)
@@ -194,10 +191,9 @@ class Parameters:
         choices=('rep103', 'compass'),
     )
     estimator: str = _parameter(
-        'auto',
-        'auto is log_time during a coastdown and ode_fit after it; log_time: all inputs that are '
-        'there, polynomials in the logarithm of time averaged over models; ode_fit: fit of the '
-        'equation of motion; s1_...: the published problems',
+        'one',
+        'one: one posterior of hull, thrust, instruments and noise, of all inputs, while a '
+        'coastdown runs and after it; s1_...: the published problems',
         choices=ESTIMATORS,
     )
     regimes: str = _parameter(

@@ -284,15 +284,13 @@ print(table.tobytes().hex())
 LIVE = ESTIMATES.replace('(estimate, estimate_final)', '(estimate,)')
 # functions that call those of other files, and what they call
 CALLERS = (
-    'estimation.ode_fit.solve',
+    'posterior.laplace',
     'estimation.distance',
-    'estimation.log_time.robust',
+    'inference.sampling',
 )
 CALLEES = (
-    'estimation.ode_fit.coast',
-    'estimation.ode_fit.law',
+    'inference.settings',
     'inference.noise',
-    'estimation.log_time.model',
     'inference.gaussian',
     'regression.refit',
 )
@@ -348,8 +346,8 @@ def elsewhere(estimates: tuple[Path, str], tmp_path_factory: pytest.TempPathFact
 @pytest.mark.parametrize(
     ('module', 'old', 'new'),
     [
-        ('estimation/log_time/robust.py', 'HUBER = 2.0', 'HUBER = 1.0'),
-        ('estimation/ode_fit/law.py', 's * s * b\n', 's * s * b * 1.01\n'),
+        ('posterior/rows.py', '_NEIGHBOURS = 9', '_NEIGHBOURS = 5'),
+        ('inference/gaussian.py', '+= table[a, i] *', '+= 1.01 * table[a, i] *'),
     ],
 )
 def test_an_edit_of_this_package_acts_at_once(

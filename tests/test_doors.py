@@ -31,7 +31,7 @@ DOORS = (
     ('messages.decoding', 'decode'),
     ('estimation.window', 'Window.from_block'),
     ('estimation.choice', 'estimate'),
-    ('estimation.final', 'estimate_final'),
+    ('estimation.choice', 'estimate_final'),
     ('coastdown.monitor', 'Monitor'),
     ('diagnosis.diagnose', 'diagnose'),
     ('library.reading', 'read'),

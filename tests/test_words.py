@@ -26,7 +26,6 @@ WORDS = {
     r'that no mixture of': 'orthogonal to all other responses',
     r'look-alikes?': 'confounders',
     r'white noise is told': 'no estimator is given the noise level',
-    r'motion_fit': 'ode_fit',
     r'own shares?': 'partial contribution',
 }
 PATTERN = re.compile(rf'(?<!\.)\b(?:{"|".join(WORDS)})\b', re.IGNORECASE)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from shipdrag_ros.coastdown.events import Dismissal, EndedCoastdown, NotCoastdown
 from shipdrag_ros.coastdown.instruments import cut_of, length_s, runs, until
 from shipdrag_ros.coastdown.readings import LEAST_READINGS, binned, readings, seconds
-from shipdrag_ros.estimation.ode_fit.shaft_fall import STANDS_RAD_S
+from shipdrag_ros.estimation.shaft_fall import STANDS_RAD_S
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import SECOND_NS, Float64
 from shipdrag_ros.ship import Ship

@@ -23,8 +23,8 @@ from shipdrag_ros.coastdown.instruments import astern, cut_of, gaps, rudder, swi
 from shipdrag_ros.coastdown.readings import binned, readings
 from shipdrag_ros.coastdown.thrust_end import thrust_end
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.ode_fit.shaft_fall import IDLING
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.shaft_fall import IDLING
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import SECOND_NS

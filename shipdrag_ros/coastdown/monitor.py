@@ -463,7 +463,8 @@ class Monitor:
         watch = self._memory.watch
         stamp_ns = int(watch.update_ns[0])
         watch.update_ns[0] = self._running.due_ns(next_stamp_ns)
-        return self._running.update(stamp_ns, self._estimator)
+        gliding = self._regimes is None or self._regimes.gliding > 0.5
+        return self._running.update(stamp_ns, self._estimator, gliding=gliding)
 
     def _cut(self, start_ns: int, end_ns: int, first_ns: int) -> Window:
         """Cut a window, with the record from `first_ns` on before it."""

@@ -84,9 +84,11 @@ class RunningCoastdown:
         start, step = self.onset.start_ns, round(self._parameters.update_s * SECOND_NS)
         return min(start + -(-(stamp_ns - start) // step) * step, ALWAYS)
 
-    def update(self, stamp_ns: int, estimator: WindowEstimator) -> Event:
+    def update(self, stamp_ns: int, estimator: WindowEstimator, *, gliding: bool = True) -> Event:
         """
         Estimate from what there is up to a stamp [ns], or say why that cannot be.
+
+        Nothing is foretold of a ship that is more probably not `gliding` any more.
         """
         window = self._window(stamp_ns)
         try:
@@ -98,7 +100,7 @@ class RunningCoastdown:
             self._estimated = not (why := too_vague(found, self._parameters))
             if why:
                 return NoEstimate(stamp_ns, why)
-        return self._with_forecast(stamp_ns, found, window)
+        return self._with_forecast(stamp_ns, found, window) if gliding else Update(stamp_ns, found)
 
     def _with_forecast(self, stamp_ns: int, found: Estimate, window: Window) -> Update:
         try:

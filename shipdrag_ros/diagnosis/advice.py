@@ -29,7 +29,7 @@ from shipdrag_ros.diagnosis.outcomes import (
 )
 from shipdrag_ros.diagnosis.result import Advice, Candidate
 from shipdrag_ros.diagnosis.sights import sight
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.decision import (
     CERTAIN,

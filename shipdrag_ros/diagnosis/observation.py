@@ -20,9 +20,9 @@ from shipdrag_ros.diagnosis.context import Context, Stop
 from shipdrag_ros.diagnosis.measured import CondensedRows, Measured, SteadyNoise
 from shipdrag_ros.diagnosis.speeds import stop_time_s
 from shipdrag_ros.errors import DiagnosisError
-from shipdrag_ros.estimation.ode_fit.record import RunRows
-from shipdrag_ros.estimation.ode_fit.run_down import ONSET_SD_S, RunDown
-from shipdrag_ros.estimation.ode_fit.steady import LEAST_S, white_sd
+from shipdrag_ros.estimation.record import RunRows
+from shipdrag_ros.estimation.run_down import ONSET_SD_S, RunDown
+from shipdrag_ros.estimation.steady import LEAST_S, white_sd
 from shipdrag_ros.estimation.window import Series, Window
 from shipdrag_ros.inference.rows import CODES, LOG, OVER_GROUND, POSITION, bin_means
 from shipdrag_ros.parameters import Parameters

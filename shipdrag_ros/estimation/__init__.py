@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Resistance against speed from a window of samples."""
 
-from shipdrag_ros.estimation.choice import estimate
-from shipdrag_ros.estimation.final import estimate_final
+from shipdrag_ros.estimation.choice import estimate, estimate_final
 from shipdrag_ros.estimation.window import Series, Window
 
 __all__ = ['Series', 'Window', 'estimate', 'estimate_final']

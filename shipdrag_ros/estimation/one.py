@@ -7,15 +7,17 @@ An adapter: a window becomes rows and a prior of the stop, the posterior becomes
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.assemble import AtEnd, assembled
+from shipdrag_ros.estimation.assemble import AtEnd, assembled, log_scale_note
 from shipdrag_ros.estimation.curve import ValidRange
-from shipdrag_ros.estimation.ode_fit.guess import InitialGuess
-from shipdrag_ros.estimation.ode_fit.record import RunRows
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.guess import InitialGuess
+from shipdrag_ros.estimation.record import RunRows
 from shipdrag_ros.estimation.result import Estimate, ResistanceCurve, Track
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.inference.rows import CODES, LOG, Rows
 from shipdrag_ros.parameters import Parameters
@@ -89,21 +91,45 @@ def _estimate(window: Window, ship: Ship, parameters: Parameters, *, quick: bool
         speed_m_s=guess.speed_m_s,
         low_m_s=guess.lowest * guess.speed_m_s,
     )
-    found = infer(problem, quick=quick)
-    return _result(found, record, window, ship, parameters, (*run_down.notes, *_notes(found)))
+    found = infer(problem, guess.seen, quick=quick)
+    notes = (*record.notes, *run_down.notes, *_notes(found, record))
+    return _result(found, record, window, ship, parameters, notes)
 
 
-def _notes(found: RunPosterior) -> tuple[str, ...]:
+def _notes(found: RunPosterior, record: RunRows) -> Iterator[str]:
+    """Yield what else the figure rests on."""
+    problem, k = found.problem, found.problem.coefficients
     chances = ', '.join(
         f'{name} {found.chance(name):.2g}'
-        for name in dict.fromkeys(each.name for each in found.problem.families)
+        for name in dict.fromkeys(each.name for each in problem.families)
     )
-    notes = [f'averaged over what the hull may differ by: {chances}']
+    yield f'averaged over what the hull may differ by: {chances}'
+    sd = np.sqrt(np.diag(found.covariance))
+    if 'speed_through_water' in record.stamps:
+        if len(record.stamps) > 1:
+            yield log_scale_note(float(found.mean[k + motion.SCALE]), float(sd[k + motion.SCALE]))
+    else:
+        yield (
+            f'a current is part of the speed: one of ± {2.0 * sd[k + motion.CURRENT]:.2g} m/s '
+            '(two standard deviations) is in the band'
+        )
     if not found.noise.learnt:
-        notes.append('the record is too short to learn slow disturbances from: usual ones are')
-    if not found.converged:
-        notes.append('the linearised posterior did not settle: the band may be too narrow')
-    return tuple(notes)
+        yield (
+            'the record is too short to learn slow disturbances from: the band holds usual ones'
+        )
+        return
+    slow = found.noise.slow
+    sizes = [f'a force of {slow.gust_m_s2:.2g} m/s² over {slow.gust_s:.0f} s']
+    if slow.log_m_s:
+        sizes.append(f'the speed readings by {slow.log_m_s:.2g} m/s over {slow.log_s:.0f} s')
+    if slow.place_m:
+        sizes.append(f'positions by {slow.place_m:.2g} m over {slow.place_s:.0f} s')
+    if slow.water_m_s:
+        sizes.append(f'the water by {slow.water_m_s:.2g} m/s over {slow.water_s:.0f} s')
+    yield (
+        f'slow disturbances learnt, averaged over {len(found.noise.settings.weight)} settings: '
+        f'about {", ".join(sizes)}'
+    )
 
 
 def _result(
@@ -135,7 +161,7 @@ def _result(
         chosen = coast.kind == CODES[name]
         measured = coast.value[chosen]
         tracks[name] = Track(times, measured, measured - table[0, chosen])
-    several = len(record.stamps) > 1 and 'speed_through_water' in record.stamps
+    over_ground = bool(record.stamps.keys() - {'speed_through_water'})
     current = k + motion.CURRENT
     return assembled(
         NAME,
@@ -149,8 +175,10 @@ def _result(
         samples={name: len(times) for name, times in record.stamps.items()},
         noise_sd=dict(record.white_sd),
         tracks=tracks,
-        current_m_s=float(found.mean[current]) if several else None,
-        current_sigma_m_s=float(np.sqrt(found.covariance[current, current])) if several else None,
+        current_m_s=float(found.mean[current]) if over_ground else None,
+        current_sigma_m_s=float(np.sqrt(found.covariance[current, current]))
+        if over_ground
+        else None,
         notes=(*window.notes, *ship.warnings, *notes),
     )
 

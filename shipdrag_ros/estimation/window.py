@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -132,6 +133,16 @@ class Window:
             depth=cut(self.depth),
             before=self.before if start_ns == self.start_ns else None,
         )
+
+    def without(self, name: str, why: str) -> Window:
+        """
+        Leave out an input, in the record before too; the reason becomes a note.
+        """
+        none = getattr(self, name)
+        none = Series(none.time_ns[:0], none.value[:0], none.variance[:0])
+        before = None if self.before is None else self.before.without(name, why)
+        changes: dict[str, Any] = {name: none, 'before': before}
+        return replace(self, **changes, notes=(*self.notes, f'without {name}: {why}'))
 
     @classmethod
     def from_block(

@@ -22,7 +22,7 @@ from shipdrag_ros.ship import Ship
 _PLACES = 7200  # kept, one a second at most
 _STEP_S = 10  # of the ship's time, between two answers to "if she were stopped now"
 _POSITIONS = (Channel.POSITION, Channel.POSITION_GEODETIC)
-_NOTHING_LEFT = 'nothing is left to foretell, or it is not sure that she glides'
+_NOTHING_LEFT = 'she may no longer glide, or nothing is left to foretell'
 _ENDED = {
     EndedBy.SPEED: 'she is as slow as a coastdown goes',
     EndedBy.TURN: 'she turned',

@@ -20,18 +20,21 @@ from shipdrag_ros.inference.gaussian import cholesky, products_of, substitute
 from shipdrag_ros.inference.learning import learn
 from shipdrag_ros.inference.learning import prior as prior_of
 from shipdrag_ros.inference.noise import Noise, whiten
-from shipdrag_ros.inference.rows import Rows
+from shipdrag_ros.inference.rows import POSITION, Rows
 from shipdrag_ros.inference.sampling import Seen
 from shipdrag_ros.inference.settings import NoisePosterior, Settings, noise_of
 from shipdrag_ros.posterior.motion import damping_of, predict
 from shipdrag_ros.posterior.problem import Family, RunModel
+from shipdrag_ros.posterior.start import along_readings
 from shipdrag_ros.samples import Float64
 
 _ITERATIONS = 12  # of Gauss and Newton, to where the noise is learnt
-_ROUNDS = 6  # linearisations about the mean of the mixture
-_CLOSE = 0.05  # of chi^2, between one mean and the next
+_ROUNDS = 12  # linearisations about the mean of the mixture
+_CLOSE = 0.05  # of chi^2, from one step to the next
+_STILL, _SETTLED = 0.05, 0.5  # of sigma of r(v), between one mean and the next
 _LEAST = 1e-3  # weight of a model; less is left out of the spread
-_LARGEST_STEP = 3.0  # of a Gauss-Newton step, in standard deviations of the prior
+_ROUGH = 0.02  # of the speed: error of the first step
+_HALVINGS = 8  # of a Gauss-Newton step that leads astray
 
 
 class Families(NamedTuple):
@@ -58,8 +61,6 @@ class RunPosterior:
         Probability of each family of `problem.families`.
     noise
         Settings with their probabilities.
-    converged
-        Whether the mean of the mixture stood still.
     """
 
     problem: RunModel
@@ -67,7 +68,6 @@ class RunPosterior:
     covariance: Float64
     family: Float64
     noise: NoisePosterior
-    converged: bool
 
     def chance(self, name: str) -> float:
         """
@@ -203,7 +203,14 @@ def _families(problem: RunModel, families: tuple[Family, ...], now: Float64) -> 
 
 def _linear(problem: RunModel, now: Float64) -> tuple[Float64, Noise]:
     """Return residual and columns of what is free, and the noise as the hull damps there."""
-    table, speed = predict(problem.forces, now, problem.grid_s, problem.rows)
+    return _prepared(problem, now, predict(problem.forces, now, problem.grid_s, problem.rows))
+
+
+def _prepared(
+    problem: RunModel, now: Float64, predicted: tuple[Float64, Float64]
+) -> tuple[Float64, Noise]:
+    """Return the same of rows as predicted under some unknowns."""
+    table, speed = predicted
     if not np.all(np.isfinite(table)):
         raise EstimationError(
             'the motion is not finite under what the readings ask for: give a window that lies in '
@@ -237,20 +244,102 @@ def _seen(problem: RunModel, now: Float64) -> Seen:
     return Seen(problem.rows, table, families.mean, families.precision, white, problem.steady)
 
 
-def _typical(problem: RunModel, noise: NoisePosterior) -> Float64:
-    """Climb, by Gauss and Newton, to the mean under one typical setting of the noise."""
+class _Linear(NamedTuple):
+    """The motion under one setting of the noise, about some unknowns: one model a family."""
+
+    misfit: float  # chi^2 of the rows
+    log_evidence: Float64  # (f,)
+    step: Float64  # (f, free)
+
+
+def _each_family(
+    problem: RunModel, now: Float64, linear: tuple[Float64, Noise], settings: Settings
+) -> _Linear:
+    """Solve each; what the noise does not explain yet counts as more noise."""
+    table, white = linear
+    table = table.copy()
+    whiten(problem.rows, table, noise_of(settings, 0, problem.rows, white, problem.steady))
+    products = products_of(table)
+    n = len(problem.rows.time_s)
+    misfit = float(products[0, 0])
+    products *= min(1.0, n / misfit)
+    priors = _families(problem, problem.families, now)
+    solved = [of_family(products, *each) for each in zip(priors.mean, priors.precision)]
+    logs = np.array([each[1] if each[0] else -np.inf for each in solved])
+    return _Linear(misfit, logs + priors.log_chance, np.array([each[2] for each in solved]))
+
+
+def _objective(problem: RunModel, now: Float64, misfit: float, which: int) -> float:
+    family, free = problem.families[which], problem.free
+    away = now[free] - family.mean[free]
+    n = len(problem.rows.time_s)
+    tempered = misfit if misfit < n else n * (1.0 + float(np.log(misfit / n)))
+    return tempered + float(family.precision[free] @ away**2)
+
+
+def _begun(problem: RunModel, seen: Float64) -> tuple[RunModel, Float64]:
+    """
+    Take the first step along the readings, where all hulls are linear.
+
+    Hulls of another level than the likeliest are left out: about one level the others are not
+    linear.
+    """
     now = problem.start.copy()
-    sd = 1.0 / np.sqrt(problem.widest.precision)
+    table, white = _prepared(problem, now, along_readings(problem, seen))
+    none = _families(problem, problem.families[:1], now)
+    typical = prior_of(
+        Seen(problem.rows, table, none.mean, none.precision, white, problem.steady),
+        problem.speed_m_s,
+    ).typical
+    length_s = float(problem.rows.time_s[-1]) / seen.shape[1]
+    rough = _ROUGH * problem.speed_m_s * np.where(problem.rows.kind == POSITION, length_s, 1.0)
+    white = white._replace(variance=white.variance + rough**2)
+    linear = _each_family(problem, now, (table, white), typical)
+    which = int(np.argmax(linear.log_evidence))
+    now[problem.free] += linear.step[which]
+    level = problem.families[which].level
+    alike = tuple(each for each in problem.families if each.level == level)
+    return replace(problem, families=alike), now
+
+
+def _climbed(problem: RunModel, now: Float64, typical: Settings) -> Float64:
+    """Climb, by Gauss and Newton, under one setting of the noise and the likeliest hull."""
+    linear = _each_family(problem, now, _linear(problem, now), typical)
     for _ in range(_ITERATIONS):
-        step, _, _ = _mixed(problem, now, noise.typical)
-        length = float(np.max(np.abs(step[: problem.coefficients]) / sd[: problem.coefficients]))
-        now += step * min(1.0, _LARGEST_STEP / max(length, 1e-12))
-        if length < _CLOSE:
+        which = int(np.argmax(linear.log_evidence))
+        least = before = _objective(problem, now, linear.misfit, which)
+        part, step = 1.0, np.zeros(len(now))
+        step[problem.free] = linear.step[which]
+        for _ in range(_HALVINGS):
+            trial = now + part * step
+            predicted = predict(problem.forces, trial, problem.grid_s, problem.rows)
+            if np.all(np.isfinite(predicted[0])):
+                linear = _each_family(
+                    problem, trial, _prepared(problem, trial, predicted), typical
+                )
+                least = _objective(problem, trial, linear.misfit, which)
+                if least < before + _CLOSE:
+                    break
+            part *= 0.5
+        else:
+            break
+        now = trial
+        if before - least < _CLOSE:
             break
     return now
 
 
-def infer(problem: RunModel, *, quick: bool = False) -> RunPosterior:
+def _moved(problem: RunModel, step: Float64, covariance: Float64) -> float:
+    """Return by how many standard deviations r(v) moves at most, over the speeds of the run."""
+    k, speed = problem.coefficients, problem.law.speed_m_s
+    inside = (speed >= problem.low_m_s) & (speed <= problem.speed_m_s)
+    columns = problem.forces.columns[0][:, inside]
+    variance = np.einsum('km,kl,lm->m', columns, covariance[:k, :k], columns)
+    with np.errstate(invalid='ignore', divide='ignore'):
+        return float(np.max(np.abs(step[:k] @ columns) / np.sqrt(variance)))
+
+
+def infer(problem: RunModel, seen: Float64 | None = None, *, quick: bool = False) -> RunPosterior:
     """
     Return the posterior of a run.
 
@@ -258,26 +347,39 @@ def infer(problem: RunModel, *, quick: bool = False) -> RunPosterior:
     ----------
     problem
         Rows, motion and priors.
+    seen : (2, b)
+        Times and speeds, roughly, to begin from; None: from `problem.start`.
     quick
         Times of the noise as they usually are, and fewer settings.
 
     Raises
     ------
     EstimationError
-        If the motion runs away.
+        If the motion runs away, or the fit does not settle.
     """
-    first = prior_of(_seen(problem, problem.start), problem.speed_m_s)
-    now = _typical(problem, first)
+    now = problem.start
+    if seen is not None:
+        problem, now = _begun(problem, seen)
+    now = _climbed(problem, now, prior_of(_seen(problem, now), problem.speed_m_s).typical)
     noise = learn(_seen(problem, now), problem.speed_m_s, quick=quick)
-    away = np.inf
+    now = _climbed(problem, now, noise.typical)
+    away, part = np.inf, 1.0
     for _ in range(_ROUNDS):
         step, covariance, weight = _mixed(problem, now, noise.settings)
-        now = now + step
-        moved = step[problem.free]
-        spread = covariance[np.ix_(problem.free, problem.free)]
-        away = float(moved @ np.linalg.solve(spread, moved))
-        if away < _CLOSE:
+        before, away = away, _moved(problem, step, covariance)
+        if not away < before:
+            part *= 0.5
+        if not np.isfinite(away):
             break
+        now = now + part * step
+        if away < _STILL:
+            break
+    if not away < _SETTLED:
+        raise EstimationError(
+            f'the fit of the motion does not settle in {_ROUNDS} rounds: the record allows '
+            'motions that are too different; give a longer window, one without a turn or thrust, '
+            'or a ship file with a baseline'
+        )
     settings = noise.settings._replace(weight=weight.sum(axis=1))
     noise = replace(noise, settings=settings)
-    return RunPosterior(problem, now, covariance, weight.sum(axis=0), noise, away < 1.0)
+    return RunPosterior(problem, now, covariance, weight.sum(axis=0), noise)

@@ -23,12 +23,14 @@ from shipdrag_ros.simulation.hydrodynamics import USUAL_FORM_FACTOR, drag_n, fri
 
 _NODES = 97  # of the grid of speeds
 _ABOVE = 1.25  # of the highest speed that a fit may try
-_SPLINE_FROUDE, _FEWEST, _MOST = 0.02, 6, 14  # spacing and number of splines
+_SPLINE_FROUDE, _MOST = 0.02, 14  # spacing and largest number of splines
+_UNIT = 0.2  # size of s by itself over that of what both parts leave of it, from Fr 0.05 to 0.2
 _ALIKE, _OWN = 5.0, 0.02  # spacings over which neighbours are alike, and the part that is not
 _NEGLIGIBLE = 0.03  # size of a column, of the largest
-# C_W = _WAVE (Fr / _WAVE_FROUDE)^4 without a baseline
+# without a baseline C_W = _WAVE (Fr / _WAVE_FROUDE)^4, which falls beyond the hump at _HUMP_FROUDE
 _WAVE, _WAVE_FROUDE, _WAVE_POWER = 8e-4, 0.22, 4
-_HIGHEST_FROUDE, _HIGHEST_WAVE = 1.0, 0.1  # of the same as a table, for simulations
+_HUMP_FROUDE, _HUMP_POWER = 0.5, 8
+_HIGHEST_FROUDE = 1.0  # of the same as a table, for simulations
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,9 @@ class HullLaw:
     humps : (h, m)
         Columns of the humps of the wave part, per unit of it [m/s^2]; none where a
         baseline states that part.
+    dry : (d, m)
+        A constant force and one in proportion to the speed, as large as the generic hull's
+        at the highest speed; none where a baseline is stated.
     stated
         Whether the ship file states a baseline.
     """
@@ -54,6 +59,7 @@ class HullLaw:
     parts: Float64
     shapes: Float64
     humps: Float64
+    dry: Float64
     stated: bool
 
     @classmethod
@@ -72,14 +78,17 @@ class HullLaw:
         parts = parts_n(ship, speed) / ship.mass_kg
         spacing = _SPLINE_FROUDE * float(ship.speed(1.0))
         shapes, humps = _shapes(speed, spacing, parts, low_m_s, top_m_s)
-        return cls(speed, parts, shapes, humps[: 0 if stated else None], stated)
+        at_top = np.interp(top_m_s, speed, parts.sum(axis=0))
+        dry = at_top * np.stack([np.ones(_NODES), speed / top_m_s])
+        none = 0 if stated else None
+        return cls(speed, parts, shapes, humps[:none], dry[:none], stated)
 
     def forces(self, ship: Ship, tau_s: float) -> Forces:
         """
         Return what the motion takes.
         """
         step = float(self.speed_m_s[1])
-        columns = np.concatenate([self.parts, self.shapes, self.humps])
+        columns = np.concatenate([self.parts, self.shapes, self.humps, self.dry])
         columns[0] += wave_with_friction(ship) * self.parts[1]
 
         def with_slope(value: Float64) -> Float64:
@@ -120,8 +129,15 @@ def _generic(ship: Ship, speed: Float64) -> Float64:
     surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
         ship.length_m, ship.displaced_volume_m3
     )
-    wave = _WAVE * (ship.froude(speed) / _WAVE_FROUDE) ** _WAVE_POWER
+    wave = _usual_wave(ship.froude(speed))
     return np.stack([friction_n(ship, speed), wave * drag_n(ship, surface, speed)])
+
+
+def _usual_wave(froude: Float64) -> Float64:
+    """Return C_W without a baseline."""
+    rising = _WAVE * (froude / _WAVE_FROUDE) ** _WAVE_POWER
+    result: Float64 = rising / (1.0 + (froude / _HUMP_FROUDE) ** _HUMP_POWER)
+    return result
 
 
 def wave_with_friction(ship: Ship) -> float:
@@ -142,7 +158,6 @@ def usual_baseline(ship: Ship) -> Ship:
     if ship.baseline is not None:
         return ship
     froude = np.linspace(0.0, _HIGHEST_FROUDE, 13)
-    wave = _WAVE * (froude / _WAVE_FROUDE) ** _WAVE_POWER
     surface = ship.wetted_surface_m2 or usual_wetted_surface_m2(
         ship.length_m, ship.displaced_volume_m3
     )
@@ -150,7 +165,7 @@ def usual_baseline(ship: Ship) -> Ship:
         USUAL_FORM_FACTOR,
         0.0,
         tuple(froude.tolist()),
-        tuple(np.minimum(wave, _HIGHEST_WAVE).tolist()),
+        tuple(_usual_wave(froude).tolist()),
         CoefficientSd(priors.GENERIC_FRICTION.sd, priors.GENERIC_WAVE.sd),
     )
     return replace(ship, baseline=base, wetted_surface_m2=surface)
@@ -165,18 +180,18 @@ def _shapes(
     Neighbours of s are alike; humps stand by themselves, in proportion to the wave part.
     """
     total = np.maximum(parts.sum(axis=0), 1e-12)
-    inside = (speed >= 0.9 * low_m_s) & (speed <= 1.05 * top_m_s)
-    count = int(np.clip(np.ceil((1.05 * top_m_s - 0.9 * low_m_s) / spacing) + 1, _FEWEST, _MOST))
-    spacing = (1.05 * top_m_s - 0.9 * low_m_s) / (count - 1)
-    d = np.abs((speed - 0.9 * low_m_s) / spacing - np.arange(count)[:, None])
+    first_m_s, last_m_s = 0.9 * low_m_s, 1.05 * top_m_s
+    inside = (speed >= first_m_s) & (speed <= last_m_s)
+    spacing = max(spacing, (last_m_s - first_m_s) / (_MOST - 1))
+    count = int(np.ceil((last_m_s - first_m_s) / spacing)) + 1
+    d = np.abs((speed - first_m_s) / spacing - np.arange(count)[:, None])
     splines = np.where(d < 1.0, 2 / 3 - d**2 + d**3 / 2, np.maximum(2.0 - d, 0.0) ** 3 / 6)
     apart = np.arange(count)[:, None] - np.arange(count)
     alike = np.exp(-0.5 * (apart / _ALIKE) ** 2) + _OWN * np.eye(count)
-    rooted = np.asarray(np.linalg.cholesky(alike).T @ splines, np.float64)
-    smooth = _columns(rooted, parts / total, inside)
-    size = np.sqrt(np.mean(np.sum(smooth[:, inside] ** 2, axis=0)))
+    rooted = np.asarray(np.linalg.cholesky(alike).T @ splines, np.float64) / _UNIT
     humps = splines * (parts[1] / total)
-    return smooth / size * total, _columns(humps, parts / total, inside) * total
+    shares = parts / total
+    return _columns(rooted, shares, inside) * total, _columns(humps, shares, inside) * total
 
 
 def _columns(shapes: Float64, shares: Float64, inside: NDArray[np.bool_]) -> Float64:

@@ -161,6 +161,8 @@ FREE_SHAFT = Declared(
     '',
     'four-quadrant open-water data of B4-70',
 )
+SHELTERED_M_S = 5.0
+"""Below it a current is weaker, with the square of the speed: slow craft are tried in basins."""
 UNNAMED_ODDS = 0.015
 """Prior odds of something smooth without a name, in each place where it may be."""
 SMOOTH_SIZES = (0.015, 0.05, 0.15)
@@ -178,6 +180,15 @@ LOG_UNIFORM = (0.03, 0.1, 0.3)
 friction, waves and s where something smooth in u is missing."""
 WIDE = (0.01, 0.03, 0.1)
 """The same without a baseline."""
+ANOTHER_CRAFT = 'another craft'
+ANOTHER_CHANCE = 0.2
+"""Of a craft without a baseline that is no displacement ship, or far from clean."""
+ANOTHER_LEVELS = (1.0, 4.0, 16.0, 64.0)
+"""Of its resistance over that of the generic hull, all alike."""
+ANOTHER_SHAPES = (0.03, 0.1)
+"""Sizes of its s, all alike."""
+SHIP_DRY = 1e-3
+"""Size of forces of a ship that water does not make, of r at the stop."""
 UNFILTERED_CHANCE = 0.5
 """Of a log."""
 WIDER, WIDER_CHANCE = 3.0, 0.1

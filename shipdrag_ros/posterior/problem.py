@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,12 +54,15 @@ class StopPrior:
 class Family:
     """
     A prior of all unknowns: mean and precision (p,), and the probability of the family.
+
+    `level` is that of the hull over the generic one, about which the prior is.
     """
 
     name: str
     chance: float
     mean: Float64
     precision: Float64
+    level: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -77,8 +81,8 @@ class RunModel:
     start : (p,)
         Where the search begins.
     families
-    speed_m_s
-        At the stop, roughly.
+    low_m_s, speed_m_s
+        At the end and at the stop, roughly.
     law
     """
 
@@ -89,6 +93,7 @@ class RunModel:
     grid_s: Float64
     start: Float64
     families: tuple[Family, ...]
+    low_m_s: float
     speed_m_s: float
     law: HullLaw
 
@@ -169,10 +174,11 @@ class RunModel:
             _grid(end, tau_s),
             start,
             families,
+            low_m_s,
             speed_m_s,
             law,
         )
-        start[:k] = found.widest.mean[:k]
+        start[:k] = families[0].mean[:k]
         return found
 
 
@@ -227,7 +233,8 @@ def _extras(
         sd[motion.SCALE] = priors.LOG_SCALE.sd
         sd[motion.OFFSET] = priors.LOG_OFFSET.sd
     if ground:
-        sd[motion.CURRENT] = priors.CURRENT.sd
+        sheltered = min(1.0, mean[motion.SPEED] / priors.SHELTERED_M_S)
+        sd[motion.CURRENT] = priors.CURRENT.sd * sheltered**2
     if ground - {POSITION}:
         lag = priors.GROUND_LAG
         mean[motion.GROUND_LAG], sd[motion.GROUND_LAG] = lag.mean, lag.sd
@@ -238,16 +245,19 @@ def _all_families(
     ship: Ship, law: HullLaw, stop: StopPrior, start: Float64, kinds: frozenset[int]
 ) -> Iterator[Family]:
     extra_mean, extra_sd = _extras(ship, stop, start, kinds)
-    humps = np.full(len(law.humps), priors.GENERIC_HUMPS.sd)
-    zeros = np.zeros(len(law.shapes) + len(humps))
-    for (name, chance, scales, size), (part, lag) in product(_hulls(ship), _lags(kinds)):
+    zeros = np.zeros(len(law.shapes) + len(law.humps) + len(law.dry))
+    for (name, chance, scales, size, level, of_dry), (part, lag) in product(
+        _hulls(ship), _lags(kinds)
+    ):
         mean = np.concatenate([[each[0] for each in scales], zeros, extra_mean])
         sizes = np.full(len(law.shapes), size)
-        sd = np.concatenate([[each[1] for each in scales], sizes, humps, extra_sd])
+        humps = np.full(len(law.humps), level * priors.GENERIC_HUMPS.sd)
+        dry = np.full(len(law.dry), max(of_dry, priors.SHIP_DRY))
+        sd = np.concatenate([[each[1] for each in scales], sizes, humps, dry, extra_sd])
         if lag is not None:
             at = motion.LAG - EXTRAS
             mean[at], sd[at] = lag.mean, lag.sd
-        yield Family(name, chance * part, mean, 1.0 / sd**2)
+        yield Family(name, chance * part, mean, 1.0 / sd**2, level)
 
 
 def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, priors.Declared | None]]:
@@ -259,18 +269,44 @@ def _lags(kinds: frozenset[int]) -> Iterator[tuple[float, priors.Declared | None
     yield 1.0 - priors.UNFILTERED_CHANCE, priors.LOG_LAG
 
 
-_Hull = tuple[str, float, tuple[tuple[float, float], tuple[float, float]], float]
+class _Hull(NamedTuple):
+    """
+    What a hull may be: mean and sd of both scales, size of s, level of the generic parts, and
+    sd of the forces that water does not make.
+    """
+
+    name: str
+    chance: float
+    scales: tuple[tuple[float, float], tuple[float, float]]
+    size: float
+    level: float = 1.0
+    dry: float = 0.0
+
+
+def _generic_hulls() -> Iterator[_Hull]:
+    """Yield hulls without a baseline: a ship, or another craft of a level that is not known."""
+    friction, wave = priors.GENERIC_FRICTION, priors.GENERIC_WAVE
+
+    def scales(level: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        return (
+            (level * (1.0 + friction.mean) - 1.0, level * friction.sd),
+            (level * (1.0 + wave.mean) - 1.0, level * wave.sd),
+        )
+
+    ships = (1.0 - priors.ANOTHER_CHANCE) / len(priors.WIDE)
+    for size in priors.WIDE:
+        yield _Hull(priors.SMOOTH, ships, scales(1.0), size)
+    others = priors.ANOTHER_CHANCE / len(priors.ANOTHER_LEVELS) / len(priors.ANOTHER_SHAPES)
+    for level, size in product(priors.ANOTHER_LEVELS, priors.ANOTHER_SHAPES):
+        yield _Hull(priors.ANOTHER_CRAFT, others, scales(level), level * size, level, level)
 
 
 def _hulls(ship: Ship) -> Iterator[_Hull]:
-    """Yield what hulls may be: name, probability, mean and sd of both scales, size of s."""
+    """Yield what hulls may be."""
     base = ship.baseline
     unsure = priors.LAW_ERROR.sd
     if base is None:
-        friction, wave = priors.GENERIC_FRICTION, priors.GENERIC_WAVE
-        scales = ((friction.mean, friction.sd), (wave.mean, wave.sd))
-        for size in priors.WIDE:
-            yield priors.SMOOTH, 1.0 / len(priors.WIDE), scales, size
+        yield from _generic_hulls()
         return
     if isinstance(base, CoefficientBaseline):
         alone = base.relative_sd.wave * math.sqrt(1.0 - base.relative_sd.correlation**2)
@@ -282,19 +318,21 @@ def _hulls(ship: Ship) -> Iterator[_Hull]:
         ((1.0, 1.0 - priors.WIDER_CHANCE), (priors.WIDER, priors.WIDER_CHANCE)), priors.HALF_NORMAL
     ):
         stated = ((0.0, wide * sds[0]), (0.0, wide * sds[1]))
-        yield priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
+        yield _Hull(
+            priors.NOTHING, priors.CHANCES[priors.NOTHING] * chance * part, stated, size * unsure
+        )
     chance = priors.CHANCES[priors.FRICTION_ALONE] / len(priors.LOG_UNIFORM)
     for more, (size, part) in product(priors.LOG_UNIFORM, priors.HALF_NORMAL):
-        of_wave = -with_it * more, math.hypot(with_it * more, sds[1])
+        of_wave = 0.0 - with_it * more, math.hypot(with_it * more, sds[1])
         scales = ((more, math.hypot(more, sds[0])), of_wave)
         shape = math.hypot(size * unsure, priors.SHAPE_OF_MORE.mean * more)
-        yield priors.FRICTION_ALONE, chance * part, scales, shape
+        yield _Hull(priors.FRICTION_ALONE, chance * part, scales, shape)
     chance = priors.CHANCES[priors.SMOOTH] / len(priors.LOG_UNIFORM)
     for size in priors.LOG_UNIFORM:
         # friction, waves and shape all differ
         wide = math.hypot(size, with_it * size, sds[1]) if sds[1] > _EXACT else _EXACT
         scales = ((0.0, math.hypot(size, sds[0])), (0.0, wide))
-        yield priors.SMOOTH, chance, scales, size
+        yield _Hull(priors.SMOOTH, chance, scales, size)
 
 
 def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
@@ -308,7 +346,7 @@ def families_declared() -> Iterator[tuple[str, float, str, str, str]]:
     """
     ship = Ship.example()
     for which in (ship, replace(ship, baseline=None)):
-        for name, chance, scales, size in _hulls(which):
+        for name, chance, scales, size, *_ in _hulls(which):
             friction, wave = (f'{mean + 0.0:g} ± {sd:.2g}' for mean, sd in scales)
             beside = name if which.baseline is not None else f'{name}, no baseline'
             yield beside, chance, friction, wave, f'{size:.2g}'

@@ -166,5 +166,5 @@ def write_poster(path: Path, posters: Sequence[Poster]) -> None:
         sections,
         sentence='Engine stopped, helm amidships, through water, in the weather of her runs. '
         'Beside the wheelhouse poster of IMO Resolution A.601(15), Appendix 2; it does not '
-        'replace it.',
+        'replace it. Other weather, another loading or hull: other figures.',
     )

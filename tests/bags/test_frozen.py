@@ -70,7 +70,7 @@ def test_a_parameter_that_is_gone_is_left_out_of_a_bag_and_an_error_in_a_file(
     assert main(['replay', str(path)]) == 0
     said = ' '.join(capsys.readouterr().out.split())
     assert 'parameters.yaml: wake_s: unknown key' in said
-    assert "estimator: 'warped', which is 'log_time' now; expected one of" in said
+    assert "estimator: 'warped', which is 'one' now; expected one of" in said
     (changed,) = open_runs([path])
     with pytest.raises(ParameterError, match='wake_s: unknown key'):
         Parameters.from_yaml(changed.attachments['parameters.yaml'], subject='mine')

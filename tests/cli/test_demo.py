@@ -82,7 +82,7 @@ def test_the_whole_way(tmp_path: Path) -> None:
     (coastdown,) = result['coastdowns']
     recorded = result['recorded']
     assert recorded['compared'] == recorded['identical'] > 100
-    assert coastdown['estimator'] == 'ode_fit'
+    assert coastdown['estimator'] == 'one'
     (bag,) = (out / 'recordings').glob('*.mcap')
     for path in (bag, out / 'report.html', out / 'curves.csv', out / 'node.log'):
         assert str(path) in said

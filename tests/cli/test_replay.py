@@ -71,7 +71,7 @@ def test_the_json_has_its_keys_and_the_curve_is_near_the_truth(
         'current_m_s',
     } <= set(coastdown)
     assert coastdown['bag'] == str(coastdown_bag)
-    assert coastdown['estimator'] == 'ode_fit'
+    assert coastdown['estimator'] == 'one'
     assert coastdown['start_ns'] < coastdown['onset_detected_ns'] < coastdown['end_ns']
     low, high = coastdown['froude_valid']
     froude = np.array(coastdown['froude'])
@@ -98,7 +98,7 @@ def test_the_words_give_every_figure(
         'start',
         'duration',
         'ended because',
-        'ode_fit',
+        'one',
         'coefficients',
         'samples used',
         'valid range',

@@ -11,7 +11,7 @@ import pytest
 from shipdrag_ros.diagnosis.diagnose import compare
 from shipdrag_ros.diagnosis.facts import Facts
 from shipdrag_ros.diagnosis.observation import Observation, _condensed
-from shipdrag_ros.estimation.ode_fit.steady import display_sd, white_sd
+from shipdrag_ros.estimation.steady import display_sd, white_sd
 from shipdrag_ros.inference.decision import NONE, Names
 from shipdrag_ros.inference.rows import LOG
 from shipdrag_ros.samples import Float64

@@ -3,16 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
 import pytest
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation import Window, estimate, estimate_final, ode_fit
-from shipdrag_ros.estimation.final import widened
-from shipdrag_ros.estimation.ode_fit.batch_means import batch_means
+from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Block, Channel, in_arrival_order
 from shipdrag_ros.ship import Ship
@@ -36,18 +33,15 @@ def test_a_track_of_something_else_costs_no_figure(track: str) -> None:
         blocks.append(Block.of(Channel.POSITION, stamps, place))
     window = Window.from_block(in_arrival_order(blocks), int(stamps[0]), int(stamps[-1]))
     found = estimate_final(window, SHIP, Parameters())
-    assert found.samples == {'speed_through_water': 900}
     curve = found.valid_curve
     r = np.interp(5.0, curve.speed_m_s, curve.resistance_m_s2)
     sigma = np.interp(5.0, curve.speed_m_s, curve.sigma_m_s2)
     expected = (1.0 + float(SHIP.n_r(5.0))) * DRAG_1_M * 25.0
     assert abs(r - expected) < 3.0 * sigma < 0.3 * expected
-    said = any('by speed_through_water alone, without position' in note for note in found.notes)
-    assert said == (track != 'none')
 
 
 @pytest.mark.parametrize('size', [1e303, 1e150, 1e12])
-@pytest.mark.parametrize('estimator', ['auto', 'log_time', 'ode_fit', 's1_position'])
+@pytest.mark.parametrize('estimator', ['one', 's1_position'])
 def test_positions_where_no_ship_is_are_refused(size: float, estimator: str) -> None:
     time_s = np.arange(900.0)
     stamps = (time_s * 1e9).astype(np.int64) + 10**15
@@ -59,7 +53,7 @@ def test_positions_where_no_ship_is_are_refused(size: float, estimator: str) -> 
     alone = Window.from_block(track, int(stamps[0]), int(stamps[-1]))
     with pytest.raises(EstimationError, match='no ship has'):
         estimate_final(alone, SHIP, Parameters(estimator=estimator))
-    if estimator == 'auto':
+    if estimator == 'one':
         both = in_arrival_order([log, track])
         window = Window.from_block(both, int(stamps[0]), int(stamps[-1]))
         found = estimate_final(window, SHIP, Parameters())
@@ -68,45 +62,6 @@ def test_positions_where_no_ship_is_are_refused(size: float, estimator: str) -> 
 
 def cut(block: Block) -> Window:
     return Window.from_block(block, int(block.stamp_ns[0]), int(block.stamp_ns[-1]))
-
-
-def test_a_second_estimate_that_is_far_off_is_in_the_band(coast, ship) -> None:
-    window = cut(coast.block(500))
-    found = ode_fit.estimate(window, ship, Parameters())
-    other = estimate(window, ship, Parameters())
-    assert widened(found, other, np.inf) is found
-    twice = replace(
-        other, curve=replace(other.curve, resistance_m_s2=2.0 * other.curve.resistance_m_s2)
-    )
-    wide = widened(found, twice, np.inf)
-    assert 'two estimators disagree' in wide.notes[-1]
-    middle = len(wide.curve) // 2
-    r, sigma = wide.curve.resistance_m_s2, wide.curve.sigma_repeatable_m_s2
-    np.testing.assert_array_equal(r, found.curve.resistance_m_s2)
-    assert sigma[middle] == pytest.approx(r[middle], rel=0.2)
-    assert wide.max_relative_sigma > 0.3
-    # where the other is not compared the band stays
-    low = widened(found, twice, 4.0).curve
-    above = found.curve.speed_m_s > 8.0
-    assert low.sigma_repeatable_m_s2[-1] >= found.curve.sigma_repeatable_m_s2[-1]
-    assert np.all(low.resistance_m_s2[above] == r[above])
-
-
-def test_clean_records_are_left_alone(coast, ship) -> None:
-    # seeds 0..19; of 1000 clean coastdowns of the benchmarks 1 was flagged
-    for seed in range(20):
-        found = estimate_final(cut(coast.block(300, seed=seed)), ship, Parameters())
-        assert not any('disagree' in note for note in found.notes)
-
-
-def test_independent_residuals_are_not_inflated_and_slow_ones_are() -> None:
-    # N = 400, seed 0: at most 2 % false alarms
-    rng = np.random.default_rng(0)
-    false = sum(batch_means(rng.standard_normal(500)).inflation > 1.0 for _ in range(400))
-    assert false <= 8
-    time_s = 3.0 * np.arange(500)
-    slow = GaussMarkov(1.0, 60.0).sample(time_s, rng) + rng.standard_normal(500)
-    assert batch_means(slow).inflation > 4.0
 
 
 def test_a_log_that_errs_slowly_widens_the_band_and_is_said(coast, ship) -> None:

@@ -143,8 +143,7 @@ def test_a_ship_that_drifts_astern_is_told(estimate: Estimate) -> None:
         ('s1_position', 3, True),
         ('s1_joint', 3, True),
         ('s1_joint', 4, False),
-        ('log_time', 3, False),
-        ('ode_fit', None, False),
+        ('one', None, False),
     ],
 )
 def test_a_constant_r_is_told_to_be_a_mean(
@@ -163,4 +162,4 @@ def test_a_curve_over_ground_is_named_so(estimate: Estimate) -> None:
 
 def test_an_estimator_is_named_and_explained() -> None:
     assert words.estimator('s1_speed') == 's1_speed: orthogonal polynomial, speed alone'
-    assert words.estimator('warped').endswith(words.estimator('log_time').partition(': ')[2])
+    assert words.estimator('warped').endswith(words.estimator('one').partition(': ')[2])

@@ -108,8 +108,8 @@ def test_the_error_of_a_former_name_says_the_new_one() -> None:
     assert 'warped' not in estimator.choices
     problems: list[str] = []
     estimator.read('warped', 'estimator', problems)
-    assert "which is 'log_time' now" in problems.pop()
+    assert "which is 'one' now" in problems.pop()
     assert problems == []
     estimator.read('kalman', 'estimator', problems)
-    assert 'log_time' in problems[0]
+    assert 's1_speed' in problems[0]
     assert 'warped' not in problems[0]

@@ -19,7 +19,6 @@ DESK, PHONE, PAPER = 1280, 412, 680  # width of the window [pixels]; A4 within i
 # what a page is made of, by the bag it needs and the command that writes it to {page}
 PAGES = {
     'replay, motion': 'replay {coast}',
-    'replay, log_time': 'replay {coast} --parameters {log_time}',
     'replay, s1_joint': 'replay {coast} --parameters {s1_joint}',
     'replay, s1_speed': 'replay {coast} --parameters {s1_speed}',
     'replay, window': 'replay {coast} --window 320 900',
@@ -127,7 +126,7 @@ def words(tmp_path_factory: pytest.TempPathFactory, fleet_store: Path) -> dict[s
         line = ['simulate', '--ship', str(SHIP), '-o', str(path), '--speed', '8', '--seed', '3']
         assert main([*line, *options]) == 0
         found[name] = str(path)
-    for name in ('log_time', 's1_joint', 's1_speed'):
+    for name in ('s1_joint', 's1_speed'):
         (folder / f'{name}.yaml').write_text(f'estimator: {name}\n')
         found[name] = str(folder / f'{name}.yaml')
     (folder / 'plain.yaml').write_text('length_m: 150.0\ndisplaced_volume_m3: 20200.0\n')

@@ -41,6 +41,7 @@ from shipdrag_ros.coastdown.regimes.state import (
     RAMP_S,
     RATE,
     REGIME,
+    REVS,
     SAID,
     SHAFTS,
     SINCE,
@@ -130,6 +131,7 @@ def _begin(bank: Bank, setting: BankSetting, speed: float, by_log: bool, both: b
             p[CURRENT, CURRENT] = n.CURRENT[0] ** 2 if by_log else (0.05 * speed) ** 2
             f[A0], f[A_VAR], f[P0], f[P_VAR] = x[LN_A], p[LN_A, LN_A], x[POWER], p[POWER, POWER]
             f[WEIGHT], f[SINCE], f[BEFORE], f[RAMP_S] = math.log(chance), -1e9, x[LN_U], 1.0
+            f[REVS] = np.nan
             f[FIRST_A] = math.exp(hull_law(hull, x[LN_U])[0] + x[LN_A])
             w[REGIME], w[LIAR] = regime, liar
             if regime == DRIVEN:

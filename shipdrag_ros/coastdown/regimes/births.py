@@ -18,10 +18,12 @@ from shipdrag_ros.coastdown.regimes.state import (
     COUNT,
     DRIVEN,
     FIRST_A,
+    FREE,
     GLIDE,
     GLIDE_TURN,
     GLIDED,
     KEPT,
+    KIND,
     LEVEL,
     LIAR,
     LN_A,
@@ -41,9 +43,8 @@ from shipdrag_ros.coastdown.regimes.state import (
     THE_LOG,
     THE_TRACK,
     TURN,
-    UNSEEN,
-    WANDER,
     WEIGHT,
+    WINDMILLS,
     BankSetting,
     Histories,
 )  # fmt: skip
@@ -87,7 +88,6 @@ def _free(bank: Histories, j: int, row: int, mean: float, var: float) -> None:
 def _born(
     bank: Histories,
     i: int,
-    hull: HullPrior,
     now_s: float,
     share: float,
     regime: int,
@@ -101,8 +101,8 @@ def _born(
     bank.used[0] = j + 1
     f, w = bank.number[j], bank.whole[j]
     f[WEIGHT] += math.log(share)
-    f[SINCE], f[RAMP_S], f[REVS] = now_s, ramp_s, np.nan
-    w[REGIME], w[UNSEEN] = regime, 0
+    f[SINCE], f[RAMP_S] = now_s, ramp_s
+    w[REGIME] = regime
     if w[COUNT] == SWITCHES:  # the oldest is forgotten
         for k in range(SWITCHES - 1):
             bank.at[j, k] = bank.at[j, k + 1]
@@ -112,40 +112,43 @@ def _born(
     bank.at[j, w[COUNT]], bank.what[j, w[COUNT]] = now_s, regime
     bank.ramp[j, w[COUNT]] = ramp_s
     w[COUNT] += 1
-    # how a log's filter bears a sudden change is not known
-    law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
-    bank.spread[j, WANDER, WANDER] += (n.LOG_LAG_SD_S * math.exp(law)) ** 2
     return int(j)
+
+
+@compiled(uncounted=True)
+def _glide(bank: Histories, j: int, hull: HullPrior) -> None:
+    """Begin a glide: wind is what is left open."""
+    law = hull_law(hull, bank.mean[j, LN_U])[0] + bank.mean[j, LN_A]
+    bank.number[j, FIRST_A] = math.exp(law)
+    bank.whole[j, GLIDED] = 1
+    _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
 
 
 @compiled(uncounted=True)
 def _glides(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let the thrust run down."""
-    under_way = bank.whole[i, REGIME] == DRIVEN or bank.whole[i, REGIME] == LEVEL
-    drags = len(n.DRAGGED) if under_way else 1
-    for k in range(len(n.RUN_DOWN_S) if under_way else 1):
+    if bank.whole[i, REGIME] != DRIVEN and bank.whole[i, REGIME] != LEVEL:
+        j = _born(bank, i, now_s, chance, GLIDE, n.RUN_DOWN_S[0] * setting.pace)
+        if j >= 0:
+            _glide(bank, j, setting.hull)
+        return
+    learnt = bank.whole[i, REGIME] == LEVEL
+    for k in range(len(n.RUN_DOWN_S)):
         ramp_s = n.RUN_DOWN_S[k] * setting.pace
-        share = chance * (n.RUN_DOWN_SHARE[k] if under_way else 1.0)
-        for m in range(drags * (2 if setting.shafts > 0 else 1)):
-            unseen, drag = m // drags, m % drags
-            part = share * (n.DRAGGED_SHARE[drag] if under_way else 1.0)
-            if setting.shafts > 0:
-                part *= n.PITCH_UNSEEN if unseen else 1.0 - n.PITCH_UNSEEN
-            j = _born(bank, i, setting.hull, now_s, part, GLIDE, ramp_s)
+        for kind in range(len(n.DRAGGED)):
+            part = chance * n.RUN_DOWN_SHARE[k] * n.DRAGGED_SHARE[kind]
+            j = _born(bank, i, now_s, part, GLIDE, ramp_s)
             if j < 0:
                 continue
             x, p = bank.mean[j], bank.spread[j]
-            bank.whole[j, UNSEEN] = unseen
-            if under_way:
-                if bank.whole[i, REGIME] == LEVEL:
-                    p[LN_A, LN_A] += n.KEPT_SD**2
-                x[LN_A] += n.DRAGGED[drag]
-                p[LN_A, LN_A] += n.DRAGGED_SD[drag] ** 2
-                p[POWER, POWER] += n.DRAGGED_EXPONENT_SD**2
-                bank.number[j, BEFORE] = x[OPEN]
-            bank.number[j, FIRST_A] = math.exp(hull_law(setting.hull, x[LN_U])[0] + x[LN_A])
-            _free(bank, j, OPEN, 0.0, n.WIND_SD**2)
-            bank.whole[j, GLIDED] = 1
+            bank.whole[j, KIND] = kind
+            bank.number[j, REVS] = np.nan
+            bank.number[j, BEFORE] = x[OPEN]
+            x[LN_A] += n.DRAGGED[kind]
+            x[POWER] += n.DRAGGED_EXPONENT[kind]
+            p[LN_A, LN_A] += n.DRAGGED_SD[kind] ** 2 + (n.KEPT_SD**2 if learnt else 0.0)
+            p[POWER, POWER] += n.DRAGGED_EXPONENT_SD**2
+            _glide(bank, j, setting.hull)
 
 
 @compiled(uncounted=True)
@@ -159,10 +162,15 @@ def _levels(bank: Histories, i: int, setting: BankSetting, now_s: float, chance:
         for m in range(2 * ramps):
             share = chance * n.LEVELS_SHARE[k] / (2 * ramps)
             ramp_s = (n.LEVEL_RAMP_S[m // 2] if engaged else n.ENGAGE_S) * setting.pace
-            j = _born(bank, i, setting.hull, now_s, share, LEVEL, ramp_s)
+            j = _born(bank, i, now_s, share, LEVEL, ramp_s)
             if j < 0:
                 continue
-            bank.whole[j, UNSEEN] = m % 2
+            bank.whole[j, KIND] = m % 2
+            bank.number[j, FREE] = n.WINDMILL[0]
+            if bank.whole[i, REGIME] == GLIDE and bank.whole[i, KIND] == WINDMILLS:
+                revs = f[REVS]
+                bank.number[j, FREE] = n.WINDMILL[0] if np.isnan(revs) else revs
+            bank.number[j, REVS] = np.nan
             bank.number[j, RAMP_FROM] = base if engaged else bank.mean[i, LN_U] - _LOG_S
             _free(bank, j, OPEN, base + math.log(n.LEVELS[k]), n.LEVELS_SD**2)
 
@@ -172,20 +180,22 @@ def _turns(
     bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float, regime: int
 ) -> None:
     for k in range(len(n.TURNS)):
-        j = _born(bank, i, setting.hull, now_s, chance / len(n.TURNS), regime, 1.0)
+        j = _born(bank, i, now_s, chance / len(n.TURNS), regime, 1.0)
         if j >= 0:
             if regime == TURN:
                 bank.number[j, BEFORE] = bank.mean[i, OPEN]
+                bank.number[j, REVS] = np.nan
             _free(bank, j, OPEN, math.log(n.TURNS[k]), n.TURNS_SD**2)
 
 
 @compiled(uncounted=True)
 def _back(bank: Histories, i: int, setting: BankSetting, now_s: float, chance: float) -> None:
     """Let a turn end under the power of before."""
-    j = _born(bank, i, setting.hull, now_s, chance, LEVEL, 1.0)
+    j = _born(bank, i, now_s, chance, LEVEL, 1.0)
     if j >= 0:
         before = bank.number[i, BEFORE]
-        bank.number[j, RAMP_FROM] = before
+        bank.number[j, RAMP_FROM], bank.number[j, REVS] = before, np.nan
+        bank.whole[j, KIND] = 0
         _free(bank, j, OPEN, before, 0.02**2)
 
 
@@ -257,7 +267,7 @@ def bear(bank: Histories, setting: BankSetting, both: bool, steered: bool) -> No
                 left += n.GLIDE_TURN
             for k in range(len(n.BRAKES)):
                 share = n.GLIDE_BRAKE * hours / len(n.BRAKES)
-                j = _born(bank, i, setting.hull, now_s, share, BRAKE, 1.0)
+                j = _born(bank, i, now_s, share, BRAKE, 1.0)
                 if j >= 0:
                     _free(bank, j, OPEN, math.log(n.BRAKES[k]), n.BRAKES_SD**2)
         elif regime == BRAKE:
@@ -278,7 +288,7 @@ def _alike(bank: Histories, i: int, j: int, now_s: float, pace: float) -> bool:
     """Say whether two histories differ by the moment of an old switch alone."""
     w, v = bank.whole[i], bank.whole[j]
     last = w[COUNT] - 1
-    if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[UNSEEN] != v[UNSEEN] or last < 0:
+    if w[COUNT] != v[COUNT] or w[LIAR] != v[LIAR] or w[KIND] != v[KIND] or last < 0:
         return bool(w[COUNT] == 0 and v[COUNT] == 0 and w[LIAR] == v[LIAR])
     if w[REGIME] != v[REGIME] or now_s - bank.at[i, last] < _OLD_S * pace:
         return False

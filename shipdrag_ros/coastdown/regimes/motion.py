@@ -18,11 +18,14 @@ from shipdrag_ros.coastdown.regimes.state import (
     CURRENT,
     DRIVEN,
     FIRST_A,
+    FREE,
     GLIDE,
     GLIDE_TURN,
     GROUND,
     GUST,
+    HELD,
     HIGH,
+    KIND,
     LAG,
     LEVEL,
     LIAR,
@@ -48,14 +51,15 @@ from shipdrag_ros.coastdown.regimes.state import (
     REGIME,
     REVS,
     SINCE,
+    STANDS,
     STATES,
     THE_LOG,
     THE_TRACK,
     TURN,
-    UNSEEN,
     WANDER,
     WAY,
     WEIGHT,
+    WINDMILLS,
     BankSetting,
     Histories,
 )  # fmt: skip
@@ -65,6 +69,7 @@ from shipdrag_ros.samples import Float64
 _PARTS = 5  # of a bin
 _S = float(n.NO_THRUST)
 _LAG_S, _GROUND_LAG_S = float(n.LOG_LAG_S), float(n.GROUND_LAG_S)
+_LAG_SD = float(n.LOG_LAG_SD_S) / _LAG_S  # of the lag
 _ROOT = math.sqrt(2.0 * math.pi)
 
 
@@ -78,23 +83,22 @@ def hull_law(hull: HullPrior, log_u: float) -> tuple[float, float]:
 
 
 @compiled(inline=True, uncounted=True)
-def _advance(part: float, torque: bool) -> tuple[float, float]:
+def _advance(part: float, free: float) -> tuple[float, float]:
     """
     Return revs over speed, as of steady sailing, and their derivative by ln of `part`.
 
-    `part` is the speed that balances over that of now. A governor holds the revs; where the
-    torque is held, they go up with the water.
+    `part` is the speed that balances over that of now. A governor holds the revs (`free` 0);
+    where the torque is held, they go up with the water, to `free` without any.
     """
-    if not torque:
+    if free == 0.0:
         return part, part
-    free = float(n.WINDMILL[0])
     root = math.sqrt(free * free + 4.0 * part * part * (1.0 - free))
     return 0.5 * (free + root), 2.0 * part * part * (1.0 - free) / root
 
 
 @compiled(inline=True, uncounted=True)
 def _force(
-    regime: int, torque: bool, x: Float64, f: Float64, now_s: float, law: float, slope: float
+    regime: int, free: float, x: Float64, f: Float64, now_s: float, law: float, slope: float
 ) -> tuple[float, float, float, float, float]:
     """Return net force per mass, its derivatives by ln u, ln a and the open one, and a."""
     a = math.exp(min(max(law + x[LN_A], -20.0), 5.0))
@@ -106,7 +110,7 @@ def _force(
         elif regime == LEVEL:
             share = min(1.0, (now_s - f[SINCE]) / f[RAMP_S])
             target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
-        rho, by_target = _advance(math.exp(min(target - x[LN_U], 1.0)), torque)
+        rho, by_target = _advance(math.exp(min(target - x[LN_U], 1.0)), free)
         thrust = (_S * rho * rho - rho) / (_S - 1.0)
         steep = by_target * (2.0 * _S * rho - 1.0) / (_S - 1.0)
         left, by_u, by_open = 1.0 - thrust, steep, a * steep * share
@@ -144,7 +148,7 @@ def predict(
     """
     x, p, f = bank.mean[i], bank.spread[i], bank.number[i]
     regime = bank.whole[i, REGIME]
-    torque = regime == LEVEL and bank.whole[i, UNSEEN] == 1
+    free = f[FREE] if regime == LEVEL and bank.whole[i, KIND] == 1 else 0.0
     dt = setting.step_s / _PARTS
     pace = setting.pace
     keep_g, keep_b = math.exp(-dt / (n.GUST_S * pace)), math.exp(-dt / (noise[N_WANDER_S] * pace))
@@ -155,7 +159,7 @@ def predict(
     for part in range(_PARTS):
         now_s = (bank.clock[0] - 1) * setting.step_s + (part + 0.5) * dt
         law, slope = hull_law(setting.hull, x[LN_U])
-        net, by_u, by_a, by_open, a = _force(regime, torque, x, f, now_s, law, slope)
+        net, by_u, by_a, by_open, a = _force(regime, free, x, f, now_s, law, slope)
         u = math.exp(x[LN_U])
         change = min(max(dt * net / u, -0.5), 0.5)
         for j in range(STATES):
@@ -201,6 +205,7 @@ def predict(
         p[WANDER, WANDER] += (1.0 - keep_b * keep_b) * noise[N_WANDER] ** 2
         p[CURRENT, CURRENT] += (1.0 - keep_c * keep_c) * 0.03**2
         p[WAY, WAY] += noise[N_WALK] ** 2 * dt
+        p[LAG, LAG] += (1.0 - keep_f * keep_f) * (_LAG_SD * x[LAG]) ** 2
         x[WAY] += dt * (u + x[CURRENT])
         x[LAG] = keep_f * x[LAG] - u * change
         x[LN_U] = max(x[LN_U] + change, setting.hull.first - 1.0)  # at rest
@@ -254,20 +259,21 @@ def _normal(off: float, sd: float) -> float:
 
 
 @compiled(inline=True, uncounted=True)
-def _as_usual(
-    f: Float64, nu: float, expected: float, wide: float, rises: float, falls: float
-) -> float:
+def _off(nu: float, expected: float) -> float:
+    """Return the density of revs where they are known but for their own error."""
+    return _normal(nu - expected, math.hypot(n.SHAFT_SD[0], n.SHAFT_SD[1] * expected))
+
+
+@compiled(inline=True, uncounted=True)
+def _as_usual(f: Float64, nu: float, expected: float, rises: float, falls: float) -> float:
     """
     Return the density of revs that are a ratio times those expected, and learn the ratio.
 
     The error of an expectation stays as it is: it is paid for once, by the first reading, and
-    then held. `rises` is how fast the ratio may grow with each bin; it falls by a fifth.
+    then held. `rises` and `falls` are parts of a change of the ratio that are learnt in a bin.
     """
     ratio, now = f[REVS], nu / max(expected, 0.05)
-    if np.isnan(ratio):
-        f[REVS] = min(max(now, 0.7), 1.3)
-        return _normal(nu - expected, wide)
-    density = _normal(nu - ratio * expected, n.SHAFT_SD)
+    density = _off(nu, ratio * expected)
     f[REVS] = ratio + (rises if now > ratio else falls) * min(max(now - ratio, -0.2), 0.2)
     return density
 
@@ -292,15 +298,47 @@ def _driving(
         target = f[RAMP_FROM] + (target - f[RAMP_FROM]) * share
         settled = share == 1.0
     at = math.exp(min(target - log_first, 1.0))
-    if regime == TURN or (regime == LEVEL and bank.whole[i, UNSEEN] == 1):
-        at = _advance(math.exp(min(target - x[LN_U], 1.0)), True)[0] * u_part
-    if not settled:
-        density = _normal(nu - at, 2.0 * n.SHAFT_SD)
-        return 0.5 * (density + (1.0 if nu < 1.1 else 0.0)) if several else density
-    if several and regime == LEVEL and np.isnan(f[REVS]):  # one of them may turn as before
+    if regime == TURN or (regime == LEVEL and bank.whole[i, KIND] == 1):
+        free = float(n.WINDMILL[0]) if regime == TURN else f[FREE]
+        at = _advance(math.exp(min(target - x[LN_U], 1.0)), free)[0] * u_part
+    if np.isnan(f[REVS]):
+        density = _normal(nu - at, n.SHAFT_FIRST_SD)
         f[REVS] = nu / at
-        return 0.5 * (_normal(nu - at, 2.0 * n.SHAFT_SD) + (1.0 if nu < 1.1 else 0.0))
-    return _as_usual(f, nu, at, 2.0 * n.SHAFT_SD, 0.03, 0.03)
+    else:
+        gain = 0.1 if settled else 1.0
+        density = _as_usual(f, nu, at, gain, gain)
+    f[REVS] = min(max(f[REVS], 0.7), max(1.0 / at, 1.3) if several else 1.3)
+    if several and not settled:  # one of them may turn as before
+        density = 0.5 * (density + (1.0 if nu < 1.1 else 0.0))
+    return density
+
+
+@compiled(uncounted=True)
+def _dragged(f: Float64, kind: int, nu: float, u_part: float, left: float, several: bool) -> float:
+    """
+    Return the density of the revs of a screw that does not drive; `left` is thrust not yet gone.
+    """
+    if left > 0.0:
+        falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
+        any_ = 1.0 if kind == HELD or (nu < 1.05 and nu > n.WINDMILL[2] * u_part) else 0.0
+        share = 0.5 if several or kind == HELD else 0.8
+        return share * _normal(nu - falls, 0.5 * n.SHAFT_FIRST_SD) + (1.0 - share) * any_
+    revs = f[REVS]
+    if kind == WINDMILLS:
+        if not np.isnan(revs):  # it may turn slower later, by its friction, but not faster
+            return _as_usual(f, nu, u_part, 0.05, 0.3)
+        f[REVS] = min(nu / u_part, n.WINDMILL[2])
+        wide = math.hypot(n.SHAFT_SD[0], n.WINDMILL[1] * u_part)
+        at = n.WINDMILL[0] * u_part
+        return _normal(nu - at, wide) if nu < n.WINDMILL[2] * u_part + n.SHAFT_SD[0] else 0.0
+    if kind == STANDS or np.isnan(revs):
+        stands = _normal(nu, 2.0 * n.SHAFT_SD[0])
+        if kind == STANDS:
+            return stands
+        f[REVS] = nu
+        return 0.5 * stands + 0.5
+    f[REVS] = nu
+    return 0.9 * _off(nu, revs) + 0.1
 
 
 @compiled(uncounted=True)
@@ -315,26 +353,13 @@ def _shaft(
         return math.log(1.0 if regime == BRAKE else n.SHAFT_LIES)
     if regime in (DRIVEN, LEVEL, TURN):
         density = _driving(bank, i, nu, log_first, u_part, now_s, several)
-    elif bank.whole[i, UNSEEN] == 1:  # no pitch is read: the shaft turns on as it likes
-        density = 1.0 if np.isnan(f[REVS]) else _normal(nu - f[REVS], n.SHAFT_SD)
-        f[REVS] = nu if np.isnan(f[REVS]) else 0.97 * f[REVS] + 0.03 * nu
+        if several and regime != LEVEL:  # they turn alike
+            density *= math.exp(-0.5 * ((nu - low) / n.SHAFT_FIRST_SD) ** 2)
     else:
-        left = 0.0
-        if regime == GLIDE:
-            left = 1.0 - (now_s - f[SINCE]) / (f[RAMP_S] + 10.0)
-        stands = 0.3 * _normal(nu, 0.5 * n.SHAFT_SD)
-        at, wide = n.WINDMILL[0] * u_part, math.hypot(n.SHAFT_SD, n.WINDMILL[1] * u_part)
-        if left > 0.0:
-            falls = 0.5 * u_part * (1.0 + math.sqrt(1.0 + 4.0 * _S * (_S - 1.0) * left)) / _S
-            density = 0.4 * (stands + 0.7 * _normal(nu - at, wide)) + (0.3 if nu < 1.05 else 0.0)
-            density += 0.3 * _normal(nu - falls, 1.5 * n.SHAFT_SD)
-        elif not np.isnan(f[REVS]):  # it may turn slower later, by its friction, but not faster
-            density = _as_usual(f, nu, u_part, wide, 0.01, 0.2)
-        else:
-            density = stands
-            if nu < n.WINDMILL[2] * u_part + n.SHAFT_SD:
-                density += 0.7 * _normal(nu - at, wide)
-            f[REVS] = min(nu / u_part, n.WINDMILL[2])
+        left = 1.0 - (now_s - f[SINCE]) / f[RAMP_S] if regime == GLIDE else 0.0
+        density = _dragged(f, bank.whole[i, KIND], nu, u_part, left, several)
+        if regime == BRAKE:  # astern, where no sign is read
+            density = 0.9 * density + 0.1
     return math.log(density + n.SHAFT_LIES)
 
 

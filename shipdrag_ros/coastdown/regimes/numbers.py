@@ -64,9 +64,14 @@ RESISTANCE = _grid(
 RESISTANCE_FILE = _grid(
     'RESISTANCE_FILE', (0.15, 0.20), 'ln', 'over the baseline of the ship file: mean, sd'
 )
-DRAGGED = _grid('DRAGGED', (0.1, 0.8), 'ln', 'more in a glide: a propeller windmills, or stands')
-DRAGGED_SHARE = _grid('DRAGGED_SHARE', (0.7, 0.3), '1', 'of these')
-DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.35), 'ln', 'of each')
+DRAGGED = _grid(
+    'DRAGGED', (0.15, 0.7, 1.4), 'ln', 'more in a glide: the screw windmills, stands, has no pitch'
+)
+DRAGGED_SHARE = _grid('DRAGGED_SHARE', (0.7, 0.2, 0.1), '1', 'of these')
+DRAGGED_SD = _grid('DRAGGED_SD', (0.2, 0.35, 0.45), 'ln', 'of each')
+DRAGGED_EXPONENT = _grid(
+    'DRAGGED_EXPONENT', (-0.1, 0.0, -0.9), '1', 'a screw that turns without pitch drags as u does'
+)
 DRAGGED_EXPONENT_SD = _number('DRAGGED_EXPONENT_SD', 0.2, '1', 'a propeller drags by another law')
 WIND_SD = _number('WIND_SD', 0.06, 'of the first resistance', 'a force that stays as she slows')
 KEPT_SD = _number('KEPT_SD', 0.15, 'ln', 'of a resistance learnt under power, taken to a glide')
@@ -129,9 +134,9 @@ STEADY_TURNS = _number('STEADY_TURNS', 0.03, '1', 'share of bins with a yaw like
 
 # the shaft, revs times pitch over those of steady sailing
 SHAFT_TEMPER = _number('SHAFT_TEMPER', 0.35, '1', 'of its log likelihood: errors last a minute')
-SHAFT_SD = _number('SHAFT_SD', 0.06, '1', 'its own error')
+SHAFT_SD = _grid('SHAFT_SD', (0.015, 0.04), '1', 'its own error, and that of an expectation')
+SHAFT_FIRST_SD = _number('SHAFT_FIRST_SD', 0.12, '1', 'of what a level should have')
 WINDMILL = _grid('WINDMILL', (0.5, 0.13, 0.72), '1', 'over u / U: mean, sd, most; 108 glides')
-PITCH_UNSEEN = _number('PITCH_UNSEEN', 0.1, '1', 'share of glides with the shaft held')
 SHAFT_LIES = _number('SHAFT_LIES', 0.002, '1', 'least density')
 
 # what is made of it: the only loss

@@ -24,15 +24,16 @@ STATES = 9
 DRIVEN, LEVEL, GLIDE, BRAKE, TURN, GLIDE_TURN = range(6)
 
 # further columns of a history: log weight, seconds of its last switch, ln u_e before it and at the
-# start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], lowest revs of a
-# glide, prior of ln a and exponent with their variances
-WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, A0, A_VAR, P0, P_VAR = range(11)
-COLUMNS = 11
-# and whole ones: regime, whether the shaft says nothing, the input that lies, number of switches,
-# whether she has glided
-REGIME, UNSEEN, LIAR, COUNT, GLIDED = range(5)
+# start of its ramp, length of ramp or run-down [s], first resistance [m/s^2], revs over those
+# expected, or held; revs over speed of a free screw; prior of ln a, exponent, and their variances
+WEIGHT, SINCE, BEFORE, RAMP_FROM, RAMP_S, FIRST_A, REVS, FREE, A0, A_VAR, P0, P_VAR = range(12)
+COLUMNS = 12
+# and whole ones: regime, how the screw is dragged or whether torque is held, the input that lies,
+# number of switches, whether she has glided
+REGIME, KIND, LIAR, COUNT, GLIDED = range(5)
 WHOLE = 5
 NOBODY, THE_LOG, THE_TRACK = range(3)
+WINDMILLS, STANDS, HELD = range(3)  # a screw in a glide
 
 # what a bin says; NaN where nothing
 LOG, GROUND, ADVANCE, RATE, HIGH, LOW = range(6)

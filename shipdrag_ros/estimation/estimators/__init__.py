@@ -16,9 +16,6 @@ from shipdrag_ros.estimation.estimator import Estimator
 from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import FORMER_ESTIMATORS
 
-DURING, AFTER = 'log_time', 'ode_fit'
-"""What `auto` stands for: during a coastdown, and when it has ended."""
-
 
 @cache
 def named(name: str) -> Estimator:
@@ -28,9 +25,9 @@ def named(name: str) -> Estimator:
     Parameters
     ----------
     name
-        One of `parameters.ESTIMATORS`; `auto` is that during a coastdown.
+        One of `parameters.ESTIMATORS`, or of `parameters.FORMER_ESTIMATORS`.
     """
-    known = DURING if name == 'auto' else FORMER_ESTIMATORS.get(name, name)
+    known = FORMER_ESTIMATORS.get(name, name)
     found = import_module(f'{__name__}.{known}').ESTIMATOR
     assert isinstance(found, Estimator)
     live = None if found.live is None else shielded(found.live)

@@ -19,7 +19,7 @@ function round(most) {
 }
 
 /** Draw it; `label` stands at the mark, `far` says a length. */
-export function drawTrack(box, { was, ahead, mark, over }, { label, far, unit }) {
+export function drawTrack(box, { was, ahead, mark }, { label, far, unit }) {
   const all = [...was, ...ahead, ...(mark ?? [])];
   const [xs, ys] = [all.map(([x]) => x), all.map(([, y]) => y)];
   const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
@@ -38,7 +38,7 @@ export function drawTrack(box, { was, ahead, mark, over }, { label, far, unit })
   const [x, y] = at([0, 0]);
   const [before, after] = [at(ahead[0]), at(ahead[ahead.length - 1])];
   const course = Math.atan2(after[1] - before[1], after[0] - before[0]) * 180 / Math.PI;
-  svg.append(shape('path', { d: 'M9 0 -6 -5 -6 5Z', transform: `translate(${x} ${y}) rotate(${over ? 0 : course})`, class: 'track-ship' }));
+  svg.append(shape('path', { d: 'M9 0 -6 -5 -6 5Z', transform: `translate(${x} ${y}) rotate(${course})`, class: 'track-ship' }));
   const bar = round(WIDE / 4 / scale / unit);
   const end = EDGE + bar * unit * scale;
   svg.append(shape('path', { d: `M${EDGE} ${HIGH - 12}v5H${end}v-5`, class: 'track-bar' }), shape('text', { x: end + 6, y: HIGH - 6 }, far(bar * unit)));

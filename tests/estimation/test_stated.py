@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shipdrag_ros.estimation import Window, log_time, ode_fit
-from shipdrag_ros.estimation.ode_fit.stated import stated_weight
+from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.result import Estimate
+from shipdrag_ros.estimation.stated import stated_weight
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.samples import Float64
 from shipdrag_ros.ship import Ship
@@ -33,14 +33,14 @@ def window(coast, seed: int, sd: Float64, stated: Float64) -> Window:
 def rmse(coast, ship: Ship, estimator, stated: Float64) -> float:
     squares = []
     for seed in range(RUNS):
-        found: Estimate = estimator.estimate(window(coast, seed, SD, stated), ship, Parameters())
+        found: Estimate = estimator(window(coast, seed, SD, stated), ship, Parameters())
         curve = found.valid_curve
         away = curve.resistance_m_s2 - coast.resistance(curve.speed_m_s, ship)
         squares.append(np.mean(away**2))
     return float(np.sqrt(np.mean(squares)))
 
 
-@pytest.mark.parametrize('estimator', [ode_fit, log_time])
+@pytest.mark.parametrize('estimator', [estimate, estimate_final])
 def test_good_readings_among_bad_ones_count_and_a_wrong_statement_does_no_harm(
     coast, ship, estimator
 ) -> None:
@@ -52,10 +52,10 @@ def test_good_readings_among_bad_ones_count_and_a_wrong_statement_does_no_harm(
     assert inverted < 1.05 * unknown
 
 
-@pytest.mark.parametrize('estimator', [ode_fit, log_time])
+@pytest.mark.parametrize('estimator', [estimate, estimate_final])
 def test_one_variance_for_all_changes_no_bit(coast, ship, estimator) -> None:
     curves = [
-        estimator.estimate(window(coast, 0, SD, stated), ship, Parameters()).curve
+        estimator(window(coast, 0, SD, stated), ship, Parameters()).curve
         for stated in (np.full(N, np.nan), np.full(N, 3.0))
     ]
     assert np.array_equal(curves[0].resistance_m_s2, curves[1].resistance_m_s2)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -11,9 +11,9 @@ import numpy as np
 
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation.distance import along_track
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
-from shipdrag_ros.estimation.ode_fit.stated import stated_weight
-from shipdrag_ros.estimation.ode_fit.steady import (
+from shipdrag_ros.estimation.run_down import RunDown
+from shipdrag_ros.estimation.stated import stated_weight
+from shipdrag_ros.estimation.steady import (
     condense,
     display_sd,
     steady_since,
@@ -46,6 +46,8 @@ class RunRows:
         Stamps of each input used, in the window.
     display_sd
         Of each input used: what the last digit hides from a mean of the steady record.
+    notes
+        A sentence for each input that is left out.
     """
 
     steady: Rows
@@ -55,6 +57,7 @@ class RunRows:
     white_sd: dict[str, float]
     stamps: dict[str, Int64]
     display_sd: dict[str, float]
+    notes: tuple[str, ...]
 
     @classmethod
     def of(cls, window: Window, run_down: RunDown, parameters: Parameters) -> RunRows:
@@ -64,7 +67,7 @@ class RunRows:
         Raises
         ------
         EstimationError
-            If no input has enough samples.
+            If no input has enough samples, or none can be used.
         """
         inputs = {
             name: series for name in CODES if len(series := getattr(window, name)) >= LEAST_STAMPS
@@ -73,7 +76,7 @@ class RunRows:
             found = ', '.join(f'{name} {len(getattr(window, name))}' for name in CODES)
             raise EstimationError(
                 f'samples in the window: {found}; a fit of the motion needs {LEAST_STAMPS} of '
-                'one of them: give a longer window, or another `estimator`'
+                'one of them: give a longer window'
             )
         _check_finite(inputs)
         zero_ns = run_down.stop_ns
@@ -83,30 +86,29 @@ class RunRows:
             'position': parameters.position_sigma_m,
         }
         since = -np.inf if window.before is None else _steady_since(window, inputs, zero_ns)
-        each_input = {
-            name: _condensed(name, window, zero_ns, since, known[name]) for name in inputs
-        }
+        each_input, refused = {}, {}
+        for name in inputs:
+            try:
+                each_input[name] = _condensed(name, window, zero_ns, since, known[name])
+            except EstimationError as error:
+                refused[name] = error
+        if not each_input:
+            raise next(iter(refused.values()))
         steady = _merge([each.steady for each in each_input.values() if each.steady is not None])
         coast = _merge([each.coast for each in each_input.values()])
         return cls(
             *steady,
             *coast,
             {name: each.white_sd for name, each in each_input.items()},
-            {name: series.time_ns for name, series in inputs.items()},
+            {name: inputs[name].time_ns for name in each_input},
             {name: each.display_sd for name, each in each_input.items()},
+            tuple(f'without {name}: {error}' for name, error in refused.items()),
         )
 
     @property
     def steady_s(self) -> float:
         """Length of the steady record [s]."""
         return float(np.ptp(self.steady.time_s)) if len(self.steady.time_s) else 0.0
-
-    def without_steady(self) -> RunRows:
-        """
-        Return the coastdown alone.
-        """
-        rows, weight = _merge([])
-        return replace(self, steady=rows, steady_weight=weight)
 
     def variance(self, rows: Rows, weight: Float64) -> Float64:
         """

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import pytest
 
-from shipdrag_ros.estimation import Window
-from shipdrag_ros.estimation.ode_fit.estimate import estimate
+from shipdrag_ros.estimation import Window, estimate_final
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
 from shipdrag_ros.simulation import START_NS, Scenario, sense, simulate, standard_sensors
@@ -39,6 +38,6 @@ def test_a_log_that_lags_is_no_current(steady_s: float) -> None:
     stop_ns = START_NS + round((steady_s + 9.0) * 1e9)  # found late, as the log shows it late
     end_ns = int(block.stamp_ns.max())
     window = Window.from_block(block, stop_ns, end_ns, before_ns=START_NS)
-    found = estimate(window, FERRY, Parameters())
+    found = estimate_final(window, FERRY, Parameters())
     assert found.current_m_s is not None
     assert abs(found.current_m_s) < 0.04  # 0.06 to 0.09 where the log is taken at its word

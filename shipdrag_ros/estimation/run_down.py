@@ -8,22 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipdrag_ros.estimation.ode_fit.coast import ONSET, THRUST, THRUST_FAST
-from shipdrag_ros.estimation.ode_fit.shaft_fall import Fall, Slowing, find_fall, say
+from shipdrag_ros.estimation.shaft_fall import Fall, Slowing, find_fall, say
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import SHAFTS
 from shipdrag_ros.ship import Ship
 
 _SUDDEN_S = 30.0  # slower than this, a shaft that follows the ship seems to run down
 ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the fit finds it
-# Of a and b in `coast`, before the fit: mean and sd. Their impulse, a + b / 3 run-downs of the
-# shaft, is 0.42 +- 0.81: below 0 (the propeller brakes before it stands), 0 (gone at once), 1/2
-# (the square of the shaft speed), 1 (as the shaft) are all within one standard deviation. With
-# half of it a shaft would make r worse than none where the law is one of the extremes.
-_THRUST = (0.25, 0.7)
-_THRUST_FAST = (0.5, 1.2)
-_UNSEEN = 0.6  # of these sds where the stop is not seen: its time takes up the impulse
-_SHAPE = 0.1  # of the run-down: no shaft falls exactly as an exponential, from one moment on
 _KEPT = 0.05  # of the steady shaft speed: less is not measured
 _AT_START = 1.0  # run-downs after the start of a window: a stop by then is at the start
 _FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven
@@ -121,18 +112,6 @@ class RunDown:
             fall.run_down_s,
             (*notes, *others),
         )
-
-    @property
-    def priors(self) -> tuple[tuple[int, float, float], ...]:
-        """Mean and sd of each unknown of the stop, 0 where it is not fitted."""
-        part = _UNSEEN if self.stop_sd_s >= ONSET_SD_S else 1.0
-        thrust = tuple(
-            (unknown, mean, part * sd)
-            for unknown, (mean, sd) in ((THRUST, _THRUST), (THRUST_FAST, _THRUST_FAST))
-            if self.shaft_s > 0.0
-        )
-        doubt_s = self.stop_sd_s + _SHAPE * self.shaft_s if self.stop_sd_s > 0.0 else 0.0
-        return (*thrust, (ONSET, 0.0, doubt_s))
 
 
 def _falls(window: Window) -> Iterator[tuple[int, str, Fall]]:

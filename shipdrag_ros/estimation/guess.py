@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from shipdrag_ros.errors import EstimationError
-from shipdrag_ros.estimation.ode_fit.steady import block_medians
+from shipdrag_ros.estimation.steady import block_medians
 from shipdrag_ros.inference.rows import LOG, OVER_GROUND, POSITION, Rows
+from shipdrag_ros.samples import Float64
 
 _LEAST_LOSS = 1e-3  # of the speed over the window: less is rounding
-_BLOCKS = 12  # whose medians outliers do not reach
+_ABOVE = 1.05  # of the highest median: she was hardly faster
+_BLOCKS, _BLOCKS_OF_SPEED = 12, 48  # whose medians outliers do not reach
 
 
 @dataclass(frozen=True)
@@ -26,16 +28,16 @@ class InitialGuess:
         At time 0.
     quadratic_1_m
         r / v^2.
-    first_m
-        Position at time 0.
     lowest
         Speed at the end over that at the start.
+    seen : (2, b)
+        Times and median speeds of parts of the record.
     """
 
     speed_m_s: float
     quadratic_1_m: float
-    first_m: float
     lowest: float
+    seen: Float64
 
     @classmethod
     def of(cls, coast: Rows, n_r: float) -> InitialGuess:
@@ -54,7 +56,8 @@ class InitialGuess:
                 break
         chosen = coast.kind == kind
         time_s, value = coast.time_s[chosen], coast.value[chosen]
-        count = min(_BLOCKS, len(time_s) // 4)
+        blocks = _BLOCKS if kind == POSITION else _BLOCKS_OF_SPEED
+        count = min(blocks, len(time_s) // 4)
         edges = np.linspace(0.0, len(time_s), count + 1).astype(np.int64)
         when, speed = block_medians(time_s, edges), block_medians(value, edges)
         if kind == POSITION:
@@ -78,9 +81,10 @@ class InitialGuess:
                 'the engine stop'
             )
         first = mean - slope * mean_t
-        v0 = min(1.0 / first, 1.2 * top) if first > 0.0 else 1.2 * top
-        positions = coast.value[coast.kind == POSITION]
-        first_m = float(positions[0]) if len(positions) else 0.0
+        v0 = min(1.0 / first, _ABOVE * top) if first > 0.0 else _ABOVE * top
         return cls(
-            float(v0), slope * (1.0 + n_r), first_m, float(np.clip(speed[-1] / v0, 0.05, 0.9))
+            float(v0),
+            slope * (1.0 + n_r),
+            float(np.clip(speed[-1] / v0, 0.05, 0.9)),
+            np.stack([when, speed]),
         )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipdrag_ros.estimation.ode_fit.run_down import RunDown
+from shipdrag_ros.estimation.run_down import RunDown
 from shipdrag_ros.estimation.window import Window
 from shipdrag_ros.samples import Block, Channel, Float64, in_arrival_order
 from shipdrag_ros.ship import Ship
