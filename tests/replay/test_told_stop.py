@@ -114,7 +114,7 @@ def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
     assert result.recorded.compared == result.recorded.identical > 10
     (told,) = result.coastdowns
     assert told.onset_detected_ns is not None
-    assert told.onset_detected_ns < now_ns + 30e9
+    assert told.onset_detected_ns < now_ns + 40e9  # 15 s later without it
 
 
 @pytest.mark.parametrize('verb', ['forecast', 'diagnose'])
