@@ -2,7 +2,15 @@
 """MCAP files in and out; nothing that estimates."""
 
 from shipdrag_ros.bags.reader import BagInfo, info, open_runs
-from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, SilenceMark, TopicInfo
+from shipdrag_ros.bags.run import (
+    Mark,
+    ResetMark,
+    Run,
+    RunSamples,
+    SilenceMark,
+    StopMark,
+    TopicInfo,
+)
 from shipdrag_ros.bags.writer import BagWriter, Compression
 
 __all__ = [
@@ -14,6 +22,7 @@ __all__ = [
     'Run',
     'RunSamples',
     'SilenceMark',
+    'StopMark',
     'TopicInfo',
     'info',
     'open_runs',

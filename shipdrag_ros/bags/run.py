@@ -59,7 +59,14 @@ class SilenceMark:
     reason: str
 
 
-Mark = ResetMark | SilenceMark
+@dataclass(frozen=True)
+class StopMark:
+    """A person said that the engine was stopped, within some seconds of `receive_ns`."""
+
+    receive_ns: int
+
+
+Mark = ResetMark | SilenceMark | StopMark
 """What the node learnt other than from samples, and what a replay obeys at its place."""
 
 
@@ -357,6 +364,8 @@ def _mark(payload: bytes) -> Mark | None:
         return ResetMark(note.stamp_ns, note.text)
     if note.kind is EventKind.SILENCE:
         return SilenceMark(note.stamp_ns, note.text)
+    if note.kind is EventKind.ENGINE_STOPPED:
+        return StopMark(note.stamp_ns)
     return None
 
 

@@ -12,6 +12,7 @@ from shipdrag_ros.cli.arguments import (
     add_json,
     add_remap,
     add_report,
+    add_stop,
     number,
     unused_file,
 )
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='the coastdown [s from the start of each bag without a window of its own], without '
         'looking for one; what in it is no coastdown is cut',
     )
+    add_stop(parser)
     parser.add_argument(
         '--fact',
         action='append',
@@ -105,7 +107,9 @@ def run(options: argparse.Namespace) -> int:
     facts = _facts(options.fact)
     earlier = [read_earlier(path) for path in options.earlier]
     with stages(output) as progress:
-        found, ship = diagnose_runs(output, runs, given, facts, earlier=earlier, progress=progress)
+        found, ship = diagnose_runs(
+            output, runs, given, facts, earlier=earlier, stop=options.stop, progress=progress
+        )
     if ship is None and options.write is not None:
         raise DiagnosisError(
             f'no ship file is attached to {runs[0].run.name!r}, and --write needs one; give it '

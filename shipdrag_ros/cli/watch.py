@@ -9,7 +9,7 @@ import ipaddress
 import os
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from shipdrag_ros.cli.arguments import add_remap, bag, number, whole
@@ -34,7 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.description = (
         'Serve one page for the bridge: the state and what to do now, speed, r(v) against the '
         'clean hull, inputs, checklist and verdict. Without a bag it shows the node that runs on '
-        'this network, which may come and go; with bags or logs it plays them. It only reads.'
+        'this network, which may come and go; with bags or logs it plays them. It only reads, '
+        'but for --allow-marks.'
     )
     parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='bag or log to play')
     parser.add_argument(
@@ -86,6 +87,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='STORE',
         help='store of `shipdrag fleet`: the page of the fleet stands under /fleet',
     )
+    parser.add_argument(
+        '--allow-marks',
+        action='store_true',
+        help='a button tells the node that the engine was stopped just now: who sees the page '
+        'may press it',
+    )
     add_remap(parser)
 
 
@@ -94,6 +101,11 @@ def run(options: argparse.Namespace) -> int:
     Serve until SIGINT or SIGTERM.
     """
     output = Output()
+    if options.allow_marks and options.bags:
+        raise ShipdragError(
+            '--allow-marks tells a running node; of a bag say it with `shipdrag replay --stop '
+            'TIME`'
+        )
     token = _token(options.listen, options.token_file)
     ship = None if options.ship is None else Ship.load(options.ship)
     notes: list[str] = []
@@ -101,7 +113,7 @@ def run(options: argparse.Namespace) -> int:
     deltas = None if options.signal_k is None else listen(LOOPBACK, options.signal_k)
     with page_socket, contextlib.ExitStack() as stack:
         past = [] if options.earlier is None else list(_earlier(options.earlier, notes))
-        source: PictureFeed = stack.enter_context(_source(options, ship, past, output))
+        source, mark = stack.enter_context(_source(options, ship, past, output))
         fleet = None if options.store is None else fleet_pages(output, options.store)
         for note in notes:
             output.log(note)
@@ -118,7 +130,9 @@ def run(options: argparse.Namespace) -> int:
                 )
             output.log('Ctrl-C ends it; the node is not touched')
 
-        page = LivePage(source, token=token, notes=tuple(notes), fleet=fleet, ready=announce)
+        page = LivePage(
+            source, token=token, notes=tuple(notes), fleet=fleet, mark=mark, ready=announce
+        )
         serve(page, [page_socket], deltas=deltas)
     # a library's thread may still be in compiled code, where the end of the interpreter aborts it
     sys.stdout.flush()
@@ -129,13 +143,13 @@ def run(options: argparse.Namespace) -> int:
 @contextlib.contextmanager
 def _source(
     options: argparse.Namespace, ship: Ship | None, past: list[PastRun], output: Output
-) -> Iterator[PictureFeed]:
-    """Yield what feeds the page, and end it."""
+) -> Iterator[tuple[PictureFeed, Callable[[], str] | None]]:
+    """Yield what feeds the page, and what tells the node of a stop; end it."""
     if options.bags:
         runs = open_sources(options.bags, output, remap=dict(options.remap))
         bags = BagSource(runs, ship=ship, speed=options.speed, past=past)
         try:
-            yield bags
+            yield bags, None
         finally:
             bags.close()
         return
@@ -146,8 +160,9 @@ def _source(
     node = NodeSource(ship)
     for each in past:
         node.hear(each)
-    with Spectator(node.hear, node=options.node):
-        yield node
+    marks = bool(options.allow_marks)
+    with Spectator(node.hear, node=options.node, marks=marks) as spectator:
+        yield node, spectator.mark_stop if marks else None
 
 
 def fleet_pages(output: Output, store: Path) -> FleetPages:

@@ -31,7 +31,7 @@ from shipdrag_ros.coastdown.events import (
 )
 from shipdrag_ros.coastdown.health import InputHealth, MonitorProgress, input_health
 from shipdrag_ros.coastdown.kernel import WalkEvent, walk
-from shipdrag_ros.coastdown.memory import ALWAYS, InputTally, Memory, Tuning
+from shipdrag_ros.coastdown.memory import ALWAYS, RECENT, InputTally, Memory, Tuning
 from shipdrag_ros.coastdown.onset import Doubt, OnsetCandidate, OnsetDecision, judge, propose
 from shipdrag_ros.coastdown.regimes import numbers
 from shipdrag_ros.coastdown.ring import CAPACITY, make_room, since
@@ -45,7 +45,7 @@ from shipdrag_ros.estimation import Window, estimate, estimate_final
 from shipdrag_ros.estimation.estimator import WindowEstimator
 from shipdrag_ros.estimation.shield import shielded
 from shipdrag_ros.parameters import Parameters
-from shipdrag_ros.samples import SECOND_NS, Block
+from shipdrag_ros.samples import SECOND_NS, Block, Reason
 from shipdrag_ros.ship import Ship
 
 if TYPE_CHECKING:
@@ -240,25 +240,34 @@ class Monitor:
         self._memory, self._reported_s = self._fresh(self._memory.tally), -np.inf
         return [*events, Reset(receive_ns, reason)]
 
-    def engine_stopped(self, stamp_ns: int) -> bool:
+    def engine_stopped(self, receive_ns: int) -> str:
         """
-        Take it from a person that the engine was stopped at a stamp [ns], within some seconds.
+        Take it from a person that the engine was stopped, within some seconds.
 
         It is evidence like the rest, and wakes the regimes.
 
+        Parameters
+        ----------
+        receive_ns
+            Time of arrival of what the person said [ns]; stamps may be of another clock.
+
         Returns
         -------
-        bool
-            False where it is of no use: no speed was read yet, or the rules judge.
+        str
+            Why it is of no use; '' where it is weighed.
         """
-        source = int(self._memory.watch.seen_source[0])
-        if self._parameters.regimes != 'filter' or source == NEVER:
-            return False
+        source, tally = int(self._memory.watch.seen_source[0]), self._memory.tally
+        if self._parameters.regimes != 'filter':
+            return 'the rules judge, which weigh no such thing: set the parameter regimes: filter'
+        if source == NEVER:
+            return 'no speed was read yet, so there is nothing to weigh the stop with'
         if self._regimes is None:
             self._propose(source, int(self._memory.watch.seen[0]), noticed=True)
         assert self._regimes is not None
-        self._regimes.tell(stamp_ns / SECOND_NS)
-        return True
+        last = (int(tally.reasons[source, Reason.ACCEPTED]) - 1) % RECENT
+        clock_ns = int(tally.stamp_ns[source, last] - tally.arrival_ns[source, last])
+        self._regimes.tell((receive_ns + clock_ns) / SECOND_NS)
+        return ''
 
     def fall_silent(self) -> list[Event]:
         """

@@ -39,6 +39,7 @@ from shipdrag_ros.replay import (
 from shipdrag_ros.replay.cuts import cut_lines
 from shipdrag_ros.replay.glides import DISMISSED, dismissed_glide, whole_glide
 from shipdrag_ros.replay.playback import SHIP_FILE
+from shipdrag_ros.replay.told_stop import StopTime
 from shipdrag_ros.ship import Fact, RunSheet, Ship, run_sheet
 from shipdrag_ros.ship.facts import overriding
 
@@ -50,6 +51,7 @@ def diagnose_runs(
     facts: Sequence[Fact],
     *,
     earlier: Sequence[EarlierDiagnosis] = (),
+    stop: StopTime | None = None,
     progress: Progress = silent,
 ) -> tuple[DiagnosisResult, Ship | None]:
     """
@@ -67,6 +69,8 @@ def diagnose_runs(
         Of all runs.
     earlier
         Diagnoses of earlier runs of the ship.
+    stop
+        When the engine was stopped in each run, as of `replay`.
     progress
         Called with each stage, how much of it is done, and of how much.
 
@@ -86,11 +90,16 @@ def diagnose_runs(
     if given is None:
         refuse_two_ships((run, None) for run, _ in runs)
     windowed = any(window is not None for _, window in runs)
-    if not windowed and given is None and not any(SHIP_FILE in run.attachments for run, _ in runs):
+    if (
+        not windowed
+        and stop is None
+        and given is None
+        and not any(SHIP_FILE in run.attachments for run, _ in runs)
+    ):
         why = 'without a ship file none is looked for; give one with --ship FILE'
         sailing = _sailing(runs, f'No coastdown was found: {why}.', progress)
         return _unused(sailing, facts, earlier), None
-    seen = _found(listener, runs, given, progress)
+    seen = _found(listener, runs, given, progress, stop)
     alone = partial(_of_coastdowns, runs, seen, facts, earlier, progress)
     of_whole = partial(
         diagnose,
@@ -255,6 +264,7 @@ def _found(
     runs: Sequence[WindowedRun],
     given: Ship | None,
     progress: Progress,
+    stop: StopTime | None = None,
 ) -> _Coastdowns:
     """Find the coastdowns, if there are any; ship and parameters as in `coasts_of`."""
     seen: list[_OfRun] = []
@@ -265,7 +275,7 @@ def _found(
         stage = partial(progress, f'replaying {each.name}')
         stage(0, 0)
         # recorded outputs are not looked at, nor what is estimated while a coastdown runs
-        result = replay(each, ship=ship, window=window, compare=False, progress=stage)
+        result = replay(each, ship=ship, window=window, stop=stop, compare=False, progress=stage)
         ship, parameters = ship or result.ship, parameters or result.parameters
         sheet, of_run = _sheet(listener, each, ship)
         for name in clocks_apart(result):

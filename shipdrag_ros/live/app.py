@@ -102,6 +102,9 @@ class LivePage:
         Lines about how the page was started, shown below it.
     fleet
         Shown under /fleet; None: none.
+    mark
+        Tells the node that the engine was stopped just now, and returns its answer; None: the
+        page has no button for it.
     ready
         Called once it answers.
 
@@ -119,6 +122,7 @@ class LivePage:
         token: str | None = None,
         notes: tuple[str, ...] = (),
         fleet: FleetPages | None = None,
+        mark: Callable[[], str] | None = None,
         ready: Callable[[], None] = lambda: None,
     ) -> None:
         self._ready = ready
@@ -126,10 +130,12 @@ class LivePage:
         self._source = source
         self._token = token
         self._fleet = fleet
+        self._mark = mark
         self._started = {
             'version': __version__,
             'notes': list(notes),
             'fleet': fleet is not None,
+            'marks': mark is not None,
         }
         self.app: ASGIApp = Guard(self._routes(), token=token)
 
@@ -141,6 +147,7 @@ class LivePage:
                 Route('/login', self._login, methods=['GET', 'POST']),
                 Route('/stream', self._stream),
                 Route('/player', self._control, methods=['POST']),
+                Route('/engine_stopped', self._engine_stopped, methods=['POST']),
                 Route('/signalk', self._signal_k),
                 Route('/signalk/v1/deltas', self._deltas),
                 Route('/state.json', self._state),
@@ -225,6 +232,11 @@ class LivePage:
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
             return PlainTextResponse('expected {"action": ..., "value": number}\n', 400)
         return JSONResponse(self._source.player())
+
+    async def _engine_stopped(self, request: Request) -> Response:
+        if self._mark is None:
+            return PlainTextResponse('Marks are off: start the page with --allow-marks.\n', 403)
+        return PlainTextResponse(f'{await asyncio.to_thread(self._mark)}\n')
 
     # streams
 

@@ -12,6 +12,7 @@ from shipdrag_ros.messages.reporting import (
     read_event,
     reset_request,
     silence_mark,
+    stop_mark,
 )
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
@@ -47,4 +48,5 @@ __all__ = [
     'read_event',
     'reset_request',
     'silence_mark',
+    'stop_mark',
 ]

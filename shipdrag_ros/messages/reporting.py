@@ -78,6 +78,7 @@ class EventKind(Enum):
     RESET = 'reset'  # done, whatever the cause
     RESET_REQUEST = 'reset_request'  # asked for from outside: an input of replay
     SILENCE = 'silence'  # by the clock, which no sample shows: an input of replay
+    ENGINE_STOPPED = 'engine_stopped'  # a person says so: an input of replay
     LIFECYCLE = 'lifecycle'
     CLOCK_JUMP = 'clock_jump'
     FILES = 'files'  # recordings removed
@@ -191,6 +192,16 @@ def silence_mark(receive_ns: int, reason: str, *, node: str = DEFAULT_NODE) -> O
     To be recorded before the coastdown is ended, at log time `receive_ns`.
     """
     return event_message(EventNote(EventKind.SILENCE, receive_ns, reason, {}), node=node)
+
+
+def stop_mark(receive_ns: int, *, node: str = DEFAULT_NODE) -> OutputMessage:
+    """
+    Encode that a person said that the engine was stopped just then, so that replay takes it too.
+
+    To be recorded before the monitor takes it, at log time `receive_ns`.
+    """
+    note = EventNote(EventKind.ENGINE_STOPPED, receive_ns, 'the engine was stopped', {})
+    return event_message(note, node=node)
 
 
 def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage:

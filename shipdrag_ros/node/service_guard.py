@@ -169,7 +169,7 @@ def _refuse(request: Any, response: Any, why: str) -> Any:
 
 def add_services(node: Node, session: Callable[[], Session | None]) -> None:
     """
-    Offer `~/start_recording`, `~/stop_recording` and `~/reset`.
+    Offer `~/start_recording`, `~/stop_recording`, `~/engine_stopped` and `~/reset`.
 
     Parameters
     ----------
@@ -185,6 +185,9 @@ def add_services(node: Node, session: Callable[[], Session | None]) -> None:
         active.recorder.stop()
         return _recording(active)
 
+    def engine_stopped(active: Session) -> tuple[bool, str]:
+        return active.engine_stopped(int(node.get_clock().now().nanoseconds))
+
     def reset(active: Session) -> tuple[bool, str]:
         active.reset('asked for', int(node.get_clock().now().nanoseconds))
         return True, 'all memory is dropped'
@@ -198,7 +201,7 @@ def add_services(node: Node, session: Callable[[], Session | None]) -> None:
 
         return answer
 
-    for action in (start_recording, stop_recording, reset):
+    for action in (start_recording, stop_recording, engine_stopped, reset):
         node.create_service(Trigger, f'~/{action.__name__}', answered(action))
 
 

@@ -33,6 +33,7 @@ from shipdrag_ros.messages import (
     outputs,
     reset_request,
     silence_mark,
+    stop_mark,
     types,
 )
 from shipdrag_ros.node.recorder import RawMessage, Recorder
@@ -98,7 +99,7 @@ class Session:
         self._on_event = on_event
         self.why_none = ''
         self._ready = ready
-        self._waiting: deque[tuple[int, int, Callable[[], None]]] = deque()
+        self._waiting: deque[tuple[int, int, Callable[[], object]]] = deque()
         self._arrival_ns = 0
         self._cause_ns = 0  # arrival of what the messages out come of, if not the last
 
@@ -157,7 +158,7 @@ class Session:
         finally:
             self._cause_ns = 0
 
-    def _in_turn(self, use: Callable[[], None], size: int = 0) -> None:
+    def _in_turn(self, use: Callable[[], object], size: int = 0) -> None:
         """Do it behind what waits."""
         self._waiting.append((self._arrival_ns, size, use))
         self._waiting_bytes += size
@@ -192,11 +193,26 @@ class Session:
         arrival_ns = self.watch_clock(now_ns)
         if self.monitor.state not in (State.CANDIDATE, State.COASTDOWN):
             return
-        mark = silence_mark(arrival_ns, reason, node=self._node)
-        self._publish(mark)
-        if arrival_ns:
-            self.recorder.request(mark, arrival_ns)
+        self._obey_in_replay(silence_mark(arrival_ns, reason, node=self._node), arrival_ns)
         self._in_turn(lambda: self._report(self.monitor.fall_silent()))
+
+    def engine_stopped(self, now_ns: int) -> tuple[bool, str]:
+        """
+        Take it from a person that the engine was stopped just now, within some seconds.
+
+        Returns
+        -------
+        done, text
+            Whether it is weighed, and what comes of it.
+        """
+        arrival_ns = self.watch_clock(now_ns)
+        self._obey_in_replay(stop_mark(arrival_ns, node=self._node), arrival_ns)
+        if self._waiting or not self._ready():
+            self._in_turn(partial(self.monitor.engine_stopped, arrival_ns))
+            return True, 'recorded; it is weighed once compiled code is there'
+        why = self.monitor.engine_stopped(arrival_ns)
+        weighed = 'the stop is weighed with the readings, as of now within some seconds'
+        return (False, f'recorded, and of no use: {why}') if why else (True, weighed)
 
     def reset(self, reason: str, now_ns: int) -> None:
         """
@@ -283,6 +299,12 @@ class Session:
             self.latest = None
 
         self._in_turn(use)
+
+    def _obey_in_replay(self, mark: OutputMessage, arrival_ns: int) -> None:
+        """Publish and record what a replay obeys at its place, as it does an input."""
+        self._publish(mark)
+        if arrival_ns:
+            self.recorder.request(mark, arrival_ns)
 
     def _note(self, kind: EventKind, text: str) -> None:
         self._send(event_message(EventNote(kind, self._arrival_ns, text, {}), node=self._node))

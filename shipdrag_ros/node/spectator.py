@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """
-A listener that publishes nothing and offers no service: it hears a node for others.
+A listener that publishes nothing and offers no service: it hears a node for others, and
+calls its `~/engine_stopped` where that is allowed.
 
 It may start before the node, and the node may come and go.
 """
@@ -18,6 +19,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from shipdrag_ros.messages import OUTPUT_TOPICS, TOPICS, MalformedMessage, Source, decode
 from shipdrag_ros.messages.heard import DIAGNOSTICS, Health, Heard, NodeMessage, Samples, ShipFile
@@ -26,6 +28,7 @@ from shipdrag_ros.messages.topics import RESISTANCE_CURVE
 from shipdrag_ros.node.inputs import is_installed, message_class
 
 LOOK_S = 1.0
+ANSWER_S = 5.0  # that a mark waits for the node
 CLOSEST_S = 0.04  # a reading of an input that comes sooner after the last one is not decoded
 _RELIABLE = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 _LATCHED = QoSProfile(
@@ -46,6 +49,8 @@ class Spectator:
         Called in that thread with everything heard; must return at once.
     node
         Full name of the node, '' for the first one that is found.
+    marks
+        It may tell the node that the engine was stopped.
 
     Attributes
     ----------
@@ -55,7 +60,9 @@ class Spectator:
         Nodes of the same kind that are not heard.
     """
 
-    def __init__(self, hear: Callable[[Heard], None], *, node: str = '') -> None:
+    def __init__(
+        self, hear: Callable[[Heard], None], *, node: str = '', marks: bool = False
+    ) -> None:
         self.node = ''
         self.others: tuple[str, ...] = ()
         self._hear = hear
@@ -68,6 +75,8 @@ class Spectator:
         )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._ros)
+        self._marks = marks
+        self._stopped: Any = None
         self._of_node: list[Any] = []
         self._of_inputs: dict[str, tuple[str, str, Any]] = {}
         self._last_s: dict[str, float] = {}
@@ -90,6 +99,21 @@ class Spectator:
         self._context.try_shutdown()
         self._thread.join()
         self._ros.destroy_node()
+
+    def mark_stop(self) -> str:
+        """
+        Tell the node that the engine was stopped just now, and return its answer.
+        """
+        client = self._stopped
+        if client is None or not client.service_is_ready():
+            return 'no node is there to be told: the stop was not marked'
+        done = threading.Event()
+        asked = client.call_async(Trigger.Request())
+        asked.add_done_callback(lambda _: done.set())
+        if not done.wait(ANSWER_S):
+            asked.cancel()
+            return f'the node did not answer within {ANSWER_S:.0f} s: the stop may not be marked'
+        return str(asked.result().message)
 
     def _spin(self) -> None:
         try:
@@ -120,6 +144,10 @@ class Spectator:
         for subscription in self._of_node:
             self._ros.destroy_subscription(subscription)
         self.node = node
+        if self._marks:
+            if self._stopped is not None:
+                self._ros.destroy_client(self._stopped)
+            self._stopped = self._ros.create_client(Trigger, f'{node}/engine_stopped')
         self._of_node = [
             self._ros.create_subscription(
                 message_class(topic.type),

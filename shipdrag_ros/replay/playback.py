@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples
+from shipdrag_ros.bags.run import Mark, ResetMark, Run, RunSamples, StopMark
 from shipdrag_ros.coastdown import Monitor
 from shipdrag_ros.coastdown.events import (
     Dismissal,
@@ -29,7 +29,7 @@ from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.progress import PartDone
 from shipdrag_ros.replay.comparison import Comparison, Recorded
 from shipdrag_ros.replay.given_window import estimate_window, read_window
-from shipdrag_ros.replay.told_stop import StopTime, ToldStop, told_ns, with_stop
+from shipdrag_ros.replay.told_stop import StopTime, told_ns, with_stop
 from shipdrag_ros.samples import Block, Channel, Reason
 from shipdrag_ros.ship import Ship
 
@@ -232,8 +232,8 @@ def _as_on_board(
     inputs = run.inputs()
     total = sum(topic.messages for topic in run.topics if topic.input)
     for item in with_stop(inputs, told):
-        if isinstance(item, ToldStop):
-            if not monitor.engine_stopped(item):
+        if isinstance(item, StopMark) and item.receive_ns == told:
+            if monitor.engine_stopped(told):
                 raise BagError(f'{run.name!r}: no speed was read before the stop that is given')
             continue
         take(feed(monitor, item))
@@ -262,6 +262,9 @@ def feed(monitor: Monitor, item: Block | Mark) -> list[Event]:
         return monitor.update(item)
     if isinstance(item, ResetMark):
         return monitor.reset(item.receive_ns, item.reason)
+    if isinstance(item, StopMark):
+        monitor.engine_stopped(item.receive_ns)
+        return []
     return monitor.fall_silent()
 
 

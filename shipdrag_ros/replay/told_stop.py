@@ -8,7 +8,7 @@ from datetime import datetime
 
 import numpy as np
 
-from shipdrag_ros.bags.run import Mark, Run
+from shipdrag_ros.bags.run import Mark, Run, StopMark
 from shipdrag_ros.display import utc
 from shipdrag_ros.errors import BagError
 from shipdrag_ros.samples import SECOND_NS, Block
@@ -42,13 +42,7 @@ def told_ns(run: Run, stop: StopTime) -> int:
     return start_ns + round(at_s * SECOND_NS)
 
 
-class ToldStop(int):
-    """The stamp of a stop that was told [ns]."""
-
-
-def with_stop(
-    items: Iterable[Block | Mark], at_ns: int | None
-) -> Iterator[Block | Mark | ToldStop]:
+def with_stop(items: Iterable[Block | Mark], at_ns: int | None) -> Iterator[Block | Mark]:
     """
     Put a stop between the samples of a run.
 
@@ -57,7 +51,7 @@ def with_stop(
     items
         In the order of arrival.
     at_ns
-        Its time of arrival [ns]; the stamps of the samples may be of another clock.
+        Its time of arrival [ns].
     """
     for item in items:
         if at_ns is None or not isinstance(item, Block) or not len(item):
@@ -67,8 +61,9 @@ def with_stop(
         if first < 0:
             yield item
             continue
-        near = max(first - 1, 0)
         yield item[:first]
-        yield ToldStop(at_ns + int(item.stamp_ns[near] - item.receive_ns[near]))
+        yield StopMark(at_ns)
         yield item[first:]
         at_ns = None
+    if at_ns is not None:  # after the last sample
+        yield StopMark(at_ns)

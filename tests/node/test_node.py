@@ -311,7 +311,7 @@ def test_waits_to_be_configured_without_autostart(
     ship_file.write_text('length_m: -1.0\n')
     node = start_node(autostart=False, up='waiting to be configured')
     assert peer.state() == 'unconfigured'
-    for name in ('start_recording', 'stop_recording', 'reset'):
+    for name in ('start_recording', 'stop_recording', 'engine_stopped', 'reset'):
         answer = peer.trigger(name)
         assert not answer.success
         assert answer.message == 'the node is not active'

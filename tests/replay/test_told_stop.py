@@ -7,13 +7,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from shipdrag_ros.bags import open_runs
+from shipdrag_ros.bags import StopMark, open_runs
 from shipdrag_ros.cli import main
 from shipdrag_ros.coastdown.events import Event
 from shipdrag_ros.errors import BagError
+from shipdrag_ros.messages import encode, stop_mark
+from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.replay import replay
 from shipdrag_ros.samples import Block, Channel
 from shipdrag_ros.ship import Ship
@@ -90,8 +93,33 @@ def test_what_a_bag_holds_is_not_denied_with_a_stop(
     )
 
 
-def test_a_forecast_takes_a_stop(
-    recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str]
+def test_a_stop_that_is_told_on_board_is_replayed_to_the_bit(
+    tmp_path: Path, ship: Ship, voyage: Callable[..., Block], live: type[Any]
 ) -> None:
-    assert main(['forecast', str(recording[0]), '--stop', '1e6']) == 1
+    messages = list(encode(voyage()))
+    at = next(i for i, each in enumerate(messages) if each.log_ns > START_NS + 405e9)
+    session = live(ship, Parameters(update_s=30.0, regimes='filter'))
+    session.start(tmp_path / 'a.mcap')
+    for message in messages[:at]:
+        session.receive(message)
+    now_ns = messages[at - 1].log_ns
+    session.write_output(stop_mark(now_ns), now_ns)
+    assert session.monitor.engine_stopped(now_ns) == ''
+    for message in messages[at:]:
+        session.receive(message)
+    session.stop(messages[-1].log_ns)
+    (run,) = open_runs([tmp_path / 'a.mcap'])
+    assert StopMark(now_ns) in list(run.inputs())
+    result = replay(run)
+    assert result.recorded.compared == result.recorded.identical > 10
+    (told,) = result.coastdowns
+    assert told.onset_detected_ns is not None
+    assert told.onset_detected_ns < now_ns + 40e9  # 15 s later without it
+
+
+@pytest.mark.parametrize('verb', ['forecast', 'diagnose'])
+def test_other_verbs_take_a_stop(
+    recording: tuple[Path, list[Event]], capsys: pytest.CaptureFixture[str], verb: str
+) -> None:
+    assert main([verb, str(recording[0]), '--stop', '1e6']) == 1
     assert 'stop at 1000000.0 s: expected inside of' in capsys.readouterr().err

@@ -275,6 +275,7 @@ function showNotes(part) {
 function showStarted(part) {
   text('version', `shipdrag_ros ${part.version}.`);
   const fleet = part.fleet ? [make('li', make('a', 'The fleet: which hull first', { href: '/fleet' }))] : [];
+  el('engine-stopped').hidden = !part.marks;
   el('started').replaceChildren(...fleet, ...part.notes.map(note => make('li', note)));
 }
 
@@ -345,6 +346,15 @@ async function control(action, value = 0) {
   await fetch('/player', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify({ action, value }) });
 }
 
+async function engineStopped() {
+  el('engine-stopped').disabled = true;
+  try {
+    const answer = await fetch('/engine_stopped', { method: 'POST' });
+    text('marked', await answer.text());
+  } catch { text('marked', 'The page did not answer: the stop was not marked.'); }
+  el('engine-stopped').disabled = false;
+}
+
 // buttons and keys
 
 function setMode(mode) {
@@ -379,6 +389,7 @@ function setUp() {
   el('zone').addEventListener('change', () => { zone = Number(el('zone').value); keep('zone', zone); showAll(); });
   el('mode').addEventListener('click', nextMode);
   el('units').addEventListener('click', nextUnits);
+  el('engine-stopped').addEventListener('click', engineStopped);
   el('span').addEventListener('change', showTraces);
   el('play').addEventListener('click', () => control(picture.player?.playing ? 'pause' : 'play'));
   el('speed').addEventListener('change', () => control('speed', Number(el('speed').value)));
