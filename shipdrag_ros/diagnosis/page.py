@@ -209,7 +209,7 @@ def _known(found: DiagnosisResult, ship: Ship | None) -> Section:
 
 def _trust(score: Score | None) -> Section:
     if score is None:
-        text = ['This method was not scored on hidden effects.']
+        text = ['The method of this version was not scored as a whole on hidden effects.']
     else:
         text = [
             f'The method was tried on {score.cases} simulated cases (seed {score.seed}) made by '

@@ -10,11 +10,12 @@ import numpy as np
 
 from shipdrag_ros.estimation.shaft_fall import Fall, Slowing, find_fall, say
 from shipdrag_ros.estimation.window import Window
+from shipdrag_ros.posterior.priors import STOP
 from shipdrag_ros.samples import SHAFTS
 from shipdrag_ros.ship import Ship
 
 _SUDDEN_S = 30.0  # slower than this, a shaft that follows the ship seems to run down
-ONSET_SD_S = 30.0  # of an onset found from the speed alone: a loose bound, the fit finds it
+ONSET_SD_S = STOP.sd  # of an onset found from the speed alone: a loose bound, the fit finds it
 _KEPT = 0.05  # of the steady shaft speed: less is not measured
 _AT_START = 1.0  # run-downs after the start of a window: a stop by then is at the start
 _FALLEN = 5.0  # run-downs after which the shaft turns on by the water, or is driven

@@ -280,29 +280,3 @@ def whiten(rows: Rows, table: Float64, noise: Noise) -> float:
             for b in range(active):
                 cov[a, b] -= gain[a] * seen[b]
     return log_det
-
-
-@compiled
-def apply(whitener: Float64, table: Float64) -> Float64:
-    """
-    Whiten lines by a matrix; compiled, as the threads of a library do not pay for so small ones.
-
-    Parameters
-    ----------
-    whitener : (n, n)
-        Lower triangular: the inverse Cholesky factor of the covariance of the rows.
-    table : (c, n)
-
-    Returns
-    -------
-    (c, n)
-    """
-    lines, n = table.shape
-    turned = np.ascontiguousarray(table.T)
-    result = np.zeros((n, lines))
-    for i in range(n):
-        for j in range(i + 1):
-            factor = whitener[i, j]
-            for c in range(lines):
-                result[i, c] += factor * turned[j, c]
-    return result.T

@@ -31,8 +31,6 @@ POSITION = int(Input.POSITION)
 KIND_COUNT = len(Input)
 CODES = {input_.key: int(input_) for input_ in Input}
 
-LOG_SCALE_SD = 0.02  # of a log's scale about 1, before any measurement: a Doppler log's
-
 
 class Rows(NamedTuple):
     """
