@@ -10,6 +10,7 @@ from pathlib import Path
 from shipdrag_ros.cli.arguments import add_effects, add_json, add_remap, add_report, unused_file
 from shipdrag_ros.cli.output import Output, stages
 from shipdrag_ros.cli.windowed import HELP, WindowedBag, open_windowed, windowed_bag
+from shipdrag_ros.errors import FleetError
 from shipdrag_ros.imports import need
 from shipdrag_ros.learning import words
 from shipdrag_ros.learning.term import check_name
@@ -98,8 +99,24 @@ def _bags(given: Sequence[WindowedBag]) -> list[WindowedBag]:
         need('pyarrow')
         from shipdrag_ros.fleet.store import read_bags
 
-        rows = read_bags(each.path).to_pylist()
+        rows = [row for row in read_bags(each.path).to_pylist() if row['coastdowns']]
+        if not rows:
+            raise FleetError(f'{str(each.path)!r} holds no coastdown; give bags with coastdowns')
         found += [
-            WindowedBag(Path(row['root'], row['bag']), None) for row in rows if row['coastdowns']
+            WindowedBag(_place(each.path, Path(row['root'], row['bag'])), each.window)
+            for row in rows
         ]
     return found
+
+
+def _place(store: Path, bag: Path) -> Path:
+    """Return where a bag of a store is: the store holds the last part of its folder alone."""
+    for folder in (Path.cwd(), store.resolve().parent):
+        # a folder that was given as `.` holds the bag without its own name
+        for path in (folder / bag, folder.parent / bag):
+            if path.exists():
+                return path
+    raise FleetError(
+        f'{str(bag)!r} of the store {str(store)!r} is neither below this folder nor beside the '
+        f'store; change to the folder that holds {bag.parts[0]!r}, or give the bags themselves'
+    )

@@ -533,7 +533,7 @@ def _chosen(dated: Dated) -> Chosen:
     if not dated.slow_s:
         return Chosen(start_ns, ())
     text = (
-        f'the thrust ran down for {dated.slow_s:.0f} s, and was gone at the start '
+        f'the thrust ran down for {dated.slow_s:.0f} s, and was gone at the end of that, '
         f'± {dated.begin_sd_s:.0f} s'
     )
     first_ns = start_ns - round(dated.slow_s * SECOND_NS)

@@ -88,10 +88,13 @@ def _verdict(found: DiagnosisResult) -> str:
             if found.baseline == 'none':  # the force was not examined
                 said = 'Log and track agree'
             said = f'{said} ({probability(found.nothing)})'
+            if not rest:
+                return f'{said}.'
+            if seen[0].names == NONE:  # the most probable comes first
+                return f'{said}, or {_listed(rest)}. These runs cannot separate them.'
             return (
-                f'{said}, or {_listed(rest)}. These runs cannot separate them.'
-                if rest
-                else f'{said}.'
+                f'Missing is one of these: {_listed(rest)}; or {said[0].lower()}{said[1:]}. '
+                'These runs cannot separate them.'
             )
         case Verdict.UNKNOWN:
             return (

@@ -307,8 +307,8 @@ class _Judged:
         )
         if by_name > 0.5:
             return (
-                f'{first} of the library explains it, probability {kinds[first]:.2f}; '
-                '`shipdrag diagnose` names it'
+                f'effects of the library explain it, probability {by_name:.2f}, first {first}, '
+                f'{kinds[first]:.2f}; `shipdrag diagnose` says which, or what would decide'
             )
         if count < 2:
             return 'one run never tells forms apart'

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from shipdrag_ros.cli import main
+from shipdrag_ros.fleet.rows import BagResult, bag_row
+from shipdrag_ros.fleet.store import Store
 
 SHIP = Path(__file__).resolve().parents[2] / 'config' / 'vitus_bering.yaml'
 
@@ -34,3 +36,63 @@ def test_a_name_that_cannot_be_is_refused_before_the_work(
     line = ['learn', str(tmp_path / 'none.mcap'), '-o', str(tmp_path / 'a.yaml'), '--name', name]
     assert main(line) == 1
     assert 'name' in capsys.readouterr().err
+
+
+@pytest.fixture(scope='module')
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that holds `bags/run.mcap`, and a store that lists it as the fleet does."""
+    folder = tmp_path_factory.mktemp('fleet')
+    bag = folder / 'bags' / 'run.mcap'
+    bag.parent.mkdir()
+    line = ['simulate', '--ship', str(SHIP), '-o', str(bag), '--lead-in', '400']
+    assert main([*line, '--duration', '900']) == 0
+    store = folder / 'store'
+    (store / 'coastdowns').mkdir(parents=True)
+    Store(store).write(BagResult({**bag_row('bags', 'run.mcap', 'a' * 64), 'coastdowns': 1}))
+    return folder
+
+
+def test_the_bags_of_a_store_are_found_from_anywhere(
+    fleet: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(['learn', str(fleet / 'store'), '-o', str(tmp_path / 'a.yaml'), '--json']) == 0
+    assert len(json.loads(capsys.readouterr().out)['runs']) == 1
+
+
+def test_a_window_of_a_store_counts(
+    fleet: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line = ['learn', f'{fleet / "store"}@0:200', '-o', str(tmp_path / 'a.yaml')]
+    assert main(line) == 1
+    assert 'no coastdown from 0 to 200 s' in capsys.readouterr().err
+
+
+def test_a_bag_of_a_store_that_is_gone_is_named(
+    fleet: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    store = (fleet / 'store').rename(tmp_path / 'moved')
+    try:
+        monkeypatch.chdir(tmp_path)
+        assert main(['learn', str(store), '-o', 'a.yaml']) == 1
+    finally:
+        store.rename(fleet / 'store')
+    said = capsys.readouterr().err
+    assert "'bags/run.mcap' of the store" in said
+    assert 'give the bags themselves' in said
+
+
+def test_a_store_without_a_coastdown_is_an_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = tmp_path / 'store'
+    (store / 'coastdowns').mkdir(parents=True)
+    Store(store).write(BagResult(bag_row('bags', 'run.mcap', 'a' * 64)))
+    assert main(['learn', str(store), '-o', str(tmp_path / 'a.yaml')]) == 1
+    assert 'holds no coastdown' in capsys.readouterr().err

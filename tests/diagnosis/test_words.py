@@ -78,6 +78,13 @@ def diagnosis(
             ),
             'Nothing is missing (60.0 %), or fouling (35.0 %). These runs cannot separate them.',
         ),
+        (  # the least probable does not come first
+            diagnosis(
+                Verdict.ONE_OF, (('fouling',), 0.6), (('wind',), 0.3), (NONE, 0.1), nothing=0.1
+            ),
+            'Missing is one of these: fouling (60.0 %), wind (30.0 %); or nothing is missing '
+            '(10.0 %). These runs cannot separate them.',
+        ),
         (
             diagnosis(Verdict.UNKNOWN, (('wind',), 0.1), unnamed=0.9),
             'Something is missing that is none of the known effects, in the force on the ship, 12 '

@@ -115,6 +115,9 @@ def test_what_the_library_names_is_not_learnt() -> None:
     ]
     found = sd.learn(runs, ship=SHIP)
     assert found.term is None
+    # what none of them reaches, the diagnosis does not name either
+    assert 'effects of the library explain it' in found.reason
+    assert 'says which, or what would decide' in found.reason
 
 
 def test_a_ship_without_a_baseline_is_an_error() -> None:

@@ -105,11 +105,15 @@ def test_a_coastdown_over_topics_from_steady_to_verdict(
     port = url.rstrip('/').rpartition(':')[2]
     watch.kill()
     viewer.wait_for('#lost', 'NO CONNECTION', within_s=240.0)
-    again = start('shipdrag_ros.cli', 'watch', '--port', port)
+    assert not viewer.page.is_visible('#engine-stopped')
+    again = start('shipdrag_ros.cli', 'watch', '--port', port, '--allow-marks')
     again.wait_for('the page')
     viewer.page.wait_for_selector('#lost', state='hidden')
     viewer.wait_for('#verdict', agreed)  # as the node says it; the curve is latched
     viewer.wait_for('#curve-say', 'clean hull')
+    viewer.page.click('#engine-stopped')
+    # the node's own answer: the rules, which judge unless told otherwise, weigh no such thing
+    assert 'regimes: filter' in viewer.wait_for('#marked', 'recorded')
 
     assert node.stop() == 0
     viewer.wait_for('#headline', 'NODE SILENT', within_s=240.0)
