@@ -119,7 +119,7 @@ PARAMETERS = (
         "window_s: '600', expected a number without quotes or unit, 60..21600 s",
     ),
     _parameters(
-        'a wrong choice', 'estimator: kalman\n', 1, "estimator: 'kalman', expected one of auto,"
+        'a wrong choice', 'estimator: kalman\n', 1, "estimator: 'kalman', expected one of one,"
     ),
     _parameters(
         'a value without a name',
@@ -351,7 +351,7 @@ NODE = (
     _node(
         'a wrong choice',
         1,
-        "estimator: 'kalman', expected one of auto,",
+        "estimator: 'kalman', expected one of one,",
         ros=('-p', 'estimator:=kalman'),
     ),
     _node(

@@ -101,5 +101,6 @@ def write_report(path: Path, found: Learnt) -> None:
     """
     Write it as a page; an existing one is replaced.
     """
-    sections = [Section('What explains the runs', tables=(('', table(found)),), text=lines(found))]
+    shown = (('Probability of each explanation of the runs', table(found)),)
+    sections = [Section('What explains the runs', text=lines(found), tables=shown)]
     write_page(path, 'Learnt effect', sections, sentence=sentence(found))

@@ -81,8 +81,8 @@ def test_an_engine_that_is_engaged_ends_it(ship, record) -> None:
 
 
 def test_a_forecast_is_withdrawn_once_it_is_likelier_that_she_is_driven(ship, record) -> None:
-    orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(400.0, shaft=0.5, thrust=0.25))
-    block = record(sensors=(LOG,), orders=orders, duration_s=1200.0)
+    orders = (EngineOrder(0.0, shaft=0.0, thrust=0.0), EngineOrder(1000.0, shaft=0.5, thrust=0.25))
+    block = record(sensors=(LOG, TRACK), orders=orders, duration_s=1600.0)
     monitor = Monitor(ship, replace(FILTER, update_s=5.0))
     updates = of(Update, [*monitor.update(block), *monitor.finish()])
     made = [each.forecast is not None for each in updates]

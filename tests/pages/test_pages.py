@@ -28,6 +28,7 @@ PAGES = {
     'diagnose, stated baseline': 'diagnose {coast} {back}',
     'diagnose, fitted baseline': 'diagnose {coast} --ship {plain}',
     'diagnose, no coastdown': 'diagnose {steady}',
+    'learn, no form': 'learn {coast} -o {folder}/none.yaml',
     'trend': 'trend {store}',
     'poster': 'poster {store}',
     'cable': 'cable --length 50 --diameter 0.1 --speed 3',
@@ -116,7 +117,12 @@ TOO_WIDE = 'document.documentElement.scrollWidth - document.documentElement.clie
 def words(tmp_path_factory: pytest.TempPathFactory, fleet_store: Path) -> dict[str, str]:
     """What stands for the words in braces: bags and files."""
     folder = tmp_path_factory.mktemp('pages')
-    found = {'ship': str(SHIP), 'root': str(ROOT), 'store': str(fleet_store)}
+    found = {
+        'ship': str(SHIP),
+        'root': str(ROOT),
+        'store': str(fleet_store),
+        'folder': str(folder),
+    }
     for name, options in (
         ('coast', ('--lead-in', '600')),
         ('back', ('--lead-in', '600', '--heading', '3.1416', '--first-heading', '0')),
@@ -150,7 +156,7 @@ def test_a_page_opens_and_no_picture_is_without_data(
         assert tab.run(UNTOLD) == []
     found = tab.run(EMPTY_AXES)
     assert found['empty'] == []
-    without = 'no coastdown' in kind or kind == 'poster'
+    without = 'no coastdown' in kind or kind in ('poster', 'learn, no form')
     assert found['axes'] >= found['pictures'] >= (not without)
 
 
