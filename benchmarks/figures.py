@@ -132,22 +132,16 @@ FIGURES = tuple(
             'median {0} s of input, at most {1} s',
         ),
         (
-            'Is a name of `diagnose` right? World A, one effect hidden',
+            'Is a name of `diagnose` right? World B, by another author, one effect hidden',
             'diagnosis_score',
-            r'something is named \| (\d.*?) \| (\d.*?) \| (\d.*?) \| (\d.*?) \|',
-            'one run {0}, with context {1}; two runs {2}, with context {3}',
-        ),
-        (
-            'The same in world B, by another author',
-            'diagnosis_score',
-            r'something is named \| \*\*(\d+ of \d+)\*\* \| \*\*(\d+ of \d+)\*\*',
-            '{0}; {1} with what a crew knows',
+            r'something is named \| (\d+ of \d+) \|',
+            '{0}',
         ),
         (
             'Is something named where nothing is hidden? World B',
             'diagnosis_score',
-            r'nothing hidden: alarm; false name \| \*\*(\d+); (\d+)\*\* of (\d+)',
-            '{0} alarms and {1} false name in {2}',
+            r'nothing hidden: false name; plain "none" \| (\d+); (\d+) of (\d+)',
+            '{0} false names and {1} plain `none` in {2}; the rest are sets that hold "nothing"',
         ),
     )
 )

@@ -237,14 +237,15 @@ def test_a_closure_is_refused() -> None:
 def test_the_type_checker_sees_what_calls_a_compiled_function(tmp_path: Path) -> None:
     snippet = tmp_path / 'snippet.py'
     whiten = 'from shipdrag_ros.inference.noise import whiten\n'
-    spread = 'from shipdrag_ros.inference.gaussian import root\n'
-    snippet.write_text(f"{whiten}{spread}whiten(1, 2, 3, 'wrong')\nroot('wrong')\nroot()\n")
+    products = 'from shipdrag_ros.inference.gaussian import products_of\n'
+    wrong = "products_of('wrong')\nproducts_of()\n"
+    snippet.write_text(f"{whiten}{products}whiten(1, 2, 3, 'wrong')\n{wrong}")
     # with the options of `make types`, whose cache it takes; others would empty it
     told, _, status = api.run(['--config-file', str(ROOT / 'pyproject.toml'), str(snippet)])
     assert status == 1
     assert 'Too many arguments for "whiten"' in told
-    assert 'Argument 1 to "root" has incompatible type "str"' in told
-    assert 'Missing positional argument "covariance" in call to "root"' in told
+    assert 'Argument 1 to "products_of" has incompatible type "str"' in told
+    assert 'Missing positional argument "table" in call to "products_of"' in told
 
 
 # a live estimate, a final one and the noise of a diagnosis, printed to the last bit

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, apply, whiten
+from shipdrag_ros.inference.noise import GaussMarkovNoise, Noise, whiten
 from shipdrag_ros.inference.rows import LOG, POSITION, Rows, bin_means
 
 TIMES_S = np.array([90.0, 600.0, 50.0, 40.0])
@@ -86,15 +86,6 @@ def test_a_gust_moves_the_ship_and_its_position() -> None:
     whiten(rows, table, Noise(np.full(n, 0.25), gusts, np.full(n, rate), np.full(n, inertia)))
     # the first rows show whether the beginning is stationary; the chain above is only nearly so
     assert np.mean(table[:, 5:] ** 2) == pytest.approx(1.0, abs=0.05)
-
-
-@settings(deadline=None)  # the first call compiles
-@given(st.integers(1, 30), st.integers(1, 5), st.integers(0, 1000))
-def test_apply_is_a_product_of_matrices(n: int, lines: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    lower = np.tril(rng.standard_normal((n, n)))
-    table = rng.standard_normal((lines, n))
-    np.testing.assert_allclose(apply(lower, table), table @ lower.T, rtol=1e-12, atol=1e-12)
 
 
 def test_a_gust_reaches_position_as_far_as_speed_carries_it() -> None:
