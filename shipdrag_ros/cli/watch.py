@@ -38,21 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'but for --allow-marks.'
     )
     parser.add_argument('bags', nargs='*', type=bag, metavar='BAG', help='bag or log to play')
-    parser.add_argument(
-        '--port', type=whole(0, 65535), default=8088, help='of the page, 0: any free one'
-    )
-    parser.add_argument(
-        '--listen',
-        default=LOOPBACK,
-        metavar='ADDRESS',
-        help='address to listen on; any but that of this machine alone needs --token-file',
-    )
-    parser.add_argument(
-        '--token-file',
-        type=Path,
-        metavar='FILE',
-        help=f'text of at least {SHORTEST_TOKEN} characters that a viewer must give',
-    )
+    _add_server(parser)
     parser.add_argument(
         '--speed',
         type=number(0.0, FASTEST, above=True),
@@ -94,6 +80,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'may press it',
     )
     add_remap(parser)
+
+
+def _add_server(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--port', type=whole(0, 65535), default=8088, help='of the page, 0: any free one'
+    )
+    parser.add_argument(
+        '--listen',
+        default=LOOPBACK,
+        metavar='ADDRESS',
+        help='address to listen on; any but that of this machine alone needs --token-file',
+    )
+    parser.add_argument(
+        '--token-file',
+        type=Path,
+        metavar='FILE',
+        help=f'text of at least {SHORTEST_TOKEN} characters that a viewer must give',
+    )
 
 
 def run(options: argparse.Namespace) -> int:
