@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import shutil
 import sys
 from collections import Counter
@@ -120,6 +121,7 @@ class Run:
     ) -> None:
         self.name = bag.name
         self.parts = tuple(parts)
+        self._limits_ns = (0, sys.maxsize)
         self._message_compression = bag.message_compression
         self._warnings = list(bag.warnings)
         counts: Counter[tuple[str, str]] = Counter()
@@ -148,7 +150,11 @@ class Run:
         spans = [part.span_ns for part in self.parts if part.span_ns is not None]
         if not spans:
             return None
-        return min(start for start, _ in spans), max(end for _, end in spans)
+        first, last = self._limits_ns
+        return (
+            max(first, min(start for start, _ in spans)),
+            min(last, max(end for _, end in spans)),
+        )
 
     @property
     def software(self) -> str | None:
@@ -176,6 +182,31 @@ class Run:
             shutil.copyfile(self.parts[0].path, out)
         except OSError as error:
             raise BagError(f'{str(out)!r} cannot be written: {error.strerror}') from error
+
+    def part(self, start_s: float, end_s: float) -> Run:
+        """
+        Return a part of the run, as if the recording held no more.
+
+        Parameters
+        ----------
+        start_s, end_s
+            From the start of the run [s].
+
+        Raises
+        ------
+        BagError
+            If the run ends before the part begins.
+        """
+        span_ns = self.span_ns or (0, 0)
+        first, last = (span_ns[0] + round(each * 1e9) for each in (start_s, end_s))
+        if first >= span_ns[1]:
+            raise BagError(
+                f'{self.name!r}: nothing is recorded from {start_s:g} to {end_s:g} s: it lasts '
+                f'{(span_ns[1] - span_ns[0]) * 1e-9:.1f} s; give an earlier part'
+            )
+        found = copy.copy(self)
+        found._limits_ns = (first, last)
+        return found
 
     def note(self, warnings: Iterable[str]) -> None:
         """
@@ -226,6 +257,7 @@ class Run:
         Parts follow each other; inside a part the log time counts, then the place.
         The channel of each is its place among the keys.
         """
+        start_ns, end_ns = max(start_ns, self._limits_ns[0]), min(end_ns, self._limits_ns[1])
         for part in self.parts:
             place_of = np.zeros(CHANNELS, np.uint16)
             wanted = []

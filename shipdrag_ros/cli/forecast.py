@@ -14,7 +14,7 @@ from shipdrag_ros.forecast import words
 from shipdrag_ros.forecast.followed import Passed
 from shipdrag_ros.forecast.result import Band
 from shipdrag_ros.library.forecasts import AFTER_S, Forecasts, GlideForecast, forecast
-from shipdrag_ros.library.replaying import replay_run
+from shipdrag_ros.library.replaying import WindowedRun, replay_run
 from shipdrag_ros.library.stopped import IfStopped, if_stopped_now
 from shipdrag_ros.parameters import Parameters
 from shipdrag_ros.ship import Ship
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--if-stopped-now',
         action='store_true',
         help='the glide that would begin at the end of the last bag, from the hull as last known: '
-        'the last coastdown in the bags, or else the ship file',
+        'the last coastdown in the bags, or else the ship file; of BAG@START:END, now is END',
     )
     add_stop(parser)
     add_remap(parser)
@@ -68,9 +68,12 @@ def run(options: argparse.Namespace) -> int:
     output = Output(options.json)
     ship = None if options.ship is None else Ship.load(options.ship)
     parameters = None if options.parameters is None else Parameters.load(options.parameters)
+    given = open_windowed(options.bags, remap=dict(options.remap), output=output)
+    if options.if_stopped_now:  # a window says when `now` is, not that she glides in it
+        given = [WindowedRun(run.part(*own) if own else run, None) for run, own in given]
     results = [
         replay_run(each, output, ship=ship, parameters=parameters, window=own, stop=options.stop)
-        for each, own in open_windowed(options.bags, remap=dict(options.remap), output=output)
+        for each, own in given
     ]
     if options.if_stopped_now:
         stopped = if_stopped_now(results)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 from shipdrag_ros.display import LIGHT_KG, Table, ship_speed
 from shipdrag_ros.forecast.followed import Passed
@@ -11,6 +12,7 @@ from shipdrag_ros.forecast.result import Band, Milestone
 
 _MILE_M = 1852.0
 _NOT_SHOWN = 'not shown'
+_T = TypeVar('_T')
 
 
 def clock(seconds: float) -> str:
@@ -56,6 +58,13 @@ def cells(band: Band, show: Callable[[float], str]) -> tuple[str, str]:
     return show(band.median), f'{show(band.low)} to {show(band.high)}'
 
 
+def apart(milestones: Sequence[_T], speed: Callable[[_T], str]) -> list[_T]:
+    """
+    Return milestones without those whose speed reads as that of one before.
+    """
+    return list({speed(each): each for each in reversed(milestones)}.values())[::-1]
+
+
 def table(compared: Sequence[Passed], mass_kg: float) -> Table:
     """
     Show milestones beside what followed, a line each.
@@ -72,6 +81,6 @@ def table(compared: Sequence[Passed], mass_kg: float) -> Table:
             *cells(each.foretold.distance_m, far),
             _NOT_SHOWN if each.was_m is None else far(each.was_m),
         )
-        for each in compared
+        for each in apart(compared, lambda each: ship_speed(each.foretold.speed_m_s, mass_kg))
     )
     return Table(('down to', 'in', '90 %', 'was', 'after', '90 %', 'was'), rows)

@@ -14,7 +14,7 @@ from shipdrag_ros.display import Table, ship_speed, utc
 from shipdrag_ros.errors import EstimationError
 from shipdrag_ros.estimation import Window
 from shipdrag_ros.forecast import words
-from shipdrag_ros.forecast.result import Forecast
+from shipdrag_ros.forecast.result import Forecast, Milestone
 from shipdrag_ros.forecast.stopped import HullNow, if_stopped
 from shipdrag_ros.library.shown import Shown
 from shipdrag_ros.replay import accepted_samples
@@ -64,10 +64,14 @@ class IfStopped(Shown):
     def _lines(self) -> Sequence[str]:
         mass = self.ship.mass_kg
         now = ship_speed(float(self.forecast.speed_m_s[0]), mass)
-        said = '; '.join(words.sentence(each, mass) for each in self.forecast.milestones)
+        said = '; '.join(words.sentence(each, mass) for each in self._shown())
         when = f'at {utc(self.forecast.made_ns)}'
         begun = f'Gliding already {when}' if self.gliding else f'If the engine were stopped {when}'
         return (f'{begun}, at {now} {self.measured}, by {self.hull}: {said}.',)
+
+    def _shown(self) -> Sequence[Milestone]:
+        mass = self.ship.mass_kg
+        return words.apart(self.forecast.milestones, lambda each: ship_speed(each.speed_m_s, mass))
 
     def table(self) -> Table:
         """
@@ -80,7 +84,7 @@ class IfStopped(Shown):
                 *words.cells(each.time_s, words.clock),
                 *words.cells(each.distance_m, lambda metres: words.way(metres, mass)),
             )
-            for each in self.forecast.milestones
+            for each in self._shown()
         )
         return Table(('down to', 'in', '90 %', 'after', '90 %'), rows)
 

@@ -13,6 +13,8 @@ import pytest
 import shipdrag_ros as sd
 from shipdrag_ros.cli import main
 from shipdrag_ros.cli.forecast import document
+from shipdrag_ros.display import ship_speed
+from shipdrag_ros.forecast import words
 
 mpl.use('agg')
 
@@ -67,7 +69,10 @@ def test_a_script_gets_the_same(found: dict[str, Any], coastdown_bag: Path) -> N
     assert len(axis.lines) == 3
     frame = made.to_frame()
     assert (frame['time_low_s'] < frame['time_high_s']).all()
-    assert len(made.table().rows) == len(frame)
+    # a speed that reads as the one before has no row of its own
+    speeds = [ship_speed(each, made.made[0].ship.mass_kg) for each in frame['speed_m_s']]
+    shown = dict.fromkeys(zip(map(words.clock, frame['after_s']), speeds, strict=True))
+    assert [row[:2] for row in made.table().rows] == list(shown)
 
 
 def test_no_glide_is_said(steady_bag: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -132,3 +137,13 @@ def test_if_she_were_stopped_now(
     said = capsys.readouterr().out
     assert 'Gliding already at ' in said
     assert ', by the coastdown of ' in said
+
+    assert main(['forecast', f'{coastdown_bag}@0:300', '--if-stopped-now', '--json']) == 0
+    told = capsys.readouterr()
+    assert 'If the engine were stopped at ' in told.err  # of the glide after it nothing is known
+    rows = [line.split('  ')[0] for line in told.err.splitlines() if ' knots  ' in line]
+    assert len(rows) == len(set(rows)) > 3
+    assert json.loads(told.out)['if_stopped_now']['hull'] == 'the clean hull of the ship file'
+
+    assert main(['forecast', f'{coastdown_bag}@90000:90010', '--if-stopped-now']) == 1
+    assert 'nothing is recorded from 90000 to 90010 s' in capsys.readouterr().err
