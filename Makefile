@@ -56,9 +56,9 @@ peers: env
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r benchmarks/peers.lock
 
 lock:
-	uv pip compile --quiet --universal --python-version 3.11 --extra ros --extra dev --extra docs --extra report --extra watch --extra fleet --extra logs --generate-hashes \
+	uv pip compile --quiet --no-strip-extras --universal --python-version 3.11 --extra ros --extra dev --extra docs --extra report --extra watch --extra fleet --extra logs --generate-hashes \
 	    --no-header setup.py -o requirements.lock
-	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header \
+	uv pip compile --quiet --no-strip-extras --universal --python-version 3.11 --generate-hashes --no-header \
 	    --constraints requirements.lock benchmarks/peers.in -o benchmarks/peers.lock
 
 clean:
