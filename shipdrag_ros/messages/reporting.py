@@ -28,7 +28,6 @@ from shipdrag_ros.estimation.result import Estimate
 from shipdrag_ros.forecast.path import PathAhead
 from shipdrag_ros.forecast.result import Forecast
 from shipdrag_ros.messages import types
-from shipdrag_ros.messages.encoding import covariance6, vector3
 from shipdrag_ros.messages.topics import (
     DEFAULT_NODE,
     DIAGNOSIS,
@@ -208,23 +207,18 @@ def event_message(note: EventNote, *, node: str = DEFAULT_NODE) -> OutputMessage
     """
     Encode a note for `~/events`.
     """
-    status = types.class_of('diagnostic_msgs/msg/DiagnosticStatus')
-    message = types.make(
-        EVENTS.type,
-        header=types.header(note.stamp_ns, ''),
-        status=[
-            status(
-                level=status.WARN if note.kind.is_warning else status.OK,
-                name=note.kind.value,
-                message=note.text,
-                hardware_id='',
-                values=[
-                    types.make('diagnostic_msgs/msg/KeyValue', key=key, value=value)
-                    for key, value in note.values.items()
-                ],
-            )
+    kind = types.class_of('diagnostic_msgs/msg/DiagnosticStatus')
+    status = types.make(
+        'diagnostic_msgs/msg/DiagnosticStatus',
+        level=kind.WARN if note.kind.is_warning else kind.OK,
+        name=note.kind.value,
+        message=note.text,
+        values=[
+            types.make('diagnostic_msgs/msg/KeyValue', key=key, value=value)
+            for key, value in note.values.items()
         ],
     )
+    message = types.make(EVENTS.type, header=types.header(note.stamp_ns, ''), status=[status])
     return _message(EVENTS, message, note.stamp_ns, node)
 
 
@@ -249,32 +243,21 @@ def read_event(payload: bytes) -> EventNote:
 
 def _figures(stamp_ns: int, estimate: Estimate, node: str) -> list[OutputMessage]:
     """Speed, resistance and the curve of one estimate."""
-    still = vector3(0.0, 0.0)
     speed = types.make(
         SPEED.type,
-        header=types.header(stamp_ns, FRAME),
-        twist=types.make(
-            'geometry_msgs/msg/TwistWithCovariance',
-            twist=types.make(
-                'geometry_msgs/msg/Twist',
-                linear=vector3(float(estimate.last_speed_m_s), 0.0),
-                angular=still,
-            ),
-            covariance=covariance6(float(estimate.last_speed_sigma_m_s) ** 2),
-        ),
+        {
+            'header': types.header(stamp_ns, FRAME),
+            'twist.twist.linear.x': float(estimate.last_speed_m_s),
+            'twist.covariance[0]': float(estimate.last_speed_sigma_m_s) ** 2,
+        },
     )
     resistance = types.make(
         RESISTANCE.type,
-        header=types.header(stamp_ns, FRAME),
-        accel=types.make(
-            'geometry_msgs/msg/AccelWithCovariance',
-            accel=types.make(
-                'geometry_msgs/msg/Accel',
-                linear=vector3(float(estimate.last_resistance_m_s2), 0.0),
-                angular=still,
-            ),
-            covariance=covariance6(float(estimate.last_sigma_m_s2) ** 2),
-        ),
+        {
+            'header': types.header(stamp_ns, FRAME),
+            'accel.accel.linear.x': float(estimate.last_resistance_m_s2),
+            'accel.covariance[0]': float(estimate.last_sigma_m_s2) ** 2,
+        },
     )
     return [
         _message(SPEED, speed, stamp_ns, node),
@@ -307,14 +290,15 @@ def _path(stamp_ns: int, path: PathAhead | None, node: str) -> OutputMessage:
     poses = []
     if path is not None:
         half = 0.5 * path.course_rad
-        ahead = types.make(
-            'geometry_msgs/msg/Quaternion', x=0.0, y=0.0, z=math.sin(half), w=math.cos(half)
-        )
         for time_ns, (x, y) in zip(path.time_ns, path.position_m, strict=True):
-            place = types.make('geometry_msgs/msg/Point', x=float(x), y=float(y), z=0.0)
-            pose = types.make('geometry_msgs/msg/Pose', position=place, orientation=ahead)
-            head = types.header(int(time_ns), PLANE)
-            poses.append(types.make(types.POSE, header=head, pose=pose))
+            pose = {
+                'header': types.header(int(time_ns), PLANE),
+                'pose.position.x': float(x),
+                'pose.position.y': float(y),
+                'pose.orientation.z': math.sin(half),
+                'pose.orientation.w': math.cos(half),
+            }
+            poses.append(types.make(types.POSE, pose))
     message = types.make(FORECAST_PATH.type, header=types.header(stamp_ns, PLANE), poses=poses)
     return _message(FORECAST_PATH, message, stamp_ns, node)
 

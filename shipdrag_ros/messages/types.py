@@ -10,9 +10,11 @@ older bags are read.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import reduce
 from typing import Any, NamedTuple
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -97,11 +99,47 @@ def class_of(type_name: str) -> Any:
     return _store.types[type_name]
 
 
-def make(type_name: str, /, **fields: Any) -> Any:
+def make(type_name: str, fields: Mapping[str, Any] | None = None, /, **more: Any) -> Any:
     """
-    Build a message; every field must be given.
+    Build a message; what is not given is zero or empty.
+
+    Parameters
+    ----------
+    type_name
+    fields
+        By path: `twist.twist.linear.x` or `twist.covariance[7]` for instance.
+    more
+        The same of fields whose names are paths.
     """
-    return class_of(type_name)(**fields)
+    message = _blank(type_name)
+    for path, value in {**(fields or {}), **more}.items():
+        *way, last = path.split('.')
+        owner = reduce(getattr, way, message)
+        name, bracket, place = last.partition('[')
+        if bracket:
+            getattr(owner, name)[int(place.removesuffix(']'))] = value
+        else:
+            setattr(owner, name, value)
+    return message
+
+
+def _blank(type_name: str) -> Any:
+    """Return a message of zeros, empty texts and empty sequences."""
+    fields = _store.fielddefs[type_name][1]
+    return class_of(type_name)(**{name: _blank_field(*each) for name, each in fields})
+
+
+def _blank_field(node: Nodetype, about: Any) -> Any:
+    if node is Nodetype.NAME:
+        return _blank(about)
+    if node is Nodetype.BASE:
+        kind = about[0]
+        return '' if kind == 'string' else np.dtype(kind).type(0).item()
+    (inner, of), length = about
+    count = length if node is Nodetype.ARRAY else 0
+    if inner is Nodetype.BASE and of[0] != 'string':
+        return np.zeros(count, of[0])
+    return [_blank_field(inner, of) for _ in range(count)]
 
 
 def header(stamp_ns: int, frame_id: str) -> Any:
