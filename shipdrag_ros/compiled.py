@@ -186,9 +186,22 @@ class _LazyFunction:
 @cache
 def _numba_lock() -> Any:
     """Import numba for one kind of processor, and teach it what a lazy function is."""
-    os.environ.setdefault('NUMBA_CPU_NAME', PROCESSOR)
+    from numba.core import config, event
     from numba.core.compiler_lock import global_compiler_lock
     from numba.extending import typeof_impl
+
+    # also where something else has imported numba before
+    config.CPU_NAME = os.environ.setdefault('NUMBA_CPU_NAME', PROCESSOR)
+
+    class Notice(event.Listener):  # type: ignore[misc]
+        def on_start(self, event: object) -> None:
+            for say in list(_listeners):
+                say()
+
+        def on_end(self, event: object) -> None:
+            pass
+
+    event.register('numba:compile', Notice())
 
     @typeof_impl.register(_LazyFunction)
     def _(value: _LazyFunction, context: Any) -> Any:
@@ -245,18 +258,14 @@ class _Cache:
         try:
             kept = path.read_bytes()
         except OSError:
-            return self._none()
+            return None
         data = kept[_CHECKED:]
         if hashlib.sha256(data).digest() != kept[:_CHECKED]:
-            return self._none()  # the power failed, or the disk did
+            return None  # the power failed, or the disk did
         _mark_used(self._folder)
         result = compiler.CompileResult._rebuild(target_context, *pickle.loads(data))
         # types of two modules may have one name
-        return result if tuple(result.signature.args) == _arguments(sig) else self._none()
-
-    def _none(self) -> None:
-        for say in _listeners:
-            say()
+        return result if tuple(result.signature.args) == _arguments(sig) else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what was compiled for a type of arguments."""
@@ -357,6 +366,7 @@ def _compiler() -> tuple[object, ...]:
     import numba
     import numpy as np
 
+    _numba_lock()  # which settles for what processor
     settings = sorted(
         f'{name}={value}'
         for name, value in os.environ.items()
