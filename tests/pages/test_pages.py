@@ -176,7 +176,8 @@ def test_a_page_is_read_by_day_and_by_night(
 
 
 def test_every_verb_that_writes_a_page_is_among_them() -> None:
-    writing = {verb.name for verb in verbs() if '--report' in options(parser(verb.name), verb.name)}
+    names = [verb.name for verb in verbs()]
+    writing = {name for name in names if '--report' in options(parser(name), name)}
     assert writing == {line.split()[0] for line in PAGES.values()}
 
 
