@@ -30,17 +30,17 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
 from diagnosis_score import as_block
+from hidden_b.cases import EPOCH_NS
 from scipy.stats import binomtest
 from strangers import world
 from strangers.hidden import CURVES, PLAIN, STRANGERS
 
 from shipdrag_ros import cli
 from shipdrag_ros.bags import BagWriter
-from shipdrag_ros.learning.folder import using
 from shipdrag_ros.learning.term import LearntTerm
-from shipdrag_ros.parameter import Parameter
-from shipdrag_ros.ship import Ship, StatedEffect
-from shipdrag_ros.simulation import Scenario, simulate
+from shipdrag_ros.ship import Ship
+from shipdrag_ros.simulation import Action, Scenario, simulate_columns
+from shipdrag_ros.simulation.effect import Frame
 
 OUT = Path(__file__).parent / 'out' / 'learn_strangers.jsonl'
 NAME = 'stranger'
@@ -83,18 +83,18 @@ def gap_cut(case: world.Case, run: int, term: LearntTerm) -> float:
         lead_in_s=60.0,
         duration_s=float(t[-1]),
         heading_rad=setting.heading_rad,
+        depth_m=setting.depth_m,
+        day=(EPOCH_NS * 1e-9 + setting.clock_s) / 86400.0,
     )
-    sizes = {name: Parameter(q.value, 0.0) for name, q in term.parameters.items()}
-    with using([term]):
-        speeds = [
-            np.interp(t + 60.0, motion.time_s, motion.speed_through_water_m_s)
-            for effects in ([], [StatedEffect(term.name, sizes)])
-            for motion in [simulate(ship, scenario, effects=effects)]
-        ]
-    change = speeds[1] - speeds[0]
+    sizes = [q.value for q in term.parameters.values()]
+    acting = term.effect().action(Frame(ship, scenario, setting.first_rad), *sizes)
+    time_s = np.clip(t + 60.0, 0.0, scenario.length_s)
+    read = simulate_columns(ship, scenario, [Action(), acting], time_s)
+    change = np.concatenate(
+        [speed[1] - speed[0] for speed in (read.log_m_s, read.speed_through_water_m_s)]
+    )
     gap = np.concatenate([log, ground])
-    left = gap - np.concatenate([change, change])
-    return 1.0 - float(np.sqrt(np.mean(left**2) / np.mean(gap**2)))
+    return 1.0 - float(np.sqrt(np.mean((gap - change) ** 2) / np.mean(gap**2)))
 
 
 def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
@@ -107,8 +107,9 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
         bags = [write_run(case, run, folder) for run in list(world.LEARNT)[:runs]]
         file = folder / 'effects' / f'{NAME}.yaml'
         file.parent.mkdir()
+        alone = verb(['diagnose', bags[0]])
         if show:
-            _show('first run', verb(['diagnose', bags[0]]))
+            _show('first run', alone)
         start = time.process_time()
         found = verb(['learn', *bags, '-o', str(file), '--name', NAME])
         result: Found = {
@@ -120,6 +121,7 @@ def tried(stranger: str, ship: int, runs: int, show: bool = False) -> Found:
             'reason': found['reason'],
             'probability': {k: round(p, 3) for k, p in found['probability'].items() if p > 0.01},
             'cut': 0.0,
+            'alone': [alone['verdict'], [each['name'] for each in alone['effects']]],
             'later': None,
         }
         if found['learnt'] is None:

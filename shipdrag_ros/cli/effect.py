@@ -9,7 +9,8 @@ from pathlib import Path
 from shipdrag_ros.cli.arguments import add_effects, add_json
 from shipdrag_ros.cli.output import Output
 from shipdrag_ros.display import Table
-from shipdrag_ros.learning.term import OWN, LearntTerm
+from shipdrag_ros.learning.expression import unit_text
+from shipdrag_ros.learning.term import OWN, RESULT, LearntTerm
 from shipdrag_ros.simulation.effects import LIBRARY
 
 
@@ -45,7 +46,8 @@ def _check(files: list[Path], output: Output) -> int:
     document = []
     for path in files:
         term = LearntTerm.load(path)  # the first that cannot be used is the error
-        output.say(f'{path}: {term.name} can be used: {term.form.expression} [N]')
+        unit = unit_text(RESULT[term.form.channel])
+        output.say(f'{path}: {term.name} can be used: {term.form.expression} [{unit}]')
         document.append({'file': str(path), 'name': term.name, 'channel': term.form.channel})
     output.json({'effects': document})
     return 0

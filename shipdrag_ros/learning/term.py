@@ -56,7 +56,7 @@ from shipdrag_ros.ship import GRAVITY_M_S2, Ship
 from shipdrag_ros.simulation.action import Action
 from shipdrag_ros.simulation.effect import DAY_S, Effect, Frame, Scope
 from shipdrag_ros.simulation.effects import LIBRARY
-from shipdrag_ros.simulation.scenario import Turn
+from shipdrag_ros.simulation.scenario import Scenario, Turn
 
 CHANNELS = ('force', 'water', 'log', 'ground', 'inertia')
 SHAPES = ('constant', 'power', 'step', 'ramp', 'hump', 'decay', 'periodic')
@@ -76,9 +76,9 @@ class Variable(StrEnum):
     DATE = auto()
 
 
-ACTING = {'force': ('speed', 'time', 'heading')}
+ACTING = {'force': ('speed', 'time', 'heading', 'date', 'depth'), 'log': ('speed', 'time')}
 """What can be simulated today: variables by channel."""
-RESULT: dict[str, Unit] = {'force': (1.0, 1.0, -2.0)}
+RESULT: dict[str, Unit] = {'force': (1.0, 1.0, -2.0), 'log': (0.0, 1.0, -1.0)}
 NAMES: dict[str, Unit] = {
     'rho': (1.0, -3.0, 0.0),
     'g': (0.0, 1.0, -2.0),
@@ -87,8 +87,13 @@ NAMES: dict[str, Unit] = {
     'u': (0.0, 1.0, -1.0),
     't': (0.0, 0.0, 1.0),
     'psi': PURE,
+    'd': PURE,
+    'h': (0.0, 1.0, 0.0),
 }
-"""Density, gravity, length, displaced volume; speed through water, time since the stop, yaw."""
+"""
+Density, gravity, length, displaced volume; speed through water, time since the stop, yaw, days
+since 1970 and depth of the water at the stop.
+"""
 UNITS: dict[str, Unit] = {
     '1': PURE,
     'rad': PURE,
@@ -106,9 +111,15 @@ OWN = frozenset(LIBRARY)
 
 _NAME = re.compile(r'[a-z][a-z0-9_]{0,59}')
 _SIDES_SD = 3.0  # of a parameter, inside which a formula must be sound
-_SPEEDS, _TIMES, _HEADINGS = 16, 8, 2  # boxes in which ranges are looked at
-_LENGTHS_M = (2.0, 10.0, 30.0, 100.0, 200.0, 400.0)  # of ships that a term may be carried to
-_LONGEST_S = 86400.0
+_AXES = {
+    'L': (2.0, 10.0, 30.0, 100.0, 200.0, 400.0),  # of ships that a term may be carried to
+    'u': tuple(np.linspace(0.0, 20.0, 17).tolist()),
+    't': tuple(np.linspace(0.0, 86400.0, 9).tolist()),
+    'psi': (-math.pi, 0.0, math.pi),
+    'd': tuple(np.linspace(0.0, 40000.0, 9).tolist()),
+    'h': tuple(np.geomspace(0.5, 1e4, 17).tolist()),
+}
+"""Ends of the boxes in which ranges are looked at, where a term does not say what is valid."""
 _KNOTS = 24  # of a force in time: straight between them
 _FOR_EVER_S = 1e7
 _SIZE_SD, _SHAPE_SD = 0.5, 0.05  # of logarithms: a later size may differ, its form hardly
@@ -298,9 +309,7 @@ class LearntTerm:
         """Of the expression."""
         return Formula.parse(self.form.expression)
 
-    def force_n(
-        self, ship: Ship, heading_rad: float, values: tuple[float, ...], speed_m_s: Float64
-    ) -> Float64:
+    def force_n(self, frame: Frame, values: tuple[float, ...], speed_m_s: Float64) -> Float64:
         """
         Return the force at speeds (n,), at the stop [N].
 
@@ -308,7 +317,7 @@ class LearntTerm:
         """
         low, high = self.form.valid.get('u', (0.0, math.inf))
         inside = np.clip(speed_m_s, low, high)
-        force = self._worth(ship, heading_rad, values, inside, 0.0)
+        force = self._worth(frame, values, inside, 0.0)
         beyond = np.where(inside > 0.0, speed_m_s / np.maximum(inside, 1e-9), 1.0) ** 2
         found: Float64 = np.broadcast_to(force, np.shape(speed_m_s)) * beyond
         return found
@@ -317,10 +326,11 @@ class LearntTerm:
         """
         Return what it does, as an effect of the library does.
         """
-        heading = frame.scenario.heading_rad
+        if self.form.channel == 'log':
+            return Action(log_error=(partial(self._reading_m_s, frame, values),))
         if 't' not in self.formula.names:
-            return Action(resistance=(partial(self.force_n, frame.ship, heading, values),))
-        return Action(turns=self._in_time(frame, heading, values))
+            return Action(resistance=(partial(self.force_n, frame, values),))
+        return Action(turns=self._in_time(frame, values))
 
     def effect(self) -> Effect:
         """
@@ -346,17 +356,29 @@ class LearntTerm:
             formula=self.form.expression,
             source=f'learnt from {seen} runs' if seen else 'declared by a file',
             act=self.act,
+            errs_in=('speed_through_water',) if self.form.channel == 'log' else (),
             lasts_s=0.0 if self.form.scope == Scope.RUN else 365.0 * DAY_S,
         )
 
+    def _reading_m_s(
+        self, frame: Frame, values: tuple[float, ...], speed_m_s: Float64, since_s: Float64
+    ) -> Float64:
+        """Return what the log reads too much; before the stop, as at the stop."""
+        speed = np.clip(speed_m_s, *self.form.valid.get('u', (0.0, math.inf)))
+        since = np.clip(since_s, *self.form.valid.get('t', (0.0, math.inf)))
+        found: Float64 = np.broadcast_to(
+            self._worth(frame, values, speed, since), np.shape(speed_m_s)
+        )
+        return found
+
     def _worth(
         self,
-        ship: Ship,
-        heading_rad: float,
+        frame: Frame,
         values: tuple[float, ...],
         speed_m_s: Float64,
         time_s: Float64 | float,
     ) -> Float64:
+        ship, scenario = frame.ship, frame.scenario
         names = {
             'rho': ship.water.density_kg_m3,
             'g': GRAVITY_M_S2,
@@ -364,7 +386,11 @@ class LearntTerm:
             'nabla': ship.displaced_volume_m3,
             'u': speed_m_s,
             't': time_s,
-            'psi': heading_rad,
+            'psi': scenario.heading_rad,
+            **{
+                name: float(np.clip(value, *self.form.valid.get(name, (0.0, math.inf))))
+                for name, value in (('d', scenario.day), ('h', scenario.depth_m))
+            },
             **dict(zip(self.parameters, values, strict=True)),
         }
         with np.errstate(all='ignore'):
@@ -375,17 +401,15 @@ class LearntTerm:
         result: Float64 = np.nan_to_num(found, nan=0.0, posinf=1e15, neginf=-1e15)
         return result
 
-    def _in_time(
-        self, frame: Frame, heading_rad: float, values: tuple[float, ...]
-    ) -> tuple[Turn, ...]:
+    def _in_time(self, frame: Frame, values: tuple[float, ...]) -> tuple[Turn, ...]:
         """Return a drag over the square of the speed that grows and falls in time."""
-        low, high = self.form.valid.get('t', (0.0, _LONGEST_S))
+        low, high = self.form.valid.get('t', (0.0, math.inf))
         last = max(frame.scenario.duration_s, 1.0)
         knots = np.linspace(0.0, last, _KNOTS + 1)
         # where much happens early, as of a decay, knots stand closer there
         knots = last * (knots / last) ** 1.5
         at = np.clip(knots, low, high)
-        force = self._worth(frame.ship, heading_rad, values, np.asarray(1.0), at)
+        force = self._worth(frame, values, np.asarray(1.0), at)
         density = frame.ship.water.density_kg_m3
         area = np.broadcast_to(2.0 * force / density, knots.shape)
         turns = [Turn(0.0, _FOR_EVER_S, 0.0, float(area[0]))]
@@ -445,8 +469,8 @@ def _plain_problems(term: LearntTerm) -> list[str]:
         if not re.fullmatch(r'[A-Za-z][A-Za-z0-9_]{0,29}', name) or name in NAMES:
             found.append(f'parameters: {name[:40]!r} cannot be a name of a parameter')
     for name, ends in term.form.valid.items():
-        if name not in ('u', 't') or len(ends) != 2:
-            found.append(f'term.valid.{name[:40]}: expected u or t, with two ends each')
+        if name not in _AXES or name in ('L', 'psi') or len(ends) != 2:
+            found.append(f'term.valid.{name[:40]}: expected u, t, d or h, with two ends each')
     sizes = {len(row) for row in term.covariance}
     if term.covariance and (len(term.covariance) != count or sizes != {count}):
         found.append(f'covariance: expected {count} rows of {count} numbers')
@@ -498,7 +522,7 @@ def _name_problems(name: str) -> Iterator[str]:
 
 
 _NONE = TermEvidence((), 0.0, 0.0, False, 0.0)
-_NEEDS = {'speed': 'u', 'time': 't', 'heading': 'psi'}
+_NEEDS = {'speed': 'u', 'time': 't', 'heading': 'psi', 'date': 'd', 'depth': 'h'}
 
 
 def _refuse_wrong_variable(term: LearntTerm) -> None:
@@ -507,27 +531,25 @@ def _refuse_wrong_variable(term: LearntTerm) -> None:
     names = set(term.formula.names)
     if mine not in names and term.form.shape != 'constant':
         raise FormulaError(f'goes by {term.form.variable}, and {mine} is not in it')
-    for other in {'t', 'psi'} - {mine}:
+    for other in {'t', 'psi', 'd', 'h'} - {mine}:
         if other in names:
             raise FormulaError(f'goes by {term.form.variable}, and {other} is in it')
-    if mine not in ('psi',) and mine in names and mine not in term.form.valid:
+    if mine != 'psi' and mine in names and mine not in term.form.valid:
         raise FormulaError(f'has {mine} in it, and valid does not say between what it holds')
 
 
 def _boxes(term: LearntTerm) -> dict[str, Range]:
     """Return ranges of all names, in boxes that cover all ships and what is valid."""
-    valid = term.form.valid
-    axes = [
-        np.array(_LENGTHS_M),
-        np.linspace(*valid.get('u', (0.0, 20.0)), _SPEEDS + 1),
-        np.linspace(*valid.get('t', (0.0, _LONGEST_S)), _TIMES + 1),
-        np.linspace(-math.pi, math.pi, _HEADINGS + 1),
-    ]
-    lows = np.meshgrid(*(axis[:-1] for axis in axes), indexing='ij')
-    highs = np.meshgrid(*(axis[1:] for axis in axes), indexing='ij')
+    axes = {}
+    for name, ends in _AXES.items():
+        valid = term.form.valid.get(name)
+        if name in ('L', *term.formula.names):
+            axes[name] = np.linspace(*valid, len(ends)) if valid else np.array(ends)
+    lows = np.meshgrid(*(axis[:-1] for axis in axes.values()), indexing='ij')
+    highs = np.meshgrid(*(axis[1:] for axis in axes.values()), indexing='ij')
     found = {
         name: Range(low.ravel(), high.ravel())
-        for name, low, high in zip(('L', 'u', 't', 'psi'), lows, highs, strict=True)
+        for name, low, high in zip(axes, lows, highs, strict=True)
     }
     length = found['L']
     found['nabla'] = Range(1e-4 * length.low**3, 0.1 * length.high**3)
@@ -544,17 +566,19 @@ def _boxes(term: LearntTerm) -> dict[str, Range]:
 def _refuse_mixed(term: LearntTerm) -> None:
     """Expect what can be simulated: a force in time goes as the square of the speed."""
     values = tuple(each.value for each in term.parameters.values())
-    some = Ship(length_m=100.0, displaced_volume_m3=9000.0)
+    some = Frame(
+        Ship(length_m=100.0, displaced_volume_m3=9000.0),
+        Scenario(speed_m_s=1.0, heading_rad=0.3),
+        0.0,
+    )
     low, high = term.form.valid.get('u', (0.5, 8.0))
     speed = np.linspace(max(low, 0.05 * high), high, 7)
     last = term.form.valid.get('t', (0.0, 1e3))[1]
-    if 't' not in term.formula.names:
-        worth = term._worth(some, 0.3, values, speed, 0.0)
-        if not is_finite(worth):
-            raise FormulaError('is no finite number of newton inside its valid range')
-        return
     for share in (0.0, 0.1, 0.5, 1.0):
-        worth = term._worth(some, 0.3, values, speed, share * last) / speed**2
-        worth = np.broadcast_to(worth, speed.shape)
-        if np.ptp(worth) > _ALIKE * np.abs(worth).max():
+        worth = np.broadcast_to(term._worth(some, values, speed, share * last), speed.shape)
+        if not is_finite(worth):
+            raise FormulaError('is no finite number inside its valid range')
+        over = worth / speed**2
+        force_in_time = term.form.channel == 'force' and 't' in term.formula.names
+        if force_in_time and np.ptp(over) > _ALIKE * np.abs(over).max():
             raise FormulaError('goes by time, and is not u**2 times a function of t alone')

@@ -9,7 +9,9 @@ from typing import Any
 
 from shipdrag_ros.display import Section, Table
 from shipdrag_ros.fields import plain
-from shipdrag_ros.learning.search import Learnt
+from shipdrag_ros.learning.expression import unit_text
+from shipdrag_ros.learning.search import Learnt, kind_text
+from shipdrag_ros.learning.term import RESULT
 from shipdrag_ros.report.document import write_page
 
 _SHOWN = 0.001  # probability of a line
@@ -25,7 +27,7 @@ def sentence(found: Learnt) -> str:
     form, rest = term.form, term.evidence
     sizes = ', '.join(f'{key} {q.value:.3g} ± {q.sd:.2g}' for key, q in term.parameters.items())
     return (
-        f'{term.name}: a {form.channel} by {form.variable} ({form.shape}), {sizes}, from '
+        f'{term.name}: a {kind_text((form.channel, form.variable, form.shape))}, {sizes}, from '
         f'{len(found.runs)} runs; {rest.held_out_gap_cut:.0%} of the gap of a run is gone that '
         'it was not learnt on.'
     )
@@ -44,12 +46,14 @@ def lines(found: Learnt) -> list[str]:
             f'after the stop, at {low:.1f} to {high:.1f} m/s.'
         )
     if found.term is not None:
-        said.append(f'It is {found.term.form.expression} [N].')
+        unit = unit_text(RESULT[found.term.form.channel])
+        said.append(f'It is {found.term.form.expression} [{unit}].')
         if found.term.looks_like:
             said.append(f'Effects that come nearest: {", ".join(found.term.looks_like)}.')
     if math.isfinite(found.largest_percent):
         said.append(
-            f'The likeliest form is up to {found.largest_percent:.0f} % of the resistance.'
+            f'The likeliest form is up to {found.largest_percent:.0f} % of the resistance, or of '
+            'a reading of the log.'
         )
     if found.next_run:
         said.append(f'What would decide: {found.next_run}.')

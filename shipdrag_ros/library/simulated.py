@@ -26,6 +26,7 @@ from shipdrag_ros.replay.truth import ATTACHMENT, TrueCurve
 from shipdrag_ros.samples import Block
 from shipdrag_ros.ship import Ship, StatedEffect, TableBaseline
 from shipdrag_ros.simulation import STANDARD_INPUTS, START_NS, Scenario, sense, standard_sensors
+from shipdrag_ros.simulation.effect import DAY_S
 from shipdrag_ros.simulation.effects import LIBRARY, find, parse, values_of
 
 SPEED_FRACTION = 0.8
@@ -95,6 +96,7 @@ def make(ship: Ship, settings: SimulationSettings) -> tuple[Block, TrueCurve]:
         lead_in_s=settings.lead_in_s,
         duration_s=settings.duration_s,
         heading_rad=settings.heading_rad,
+        day=(settings.start_ns * 1e-9 + settings.lead_in_s) / DAY_S,
         seed=settings.seed,
     )
     motion = simulation.simulate(
